@@ -148,6 +148,14 @@ describe("repetitions", () => {
     replays.shift(3);
     expect(replays.peek(3)).toBeNull();
   });
+  it("are dropped, that play alone, where they were begun and broken off", () => {
+    const replays = new Replays();
+    const trial = aTrial({ trial_index: 4, block: 2 });
+    replays.add(trial, 2);
+    replays.add(trial, 3);
+    replays.drop(trial, 2);
+    expect(replays.peek(3)?.play).toBe(3);
+  });
   it("are owed where an earlier visit stopped before them", () => {
     expect(owed([aTrial(), aTrial({ plays_done: 1, plays_wanted: 2 }), aTrial({ plays_done: 1 })])).toMatchObject([{ play: 2 }]);
   });

@@ -104,6 +104,27 @@ def test_a_reload_in_mid_clip_ends_the_view_and_the_trial_comes_again(studies: S
     assert [(view["number"], view["outcome"]) for view in of_first] == [(1, "interrupted"), (2, "shown")]
 
 
+def test_a_repeat_that_is_interrupted_too_ends_its_trial_and_the_run_goes_on(
+    studies: Served, page: Page
+) -> None:
+    visit = studies.visit("two_trials", page)
+    reload_in_next_clip(page)
+    page.keyboard.press(" ")
+    go_back(page)
+    visit.rate()
+    page.wait_for_selector("text=once more")
+    reload_in_next_clip(page)
+    page.keyboard.press(" ")
+    page.wait_for_selector(".prose, form, .code")
+    visit.trials()
+    first, other, again = rated(studies)
+    assert (other["response"], other["play"]) == (4, 1)
+    assert (again["trial_index"], again["play"]) == (first["trial_index"], 2)
+    assert [row["verdict_rule"] for row in (first, again)] == ["interrupted", "interrupted"]
+    assert [view["outcome"] for view in studies.views()] == ["interrupted", "shown", "interrupted"]
+    assert visit.problems == []
+
+
 def test_another_device_answers_what_the_first_has_shown(
     studies: Served, chromium: Browser, page: Page
 ) -> None:

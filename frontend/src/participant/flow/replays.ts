@@ -7,11 +7,16 @@ export interface Replay {
 }
 
 export class Replays {
-  private readonly queue: Replay[] = [];
+  private queue: Replay[] = [];
 
   add(trial: TrialInfo, play: number): void {
     const known = this.queue.some((one) => one.trial.trial_index === trial.trial_index && one.play === play);
     if (!known) this.queue.push({ trial, play });
+  }
+
+  /** A play that was begun and broken off is not shown again. */
+  drop(trial: TrialInfo, play: number): void {
+    this.queue = this.queue.filter((one) => one.trial.trial_index !== trial.trial_index || one.play !== play);
   }
 
   /** The next one of this block or an earlier one, whose receipt came late; it stays until `shift`. */

@@ -31,6 +31,8 @@ export async function saveRating(session: Session, trial: TrialInfo, body: Ratin
 export async function saveInterrupted(session: Session, trial: TrialInfo, play: number): Promise<void> {
   const body = (trial.kind === "check" ? session.checks : session.kind).unrated(session, trial, play);
   await saveRating(session, trial, { ...body, playback: { ...body.playback, disturbances: { interrupted: 1 } } });
+  // The page began with this play among those owed.
+  session.replays.drop(trial, play);
   if (trial.kind === "main" && play <= session.run.playback.max_repeats) session.replays.add(trial, play + 1);
 }
 
