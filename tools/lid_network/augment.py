@@ -56,7 +56,7 @@ def _placement(rng: np.random.Generator) -> Values:
     a = scale * a @ np.array([[1, shear], [0, tall]])
     middle = (np.array([192, 160]) - 1) / 2
     centre = (np.array(SIZE) - 1) / 2 + rng.normal(0, 1, 2) * [6, 4]
-    return np.c_[a, centre - a @ middle]
+    return np.column_stack([a, centre - a @ middle])
 
 
 def _offset(points: Values, bend: Values) -> Values:
@@ -72,14 +72,15 @@ def _bent(grey: Grey, matrix: Values, bend: Values) -> Grey:
     at = np.stack([x, y], -1)
     source = (at + _offset(at, bend)) @ inverse[:, :2].T + inverse[:, 2]
     source = source.astype(np.float32)
-    return cv2.remap(
+    bent = cv2.remap(
         grey, source[..., 0], source[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT_101
     )
+    return np.asarray(bent, np.float32)
 
 
 def _taken(points: Values, matrix: Values, bend: Values) -> Values:
     """Points of the cut-out in the picture: the bend is undone by iteration, it is small."""
-    straight = points @ matrix[:, :2].T + matrix[:, 2]
+    straight: Values = points @ matrix[:, :2].T + matrix[:, 2]
     at = straight
     for _ in range(4):
         at = straight - _offset(at, bend)
@@ -89,7 +90,7 @@ def _taken(points: Values, matrix: Values, bend: Values) -> Values:
 def _mixed(picture: NDArray[np.uint8], rng: np.random.Generator) -> Grey:
     """Grey of a colour picture, from mostly red (as in infrared, where skin is bright) to mostly blue."""
     weights = rng.dirichlet([1.6, 1.2, 0.5])
-    return cv2.transform(picture.astype(np.float32), weights[None].astype(np.float32))
+    return np.asarray(cv2.transform(picture.astype(np.float32), weights[None].astype(np.float32)), np.float32)
 
 
 def _other_eye(grey: Grey, lids: Values, iris: Values, rng: np.random.Generator) -> Grey:
@@ -104,18 +105,17 @@ def _other_eye(grey: Grey, lids: Values, iris: Values, rng: np.random.Generator)
     if rng.random() < 0.5:
         disc = share * np.clip(radius - away + 0.5, 0, 1)
         level = rng.uniform(30, 190)
-        grey = grey + disc * rng.uniform(0.3, 1) * (level - grey)
+        grey = np.asarray(grey + disc * rng.uniform(0.3, 1) * (level - grey), np.float32)
     if rng.random() < 0.6:
         pupil = share * np.clip(radius * rng.uniform(0.22, 0.62) - away + 0.5, 0, 1)
-        grey = (
-            grey + pupil * (rng.uniform(0, 50) if rng.random() < 0.9 else 210.0 - grey) - pupil * grey * 0.9
-        )
+        filling = rng.uniform(0, 50) if rng.random() < 0.9 else 210.0 - grey
+        grey = np.asarray(grey + pupil * filling - pupil * grey * 0.9, np.float32)
     if rng.random() < 0.4:
-        grey = grey * (1 - share * rng.uniform(0, 0.45))
+        grey = np.asarray(grey * (1 - share * rng.uniform(0, 0.45)), np.float32)
     for _ in range(rng.integers(0, 4)):
         gx, gy = x + rng.normal(0, 0.6) * radius, y + rng.normal(0, 0.6) * radius
         spot = np.exp(-(((xs - gx) ** 2 + (ys - gy) ** 2) / (2 * rng.uniform(0.5, 1.8) ** 2)))
-        grey = grey + share * spot * (255 - grey)
+        grey = (grey + share * spot * (255 - grey)).astype(np.float32)
     return grey.astype(np.float32)
 
 
@@ -136,7 +136,7 @@ def _lashes(grey: Grey, lids: Values, rng: np.random.Generator) -> Grey:
             ends = np.round(np.stack([root, tip]) * 16).astype(np.int32)
             cv2.line(layer, ends[0], ends[1], int(rng.uniform(60, 220)), 1, cv2.LINE_AA, 4)
     share = cv2.GaussianBlur(layer, (3, 3), 0.5).astype(np.float32) / 255
-    return grey + share * (rng.uniform(10, 60) - grey)
+    return np.asarray(grey + share * (rng.uniform(10, 60) - grey), np.float32)
 
 
 def _lit(grey: Grey, rng: np.random.Generator) -> Grey:
@@ -153,7 +153,7 @@ def _lit(grey: Grey, rng: np.random.Generator) -> Grey:
         grey = grey * (1 + rng.uniform(0.01, 0.1) * fine / fine.std())
     low, high = np.percentile(grey, [1, 99])
     unit = np.clip((grey - low) / max(high - low, 1.0), 0, 1.2)
-    return (unit ** np.exp(rng.normal(0, 0.35))).astype(np.float32)
+    return np.asarray(unit ** np.exp(rng.normal(0, 0.35)), np.float32)
 
 
 def _covered(unit: Grey, lids: Values, rng: np.random.Generator) -> Grey:
@@ -218,4 +218,4 @@ def _photographed(unit: Grey, rng: np.random.Generator) -> Grey:
 def normalised(grey: NDArray[np.uint8]) -> Grey:
     """Mean 0, standard deviation 1."""
     levels = grey.astype(np.float32)
-    return (levels - levels.mean()) / max(float(levels.std()), 4.0)
+    return np.asarray((levels - levels.mean()) / max(float(levels.std()), 4.0), np.float32)

@@ -42,7 +42,8 @@ class Region:
     def of(cls, canthi: Values) -> "Region":
         """The region of two canthi (2, 2)."""
         across = canthi[1] - canthi[0]
-        return cls(*canthi.mean(0), float(np.hypot(*across)), float(np.arctan2(across[1], across[0])))
+        x, y = canthi.mean(0)
+        return cls(float(x), float(y), float(np.hypot(*across)), float(np.arctan2(across[1], across[0])))
 
     def matrix(self) -> Values:
         """(2, 3) from the recording to the network's picture."""
@@ -50,7 +51,7 @@ class Region:
         a = scale * np.array(
             [[np.cos(self.angle), np.sin(self.angle)], [-np.sin(self.angle), np.cos(self.angle)]]
         )
-        return np.c_[a, MIDDLE - a @ [self.x, self.y]]
+        return np.column_stack([a, MIDDLE - a @ np.array([self.x, self.y])])
 
 
 @dataclass(frozen=True)

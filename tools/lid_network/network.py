@@ -16,7 +16,7 @@ def block(into: int, out: int, stride: int) -> nn.Sequential:
     )
 
 
-class LidNetwork(nn.Module):
+class LidNetwork(nn.Module):  # type: ignore[misc]  # torch is in an environment of its own
     """Direct regression; the last grid is small enough to be read whole."""
 
     def __init__(self) -> None:

@@ -143,7 +143,7 @@ def cut_out(eye: Eye) -> dict[str, Any]:
     shares = np.linspace(0, 1, CURVE)
     lids = []
     for lid in (eye.upper, eye.lower):
-        points = along(lid, shares)
+        points = along(lid, shares.tolist())
         points[[0, -1]] = ends
         lids.append(points * scale + shift)
     iris = np.array([*(eye.iris[:2] * scale + shift), eye.iris[2] * scale])
@@ -180,7 +180,8 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--actors", type=int, default=60)
     options = parser.parse_args(arguments)
     cuts = [cut_out(eye) for eye in collected(options)]
-    np.savez(options.out, **{key: np.array([cut[key] for cut in cuts]) for key in cuts[0]})
+    arrays: dict[str, Any] = {key: np.array([cut[key] for cut in cuts]) for key in cuts[0]}
+    np.savez(options.out, **arrays)
     print(f"{len(cuts)} eyes in {options.out}")
 
 

@@ -93,7 +93,8 @@ def _begin(eyes: Eyes, seed: int) -> None:
 
 
 def _batch(step: int) -> list[NDArray[np.float32]]:
-    return _SHARED["eyes"].batch(np.random.default_rng([_SHARED["seed"], 1, step]))
+    eyes: Eyes = _SHARED["eyes"]
+    return eyes.batch(np.random.default_rng([_SHARED["seed"], 1, step]))
 
 
 def trained(eyes: Eyes, options: argparse.Namespace) -> tuple[LidNetwork, dict[str, Any]]:
