@@ -14,6 +14,7 @@ from experiments.definition.experiment import STORED
 from experiments.errors import InputError, did_you_mean
 from experiments.schema.keys import Key, is_tag
 from experiments.schema.upgrades import upgraded
+from experiments.toml_keys import MAX_DEPTH, has_endless_key
 from experiments.toml_lines import line_of
 from experiments.wrong_values import is_follower, wrong_value
 
@@ -85,18 +86,7 @@ def locate(name_or_path: str) -> Path:
 
 MAX_PROBLEMS = 100
 """Reasons that are listed; a text can hold a hundred thousand unknown keys."""
-MAX_DEPTH = 32
-"""Tables and lists in one another; dotted keys make tables of any depth in a few letters each."""
 TOO_DEEP = "not valid TOML: lists or tables are nested too deeply"
-_PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
-_DOTTED = re.compile(rf"{_PART}(?:[ \t]*+\.[ \t]*+{_PART})*+")
-MAX_DOTS = 500
-"""In one key, written or quoted in a text; the time to read one grows with their square."""
-
-
-def has_endless_key(text: str) -> bool:
-    """Whether the text has a dotted key that takes seconds to read; asked before any reader gets it."""
-    return any(key[0].count(".") > MAX_DOTS for key in _DOTTED.finditer(text))
 
 
 def parse_experiment(text: str, source: str = "definition", *, has_data: bool = False) -> Experiment:
@@ -107,20 +97,7 @@ def parse_experiment(text: str, source: str = "definition", *, has_data: bool = 
     has_data : bool
         Of data that were collected by it: what an earlier version took, such as a number in quotes, still is.
     """
-    if has_endless_key(text):
-        raise DefinitionError(source, [Problem(None, "", TOO_DEEP)])
-    try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        line = getattr(error, "lineno", None) or _line_in(str(error))
-        raise DefinitionError(source, [Problem(line, "", f"not valid TOML: {error}")]) from error
-    except ValueError as error:  # of a number longer than Python reads
-        problem = Problem(None, "", "not valid TOML: a number has too many digits")
-        raise DefinitionError(source, [problem]) from error
-    except RecursionError as error:
-        raise DefinitionError(source, [Problem(None, "", TOO_DEEP)]) from error
-    if _is_deeper(data, MAX_DEPTH):
-        raise DefinitionError(source, [Problem(None, "", TOO_DEEP)])
+    data = toml_data(text, source)
     number = data.pop("format", 1)
     try:
         data = upgraded(data, number)
@@ -138,7 +115,32 @@ def parse_experiment(text: str, source: str = "definition", *, has_data: bool = 
         raise DefinitionError(source, problems, len(details)) from error
 
 
-def _is_deeper(data: Any, depth: int) -> bool:
+def toml_data(text: str, source: str = "definition") -> dict[str, Any]:
+    """What a TOML text says, whoever wrote it: what would keep a reader busy is refused before it is read.
+
+    Raises
+    ------
+    DefinitionError
+        Where it is not TOML, or tables stand in one another without end.
+    """
+    if has_endless_key(text):
+        raise DefinitionError(source, [Problem(None, "", TOO_DEEP)])
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        line = getattr(error, "lineno", None) or _line_in(str(error))
+        raise DefinitionError(source, [Problem(line, "", f"not valid TOML: {error}")]) from error
+    except ValueError as error:  # of a number longer than Python reads
+        problem = Problem(None, "", "not valid TOML: a number has too many digits")
+        raise DefinitionError(source, [problem]) from error
+    except RecursionError as error:
+        raise DefinitionError(source, [Problem(None, "", TOO_DEEP)]) from error
+    if is_deeper(data, MAX_DEPTH):
+        raise DefinitionError(source, [Problem(None, "", TOO_DEEP)])
+    return data
+
+
+def is_deeper(data: Any, depth: int) -> bool:
     """Whether tables and lists stand in one another more than `depth` times."""
     level = [data]
     for _ in range(depth + 1):

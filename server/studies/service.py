@@ -1,6 +1,5 @@
 """Studies from the dashboard: create, edit as new versions, open and close."""
 
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ from experiments.assignment.groups import names
 from experiments.definition import Experiment
 from experiments.definition.languages import unlisted
 from experiments.errors import InputError, did_you_mean
-from experiments.load import DEMOS, SHIPPED, DefinitionError, locate, parse_experiment
+from experiments.load import DEMOS, SHIPPED, DefinitionError, locate, parse_experiment, toml_data
 from experiments.manifest import MANIFEST_NAME, Manifest, read_manifest
 from experiments.own_clips import Placed, check_factorial, levels_from_names, levels_from_table
 from experiments.trials import KINDS
@@ -122,8 +121,8 @@ def edit(edited: EditDefinition) -> EditedDefinition:
     """A definition's text with other data in it: what did not change keeps its form and its comments."""
     text = edited.toml if edited.data is None else with_data(edited.toml, edited.data)
     try:
-        data = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError):
+        data = toml_data(text)
+    except DefinitionError:
         data = None
     checked = check(text)
     return EditedDefinition(toml=text, data=data, problems=checked.problems, design=checked.design)

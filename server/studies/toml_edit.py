@@ -14,7 +14,8 @@ from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import AoT, Array, Comment, Table, Whitespace
 
 from experiments.errors import InputError
-from experiments.load import has_endless_key
+from experiments.load import DefinitionError, is_deeper, toml_data
+from experiments.toml_keys import MAX_DEPTH
 from server.studies import toml_items
 
 TOO_DEEP = "lists or tables are nested too deeply; correct the text first"
@@ -32,19 +33,18 @@ def with_data(text: str, data: Mapping[str, Any]) -> str:
     InputError
         Where `text` is not TOML, `data` holds what TOML cannot say, or there is too much of either.
     """
-    edited = _without_none(data)
-    if has_endless_key(text):
+    if is_deeper(data, MAX_DEPTH):
         raise InputError(TOO_DEEP)
+    edited = _without_none(data)
+    _refuse_too_many(_said_by(text), edited)
     try:
-        _refuse_too_many(tomllib.loads(text), edited)
         document = tomlkit.parse(text)
         _merge(document, edited)
         merged = tomlkit.dumps(document)
         if _same(tomllib.loads(merged), edited):
             return merged
-    except (TOMLKitError, tomllib.TOMLDecodeError) as error:
-        if not _is_toml(text):
-            raise InputError(f"not valid TOML: {error}; correct the text first") from error
+    except (TOMLKitError, tomllib.TOMLDecodeError):
+        pass
     except (TypeError, ValueError) as error:
         raise InputError(f"the declaration holds what TOML cannot say: {error}") from error
     except RecursionError as error:
@@ -67,12 +67,11 @@ def _elements(value: Any) -> int:
     return len(inner) * isinstance(value, list) + sum(map(_elements, inner))
 
 
-def _is_toml(text: str) -> bool:
+def _said_by(text: str) -> dict[str, Any]:
     try:
-        tomllib.loads(text)
-    except tomllib.TOMLDecodeError:
-        return False
-    return True
+        return toml_data(text)
+    except DefinitionError as error:
+        raise InputError(f"{error.problems[0]}; correct the text first") from error
 
 
 def _without_none(value: Any) -> Any:

@@ -1,3 +1,4 @@
+import time
 import tomllib
 
 import pytest
@@ -69,3 +70,17 @@ def test_whatever_stands_in_texts_the_keys_after_them_are_found(texts: list[str]
     document = "\n".join(lines)
     tomllib.loads(document)
     assert {key: line_of(document, (key,)) for key in expected} == expected
+
+
+def test_spaced_and_quoted_parts_of_a_header_are_told_apart() -> None:
+    text = '[ a . "b.c" . \'d.e\' ]\nf = 1\n[[ "g.h" ]]\ni . j = 1\n'
+    tomllib.loads(text)
+    assert line_of(text, ("a", "b.c", "d.e", "f")) == 2
+    assert line_of(text, ("g.h", 0)) == 3
+
+
+def test_a_header_that_is_all_spaces_is_told_at_once() -> None:
+    text, began = f'["a{" " * 100_000}b"]\nc = 1\n', time.monotonic()
+    assert line_of(text, ("c",)) is None
+    assert line_of(text, (f"a{' ' * 100_000}b", "c")) == 2
+    assert time.monotonic() - began < 5.0  # tried from each space anew, 15 s

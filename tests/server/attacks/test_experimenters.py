@@ -32,9 +32,13 @@ def test_a_definition_that_no_program_reads_is_refused_in_words(
     for path, body in (
         ("/studies/short/versions/check", {"toml": toml}),
         ("/studies", {"name": "other", "shipped": "exp1", "toml": toml}),
+        ("/definitions/edit", {"toml": toml, "data": {"title": "t"}}),
     ):
         answer = experimenter.send("POST", path, body)
         assert (answer.status_code, said in answer.json()["error"]["message"]) == (422, True), answer.text
+    only_read = experimenter.send("POST", "/definitions/edit", {"toml": toml})
+    assert (only_read.status_code, only_read.json()["data"]) == (200, None), only_read.text
+    assert said in only_read.json()["problems"][0]["message"]
     assert time.monotonic() - began < SOON_S
 
 

@@ -1,0 +1,27 @@
+"""Tell dotted keys that take seconds to read in TOML text, in one pass and before any reader gets it."""
+
+import re
+
+MAX_DEPTH = 32
+"""Tables and lists in one another; dotted keys make tables of any depth in a few letters each."""
+PART = r"""(?:[\w-]++|"(?:[^"\\\n]++|\\[^\n])*+"|'[^'\n]*+')"""
+"""One part of a dotted key, bare or quoted."""
+_DOT = r"[ \t]*+\.[ \t]*+"
+# Possessive, and the rest of an unclosed string is swallowed: each letter is looked at a few times at most.
+_TOKEN = re.compile(
+    r'"""(?:[^"\\]++|\\.|"{1,2}+(?!"))*+(?:"{3,5}+|.*+)'
+    r"|'''(?:[^']++|'{1,2}+(?!'))*+(?:'{3,5}+|.*+)"
+    r"|\#[^\n]*+"
+    rf"|{PART}(?:{_DOT}{PART}){{0,{MAX_DEPTH}}}+(?P<beyond>{_DOT}{PART})?+"
+    r"""|["'].*+""",
+    re.DOTALL,
+)
+
+
+def has_endless_key(text: str) -> bool:
+    """Whether a dotted key has more parts than tables may stand in one another.
+
+    The time to read one grows with the square of its parts. Dots in texts and comments do not count; behind
+    the first mistake of a text, where every reader stops, the answer says nothing.
+    """
+    return any(token["beyond"] is not None for token in _TOKEN.finditer(text))
