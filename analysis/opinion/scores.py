@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 from scipy import stats
 
@@ -12,7 +13,13 @@ from analysis.opinion.doubts import doubts
 from analysis.opinion.people import PersonScore, person_scores
 from analysis.opinion.projection import Projection, alternating_projection
 from analysis.read.number_columns import numbers, unusual_numbers
-from analysis.read.text_table import name_lines, read_text_table, refuse_shared_roles, texts_required
+from analysis.read.text_table import (
+    name_lines,
+    names_in_order,
+    read_text_table,
+    refuse_shared_roles,
+    texts_required,
+)
 from experiments.errors import InputError
 
 Array = NDArray[np.float64]
@@ -90,8 +97,9 @@ def read_votes(path: Path, item: str, participant: str, rating: str) -> Votes:
     if not keep.any():
         raise InputError(f"{path.name}: '{rating}' holds no rating in any row")
     people, person = np.unique(table.columns[participant].astype(str).to_numpy()[keep], return_inverse=True)
-    items, which = np.unique(table.columns[item].astype(str).to_numpy()[keep], return_inverse=True)
-    totals, counts = np.zeros((people.size, items.size)), np.zeros((people.size, items.size))
+    items = names_in_order(table.columns[item], keep)
+    which = pd.Categorical(table.columns[item].astype(str)[keep], items).codes.astype(np.int64)
+    totals, counts = np.zeros((people.size, len(items))), np.zeros((people.size, len(items)))
     np.add.at(totals, (person, which), values[keep])
     np.add.at(counts, (person, which), 1.0)
     scores = np.divide(totals, counts, out=np.full_like(totals, np.nan), where=counts > 0)
@@ -99,8 +107,8 @@ def read_votes(path: Path, item: str, participant: str, rating: str) -> Votes:
         scores,
         counts,
         tuple(str(one) for one in people),
-        tuple(str(one) for one in items),
-        tuple(values[keep][which == index] for index in range(items.size)),
+        items,
+        tuple(values[keep][which == index] for index in range(len(items))),
         path.name,
         table.synthetic,
         tuple(table.decisions),

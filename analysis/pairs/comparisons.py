@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from analysis.read.exported_rows import EXPORT_COLUMNS, rows_that_count
@@ -12,6 +13,7 @@ from analysis.read.number_columns import MISSING_MARKS
 from analysis.read.text_table import (
     TextTable,
     name_lines,
+    names_in_order,
     read_text_table,
     refuse_shared_roles,
     texts_required,
@@ -92,7 +94,7 @@ def read_comparisons(
         table.decisions.extend(left_out)
         if not judged.any():
             raise InputError(f"{path.name}: no comparison counts; {', '.join(left_out)}")
-    items = tuple(sorted({*columns[left][judged], *columns[right][judged]}))
+    items = _items(table.columns[left], table.columns[right], judged)
     people: tuple[str, ...] = ()
     codes = None
     if participant is not None:
@@ -109,6 +111,13 @@ def read_comparisons(
         table.synthetic,
         tuple(table.decisions),
     )
+
+
+def _items(left: "pd.Series[Any]", right: "pd.Series[Any]", judged: NDArray[np.bool_]) -> tuple[str, ...]:
+    """Items of either side: in the order of their codes where both sides have codes, else sorted."""
+    names = (*names_in_order(left, judged), *names_in_order(right, judged))
+    coded = left.cat.ordered and right.cat.ordered
+    return tuple(dict.fromkeys(names)) if coded else tuple(sorted(set(names)))
 
 
 def _indices(items: tuple[str, ...], names: NDArray[Any]) -> Codes:

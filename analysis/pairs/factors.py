@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from analysis.pairs.likelihood import Counts, Model, fit, free_abilities
-from analysis.read.text_table import read_text_table, texts_required
+from analysis.read.text_table import names_in_order, read_text_table, texts_required
 from experiments.errors import InputError
 
 Array = NDArray[np.float64]
@@ -86,13 +86,16 @@ def read_item_factors(path: Path) -> ItemFactors:
     if len(table.header) < 2:
         raise InputError(f"{path.name}: expected a column of items and a column a factor, got one column")
     for name in table.header:
-        texts_required(table, name)
+        texts_required(table, name, factor=name != table.header[0])
     rows = table.columns.astype(str).to_numpy()
     names = [str(row[0]) for row in rows]
     for name in names:
         if names.count(name) > 1:
             raise InputError(f"{path.name}: item '{name}' has two rows; give each item one")
-    factors = ItemFactors(tuple(table.header[1:]), {str(row[0]): tuple(row[1:]) for row in rows}, path.name)
+    everywhere = np.ones(len(rows), dtype=np.bool_)
+    orders = {name: names_in_order(table.columns[name], everywhere) for name in table.header[1:]}
+    levels = {str(row[0]): tuple(row[1:]) for row in rows}
+    factors = ItemFactors(tuple(table.header[1:]), levels, path.name, orders)
     for factor in factors.factors:
         if len(factors.names(factor)) < 2:
             raise InputError(f"{path.name}: factor '{factor}' has one level only; leave it out")

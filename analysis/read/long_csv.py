@@ -66,7 +66,7 @@ def read_long_table(
     refuse_shared_roles(needed)
     table = read_text_table(path, needed, ("synthetic",))
     for name in (participant, *within, *between):
-        texts_required(table, name)
+        texts_required(table, name, factor=name != participant)
     values = numbers(table, rating)
     refuse_out_of_scale(table, rating, values, scale)
     unusual_numbers(table, rating, values)

@@ -60,7 +60,7 @@ def read_model_input(
     texts = list(dict.fromkeys((participant, *within, *between, *item, *nested)))
     table = read_text_table(path, list(dict.fromkeys([*texts, rating, *covariates])), EXPORT_COLUMNS)
     for name in texts:
-        texts_required(table, name)
+        texts_required(table, name, factor=name in (*within, *between))
     values = numbers(table, rating)
     unusual_numbers(table, rating, values)
     _refuse_participants_as_items(table, participant, item)

@@ -158,9 +158,12 @@ def refuse_shared_roles(names: Sequence[str]) -> None:
             raise InputError(f"column '{name}' is named for two roles; each role needs a column of its own")
 
 
-def texts_required(table: TextTable, name: str) -> None:
-    """Refuse empty cells in a column of names; codes of an SPSS file take the words the file has for them."""
-    table.columns[name] = _worded(table, table.columns[name], table.labels.get(name, {}))
+def texts_required(table: TextTable, name: str, factor: bool = False) -> None:
+    """Refuse empty cells in a column of names; codes of an SPSS file take the words the file has for them.
+
+    The order of the levels of a `factor` is said where it is not that of their names.
+    """
+    table.columns[name] = _worded(table, table.columns[name], table.labels.get(name, {}), factor)
     column = table.columns[name]
     if "" in column.cat.categories:
         row = int(np.argmax((column == "").to_numpy()))
@@ -172,7 +175,16 @@ def texts_required(table: TextTable, name: str) -> None:
             table.decisions.append(f"'{other}' and '{text}' of '{name}' differ in case only; kept apart")
 
 
-def _worded(table: TextTable, column: "pd.Series[Any]", words: Mapping[str, str]) -> "pd.Series[Any]":
+def names_in_order(column: "pd.Series[Any]", rows: NDArray[np.bool_]) -> tuple[str, ...]:
+    """The names in some rows of a column: in the order of their codes, where they have any, else sorted."""
+    there = {str(name) for name in column[rows].unique()}
+    names = column.cat.categories if column.cat.ordered else sorted(there)
+    return tuple(str(name) for name in names if str(name) in there)
+
+
+def _worded(
+    table: TextTable, column: "pd.Series[Any]", words: Mapping[str, str], factor: bool
+) -> "pd.Series[Any]":
     """The words of codes, as levels whose order is that of the codes."""
     if not words:
         return column
@@ -189,7 +201,7 @@ def _worded(table: TextTable, column: "pd.Series[Any]", words: Mapping[str, str]
         ]
     name_of = dict(zip(codes, names, strict=True))
     order = [name_of[code] for code in natural_order(codes)]
-    if order != natural_order(order):
+    if factor and order != natural_order(order):
         table.decisions.append(f"levels of '{column.name}' in the order of the codes: {', '.join(order)}")
     worded = pd.Categorical(np.array(names, dtype=object)[column.cat.codes], order, ordered=True)
     return pd.Series(worded, index=column.index)

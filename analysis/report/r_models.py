@@ -59,7 +59,7 @@ def model_files(
         floor="1e-3",
         limit="1e-3",
     )
-    return {script: text.encode(), data: _ratings(arguments, model.factors, levels, names).encode()}
+    return {script: text.encode(), data: _ratings(arguments, model.factors, names).encode()}
 
 
 def _printed_mixed(model: "MixedResult", names: dict[str, str], with_df: bool) -> Rows:
@@ -84,11 +84,10 @@ def _printed_ordinal(model: "OrdinalResult") -> Rows:
 def _ratings(
     arguments: dict[str, Any],
     factors: Sequence[str],
-    levels: dict[str, tuple[str, ...]],
     names: dict[str, str],
 ) -> str:
     """Trials with codes for people, items and levels, so that no name stands in code."""
-    from analysis.within.level_codes import natural_order
+    from analysis.within.level_codes import level_codes
 
     rows: pd.DataFrame = arguments["rows"]
     items = rows.groupby(list(arguments["item"]), sort=False, observed=True, dropna=False).ngroup()
@@ -97,8 +96,8 @@ def _ratings(
         (items + 1).tolist(),
     ]
     for name in factors:
-        order = {level: i for i, level in enumerate(natural_order(levels[name]), start=1)}
-        columns.append(rows[name].astype(str).map(order).tolist())
+        # as the model codes them: the words of an SPSS file stand in the order of its codes
+        columns.append((level_codes(rows[name], name)[0] + 1).tolist())
     columns.append([r_number(value) for value in rows[arguments["rating"]]])
     header = ["participant", "item", *(names[name] for name in factors), "rating"]
     return as_csv([header, *zip(*columns, strict=True)])

@@ -12,6 +12,7 @@ from analysis.read.number_columns import numbers
 from analysis.read.text_table import (
     TextTable,
     name_lines,
+    names_in_order,
     read_text_table,
     refuse_shared_roles,
     texts_required,
@@ -34,6 +35,8 @@ class Answers:
     ----------
     second : float64 array or None
         A second stimulus variable (n,), where there is one.
+    order : tuple of str
+        Conditions in the order of their codes; empty where they have none, and are sorted.
     """
 
     x: Array
@@ -44,6 +47,13 @@ class Answers:
     synthetic: bool
     decisions: tuple[str, ...]
     second: Array | None = None
+    order: tuple[str, ...] = ()
+
+    def conditions(self) -> tuple[str, ...]:
+        """Names of the conditions in order; one, `all`, where there are none."""
+        if self.condition is None:
+            return ("all",)
+        return self.order or tuple(sorted({str(label) for label in self.condition}))
 
 
 @dataclass(frozen=True)
@@ -111,7 +121,7 @@ def read_answers(
     refuse_shared_roles(roles)
     table = read_text_table(path, roles, ("synthetic",))
     for name in named:
-        texts_required(table, name)
+        texts_required(table, name, factor=name == by)
     values, answers = numbers(table, x), _binary(table, response)
     keep = np.isfinite(values) & np.isfinite(answers)
     across = numbers(table, second) if second else None
@@ -135,6 +145,7 @@ def read_answers(
         table.synthetic,
         tuple(table.decisions),
         None if across is None else across[keep],
+        () if by is None else names_in_order(table.columns[by], keep),
     )
 
 
@@ -184,7 +195,7 @@ def _fitted(
     labels = np.full(answers.x.size, "all", dtype=object) if answers.condition is None else answers.condition
     pooled: dict[str, Threshold] = {}
     people: list[PersonThreshold] = []
-    for condition in sorted({str(label) for label in labels}):
+    for condition in answers.conditions():
         rows = labels == condition
         try:
             pooled[condition] = fit_threshold(

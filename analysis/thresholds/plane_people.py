@@ -103,7 +103,7 @@ def fit_planes(
     reasons: dict[str, str] = {}
     people: list[PersonPlane] = []
     population: dict[str, PopulationPlane] = {}
-    for condition in sorted({str(label) for label in labels}):
+    for condition in answers.conditions():
         rows = labels == condition
         down = _falls(answers, rows, guess) if falling is None else falling
         fit, reason = fitted(points_of(answers, rows), shape, guess, lapse, down, middle)

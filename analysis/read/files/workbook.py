@@ -9,7 +9,7 @@ from typing import Any
 from zipfile import BadZipFile
 
 from analysis.read.files.cells import Cells, cells_of
-from analysis.read.files.workbook_size import refuse_too_large
+from analysis.read.files.workbook_size import refuse_too_far, refuse_too_large
 from experiments.errors import InputError, did_you_mean
 
 Rows = list[list[Any]]
@@ -119,15 +119,18 @@ def _pages(path: Path, _changed: int, formulas: bool) -> dict[str, Page]:
     refuse_too_large(path)
     try:
         book = load_workbook(path, data_only=not formulas)
+        return {sheet.title: _page_of(path, sheet) for sheet in book.worksheets}
+    except InputError:
+        raise
     except (*_UNREADABLE, InvalidFileException) as error:
         said = " ".join(str(error).split())
         raise InputError(
             f"{path.name} is not an Excel workbook that can be read ({said}); save it as .xlsx anew or as CSV"
         ) from error
-    return {sheet.title: _page_of(sheet) for sheet in book.worksheets}
 
 
-def _page_of(sheet: Any) -> Page:
+def _page_of(path: Path, sheet: Any) -> Page:
+    refuse_too_far(path, sheet)
     rows = [list(row) for row in sheet.iter_rows(values_only=True)]
     first = next((i for i, row in enumerate(rows) if any(value is not None for value in row)), len(rows))
     merged = tuple(

@@ -1,13 +1,15 @@
 """The size of a workbook, looked at before it is opened: a few kilobytes may unfold to all memory."""
 
-import re
 import zlib
 from pathlib import Path
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 from xml.parsers import expat
-from zipfile import BadZipFile, ZipFile
+from zipfile import BadZipFile, ZipFile, ZipInfo
 
 from experiments.errors import InputError
+
+if TYPE_CHECKING:
+    from openpyxl.worksheet.worksheet import Worksheet
 
 MAX_BYTES = 512 << 20
 """Of all parts unpacked; openpyxl takes a few times as much."""
@@ -18,10 +20,13 @@ MAX_ELEMENTS = 10_000_000
 MAX_AREA = 30_000_000
 """Cells from the first to the last, empty ones too, of a sheet, and of its merged areas and links."""
 
-_CELL = re.compile("([A-Za-z]{1,3})([0-9]{1,7})")
-_AREA = re.compile("([A-Za-z]{1,3})([0-9]{1,7}):([A-Za-z]{1,3})([0-9]{1,7})")
-_UNFOLDED = ("mergeCell", "hyperlink")
+LAST_ROW, LAST_COLUMN = 1_048_576, 16_384
+"""Of a sheet; a link over `A:C` reaches to the last row, one over `1:3` to the last column."""
+
+_UNFOLDED = {"mergeCell": "merged cells", "hyperlink": "a link over cells", "comment": "a note over cells"}
 """Elements of whose area every cell is made, empty or not."""
+
+_DAMAGED = (BadZipFile, zlib.error, EOFError, OSError, RuntimeError, expat.ExpatError)
 
 
 def refuse_too_large(path: Path) -> None:
@@ -39,57 +44,91 @@ def refuse_too_large(path: Path) -> None:
             if size > MAX_BYTES:
                 _refuse(path, f"unpacks to {size >> 20:,} MiB, and at most {MAX_BYTES >> 20} are read")
             elements = 0
+            # whatever their names: a relation may name any part as a sheet
             for part in parts:
-                if part.filename.lower().endswith((".xml", ".rels")):
-                    count = _Count(path, elements)
-                    with book.open(part) as file:
-                        count.parser.ParseFile(file)
-                    elements = count.elements
-    except (BadZipFile, zlib.error, EOFError, OSError, RuntimeError, expat.ExpatError):
+                elements = _counted(path, book, part, elements)
+    except _DAMAGED:
         return
 
 
+def refuse_too_far(path: Path, sheet: "Worksheet") -> None:
+    """Refuse a sheet opened whose cells, few as they are, lie so far apart that the empty ones fill memory.
+
+    Raises
+    ------
+    InputError
+        More than MAX_AREA from the first to the furthest row and column.
+    """
+    rows, columns = sheet.max_row, sheet.max_column
+    if rows * columns > MAX_AREA:
+        _refuse(
+            path,
+            f"has cells as far as row {rows:,} and column {columns:,} of '{sheet.title}', "
+            f"{rows * columns:,} with the empty ones between",
+            "delete the rows and columns behind the table, or ",
+        )
+
+
+def _counted(path: Path, book: ZipFile, part: ZipInfo, elements: int) -> int:
+    """The elements so far and those of a part: all, or those before what is no XML or damaged in it."""
+    count = _Count(path, elements)
+    try:
+        with book.open(part) as file:
+            count.parser.ParseFile(file)
+    except _DAMAGED:
+        # the reader says so where it needs this part; the parts behind are counted all the same
+        pass
+    return count.elements
+
+
 class _Count:
-    """What stands in a part: elements, the furthest row and column, areas whose every cell is made."""
+    """What stands in a part: elements, and areas whose every cell is made."""
 
     def __init__(self, path: Path, elements: int) -> None:
         self.elements = elements
-        self._path, self._row, self._column, self._unfolded = path, 0, 0, 0
+        self._path, self._unfolded, self._has_areas = path, 0, False
         self.parser = expat.ParserCreate()
         self.parser.StartElementHandler = self._element
-        self.parser.StartDoctypeDeclHandler = self._document_type
+        self.parser.EntityDeclHandler = self._entity
 
     def _element(self, name: str, attributes: dict[str, str]) -> None:
         self.elements += 1
         if self.elements > MAX_ELEMENTS:
             _refuse(self._path, f"has more than {MAX_ELEMENTS // 2:,} cells")
         kind = name.rpartition(":")[2]
-        if kind == "c" and (at := _CELL.fullmatch(attributes.get("r", ""))):
-            self._row, self._column = max(self._row, int(at[2])), max(self._column, _number(at[1]))
-            if self._row * self._column > MAX_AREA:
+        if kind in _UNFOLDED:
+            self._has_areas = True
+            self._unfold(kind, attributes.get("ref", ""))
+        elif kind == "ref" and self._has_areas:
+            # openpyxl takes it for the attribute
+            _refuse(self._path, "has an area written as an element, which no spreadsheet program does")
+
+    def _unfold(self, kind: str, ref: str) -> None:
+        cells = _area(ref)
+        if cells > 1:
+            self._unfolded += cells
+            if self._unfolded > MAX_AREA:
                 _refuse(
                     self._path,
-                    f"has a cell {at[0]}, so that {self._row * self._column:,} cells lie before it, most of "
-                    "them empty",
-                    "delete the rows and columns behind the table, or ",
+                    f"has {_UNFOLDED[kind]} {ref}, {self._unfolded:,} in all",
+                    "take them out, or ",
                 )
-        elif kind in _UNFOLDED and (area := _AREA.fullmatch(attributes.get("ref", ""))):
-            rows = abs(int(area[4]) - int(area[2])) + 1
-            self._unfolded += rows * (abs(_number(area[3]) - _number(area[1])) + 1)
-            if self._unfolded > MAX_AREA:
-                what = "merged cells" if kind == "mergeCell" else "a link over cells"
-                _refuse(self._path, f"has {what} {area[0]}, {self._unfolded:,} in all", "take them out, or ")
 
-    def _document_type(self, *_: object) -> NoReturn:
-        _refuse(self._path, "holds a document type, which no spreadsheet program writes")
+    def _entity(self, *_: object) -> NoReturn:
+        _refuse(self._path, "holds a document type with entities, which no spreadsheet program writes")
 
 
-def _number(letters: str) -> int:
-    """The number of a column, A is 1."""
-    number = 0
-    for letter in letters.upper():
-        number = 26 * number + ord(letter) - ord("A") + 1
-    return number
+def _area(ref: str) -> int:
+    """Cells in a reference, as openpyxl reads it: `A1:C9`, `$A$1:$C$9`, `A:C`, `1:9`; 0 of what is none."""
+    from openpyxl.utils.cell import range_boundaries
+
+    try:
+        left, top, right, bottom = range_boundaries(ref)
+    except ValueError:
+        return 0
+    columns = None if left is None or right is None else abs(right - left) + 1
+    rows = None if top is None or bottom is None else abs(bottom - top) + 1
+    return 0 if columns is None and rows is None else (columns or LAST_COLUMN) * (rows or LAST_ROW)
 
 
 def _refuse(path: Path, what: str, remedy: str = "") -> NoReturn:

@@ -9,13 +9,14 @@ from analysis.read.files import workbook_size
 from analysis.read.long_csv import read_long_table
 from experiments.errors import InputError
 
+RELATIONS, TYPES = "xl/_rels/workbook.xml.rels", "[Content_Types].xml"
 SHEET = "xl/worksheets/sheet1.xml"
 END = "</sheetData>"
 FURTHEST = "XFD1048576"
 
 
-def workbook(path, old: str, new: str):
-    """A small table; in its sheet's XML `old` gives way to `new`."""
+def workbook(path, old: str, new: str, first: dict[str, bytes] | None = None, name: str = SHEET):
+    """A small table; in its sheet's XML, called `name`, `old` gives way to `new`; `first` stands before."""
     book = openpyxl.Workbook()
     for row in [("id", "face", "score"), ("a", "x", 1), ("b", "x", 2)]:
         book.active.append(row)
@@ -24,8 +25,10 @@ def workbook(path, old: str, new: str):
         parts = {name: plain.read(name) for name in plain.namelist()}
     parts[SHEET] = parts[SHEET].decode().replace(old, new).encode()
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as changed:
-        for name, content in parts.items():
-            changed.writestr(name, content)
+        for part, content in ({**(first or {})} | parts).items():
+            if name != SHEET and part in (RELATIONS, TYPES):
+                content = content.replace(SHEET.encode(), name.encode())
+            changed.writestr(name if part == SHEET else part, content)
     return path
 
 
@@ -42,15 +45,60 @@ def cell(at: str) -> str:
     [
         (f'{END}<mergeCells><mergeCell ref="A5:{FURTHEST}"/></mergeCells>', "has merged cells A5:XFD1048576"),
         (f'{END}<hyperlinks><hyperlink ref="A5:{FURTHEST}" location="x"/></hyperlinks>', "a link over cells"),
-        (cell(FURTHEST) + END, "has a cell XFD1048576, so that 17,179,869,184 cells lie before it"),
+        (f'{END}<mergeCells><mergeCell ref="$A$5:$XFD$1048576"/></mergeCells>', "merged cells $A$5:$XFD"),
+        (f"{END}<mergeCells><mergeCell><ref>A5:{FURTHEST}</ref></mergeCell></mergeCells>", "as an element"),
+        (f'{END}<hyperlinks><hyperlink ref="A:XFD" location="x"/></hyperlinks>', "a link over cells A:XFD"),
+        (cell(FURTHEST) + END, "as far as row 1,048,576 and column 16,384 of 'Sheet', 17,179,869,184 with"),
+        (
+            f'<row r="1048576">{"<c/>" * 200}</row>{END}',
+            "row 1,048,576 and column 200 of 'Sheet', 209,715,200",
+        ),
+        (f'<row r="1048575"/><row>{"<x/>" * 200}</row>{END}', "row 1,048,576 and column 200"),
+        (
+            f'{END}<hyperlinks><hyperlink ref="{FURTHEST}" location="x"/></hyperlinks>',
+            "as far as row 1,048,576",
+        ),
     ],
-    ids=["merged", "link", "far cell"],
+    ids=["merged", "link", "absolute", "element", "columns", "far cell", "row", "next row", "far link"],
 )
 def test_a_small_file_with_billions_of_cells_is_refused(tmp_path, new, said) -> None:
     with pytest.raises(InputError) as caught:
         read(workbook(tmp_path / "a.xlsx", END, new))
     assert said in str(caught.value)
-    assert str(caught.value).endswith("or save its sheet as CSV")
+    assert str(caught.value).endswith("save its sheet as CSV")
+
+
+MANY = f"<row>{'<c/>' * 1000}</row>{END}"
+
+
+@pytest.mark.parametrize("first", [b"<a>", b"no XML", b""], ids=["cut off", "text", "empty"])
+def test_a_broken_part_before_the_sheet_ends_no_count(tmp_path, monkeypatch, first) -> None:
+    monkeypatch.setattr(workbook_size, "MAX_ELEMENTS", 1000)
+    with pytest.raises(InputError, match="has more than 500 cells"):
+        read(workbook(tmp_path / "a.xlsx", END, MANY, {"customXml/item1.xml": first}))
+
+
+def test_a_note_over_billions_of_cells_is_refused(tmp_path) -> None:
+    notes = f'<comments><commentList><comment ref="A1:{FURTHEST}"/></commentList></comments>'.encode()
+    with pytest.raises(InputError, match="a note over cells A1:XFD1048576, 17,179,869,184 in all"):
+        read(workbook(tmp_path / "a.xlsx", END, END, {"xl/comments1.xml": notes}))
+
+
+def test_a_sheet_of_any_name_is_counted(tmp_path, monkeypatch) -> None:
+    assert read(workbook(tmp_path / "b.xlsx", END, END, name="xl/worksheets/sheet1.bin")) == 2
+    monkeypatch.setattr(workbook_size, "MAX_ELEMENTS", 1000)
+    with pytest.raises(InputError, match="has more than 500 cells"):
+        read(workbook(tmp_path / "a.xlsx", END, MANY, name="xl/worksheets/sheet1.bin"))
+
+
+def test_a_picture_with_a_document_type_is_none_of_the_table(tmp_path) -> None:
+    picture = b'<!DOCTYPE svg PUBLIC "-//W3C//DTD SVG 1.1//EN" "svg11.dtd"><svg/>'
+    assert read(workbook(tmp_path / "a.xlsx", END, END, {"xl/media/image1.svg": picture})) == 2
+
+
+def test_a_row_behind_the_last_of_any_sheet_ends_in_one_line(tmp_path) -> None:
+    with pytest.raises(InputError, match="not an Excel workbook that can be read"):
+        read(workbook(tmp_path / "a.xlsx", END, f'<row r="9000000"><c/></row>{END}'))
 
 
 def test_what_unpacks_to_too_much_is_refused(tmp_path, monkeypatch) -> None:
@@ -64,7 +112,7 @@ def test_what_unpacks_to_too_much_is_refused(tmp_path, monkeypatch) -> None:
 def test_too_many_cells_are_refused(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(workbook_size, "MAX_ELEMENTS", 1000)
     with pytest.raises(InputError, match="has more than 500 cells; save its sheet as CSV"):
-        read(workbook(tmp_path / "a.xlsx", END, f"<row>{'<c/>' * 1000}</row>{END}"))
+        read(workbook(tmp_path / "a.xlsx", END, MANY))
 
 
 def test_a_document_type_is_refused(tmp_path) -> None:

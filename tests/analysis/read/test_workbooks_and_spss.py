@@ -9,8 +9,12 @@ import pytest
 
 from analysis.models.design import model_data
 from analysis.models.roles import ModelTerms
+from analysis.opinion.scores import read_votes
+from analysis.pairs.comparisons import read_comparisons
+from analysis.pairs.factors import read_item_factors
 from analysis.read.long_csv import LongData, read_long_table
 from analysis.read.model_csv import read_model_input
+from analysis.thresholds.people import fit_thresholds, read_answers
 from analysis.within.cell_means import cell_table
 from experiments.errors import InputError
 
@@ -116,3 +120,57 @@ def test_a_mixed_model_takes_the_order_of_the_codes(tmp_path) -> None:
 def test_order_by_letters_needs_no_word(tmp_path) -> None:
     words = {1: "a", 2: "b", 3: "c"}
     assert not any("order" in said for said in spss(tmp_path / "a.sav", words).decisions)
+
+
+def answers(path, words):
+    """The same people and conditions, each at three steps, with answers that rise."""
+    rows = [
+        (p, float("abc".index(c) + 1), step, float(step + i // 12 * 2 > 2))
+        for i, (p, c, _) in enumerate(ROWS * 2)
+        for step in (1.0, 2.0, 3.0)
+    ]
+    frame = pd.DataFrame(rows, columns=["id", "cond", "x", "yes"])
+    pyreadstat.write_sav(frame, path, variable_value_labels={"cond": words})
+    return path
+
+
+def test_thresholds_opinion_and_pairs_take_the_order_of_the_codes(tmp_path) -> None:
+    spss(tmp_path / "votes.sav", WORDS)
+    votes = read_votes(tmp_path / "votes.sav", "cond", "id", "score")
+    assert votes.items == ("low", "middle", "high")
+    means = {c: sum(s for _, one, s in ROWS if one == c) / 4 for c in "abc"}
+    assert [one.mean() for one in votes.all_votes] == [means[c] for c in "abc"]
+    read = read_answers(answers(tmp_path / "t.sav", WORDS), "x", "yes", "id", "cond")
+    assert read.conditions() == ("low", "middle", "high")
+    assert [said for said in read.decisions if "order" in said] == [
+        "levels of 'cond' in the order of the codes: low, middle, high"
+    ]
+    pairs = pd.DataFrame({"left": [1.0, 2.0, 3.0], "right": [2.0, 3.0, 1.0], "winner": ["left"] * 3})
+    both = {"left": WORDS, "right": WORDS}
+    pyreadstat.write_sav(pairs, tmp_path / "pairs.sav", variable_value_labels=both)
+    assert read_comparisons(tmp_path / "pairs.sav", "left", "right", "winner").items == (
+        "low",
+        "middle",
+        "high",
+    )
+
+
+def test_fits_of_thresholds_stand_in_the_order_of_the_codes(tmp_path) -> None:
+    read = read_answers(answers(tmp_path / "t.sav", WORDS), "x", "yes", None, "cond")
+    fits = fit_thresholds(read, "logistic", 0.0, 0.02)
+    assert list(fits.pooled) == ["low", "middle", "high"]
+
+
+def test_factors_of_items_take_the_order_of_the_codes(tmp_path) -> None:
+    frame = pd.DataFrame({"item": ["p", "q", "r"], "size": [3.0, 1.0, 2.0]})
+    pyreadstat.write_sav(frame, tmp_path / "f.sav", variable_value_labels={"size": WORDS})
+    assert read_item_factors(tmp_path / "f.sav").names("size") == ("low", "middle", "high")
+
+
+def test_people_with_words_for_their_codes_are_not_listed(tmp_path) -> None:
+    people = {1: "zoe", 2: "adam"}
+    frame = pd.DataFrame({"id": [1.0, 1.0, 2.0, 2.0], "cond": ["a", "b"] * 2, "score": [1.0, 2.0, 3.0, 5.0]})
+    pyreadstat.write_sav(frame, tmp_path / "a.sav", variable_value_labels={"id": people})
+    data = read(tmp_path / "a.sav")
+    assert sorted(data.rows["id"].unique()) == ["adam", "zoe"]
+    assert not any("order of the codes" in said for said in data.decisions)

@@ -1,8 +1,11 @@
 """The R scripts of a report's models: where R is, lme4 and clmm agree with what the report says."""
 
 import re
+from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from analysis.plans.clip_rating import PLAN, READING
@@ -32,6 +35,26 @@ def written(section: Section, folder: Path, key: str = "") -> list[Path]:
     for name, content in files.items():
         (folder / name).write_bytes(content)
     return [folder / name for name in files]
+
+
+def test_levels_stand_in_the_order_of_the_model(tmp_path) -> None:
+    factor = EXP3.factors[0].model_copy(update={"levels": EXP3.factors[0].levels[:2]})
+    experiment = EXP3.model_copy(update={"factors": (factor, *EXP3.factors[1:]), "exclusions": ()})
+    export = write_export(
+        tmp_path / "r.csv", experiment, rows_of(experiment, simulate(experiment, 7, trials=3))
+    )
+    analysis = analyse(prepare(experiment, PLAN, load_csv(export, experiment, READING)))
+    first = mixed_model(analysis).beside("")
+    backwards = sorted(analysis.exclusions.rows[factor.name].unique(), reverse=True)
+    rows = analysis.exclusions.rows
+    ordered = rows.assign(**{factor.name: pd.Categorical(rows[factor.name], backwards, ordered=True)})
+    turned = replace(analysis, exclusions=replace(analysis.exclusions, rows=ordered))
+    second = mixed_model(turned).beside("")
+    columns = [
+        pd.read_csv(BytesIO(next(text for name, text in files.items() if name.endswith(".csv"))))["f1"]
+        for files in (first, second)
+    ]
+    assert columns[0].tolist() == (3 - columns[1]).tolist()
 
 
 @pytest.fixture(scope="module")
