@@ -35,7 +35,7 @@ else:
     database = open_database(Settings())
     context.config.attributes["secret_key"] = database.secret_key
     with migrating(database) as connection:
-        without_wall(connection)
+        stood = without_wall(connection)
         migrate(connection)
-        with_wall(connection)
+        with_wall(connection, stood=stood)
     database.close()

@@ -45,23 +45,21 @@ def upgrade(database: Database, revision: str = "head") -> tuple[str | None, str
     """Run the missing migrations in one transaction; return the revision before and after."""
     with migrating(database) as connection:
         before = revision_of(connection)
-        if before != newest_revision():
-            without_wall(connection)
+        stood = before != newest_revision() and without_wall(connection)
         command.upgrade(alembic_config(connection, database.secret_key), revision)
-        with_wall(connection)
+        with_wall(connection, stood=stood)
         return before, revision_of(connection)
 
 
-def without_wall(connection: Connection) -> None:
-    """Take down the policies of rows: they hold on to columns that migrations change."""
-    if connection.dialect.name == "postgresql":
-        take_down_wall(connection)
+def without_wall(connection: Connection) -> bool:
+    """Take down the policies of rows, which hold on to columns that migrations change; whether any stood."""
+    return connection.dialect.name == "postgresql" and take_down_wall(connection)
 
 
-def with_wall(connection: Connection) -> None:
-    """Put up the policies of rows where the database has the newest revision."""
+def with_wall(connection: Connection, *, stood: bool = False) -> None:
+    """Put up the policies of rows where the database has the newest revision; `stood` as for `raise_wall`."""
     if connection.dialect.name == "postgresql" and revision_of(connection) == newest_revision():
-        raise_wall(connection)
+        raise_wall(connection, stood=stood)
 
 
 def revision_of(connection: Connection) -> str | None:

@@ -82,8 +82,20 @@ def _condition(name: str, columns: set[str]) -> str:
     return " OR ".join(parents)
 
 
-def raise_wall(connection: Connection) -> bool:
-    """Make the policies unless they stand as they should; False where the user or PostgreSQL lets none be."""
+def raise_wall(connection: Connection, *, stood: bool = False) -> bool:
+    """Make the policies unless they stand as they should; False where the user or PostgreSQL lets none be.
+
+    Parameters
+    ----------
+    stood : bool
+        Whether policies were taken down before, in this transaction: then there shall be some again.
+
+    Raises
+    ------
+    InputError
+        Where policies stood, and this user may not make them anew.
+    """
+    stood = stood or _mark(connection) is not None
     if not _role_is_ours(connection):
         return False
     statements = list(_statements(_schema(connection), _sequences(connection)))
@@ -91,10 +103,10 @@ def raise_wall(connection: Connection) -> bool:
     if _mark(connection) == mark and _is_whole(connection):
         return True
     statements.append(f"COMMENT ON FUNCTION palpebra_account() IS '{mark}'")
-    return _raised(connection, statements)
+    return _raised(connection, statements, stood)
 
 
-def _raised(connection: Connection, statements: list[str]) -> bool:
+def _raised(connection: Connection, statements: list[str], stood: bool) -> bool:
     """Whether the statements could be carried out, all or none; a wall of before is not left half-built."""
     try:
         with connection.begin_nested():
@@ -105,7 +117,7 @@ def _raised(connection: Connection, statements: list[str]) -> bool:
         if getattr(error.orig, "sqlstate", None) != NO_RIGHT:
             raise
         said = str(error.orig).splitlines()[0]
-        if _mark(connection) is not None:
+        if stood:
             raise InputError(f"rows are kept apart as by an earlier version: {said}; {OWN_TABLES}") from error
         LOG.warning("rows are not kept apart by PostgreSQL: %s; %s", said, OWN_TABLES)
         return False
@@ -130,10 +142,13 @@ def _statements(schema: str, sequences: list[str]) -> Iterator[str]:
         yield f"CREATE POLICY {_POLICY} ON {table} TO {ROLE} USING ({condition})"
 
 
-def take_down_wall(connection: Connection) -> None:
-    """Remove the policies, so that tables can be changed; the role, which is the whole cluster's, stays."""
+def take_down_wall(connection: Connection) -> bool:
+    """Remove the policies, so that tables can be changed; whether there were any.
+
+    The role, which is the whole cluster's, stays.
+    """
     if _mark(connection) is None:
-        return
+        return False
     on = text(
         "SELECT quote_ident(tablename) FROM pg_policies "
         "WHERE policyname = :name AND schemaname = current_schema()"
@@ -151,6 +166,7 @@ def take_down_wall(connection: Connection) -> None:
         connection.exec_driver_sql(f"REVOKE ALL ON SEQUENCE {sequence} FROM {ROLE}")
     for name in _FUNCTIONS:
         connection.exec_driver_sql(f"DROP FUNCTION {name}()")
+    return True
 
 
 def wall_stands(connection: Connection) -> bool:

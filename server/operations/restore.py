@@ -147,7 +147,7 @@ def _restore_rows(
 ) -> None:
     with services.database.write_connection() as connection:
         refuse_unless_empty(connection, "the database", ELSEWHERE)
-        without_wall(connection)
+        stood = without_wall(connection)
         command.upgrade(alembic_config(connection), described.revision)
         known = {table.name: table for table in tables_of(connection)}
         for name in _in_order(known, described):
@@ -162,7 +162,7 @@ def _restore_rows(
         if described.keys_apart:
             _put_keys_back(connection, keys, told)
         command.upgrade(alembic_config(connection, lambda: keys.secret), "head")
-        with_wall(connection)
+        with_wall(connection, stood=stood)
 
 
 def _put_keys_back(connection: Connection, keys: _Keys, told: Callable[[str], None]) -> None:

@@ -15,7 +15,7 @@ from tomlkit.items import AoT, Array, Comment, Table, Whitespace
 
 from experiments.errors import InputError
 from experiments.load import DefinitionError, is_deeper, toml_data
-from experiments.toml_keys import MAX_DEPTH
+from experiments.toml_keys import MAX_DEPTH, sum_of_cubes
 from server.studies import toml_items
 
 TOO_DEEP = "lists or tables are nested too deeply; correct the text first"
@@ -23,6 +23,8 @@ IDENTITY = ("name", "value", "rule", "kind")
 """Keys by which an element of a list is known again after an edit; else its content, then its place."""
 MAX_ELEMENTS = 2000
 """Elements of lists in a text that is edited: each is compared with each, while others wait."""
+MAX_CUBES = 40_000
+"""Of the parts of dotted keys, all together: 1,500 keys of three parts, some seconds of tomlkit at worst."""
 
 
 def with_data(text: str, data: Mapping[str, Any]) -> str:
@@ -37,6 +39,8 @@ def with_data(text: str, data: Mapping[str, Any]) -> str:
         raise InputError(TOO_DEEP)
     edited = _without_none(data)
     _refuse_too_many(_said_by(text), edited)
+    if sum_of_cubes(text) > MAX_CUBES:
+        raise InputError("too many dotted keys of many parts; edit such a text by hand")
     try:
         document = tomlkit.parse(text)
         _merge(document, edited)

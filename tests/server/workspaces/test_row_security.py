@@ -7,11 +7,12 @@ from fastapi import FastAPI
 from sqlalchemy import Connection, select, text, true
 from sqlalchemy.orm import Session
 
+from experiments.errors import InputError
 from server import row_policies_repository as row_policies
 from server import row_security_repository as row_security
 from server.context import Services
 from server.db import Database
-from server.migrate import downgrade, newest_revision, upgrade
+from server.migrate import downgrade, newest_revision, revision_of, upgrade
 from server.models import RIGHTS, Base, Study
 from server.workspaces import repository
 from tests.helpers.admins import Admin
@@ -189,6 +190,39 @@ def test_a_user_who_does_not_own_the_tables_gets_no_wall_and_a_line_that_says_wh
         connection.exec_driver_sql(f"DROP OWNED BY {user}")
         connection.exec_driver_sql(f"DROP ROLE {user}")
     database.close()
+
+
+@empty_postgres
+def test_an_upgrade_that_cannot_put_the_wall_up_again_changes_nothing(empty_database_url: str) -> None:
+    owner = Database(empty_database_url)
+    with owner.engine.begin() as connection:
+        connection.exec_driver_sql("CREATE ROLE former_user LOGIN PASSWORD 'former'")
+        connection.exec_driver_sql("GRANT ALL ON SCHEMA public TO former_user")
+        assert row_policies._role_is_ours(connection)  # made, where this is the first test of the server
+        connection.exec_driver_sql(f"GRANT {row_security.ROLE} TO former_user")
+    former = Database(
+        owner.url.set(username="former_user", password="former").render_as_string(hide_password=False)
+    )
+    try:
+        upgrade(former)
+        before = policies(former)
+        with owner.engine.begin() as connection:
+            connection.exec_driver_sql("DROP TABLE shared_counts")
+            connection.exec_driver_sql("UPDATE alembic_version SET version_num = '0030'")
+            # What this user may take down it may not put up again.
+            connection.exec_driver_sql("REVOKE USAGE ON LANGUAGE sql FROM PUBLIC")
+        with pytest.raises(InputError, match="earlier version: permission denied for language"):
+            upgrade(former)
+        assert (policies(former), before > 10) == (before, True)
+        with former.engine.connect() as connection:
+            assert revision_of(connection) == "0030"
+    finally:
+        former.close()
+        with owner.engine.begin() as connection:
+            connection.exec_driver_sql("DROP OWNED BY former_user")
+            connection.exec_driver_sql(f"REVOKE {row_security.ROLE} FROM former_user")
+            connection.exec_driver_sql("DROP ROLE former_user")
+        owner.close()
 
 
 def number_of_ratings(database: Database) -> int:
