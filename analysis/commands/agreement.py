@@ -57,11 +57,11 @@ def reliability(
     data = numbers.read_items(file, names_in(items), names_in(reverse), scale_bounds(scale), case)
     with saying("factor analysis"):
         result = numbers.reliability(data)
-    typer.echo(reliability_text(result, file.stem, data.synthetic))
-    show_tables(items_table(result, file.stem, data.synthetic))
+    save_json(json, asdict(result), data.synthetic)
     if scores is not None:
         _save_scores(scores, result.scores, case or "case")
-    save_json(json, asdict(result), data.synthetic)
+    typer.echo(reliability_text(result, file.stem, data.synthetic))
+    show_tables(items_table(result, file.stem, data.synthetic))
 
 
 def agreement(
@@ -89,10 +89,10 @@ def agreement(
     votes = read_votes(file, item, participant, rating)
     with saying("resampling items"):
         result = raters.agreement(votes, level.value)
+    save_json(json, asdict(result), votes.synthetic)
     typer.echo(agreement_text(result, file.stem, votes.synthetic))
     if result.icc:
         show_tables(intraclass_table(result, file.stem, votes.synthetic))
-    save_json(json, asdict(result), votes.synthetic)
 
 
 def _save_scores(path: Path, scores: tuple[tuple[str, float], ...], case: str) -> None:
@@ -104,4 +104,4 @@ def _save_scores(path: Path, scores: tuple[tuple[str, float], ...], case: str) -
         out = csv.writer(file, lineterminator="\n")
         out.writerow([case, "score"])
         out.writerows(scores)
-    typer.echo(f"\nwritten: {path} ({len(scores)} scale scores, the mean of the items)")
+    typer.echo(f"written: {path} ({len(scores)} scale scores, the mean of the items)")

@@ -121,10 +121,11 @@ def anova(
         with saying("permutations"):
             analysis = replace(analysis, robust=companions_of(analysis.anova))
     contents = contents_of(analysis)
-    show(contents)
+    # before what is printed, which `| head` may cut off
     save_json(json, contents.numbers)
     if out is not None:
         save_report(contents, out, with_r=verify_with_r)
+    show(contents)
 
 
 def _bounds(text: str | None) -> tuple[float, float] | None:

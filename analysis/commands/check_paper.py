@@ -50,6 +50,10 @@ def _check_document(file: Path, json: Path | None) -> None:
     from experiments.json import json_text
 
     result = check_text(read_document(file))
+    if json is not None:
+        counts = {"read": len(result.statistics), "checked": result.n_checked, "wrong": result.n_wrong}
+        with whole_file(json) as temporary:
+            temporary.write_text(json_text({"file": file.name, **counts, **asdict(result)}), encoding="utf-8")
     typer.echo(
         f"{file.name}: {len(result.statistics)} statistics read, {result.n_checked} checked, "
         f"{result.n_wrong} do not fit, {len(result.unread)} could not be read"
@@ -60,10 +64,6 @@ def _check_document(file: Path, json: Path | None) -> None:
             typer.echo("\n".join(wrap(f"- {statistic.text}: {problem}{grave}")))
     for fragment in result.unread:
         typer.echo("\n".join(wrap(f"- could not be read: {fragment}")))
-    if json is not None:
-        counts = {"read": len(result.statistics), "checked": result.n_checked, "wrong": result.n_wrong}
-        with whole_file(json) as temporary:
-            temporary.write_text(json_text({"file": file.name, **counts, **asdict(result)}), encoding="utf-8")
 
 
 def _check_figures(figures: Path, json: Path | None) -> None:
@@ -75,6 +75,9 @@ def _check_figures(figures: Path, json: Path | None) -> None:
 
     paper = load_figures(figures)
     findings = checks.check_paper(paper)
+    if json is not None:
+        with whole_file(json) as temporary:
+            temporary.write_text(json_text([asdict(finding) for finding in findings]), encoding="utf-8")
     typer.echo("\n".join(wrap(f"{paper.title}. {paper.source}")))
     for study in paper.study:
         typer.echo(f"\n{study.name}, N = {study.participants}")
@@ -86,6 +89,3 @@ def _check_figures(figures: Path, json: Path | None) -> None:
             typer.echo("- nothing found")
     grave = sum(finding.kind != "note" for finding in findings)
     typer.echo(f"\n{grave} problems and {len(findings) - grave} notes")
-    if json is not None:
-        with whole_file(json) as temporary:
-            temporary.write_text(json_text([asdict(finding) for finding in findings]), encoding="utf-8")

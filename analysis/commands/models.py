@@ -143,11 +143,11 @@ def mixed(
             intervals=intervals,
             progress=say,
         )
+    save_json(json, asdict(result), data.synthetic)
     _show(file, data, mixed_text(result))
     named = (result, file.stem, data.synthetic)
     tables = [mixed_effects_table(*named), mixed_components_table(*named)]
     show_tables(*tables, *([mixed_coefficients_table(*named)] if intervals else []))
-    save_json(json, asdict(result), data.synthetic)
 
 
 def ordinal(
@@ -201,12 +201,12 @@ def ordinal(
         result = fit_ordinal(
             data.rows, participant, rating, data.within, clips, slopes.value, groups, numbers, quadrature
         )
+    save_json(json, asdict(result), data.synthetic)
     _show(file, data, ordinal_text(result))
     named = (result, file.stem, data.synthetic)
     show_tables(
         ordinal_effects_table(*named), ordinal_coefficients_table(*named), ordinal_components_table(*named)
     )
-    save_json(json, asdict(result), data.synthetic)
 
 
 def _read(

@@ -47,8 +47,8 @@ def opinion(
     with saying("reading votes"):
         votes = read_votes(file, item, participant, rating)
     result = fit_opinion(votes, repeats.value)
+    save_json(json, asdict(result), votes.synthetic)
     typer.echo(opinion_text(result, file.stem, votes.synthetic))
     show_tables(
         scores_table(result, file.stem, votes.synthetic), raters_table(result, file.stem, votes.synthetic)
     )
-    save_json(json, asdict(result), votes.synthetic)

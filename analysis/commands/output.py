@@ -80,6 +80,7 @@ def check_folder(folder: Path) -> None:
 def save_json(path: Path | None, numbers: dict[str, Any], synthetic: bool | None = None) -> None:
     """Write numbers to a JSON file, whole or not at all; nothing where no path is given.
 
+    Called before anything is printed: a reader like `head` that closes the pipe ends the command there.
     `synthetic` is put before numbers that do not say it.
     """
     from experiments.files import whole_file
@@ -90,7 +91,7 @@ def save_json(path: Path | None, numbers: dict[str, Any], synthetic: bool | None
     said = {} if synthetic is None else {"synthetic": synthetic}
     with whole_file(path) as temporary:
         temporary.write_text(json_text({**said, **numbers}), encoding="utf-8")
-    typer.echo(f"\nwritten: {path}")
+    typer.echo(f"written: {path}")
 
 
 def save_report(contents: "Contents", folder: Path, more: bool = False, with_r: bool = False) -> None:
@@ -104,11 +105,11 @@ def save_report(contents: "Contents", folder: Path, more: bool = False, with_r: 
     with saying("writing") as say:
         paths = write_report(contents, folder, more, say)
     files = ", ".join(path.name for path in paths)
-    typer.echo("\n" + "\n".join(wrap(f"written to {folder}: {files}")))
+    typer.echo("\n".join(wrap(f"written to {folder}: {files}")))
     if with_r:
         with saying("R"):
             said = verify_with_r(paths)
-        typer.echo(f"\n{said}")
+        typer.echo(said)
 
 
 @contextmanager

@@ -78,9 +78,9 @@ def pairs(
     chosen: Method = method.value if method else usual
     with saying("fitting"):
         result = fit_abilities(comparisons, chosen, order_effect=order_effect, firth=firth, factors=design)
+    save_json(json, asdict(result), comparisons.synthetic)
     typer.echo("\n".join(wrap(pairs_text(result, file.stem, comparisons.synthetic))))
     show_tables(abilities_table(result, file.stem, comparisons.synthetic))
     if design is not None:
         show_tables(factors_table(result, file.stem, comparisons.synthetic))
     show_tables(contrasts_table(result, file.stem, comparisons.synthetic))
-    save_json(json, asdict(result), comparisons.synthetic)

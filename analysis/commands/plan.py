@@ -277,16 +277,16 @@ def _simulate(
     sizes = sample_sizes(n)
     with bar("simulating", len(sizes) * simulations) as advance:
         result = simulate_design(design, name, sizes, simulations, alpha, seed, advance)
-    say_power(result, target)
     text = sample_size_text(result, design, target, version("palpebra"))
-    typer.echo("\n" + "\n".join(wrap(text)))
     if plot is not None:
         from analysis.power.figure import save_power_figure
 
         save_power_figure(result, plot, target)
-        typer.echo(f"\nwritten: {plot}")
+        typer.echo(f"written: {plot}")
     numbers = asdict(result) | {"power": result.power.tolist(), "se": result.se.tolist()}
     save_json(json, numbers | {"smallest_n": result.smallest_n(target), "text": text}, True)
+    say_power(result, target)
+    typer.echo("\n" + "\n".join(wrap(text)))
 
 
 def _levels(text: str, option: str) -> dict[str, int]:

@@ -149,7 +149,8 @@ def run(
     if seal is not None:
         clips = read_clips_sha256(manifest) if manifest else None
         contents = held_against(contents, read_seal(seal), declared, clips)
-    show(contents)
+    # before what is printed, which `| head` may cut off
     save_json(json, contents.numbers)
     if report:
         save_report(contents, folder, more=sensitivity, with_r=verify_with_r)
+    show(contents)

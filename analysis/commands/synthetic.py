@@ -88,11 +88,11 @@ def power(
         figure.parent.mkdir(parents=True, exist_ok=True)
     with bar("simulating", len(sizes) * simulations) as advance:
         result = simulate_power(plan, sizes, simulations, alpha, seed, statistic.value, advance)
-    say_power(result, target)
     save_power_figure(result, figure, target)
-    typer.echo(f"\nwritten: {figure}")
+    typer.echo(f"written: {figure}")
     numbers = asdict(result) | {"power": result.power.tolist(), "se": result.se.tolist()}
     save_json(json, numbers | {"smallest_n": result.smallest_n(target)}, True)
+    say_power(result, target)
 
 
 def synthesise_command(

@@ -98,6 +98,7 @@ def thresholds(
         result = fit_thresholds(answers, function.value, guess, upper)
         if hierarchical:
             result = with_population(result, answers, function.value, guess, upper)
+    save_json(json, asdict(result), answers.synthetic)
     typer.echo("\n".join(wrap(threshold_text(result, file.stem, answers.synthetic))))
     if result.population:
         show_tables(population_table(result, file.stem, answers.synthetic))
@@ -106,7 +107,6 @@ def thresholds(
     show_tables(threshold_table(result, file.stem, answers.synthetic))
     if result.people:
         show_tables(people_table(result, file.stem, answers.synthetic))
-    save_json(json, asdict(result), answers.synthetic)
 
 
 def _planes(
@@ -131,10 +131,10 @@ def _planes(
         result = fit_planes(
             answers, "logistic" if function is FunctionChoice.LOGISTIC else "normal", guess, lapse
         )
+    save_json(json, asdict(result), answers.synthetic)
     typer.echo(plane_text(result, variables, name, answers.synthetic))
     for table in plane_tables(result, variables, name, answers.synthetic):
         show_tables(table)
-    save_json(json, asdict(result), answers.synthetic)
 
 
 def _lapse(text: str, guess: float) -> float | None:

@@ -79,7 +79,8 @@ def read_comparisons(
     Raises
     ------
     InputError
-        As `read_text_table`; a pair of an item with itself; a winner that is none of the two.
+        As `read_text_table`; a pair of an item with itself; a winner that is none of the two; a `tie` that
+        is an item or a side.
     """
     roles = [left, right, winner, *([participant] if participant else [])]
     refuse_shared_roles(roles)
@@ -146,6 +147,8 @@ def _outcomes(
     if confused:
         name = min(confused)
         raise InputError(f"{table.source}: an item is called '{name}', as is a side; rename the item")
+    if tie is not None:
+        _refuse_tie(table, tie, {*left, *right})
     outcome = np.full(left.size, -1, dtype=np.int64)
     folded = np.char.lower(said.astype(str))
     for name, code in sides.items():
@@ -162,6 +165,16 @@ def _outcomes(
     if missing.all():
         raise InputError(f"{table.source}: '{winner}' names a winner in no row")
     return outcome, ~missing
+
+
+def _refuse_tie(table: TextTable, tie: str, items: set[str]) -> None:
+    """Refuse a word for ties that names a winner as well."""
+    other = "an item" if tie in items else "a side" if tie.casefold() in ("left", "right") else ""
+    if other:
+        raise InputError(
+            f"{table.source}: --tie {tie} is {other} too; expected a word for ties that names no winner: "
+            "write another in the rows that are ties"
+        )
 
 
 def _refuse_unknown(

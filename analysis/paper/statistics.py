@@ -50,6 +50,8 @@ _ETA = re.compile(
 _LOOKS_LIKE = re.compile(
     r"(?<![A-Za-z])(?:F ?[(\[] ?\d|t ?[(\[] ?\d|(?:χ|chi) ?-?2 ?[(\[]|[pP] ?[=<>] ?\.?\d)"
 )
+_LEVEL = re.compile(r"(?:(?<=[*†])|^(?=.{,12}$)) *p ?< ?0?\.0(?:5|1|01)(?!\d)", re.MULTILINE)
+"""The head of a column or the legend of a table, which names a level and reports nothing."""
 
 NEAR = 30
 """Characters before and after a p in which it is said to be one-tailed or corrected."""
@@ -109,6 +111,7 @@ def check_text(text: str) -> TextCheck:
         reported, used = _reported(match, tail)
         statistics.append(reported)
         covered.append((match.start(), match.end() + used))
+    covered += [match.span() for match in _LEVEL.finditer(text)]
     unread = [
         " ".join(text[m.start() : m.start() + 60].split())
         for m in _LOOKS_LIKE.finditer(text)

@@ -173,5 +173,5 @@ def _refuse_words(table: TextTable, name: str, words: set[str]) -> None:
         row = int(np.argmax(table.columns[name].isin(words).to_numpy()))
         raise InputError(
             f"{table.source}: '{name}' should be a number, got '{table.columns[name].iloc[row]}' in line "
-            f"{table.line(row)}"
+            f"{table.line(row)}; correct it, or leave the cell empty (or write NA) where there is none"
         )

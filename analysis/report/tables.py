@@ -92,9 +92,9 @@ def _pair_notes(analysis: Analysis) -> list[str]:
         ]
         name = analysis.labels.factor(factor)
         if not others:
-            notes.append(f"{name}: all {len(pairs)} pairs differ (Bonferroni p < .05).")
+            notes.append(f"{name}: all {len(pairs)} pairs differ (Bonferroni, at .05).")
         elif len(others) == len(pairs):
-            notes.append(f"{name}: no pair differs (Bonferroni p < .05).")
+            notes.append(f"{name}: no pair differs (Bonferroni, at .05).")
         else:
-            notes.append(f"{name}: all pairs differ (Bonferroni p < .05) but {', '.join(others)}.")
+            notes.append(f"{name}: all pairs differ (Bonferroni, at .05) but {', '.join(others)}.")
     return notes

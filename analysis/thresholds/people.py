@@ -158,7 +158,7 @@ def _binary(table: TextTable, response: str) -> Array:
         row = int(np.argmax(unknown))
         raise InputError(
             f"{table.source}: '{response}' is '{table.columns[response].iloc[row]}' in line {table.line(row)}"
-            "; expected 1 or 0 (yes or no, correct or wrong)"
+            "; expected 1 or 0 (yes or no, correct or wrong), or an empty cell (or NA) where there is none"
         )
     return values
 

@@ -22,9 +22,15 @@ _MARKS = (
 )
 """Byte order marks of encodings that spreadsheets write beside UTF-8, the longer first."""
 
+_HEAD = 1 << 16
+"""Bytes in which one line or more ends, in nearly every table."""
+
 
 def utf8(path: Path) -> BinaryIO:
     """The file as UTF-8, opened; one whose byte order mark says UTF-16 or 32 is encoded anew.
+
+    Lines that end in a carriage return alone, as of old Macs and of Excel's "CSV (Macintosh)", end in a line
+    feed instead, for which the rows are counted.
 
     Raises
     ------
@@ -32,21 +38,27 @@ def utf8(path: Path) -> BinaryIO:
         A text that is not what its mark says, or UTF-16 without one.
     """
     with path.open("rb") as file:
-        start = file.read(4)
+        start = file.read(_HEAD)
     encoding = next((name for mark, name in _MARKS if start.startswith(mark)), None)
-    if b"\0" in start and encoding is None:
+    if b"\0" in start[:4] and encoding is None:
         raise InputError(
             f"{path.name} holds null bytes, as UTF-16 text without a byte order mark does; "
             "save it as CSV UTF-8"
         )
     if encoding is None:
-        return path.open("rb")
+        if b"\r" not in start or b"\n" in start:
+            return path.open("rb")
+        return BytesIO(_with_line_feeds(path.read_bytes()))
     try:
-        return BytesIO(path.read_bytes().decode(encoding).encode())
+        return BytesIO(_with_line_feeds(path.read_bytes().decode(encoding).encode()))
     except UnicodeDecodeError as error:
         raise InputError(
             f"{path.name} is not {encoding} text ({error.reason}); save it as CSV UTF-8"
         ) from error
+
+
+def _with_line_feeds(data: bytes) -> bytes:
+    return data if b"\n" in data else data.replace(b"\r", b"\n")
 
 
 def delimited_header(path: Path) -> tuple[list[str], str]:

@@ -179,3 +179,40 @@ def test_check_paper_ships_with_the_papers_figures(tmp_path) -> None:
     assert result.exit_code == 0
     assert "6 problems and 8 notes" in result.stdout
     assert len(json.loads((tmp_path / "f.json").read_text())) == 14
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("anova", "--participant", "id", "--rating", "y", "--within", "f"),
+        ("opinion", "--item", "f", "--participant", "id", "--rating", "y"),
+        ("mixed", "--participant", "id", "--rating", "y", "--within", "f"),
+        ("thresholds", "--x", "y", "--response", "yes"),
+        ("pairs", "--left", "f", "--right", "g", "--winner", "yes"),
+        ("reliability", "--items", "y,z"),
+    ],
+    ids=lambda arguments: arguments[0],
+)
+def test_the_numbers_are_written_though_the_reader_of_the_tables_has_gone(
+    tmp_path, monkeypatch, arguments
+) -> None:
+    """`analysis anova ... --json out.json | head` closes the pipe."""
+
+    def gone(*_: object, **__: object) -> None:
+        raise BrokenPipeError
+
+    rows = [
+        f"{i},{1 + (5 * i + 3 * j + 2 * k * k) % 7},{1 + (3 * i + j + k) % 5},{'ab'[j]},{'ba'[j]},"
+        f"{'left' if 1 + (5 * i + 3 * j + 2 * k * k) % 7 + k > 4 else 'right'}"
+        for i in range(6)
+        for j in range(2)
+        for k in range(3)
+    ]
+    text = "\n".join(["id,y,z,f,g,yes", *rows])
+    if arguments[0] == "thresholds":
+        text = text.replace("left", "1").replace("right", "0")
+    (tmp_path / "a.csv").write_text(text, encoding="utf-8")
+    monkeypatch.setattr("typer.echo", gone)
+    result = call(arguments[0], tmp_path / "a.csv", *arguments[1:], "--json", tmp_path / "a.json")
+    assert isinstance(result.exception, BrokenPipeError | SystemExit), result.exception
+    assert json.loads((tmp_path / "a.json").read_text())

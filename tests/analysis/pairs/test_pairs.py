@@ -231,3 +231,12 @@ def test_of_an_export_only_answers_that_count_are_compared(tmp_path: Path) -> No
     # The same columns in somebody else's table mean nothing to us.
     table.write_text(table.read_text().replace("left_cell", "one").replace("right_cell", "two"))
     assert len(read_comparisons(table, "one", "two", "winner").outcome) == 6
+
+
+@pytest.mark.parametrize(("tie", "what"), [("a", "an item"), ("Left", "a side")])
+def test_a_word_for_ties_that_names_a_winner_is_refused(tmp_path: Path, tie: str, what: str) -> None:
+    path = table(tmp_path, [("a", "b", "a"), ("b", "a", "Left"), ("a", "b", "b")])
+    with pytest.raises(
+        InputError, match=rf"--tie {tie} is {what} too; expected a word for ties that names no"
+    ):
+        read_comparisons(path, "left", "right", "winner", tie)

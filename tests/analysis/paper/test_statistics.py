@@ -231,3 +231,40 @@ def test_a_damaged_word_file_ends_in_one_line(tmp_path) -> None:
             said.add(str(error))
     assert len(said) > 1
     assert all("a.docx is not a readable DOCX file: " in one and "\n" not in one for one in said)
+
+
+@pytest.mark.parametrize("text", ["p\np < .05\npartial η²", "* p < .05, ** p < .01", "†p < .001"])
+def test_a_level_over_a_column_or_in_a_legend_is_no_statistic(text) -> None:
+    assert check_text(plain(text)).unread == ()
+
+
+def test_a_level_in_a_sentence_is_told_as_unread() -> None:
+    assert check_text("All of them differed, p < .05.").unread == ("p < .05.",)
+
+
+def test_notes_of_a_word_file_are_read(tmp_path) -> None:
+    from docx import Document
+    from docx.opc.constants import RELATIONSHIP_TYPE
+    from docx.opc.packuri import PackURI
+    from docx.opc.part import Part
+    from docx.oxml.ns import nsdecls
+
+    document = Document()
+    document.add_paragraph("t(30) = 2.10, p = .044")
+    for kind, said in (("footnote", "F(1, 30) = 4.56, p = .41"), ("endnote", "z = 1.96, p = .050")):
+        text = (
+            f'<w:{kind}s {nsdecls("w")}><w:{kind} w:type="separator" w:id="-1"><w:p><w:r>'
+            f'<w:separator/></w:r></w:p></w:{kind}><w:{kind} w:id="1"><w:p><w:r><w:{kind}Ref/></w:r>'
+            f"<w:r><w:t>{said[:9]}</w:t></w:r><w:r><w:t>{said[9:]}</w:t></w:r>"
+            f"</w:p></w:{kind}></w:{kind}s>"
+        )
+        content = f"application/vnd.openxmlformats-officedocument.wordprocessingml.{kind}s+xml"
+        part = Part(PackURI(f"/word/{kind}s.xml"), content, text.encode(), document.part.package)
+        document.part.relate_to(part, getattr(RELATIONSHIP_TYPE, f"{kind.upper()}S"))
+    document.save(tmp_path / "a.docx")
+    check = check_text(read_document(tmp_path / "a.docx"))
+    assert {one.text: one.verdict for one in check.statistics} == {
+        "t(30) = 2.10, p = .044": "consistent",
+        "F(1, 30) = 4.56, p = .41": "decision",
+        "z = 1.96, p = .050": "consistent",
+    }

@@ -175,7 +175,7 @@ def test_text_of_a_workbook_may_have_two(tmp_path) -> None:
 def test_lines_are_those_of_an_editor_where_blank_ones_are_skipped(tmp_path, body, line, mark) -> None:
     path = tmp_path / "a.csv"
     path.write_bytes(f"{mark}id,face,score\n{body}".encode())
-    with pytest.raises(InputError, match=f"got 'x' in line {line}$"):
+    with pytest.raises(InputError, match=f"got 'x' in line {line};"):
         ratings(path)
 
 
@@ -183,5 +183,5 @@ def test_lines_stay_true_over_blocks(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(raggedness, "_BLOCK", 7)
     path = tmp_path / "a.csv"
     path.write_text("id,face,score\n" + "\np1,a,3\n" * 20 + "p2,a,x\n", encoding="utf-8")
-    with pytest.raises(InputError, match=r"got 'x' in line 42$"):
+    with pytest.raises(InputError, match=r"got 'x' in line 42;"):
         ratings(path)

@@ -105,3 +105,22 @@ def test_no_file_a_folder_and_a_column_in_two_roles_are_refused(tmp_path) -> Non
         read_long_table(tmp_path, "id", "y", ["f"])
     with pytest.raises(InputError, match="'y' is named for two roles"):
         read_long_table(tmp_path / "x.csv", "id", "y", ["y"])
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_lines_that_end_in_a_carriage_return_alone_are_read(tmp_path, encoding) -> None:
+    path = tmp_path / "mac.csv"
+    text = "id,y,f\r1,4,a\r1,5,b\r2,6,a\r2,x,b\r"
+    path.write_bytes(text.replace("x", "7").encode(encoding))
+    assert read_long_table(path, "id", "y", ["f"]).rows["y"].tolist() == [4, 5, 6, 7]
+    path.write_bytes(text.encode(encoding))
+    with pytest.raises(InputError, match="got 'x' in line 5; correct it, or leave the cell empty"):
+        read_long_table(path, "id", "y", ["f"])
+
+
+@pytest.mark.parametrize("mark", ["na", "null", "-"])
+def test_an_unknown_mark_for_missing_is_refused_with_what_to_do(tmp_path, mark) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(f"id,y,f\n1,4,a\n1,{mark},b\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"leave the cell empty \(or write NA\) where there is none"):
+        read_long_table(path, "id", "y", ["f"])
