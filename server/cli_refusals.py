@@ -3,6 +3,7 @@
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 from sqlalchemy.exc import DBAPIError
+from sqlalchemy.exc import TimeoutError as PoolTimeout
 
 from experiments.wrong_values import wrong_value
 from server.db import is_away, is_busy
@@ -16,6 +17,8 @@ def refusal(error: Exception) -> str | None:
         return error.message
     if isinstance(error, ValidationError) and error.title == Settings.__name__:
         return "; ".join(map(_setting, error.errors()))
+    if isinstance(error, PoolTimeout):
+        return "no connection to the database came free: try again, or raise PALPEBRA_DATABASE_POOL"
     if is_busy(error):
         return "another program keeps the database locked: end it, or try again when it is done"
     if isinstance(error, DBAPIError) and is_away(error):

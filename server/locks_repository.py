@@ -2,12 +2,14 @@
 
 One connection of a process holds all of its locks, however many there are; another lets others see whether a
 lock is held. A host that goes without a word lets go of its locks within a minute. Where PostgreSQL is
-started anew, the process notices within `HEARTBEAT_S` and takes its locks again.
+started anew, the process notices within `HEARTBEAT_S` and takes its locks again; where the network was cut,
+as soon as PostgreSQL has noticed too, and ended the connection of before that still holds them.
 """
 
 import hashlib
 import logging
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -18,6 +20,8 @@ from server.db import Database, kept_alive
 
 LOG = logging.getLogger(__name__)
 HEARTBEAT_S = 5.0
+OWN_LINE_S = 60.0
+"""By then a connection of before has ended for PostgreSQL too: whatever holds a lock now is another's."""
 _ALIVE = "SET tcp_keepalives_idle = 20; SET tcp_keepalives_interval = 10; SET tcp_keepalives_count = 3"
 
 
@@ -35,6 +39,7 @@ class DatabaseLocks:
         )
         self._changing = threading.Lock()
         self._held: set[int] = set()
+        self._lost: dict[int, float] = {}  # of those held, not regained -> since when
         self._connection: Connection | None = None
         self._let_all_go = threading.Event()
 
@@ -61,15 +66,19 @@ class DatabaseLocks:
         finally:
             with self._changing:
                 self._held.discard(number)
+                self._lost.pop(number, None)
                 self._let_go(number)
 
     def is_held(self, name: str) -> bool:
         """Whether any process holds a lock."""
-        if _number(name) in self._held:  # also where PostgreSQL was started anew meanwhile
+        number = _number(name)
+        if (
+            number in self._held and number not in self._lost
+        ):  # also where PostgreSQL was started anew meanwhile
             return True
         query = text("SELECT pg_try_advisory_xact_lock_shared(:number)")
         with self._database.engine.connect() as connection:
-            return not connection.scalar(query, {"number": _number(name)})
+            return not connection.scalar(query, {"number": number})
 
     def _taken(self, number: int) -> bool:
         for _ in range(2):
@@ -90,7 +99,7 @@ class DatabaseLocks:
                 if let_all_go.is_set():
                     return
                 try:
-                    self._open().exec_driver_sql("SELECT 1")
+                    self._regain(self._open())
                 except DBAPIError:
                     self._close()
                     self._retake()
@@ -107,12 +116,19 @@ class DatabaseLocks:
         if self._connection is None:
             self._connection = self._engine.connect()
             self._connection.exec_driver_sql(_ALIVE)
-            for number in self._held:
-                if not self._connection.scalar(
-                    text("SELECT pg_try_advisory_lock(:number)"), {"number": number}
-                ):
-                    LOG.error("a lock was lost while PostgreSQL was away: another process holds it now")
+            self._lost = {number: self._lost.get(number, time.monotonic()) for number in self._held}
+            self._regain(self._connection)
         return self._connection
+
+    def _regain(self, connection: Connection) -> None:
+        """Ask for the locks that were lost with a connection; one of before may hold them a little longer."""
+        connection.exec_driver_sql("SELECT 1")
+        for number, since in list(self._lost.items()):
+            if connection.scalar(text("SELECT pg_try_advisory_lock(:number)"), {"number": number}):
+                del self._lost[number]
+            elif time.monotonic() - since > OWN_LINE_S:
+                self._lost[number] = float("inf")  # told once
+                LOG.error("a lock was lost while PostgreSQL was away: another process holds it now")
 
     def _let_go(self, number: int) -> None:
         try:

@@ -1,5 +1,6 @@
 """What the doctor looks at where hosts share: the ledger of erasures, and what stands before PostgreSQL."""
 
+import shlex
 from collections.abc import Iterator
 
 from server.context import Services
@@ -18,8 +19,12 @@ def ledger(services: Services) -> Iterator[Finding]:
     missing = len(erasures.merged(kept, before.read_bytes()).splitlines()) - len(kept.splitlines())
     if missing:
         said = f"{missing} of the lines of {before} are not in {erasures.ledger(settings)}"
-        # By cat, so that what the new one has gained meanwhile stays.
-        advice = f"a restore would bring these people back; run: cat {before} >> {erasures.ledger(settings)}"
+        # Added at the end, so that what the new one gains meanwhile stays; `echo` ends a line cut off.
+        one, other = (shlex.quote(str(path)) for path in (before, erasures.ledger(settings)))
+        advice = (
+            "a restore would bring these people back; as the server's user, run: "
+            f"(umask 077; {{ echo; cat {one}; }} >> {other})"
+        )
         yield Finding("ledger of erasures", "failed", said, advice)
     else:
         yield Finding("ledger of erasures", "ok", f"{erasures.ledger(settings)} has all that was kept before")

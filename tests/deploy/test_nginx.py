@@ -1,8 +1,10 @@
 """`deploy/nginx.conf`: as strict as the Caddyfile, and clips are asked of the server once."""
 
 import shutil
+import socket
 import subprocess
 import threading
+import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
@@ -40,6 +42,7 @@ class Upstream(BaseHTTPRequestHandler):
 
     def do_POST(self) -> None:
         """Take what is sent."""
+        self.asked.append((self.path, self.headers["x-forwarded-for"]))
         self.rfile.read(int(self.headers["content-length"]))
         self.send_response(201)
         self.send_header("content-length", "0")
@@ -111,6 +114,37 @@ def test_operations_are_not_for_the_world_and_bodies_are_bounded(program: str, t
         assert posted(proxy.port, "/api/admin/uploads", 17 << 20) == 201
 
 
+def test_a_body_reaches_the_server_as_it_comes(program: str, tmp_path: Path) -> None:
+    with upstream() as (behind, asked), nginx(program, tmp_path, behind) as proxy:
+        head = b"POST /api/run/ratings/1 HTTP/1.1\r\nHost: x\r\nContent-Length: 2\r\n\r\na"
+        with socket.create_connection(("127.0.0.1", proxy.port)) as client:
+            client.sendall(head)
+            until = time.monotonic() + 10
+            while not asked:
+                assert time.monotonic() < until, "the server was not asked before the body had come"
+                time.sleep(0.02)
+            client.sendall(b"b")
+            assert b" 201 " in client.recv(200)
+
+
+def test_a_refused_request_leaves_no_address_in_a_log(program: str, tmp_path: Path) -> None:
+    with upstream() as (behind, _), nginx(program, tmp_path, behind) as proxy:
+        assert posted(proxy.port, "/api/links/a/runs", (64 << 10) + 1) == 413
+    logs = [path.read_text(encoding="utf-8") for path in tmp_path.rglob("*log*") if path.is_file()]
+    assert not [text for text in logs if "client:" in text]
+
+
+def test_an_emptied_cache_is_filled_anew(program: str, tmp_path: Path) -> None:
+    with upstream() as (behind, asked), nginx(program, tmp_path, behind) as proxy:
+        assert answer(proxy.port, ADDRESS) == (200, CLIP)
+        kept = [path for path in tmp_path.rglob("*") if path.is_file() and CLIP in path.read_bytes()]
+        assert kept
+        for path in kept:
+            shutil.rmtree(path.parent.parent)
+        assert answer(proxy.port, ADDRESS) == (200, CLIP)
+        assert len(asked) == 2
+
+
 def posted(port: int, path: str, size: int) -> int:
     """The status of a POST that says it is so long; its body follows where it is asked for."""
     done = subprocess.run(
@@ -128,6 +162,7 @@ def posted(port: int, path: str, size: int) -> int:
 
 def test_the_file_keeps_no_addresses_and_says_what_was_changed_for_loopback(tmp_path: Path) -> None:
     assert "access_log off;" in TEXT
+    assert "error_log /dev/null" in TEXT
     assert "listen 443 ssl" in TEXT
     site = (configuration(tmp_path, 8123, 8124).parent / "site.conf").read_text(encoding="utf-8")
     assert "server 127.0.0.1:8123;" in site

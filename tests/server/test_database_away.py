@@ -10,9 +10,11 @@ import pytest
 from fastapi.testclient import TestClient
 from sqlalchemy import text
 from sqlalchemy.exc import DBAPIError
+from sqlalchemy.exc import TimeoutError as PoolTimeout
 
 from server import context, db
 from server.app import create_app
+from server.cli_refusals import refusal
 from server.context import Services
 from server.db import Database, is_away
 from server.settings import Settings
@@ -82,6 +84,11 @@ def test_a_locked_database_is_told_apart_and_nobody_waits_in_a_queue(
         assert (answer.status_code, answer.json()["error"]["code"]) == (503, "database_busy")
         assert int(answer.headers["retry-after"]) > 0
     assert [participant.rate(trial).status_code for trial in trials] == [201] * 4
+
+
+def test_a_pool_that_is_used_up_is_no_other_program() -> None:
+    said = refusal(PoolTimeout("QueuePool limit of size 1 overflow 1 reached")) or ""
+    assert ("PALPEBRA_DATABASE_POOL" in said, "another program" in said) == (True, False)
 
 
 @pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)

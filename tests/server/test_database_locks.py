@@ -128,12 +128,39 @@ def test_a_lock_that_another_took_meanwhile_is_told_of(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     monkeypatch.setattr("server.locks_repository.HEARTBEAT_S", 1.0)
+    monkeypatch.setattr("server.locks_repository.OWN_LINE_S", 1.5)
     other = DatabaseLocks(services.database)
     with locks.held("one"):
         cut_lines_of_locks(services)
         soon(lambda: not other.is_held("one"))
         with other.held("one"):
             soon(lambda: "another process holds it now" in caplog.text)
+
+
+def test_a_lock_that_the_line_of_before_still_held_is_regained_when_that_ends(
+    services: Services,
+    locks: DatabaseLocks,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    monkeypatch.setattr("server.locks_repository.HEARTBEAT_S", 1.0)
+    before, other = DatabaseLocks(services.database), DatabaseLocks(services.database)
+    with locks.held("one"):
+        cut_lines_of_locks(services)
+        soon(lambda: not other.is_held("one"))
+        with before.held("one"):  # as a backend that has not noticed the cut
+            old = locks._connection
+            soon(lambda: locks._connection is not old and locks._connection is not None)
+            assert locks.is_held("one")
+            locks._changing.acquire()
+        try:
+            assert not locks.is_held("one")
+        finally:
+            locks._changing.release()
+        soon(lambda: other.is_held("one"))
+        assert locks.is_held("one")
+        assert "another process" not in caplog.text
+    assert not other.is_held("one")
 
 
 def test_a_silent_host_is_noticed_by_every_line(

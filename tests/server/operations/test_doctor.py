@@ -1,5 +1,6 @@
 import json
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 from server.context import Services, open_services
@@ -8,6 +9,7 @@ from server.operations.checks import CHECKS
 from server.operations.doctor import examine
 from server.operations.findings import Finding
 from server.operations.modes import close_to_others
+from server.operations.shared_checks import ledger
 from server.settings import Settings
 from tests.helpers.databases import run_server_command
 from tests.helpers.studies import StudyInDatabase
@@ -79,12 +81,27 @@ def test_a_ledger_left_in_the_data_folder_is_told_until_it_was_moved(
 ) -> None:
     erasures.note(settings, ["run-a", "run-b"])
     assert by_subject(services)["ledger of erasures"].verdict == "ok"
-    shared = settings.model_copy(update={"shared_folder": tmp_path / "shared"})
+    shared = settings.model_copy(update={"shared_folder": tmp_path / "it's shared"})
     erasures.note(shared, ["run-c"])
+    with erasures.ledger(shared).open("a", encoding="utf-8") as torn:
+        torn.write('{"run": "run-')
     sharing = open_services(shared)
     found = by_subject(sharing)["ledger of erasures"]
     assert (found.verdict, found.state[:2]) == ("failed", "2 "), found
     subprocess.run(["sh", "-c", found.advice.partition("run: ")[2]], check=True)
+    assert erasures.ledger(shared).stat().st_mode & 0o777 == 0o600
     found = by_subject(sharing)["ledger of erasures"]
     sharing.database.close()
     assert (found.verdict, set(erasures.noted(shared))) == ("ok", {"run-a", "run-b", "run-c"}), found
+
+
+def test_the_advised_command_makes_a_ledger_that_only_the_server_reads(
+    services: Services, settings: Settings, tmp_path: Path
+) -> None:
+    erasures.note(settings, ["run-a"])
+    shared = settings.model_copy(update={"shared_folder": tmp_path / "it's shared"})
+    erasures.ledger(shared).parent.mkdir()
+    [finding] = ledger(replace(services, settings=shared))
+    subprocess.run(["sh", "-c", finding.advice.partition("run: ")[2]], check=True)
+    assert erasures.ledger(shared).stat().st_mode & 0o777 == 0o600
+    assert erasures.noted(shared) == ["run-a"]
