@@ -30,6 +30,15 @@ def test_systemd_accepts_the_unit_and_would_not_accept_another(tmp_path: Path) -
     assert "PrivateTemp" in verified(tmp_path / "spoiled.service").stderr
 
 
+def test_systemd_finds_little_that_the_server_could_do_beyond_its_work() -> None:
+    analyze = shutil.which("systemd-analyze")
+    if analyze is None:
+        pytest.skip("no systemd-analyze on this machine")
+    command = [analyze, "security", "--offline=true", "--threshold=30", "--no-pager", str(UNIT)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout[-200:]  # 1.8 by systemd 252; without what is taken away 7.3
+
+
 def test_what_is_read_only_leaves_the_server_its_folders() -> None:
     """Uploads and the counts of several workers go through tempfile, everything else into the data folder."""
     unit = configparser.RawConfigParser(strict=False)
