@@ -1,38 +1,29 @@
 """`analysis plan`: how many participants, clips and faces a study needs, before there are data."""
 
 from dataclasses import asdict
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from analysis.commands.output import JsonOption, names_in, save_json
+from analysis.commands.output import JsonOption, save_json
+from analysis.commands.plan_options import (
+    AlphaOption,
+    PlotOption,
+    PowerOption,
+    SeedOption,
+    ShapeChoice,
+    SimulationsOption,
+    SizesOption,
+    counts_in,
+    effects_in,
+    levels_in,
+    numbers_in,
+)
 from analysis.commands.synthetic import StatisticChoice, bar, say_power
-from experiments.errors import InputError
 
 if TYPE_CHECKING:
     from analysis.power.designs import Design
-
-SizesOption = Annotated[
-    str, typer.Option("--n", help="Numbers of participants: first:last:step, or 20,30,43.")
-]
-SimulationsOption = Annotated[int, typer.Option(help="Data sets a number of participants.", min=1)]
-AlphaOption = Annotated[float, typer.Option(help="Level of the tests.", min=1e-6, max=0.5)]
-PowerOption = Annotated[float, typer.Option("--power", help="Power to look for.", min=0.01, max=0.999)]
-SeedOption = Annotated[int, typer.Option(help="Same seed, same numbers.", min=0)]
-PlotOption = Annotated[
-    Path | None, typer.Option(help="Draw the curves into this PNG, SVG or PDF.", show_default=False)
-]
-
-
-class ShapeChoice(StrEnum):
-    """Shapes of psychometric functions."""
-
-    NORMAL = "normal"
-    LOGISTIC = "logistic"
-    WEIBULL = "weibull"
-
 
 plan = typer.Typer(
     name="plan",
@@ -87,7 +78,7 @@ def anova(
     from analysis.power.factorial import FactorialDesign
 
     design = FactorialDesign(
-        _levels(within, "--within"), _levels(between, "--between"), _effects(effect or []), correlation,
+        levels_in(within, "--within"), levels_in(between, "--between"), effects_in(effect or []), correlation,
         statistic.value, covariate,
     )  # fmt: skip
     _simulate(design, "factorial design", (n, simulations, alpha, target, seed), plot, json)
@@ -133,9 +124,9 @@ def mixed(
 
     spreads = Spreads(sd_participant, sd_slope, sd_clip, sd_face, sd_face_slope, sd_residual)
     design = MixedDesign(
-        _numbers(difference, "--difference"),
-        _counts(clips, "--clips"),
-        _counts(faces, "--faces"),
+        numbers_in(difference, "--difference"),
+        counts_in(clips, "--clips"),
+        counts_in(faces, "--faces"),
         crossed,
         repeats,
         spreads,
@@ -182,8 +173,8 @@ def ordinal(
     from analysis.power.ordinal_models import OrdinalDesign
 
     design = OrdinalDesign(
-        _numbers(difference, "--difference"),
-        _numbers(shares, "--shares"),
+        numbers_in(difference, "--difference"),
+        numbers_in(shares, "--shares"),
         clips,
         crossed,
         sd_participant,
@@ -221,7 +212,7 @@ def pairs(
     """
     from analysis.power.choices import PairsDesign
 
-    design = PairsDesign(_numbers(abilities, "--abilities"), repeats, sd_rater, tie)
+    design = PairsDesign(numbers_in(abilities, "--abilities"), repeats, sd_rater, tie)
     _simulate(design, "paired comparisons", (n, simulations, alpha, target, seed), plot, json)
 
 
@@ -254,8 +245,8 @@ def thresholds(
     from analysis.power.choices import ThresholdDesign
 
     design = ThresholdDesign(
-        _numbers(levels, "--levels"), trials, threshold, difference, sd_people, sd_difference, spread, guess,
-        lapse, function.value, seed,
+        numbers_in(levels, "--levels"), trials, threshold, difference, sd_people, sd_difference, spread,
+        guess, lapse, function.value, seed,
     )  # fmt: skip
     _simulate(design, "thresholds", (n, simulations, alpha, target, seed), plot, json)
 
@@ -278,53 +269,12 @@ def _simulate(
     with bar("simulating", len(sizes) * simulations) as advance:
         result = simulate_design(design, name, sizes, simulations, alpha, seed, advance)
     text = sample_size_text(result, design, target, version("palpebra"))
+    numbers = asdict(result) | {"power": result.power.tolist(), "se": result.se.tolist()}
+    save_json(json, numbers | {"smallest_n": result.smallest_n(target), "text": text}, True)
     if plot is not None:
         from analysis.power.figure import save_power_figure
 
         save_power_figure(result, plot, target)
         typer.echo(f"written: {plot}")
-    numbers = asdict(result) | {"power": result.power.tolist(), "se": result.se.tolist()}
-    save_json(json, numbers | {"smallest_n": result.smallest_n(target), "text": text}, True)
     say_power(result, target)
     typer.echo("\n" + "\n".join(wrap(text)))
-
-
-def _levels(text: str, option: str) -> dict[str, int]:
-    levels: dict[str, int] = {}
-    for part in names_in(text):
-        name, _, count = part.partition(":")
-        if not name or not count.isdecimal() or int(count) < 2 or name in levels:
-            raise InputError(
-                f"{option} should be like face:3,blur:2 (names and numbers of levels), got '{text}'"
-            )
-        levels[name] = int(count)
-    return levels
-
-
-def _effects(given: list[str]) -> dict[str, float]:
-    sizes: dict[str, float] = {}
-    for text in given:
-        name, _, size = text.partition("=")
-        try:
-            sizes[name.strip()] = float(size)
-        except ValueError:
-            raise InputError(f"--effect should be like face=0.25 or face:group=0.1, got '{text}'") from None
-        if not 0 <= sizes[name.strip()] < 10:
-            raise InputError(
-                f"--effect takes Cohen's f from 0 (small .1, medium .25, large .4), got '{text}'"
-            )
-    return sizes
-
-
-def _numbers(text: str, option: str) -> tuple[float, ...]:
-    try:
-        return tuple(float(part) for part in names_in(text))
-    except ValueError:
-        raise InputError(f"{option} should be numbers separated by commas, got '{text}'") from None
-
-
-def _counts(text: str, option: str) -> tuple[int, ...]:
-    parts = names_in(text)
-    if not all(part.isdecimal() and int(part) > 0 for part in parts):
-        raise InputError(f"{option} should be whole numbers separated by commas, got '{text}'")
-    return tuple(int(part) for part in parts)

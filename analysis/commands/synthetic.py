@@ -89,9 +89,9 @@ def power(
     with bar("simulating", len(sizes) * simulations) as advance:
         result = simulate_power(plan, sizes, simulations, alpha, seed, statistic.value, advance)
     save_power_figure(result, figure, target)
-    typer.echo(f"written: {figure}")
     numbers = asdict(result) | {"power": result.power.tolist(), "se": result.se.tolist()}
     save_json(json, numbers | {"smallest_n": result.smallest_n(target)}, True)
+    typer.echo(f"written: {figure}")
     say_power(result, target)
 
 
