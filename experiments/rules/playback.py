@@ -14,7 +14,7 @@ class PlaybackRules(Declaration):
     A play breaking a `failed_*` limit is failed (its clip is offered again at the end of the block), one
     breaking a `flagged_*` limit is flagged. One whose animation clock ran more unevenly than
     `uncertain_unevenness_ms` is uncertain: all frames were drawn, and one may not have reached the screen.
-    What a frame may be late and is still shown comes on top: 0.7 of the refreshes for which it stays beyond
+    What a frame may be late and is still shown comes on top: 0.9 of the refreshes for which it stays beyond
     one, or of what the only one leaves; it is never more than 0.9 of the time for which it stays. Any other
     play is good.
     """

@@ -17,10 +17,9 @@ GOOD: Ruling = ("good", "")
 INTERRUPTED = "interrupted"
 """A view that was broken off by a reload or a crash: the play has no answer."""
 ASSUMED_REFRESH_HZ = 60.0
-SLACK_SHARE = 0.7
-"""Share of a frame's slack that the clock may be uneven by, by `make scope` (decisions 0351, 0789)."""
 SHOWN_SHARE = 0.9
-"""Of the time for which a frame stays: one that came later was not seen, whatever was declared."""
+"""Share of a frame's slack that the clock may be uneven by, by `make scope` (decision 0802), and of the time for
+which a frame stays: one that came later was not seen, whatever was declared."""
 ROUNDING = 0.05
 """60 fps on a screen of 59.9 Hz counts as one refresh a frame."""
 
@@ -153,7 +152,7 @@ def _limit_ms(allowed_ms: float, refresh_rate_hz: float | None, fps: float) -> f
     """
     slack_ms = _slack_ms(refresh_rate_hz, fps, allowed_ms)
     stays_ms = max(1, _refreshes(refresh_rate_hz, fps)) * _refresh_ms(refresh_rate_hz)
-    return min(allowed_ms + SLACK_SHARE * max(0.0, slack_ms), SHOWN_SHARE * stays_ms)
+    return min(allowed_ms + SHOWN_SHARE * max(0.0, slack_ms), SHOWN_SHARE * stays_ms)
 
 
 def _slack_ms(refresh_rate_hz: float | None, fps: float, allowed_ms: float) -> float:

@@ -30,7 +30,7 @@ def _rating(late_ms: float) -> RatingIn:
     return RatingIn.model_validate({"trial_index": 0, "answer": answer, "playback": playback})
 
 
-@pytest.mark.parametrize(("late_ms", "verdict"), [(12, "good"), (14, "uncertain")])
+@pytest.mark.parametrize(("late_ms", "verdict"), [(14, "good"), (16, "uncertain")])
 @pytest.mark.parametrize("slow_first", [True, False])
 def test_clips_of_several_rates_are_judged_by_the_greatest(
     late_ms: float, verdict: str, slow_first: bool
