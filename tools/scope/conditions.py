@@ -11,12 +11,19 @@ from dataclasses import dataclass
 from tools.scope.browser import Browser
 
 HOGS = 4
-HOG = "while True: pass"
+# Either ends with the bench, which may be killed.
+HOG = """
+import os
+bench = os.getppid()
+while os.getppid() == bench:
+    pass
+"""
 WRITER = """
 import os, sys, tempfile
+bench = os.getppid()
 block = os.urandom(1 << 20)
 with tempfile.TemporaryFile(dir=sys.argv[1]) as file:
-    while True:
+    while os.getppid() == bench:
         file.seek(0)
         for _ in range(64):
             file.write(block)
