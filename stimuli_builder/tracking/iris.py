@@ -21,7 +21,7 @@ RADII = (0.165, 0.34)
 ARC = math.radians(52)
 """Half of each arc, left and right, on which the edge is looked for: above and below are the lids."""
 ANGLES = 11
-LEAST_OPEN = 0.2
+LEAST_OPEN = 0.25
 """Opening, as part of the eye's width, below which lids leave too little of the edge."""
 LEAST_STEP = 4.0
 """Grey levels by which the picture must get brighter across the edge."""
