@@ -72,9 +72,8 @@ class DatabaseLocks:
     def is_held(self, name: str) -> bool:
         """Whether any process holds a lock."""
         number = _number(name)
-        if (
-            number in self._held and number not in self._lost
-        ):  # also where PostgreSQL was started anew meanwhile
+        # Its own word goes: also where PostgreSQL was started anew meanwhile.
+        if number in self._held and number not in self._lost:
             return True
         query = text("SELECT pg_try_advisory_xact_lock_shared(:number)")
         with self._database.engine.connect() as connection:

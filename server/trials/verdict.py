@@ -146,27 +146,18 @@ def _unevenness_ms(playback: Playback) -> float | None:
 
 
 def _limit_ms(allowed_ms: float, refresh_rate_hz: float | None, fps: float) -> float:
-    """How late a frame may be drawn and is still seen: what is allowed to every frame, and most of the slack.
+    """How late a frame may be drawn and is still seen.
 
-    On screens of more than some 220 Hz the allowed time alone may be longer than the frame stays.
-    """
-    slack_ms = _slack_ms(refresh_rate_hz, fps, allowed_ms)
-    stays_ms = max(1, _refreshes(refresh_rate_hz, fps)) * _refresh_ms(refresh_rate_hz)
-    return min(allowed_ms + SHOWN_SHARE * max(0.0, slack_ms), SHOWN_SHARE * stays_ms)
-
-
-def _slack_ms(refresh_rate_hz: float | None, fps: float, allowed_ms: float) -> float:
-    """How much later than allowed to every frame one may be drawn and is still seen.
-
-    That is the time for which it stays beyond one refresh. Where it stays for one alone it is what that
-    leaves: pages draw so that no picture waits before the screen, and then one that comes in its refresh is
-    shown (decision 0789). A rate that was not measured leaves nothing: the screen may be a faster one.
+    Beyond what is allowed to every frame that is most of the time for which it stays after its first refresh.
+    One that stays for a single refresh may come within most of it: pages draw so that no picture waits before
+    the screen (decision 0789). Where the rate was not measured it gets what is allowed alone: the screen may
+    be a faster one.
     """
     refresh_ms = _refresh_ms(refresh_rate_hz)
-    refreshes = _refreshes(refresh_rate_hz, fps)
-    if refreshes > 1:
-        return (refreshes - 1) * refresh_ms
-    return 0.0 if refresh_rate_hz is None else refresh_ms - allowed_ms
+    refreshes = max(1, _refreshes(refresh_rate_hz, fps))
+    if refreshes == 1 and refresh_rate_hz is not None:
+        return SHOWN_SHARE * refresh_ms
+    return min(allowed_ms, SHOWN_SHARE * refresh_ms) + SHOWN_SHARE * (refreshes - 1) * refresh_ms
 
 
 def _refreshes(refresh_rate_hz: float | None, fps: float) -> int:
