@@ -12,6 +12,10 @@ BASE = (0.86, 0.73, 0.595)
 FILM_IOR = 1.376
 ROOM_MIRRORED = 0.5
 """Share of the room's light that the eyes mirror: half of what lies about them is the face itself."""
+ROUNDED = 3.0
+"""Exponent of a lamp's outline as the eyes mirror it: 2 is an ellipse, and beyond 8 a square."""
+HOT = 1.8
+"""Light of a mirrored lamp's middle over that of its rim: the bulb behind a soft box's cloth."""
 MELANIN, BLOOD = (1.0, 1.33, 1.64), (0.06, 0.84, 0.86)
 
 
@@ -116,7 +120,7 @@ def skin(look: dict[str, Any]) -> Any:
         height = n.math("SUBTRACT", height, n.math("MULTIPLY", part, depth))
     dry = n.math("SUBTRACT", 1.0, wet)
     bump = n.add("Bump", Strength=1.0, Distance=1.0, Height=n.math("MULTIPLY", height, dry)).outputs[0]
-    shader = n.add("BsdfPrincipled", IOR=1.4, Specular_IOR_Level=0.5)
+    shader, shine = n.add("BsdfPrincipled", IOR=1.4), n.attribute("shine")
     n.put(_skin_colour(n, grain, pit, furrow, line), shader.inputs["Base Color"])
     n.put(n.math("SUBTRACT", n.attribute("rough"), n.math("MULTIPLY", wet, 0.26)), shader.inputs["Roughness"])
     dark = look["melanin"] > 0.9
@@ -125,7 +129,8 @@ def skin(look: dict[str, Any]) -> Any:
     for name, value in (
         ("Normal", bump),
         ("Coat Normal", bump),
-        ("Coat Weight", 0.10 if dark else 0.13),
+        ("Specular IOR Level", n.math("MULTIPLY", shine, 0.5)),
+        ("Coat Weight", n.math("MULTIPLY", shine, 0.10 if dark else 0.13)),
         ("Coat Roughness", 0.26),
         ("Subsurface Weight", 1.0),
         ("Subsurface Radius", (1.0, 0.34, 0.17)),
@@ -212,7 +217,7 @@ def reflected(n: Nodes, normal: Any, lights: dict[str, Any], room: float = ROOM_
 
 
 def _lamp_share(n: Nodes, start: Any, away: Any, lamp: dict[str, Any]) -> Any:
-    """1 where a ray meets the lamp's rectangle, 0 beside it, with an edge as soft as a soft box's."""
+    """1 where a ray meets the lamp, a rectangle with rounded corners, 0 beside it, with a soft box's edge."""
     centre = Vector(lamp["place"])
     turned = (Vector(lamp["aim"]) - centre).to_track_quat("-Z", "Y")
     across, up, back = (turned @ Vector(axis) for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))
@@ -221,10 +226,13 @@ def _lamp_share(n: Nodes, start: Any, away: Any, lamp: dict[str, Any]) -> Any:
     way = n.math("DIVIDE", n.vector("DOT_PRODUCT", towards, list(back)), facing)
     off = n.vector("SUBTRACT", n.vector("SCALE", away, scale=way), towards)
     share = n.math("MULTIPLY", n.math("GREATER_THAN", way, 0.0), n.math("GREATER_THAN", facing, 0.0))
+    beside = []
     for axis, size in ((across, lamp["size"][0]), (up, lamp["size"][1])):
-        beside = n.math("ABSOLUTE", n.vector("DOT_PRODUCT", off, [c * 2 / size for c in axis]))
-        share = n.math("MULTIPLY", share, n.ramp(beside, 0.80, 1.06, 1.0, 0.0))
-    return share
+        aside = n.math("ABSOLUTE", n.vector("DOT_PRODUCT", off, [c * 2 / size for c in axis]))
+        beside.append(n.math("POWER", aside, ROUNDED))
+    edge = n.math("POWER", n.math("ADD", *beside), 1 / ROUNDED)
+    hot = n.ramp(edge, 0.0, 1.0, HOT, 1.0)
+    return n.math("MULTIPLY", n.math("MULTIPLY", share, hot), n.ramp(edge, 0.65, 1.10, 1.0, 0.0))
 
 
 def tear(lights: dict[str, Any]) -> Any:
@@ -245,7 +253,7 @@ def flesh(look: dict[str, Any]) -> Any:
     n = Nodes("flesh")
     dark = math.exp(-0.25 * look["melanin"])
     shader = n.add("BsdfPrincipled", Roughness=0.45, Coat_Weight=0.2, Coat_Roughness=0.2)
-    shader.inputs["Base Color"].default_value = (0.60 * dark, 0.29 * dark, 0.245 * dark, 1)
+    shader.inputs["Base Color"].default_value = (0.64 * dark, 0.37 * dark, 0.31 * dark, 1)
     shader.inputs["Subsurface Weight"].default_value = 0.8
     shader.inputs["Subsurface Radius"].default_value = (1.0, 0.35, 0.25)
     shader.inputs["Subsurface Scale"].default_value = 0.08

@@ -134,9 +134,10 @@ def caruncle(path: BlinkPath, posed: Array, side: int) -> Mesh:
     tip = _nasal_tip(path, posed, side, EDGE_LOOP)
     corner = _nasal_tip(path, posed, side, LASH_LOOP)
     tilt = -side * 0.5
-    main = _ellipsoid(tip + np.array([side * 0.16, -0.025, -0.035]), (0.19, 0.10, 0.11), tilt)
+    # Wide and sunk in, so that they stand out as one mound; rounder ones looked like beads.
+    main = _ellipsoid(tip + np.array([side * 0.13, -0.03, -0.070]), (0.25, 0.13, 0.105), tilt)
     fold = _ellipsoid(tip + np.array([side * 0.30, -0.02, -0.075]), (0.17, 0.14, 0.08), tilt)
-    filling = _ellipsoid(corner + np.array([side * 0.05, 0.0, -0.035]), (0.085, 0.055, 0.055), tilt)
+    filling = _ellipsoid(corner + np.array([side * 0.09, -0.01, -0.055]), (0.15, 0.075, 0.055), tilt)
     meshes = [main, fold, filling]
     starts = np.cumsum([0, *[len(mesh.vertices) for mesh in meshes[:-1]]])
     quads = np.concatenate([mesh.quads + start for mesh, start in zip(meshes, starts, strict=True)])

@@ -108,6 +108,11 @@ class FaceSkin:
         return posed
 
     @cached_property
+    def flat(self) -> Array:
+        """(n, 3) vertices with both lids shut, before relief: their skin lies drawn out flat."""
+        return self.fine(self.path.at(dict.fromkeys(SIDES, 1.0)))
+
+    @cached_property
     def _waves(self) -> tuple[Array, Array, Array]:
         """Noise along the lid (which bends the fold), across it (fine lines) and of the skin's surface."""
         at, seed = self.coordinates, self.identity.seed
@@ -117,7 +122,7 @@ class FaceSkin:
         return (
             0.35 * value_noise(along, seed + 5, 2),
             value_noise(lines, seed + 8, 3),
-            value_noise(self.rest * 4.5, seed + 30, 3),
+            value_noise(self.flat * 4.5, seed + 30, 3),
         )
 
     def _relief(self, stroke: Array) -> Array:

@@ -10,6 +10,11 @@ from stimuli_builder.characters.facekit.lid_skin import FaceSkin, age_depth
 from stimuli_builder.characters.facekit.sphere import smooth
 
 SPOTS = 220
+LID_MELANIN, LID_BLOOD, LID_ROUGH, LID_DULL = 0.25, 0.07, 0.12, 0.6
+"""The upper lid against the skin about it: pigments, roughness, and the share of gloss that it lacks.
+
+As oily as a brow, a shut lid shone as bright as the catchlight that it had covered.
+"""
 NOSE, CHIN, BRIDGE, NOSTRILS, LIPS = 30, 8, 27, (31, 35), slice(48, 60)
 """Numbers of Multi-PIE landmarks."""
 
@@ -19,6 +24,8 @@ class Pigments:
 
     def __init__(self, skin: FaceSkin) -> None:
         self.skin, self.look, self.rest = skin, skin.identity.skin, skin.rest
+        # Texture is drawn on the shut lids: on the open ones a blink stretched it into upright streaks.
+        self.flat = skin.flat
         self.seed = skin.identity.seed
         self.landmarks = skin.path.rest[skin.path.kit.landmarks]
         self.front = smooth(2.0, 5.0, self.rest[:, 2])
@@ -30,8 +37,9 @@ class Pigments:
         """Values by attribute name: (n,) or, of coordinates, (n, 3)."""
         lips = self._lips()
         wet, fine, coordinates = self._lid_values()
-        melanin = self._melanin(lips) * (1 - 0.35 * wet)
-        haemoglobin = self._haemoglobin(lips) + wet * 0.30
+        lid = self._upper_lid()
+        melanin = self._melanin(lips) * (1 - 0.35 * wet) * (1 + LID_MELANIN * lid)
+        haemoglobin = self._haemoglobin(lips) + wet * 0.30 + LID_BLOOD * lid
         melanin *= 1 + self.contrast * (0.10 * self._noise(1.3, 11) + 0.10 * self._noise(6.0, 12))
         haemoglobin *= 1 + 0.13 * self._noise(1.8, 13, 4) + 0.15 * self._noise(9.0, 14)
         # Fine speckle per vertex: as noise in the shader it doubled the time of a render.
@@ -42,21 +50,22 @@ class Pigments:
         melanin += self._spots()
         warp = 0.045 * np.stack([self._noise(3.5, k, 2) for k in (19, 20, 21)], -1)
         return {
-            "rest": self.rest,
-            "warp": self.rest + warp,
+            "rest": self.flat,
+            "warp": self.flat + warp,
             "lidc": coordinates,
             "mel": np.clip(melanin, 0.02, None),
             "hem": np.clip(haemoglobin, 0.02, None),
             "pore": np.clip(self._pores(lips), 0, 1.5)
             * np.clip(0.7 + 0.4 * self._noise(5.0, 16, 1), 0.15, 1.2),
             "net": np.clip(0.75 + 0.35 * self._noise(2.6, 17, 2), 0.2, 1.3) * age_depth(self.look.age) ** 0.5,
-            "rough": np.clip(self._roughness(lips), 0.2, 0.6),
+            "rough": np.clip(self._roughness(lips) + LID_ROUGH * lid, 0.2, 0.6),
+            "shine": 1 - LID_DULL * lid,
             "wet": wet,
             "fine": fine * age_depth(self.look.age) ** 0.7,
         }
 
     def _noise(self, scale: float, offset: int, octaves: int = 3) -> Array:
-        return value_noise(self.rest * scale, self.seed + offset, octaves) / 1.9
+        return value_noise(self.flat * scale, self.seed + offset, octaves) / 1.9
 
     def _spot(self, centre: Array, width: float, height: float) -> Array:
         x, y = self.rest[:, 0] - centre[0], self.rest[:, 1] - centre[1]
@@ -111,6 +120,11 @@ class Pigments:
         out -= 0.06 * self._spot(self.landmarks[BRIDGE] + np.array([0, 2.8, 0]), 3.0, 1.5)
         return np.asarray(out - 0.05 * (self.skin.coordinates.loop < 7) + 0.04 * self._noise(8.0, 18, 2))
 
+    def _upper_lid(self) -> Array:
+        """(n,) 1 on the upper lids' skin, 0 at their margins and from the fold upwards."""
+        at = self.skin.coordinates
+        return np.asarray(smooth(2.8, 4.5, at.loop) * smooth(12.5, 8.5, at.loop) * at.upper)
+
     def _pores(self, lips: Array) -> Array:
         depth = 0.8 + 0.2 * age_depth(self.look.age)
         out = 0.50 * depth + 0.55 * self._spot(self.landmarks[NOSE], 1.3, 1.2)
@@ -143,13 +157,13 @@ class Pigments:
         out = np.zeros(len(self.rest))
         loop = self.skin.coordinates.loop
         places = np.flatnonzero((self.rest[:, 2] > 5) & (loop > 6))
-        tree = cKDTree(self.rest)
+        tree = cKDTree(self.flat)
         for point in rng.choice(places, SPOTS):
             mole = rng.random() < 0.04
             size = rng.uniform(0.05, 0.09) if mole else rng.uniform(0.015, 0.05)
             strength = (0.25 if mole else 0.13) * rng.uniform(0.3, 1)
-            near = tree.query_ball_point(self.rest[point], 0.22)
-            distance2 = ((self.rest[near] - self.rest[point]) ** 2).sum(1)
+            near = tree.query_ball_point(self.flat[point], 0.22)
+            distance2 = ((self.flat[near] - self.flat[point]) ** 2).sum(1)
             # A blink draws the skin of the lids to several times its height, and a mole with it to a streak.
             stays = smooth(8.0, 13.0, loop[point]) if mole else 0.3 + 0.7 * smooth(7.0, 12.0, loop[point])
             out[near] += stays * strength * np.exp(-distance2 / size**2)

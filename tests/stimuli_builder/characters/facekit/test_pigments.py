@@ -1,0 +1,56 @@
+"""What the skin's shader is told of the upper lids: where its texture lies, and how they shine."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from stimuli_builder.characters.facekit.blink_path import BlinkPath
+from stimuli_builder.characters.facekit.identity import identity_of_seed
+from stimuli_builder.characters.facekit.kit import FaceKit
+from stimuli_builder.characters.facekit.lid_skin import FaceSkin, lid_skin
+from stimuli_builder.characters.facekit.pigments import Pigments
+
+Array = NDArray[np.float64]
+
+
+@pytest.fixture(scope="module")
+def skin(kit: FaceKit) -> FaceSkin:
+    identity = identity_of_seed(4)
+    return lid_skin(BlinkPath(kit, identity.rest(kit), identity.movement), identity, levels=2, loops=14)
+
+
+@pytest.fixture(scope="module")
+def values(skin: FaceSkin) -> dict[str, Array]:
+    return Pigments(skin).values()
+
+
+def on_lid(skin: FaceSkin) -> NDArray[np.bool_]:
+    """Vertices on the middle of the upper lids' skin."""
+    at = skin.coordinates
+    return (at.upper > 0.95) & (at.loop > 4.6) & (at.loop < 8) & (np.abs(at.azimuth) < 0.6)
+
+
+def lengths(skin: FaceSkin, points: Array) -> Array:
+    """Lengths of the edges between vertices of the upper lids."""
+    quads = skin.fine.quads[on_lid(skin)[skin.fine.quads].all(axis=1)]
+    return np.asarray(np.linalg.norm(points[quads] - points[np.roll(quads, 1, axis=1)], axis=-1).ravel())
+
+
+def test_texture_is_not_drawn_out_on_the_shut_lid(skin: FaceSkin, values: dict[str, Array]) -> None:
+    shut = lengths(skin, skin.at(1.0))
+    # Of the open lid it was up to six times as high when shut, and any grain in it a streak.
+    assert np.percentile(shut / lengths(skin, skin.rest), 95) > 2.5
+    for name in ("rest", "warp"):
+        least, most = np.percentile(shut / lengths(skin, values[name]), (5, 95))
+        assert least > 0.6, name
+        assert most < 1.6, name
+
+
+def test_the_upper_lid_is_duller_and_darker_than_the_skin_beyond(
+    skin: FaceSkin, values: dict[str, Array]
+) -> None:
+    lid, beyond = on_lid(skin), skin.coordinates.loop > 12.9
+    assert values["shine"][lid].max() < 0.5
+    assert values["shine"][beyond].min() == 1.0
+    assert values["rough"][lid].mean() - values["rough"][beyond].mean() > 0.04
+    assert values["mel"][lid].mean() > 1.15 * values["mel"][beyond & (skin.coordinates.upper < 0.5)].mean()
