@@ -154,7 +154,11 @@ def _label_free(job: TrackJob, info: VideoInfo) -> tuple[CoupledModel, Mapping[i
         task = progress.add_task("finding eyes", total=info.frame_count)
         seen = survey(info, one_eye=job.one_eye, advance=lambda now: progress.update(task, completed=now))
     line = f"eyes found on {len(seen.points):,} of {seen.looked_at:,} frames looked at"
-    more = f"; {seen.several_faces:,} show several faces, the largest is taken" if seen.several_faces else ""
+    more = (
+        f"; {seen.several_faces:,} show several faces, the largest over the recording is taken"
+        if seen.several_faces
+        else ""
+    )
     print(f"{line}{more}; training on them", flush=True)
     lesson = label_free_lesson(info, seen, job.options, one_eye=job.one_eye, by_hand=by_hand)
     report_modes(lesson)

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import InputError
-from stimuli_builder.tracking.detector.detection import LidDetector
+from stimuli_builder.tracking.detector.detection import Detection
 from stimuli_builder.tracking.detector.mesh import open_detector
+from stimuli_builder.tracking.detector.one_face import one_face
 from stimuli_builder.tracking.labels import Labels, save_labels
 from stimuli_builder.tracking.learn import Lesson, lesson_from
 from stimuli_builder.tracking.model import TrainingOptions
@@ -57,7 +58,7 @@ class Survey:
     looked_at : int
         Frames looked at.
     several_faces : int
-        Frames among them with more than one face; the largest was taken.
+        Frames among them with more than one face; the one larger over the recording was taken.
     """
 
     points: dict[int, Points]
@@ -74,20 +75,20 @@ def survey(info: VideoInfo, *, one_eye: bool, advance: Callable[[int], None] | N
         Too few frames show a face, or what was found is no face.
     """
     step = max(1, -(-info.frame_count // LOOKED_AT))
-    labels: dict[int, Points] = {}
-    several = looked = 0
+    seen: dict[int, list[Detection]] = {}
     first = _first(info, step) if one_eye else ()
     with open_detector(one_eye=one_eye, first=first) as detector:
         pictures = frames(info.path, read=_every(step))
         for number, picture in enumerate(islice(pictures, info.frame_count)):
             if not picture.size:
                 continue
-            looked += 1
-            several += _look(detector, number, picture, info, labels)
+            seen[number] = detector.detect(picture)
             if advance is not None:
                 advance(number)
-    _require_face(info, labels, looked, one_eye)
-    return Survey(labels, looked, several)
+    several = sum(len(faces) > 1 for faces in seen.values())
+    labels = {n: face.points for n, face in one_face(seen).items() if _inside(face.points, info)}
+    _require_face(info, labels, len(seen), one_eye)
+    return Survey(labels, len(seen), several)
 
 
 def _first(info: VideoInfo, step: int) -> list[Picture]:
@@ -107,16 +108,9 @@ def _every(step: int) -> Callable[[Any], Picture]:
     return read
 
 
-def _look(
-    detector: LidDetector, number: int, picture: Picture, info: VideoInfo, labels: dict[int, Points]
-) -> bool:
-    """Add what one frame shows; return whether it shows several faces."""
-    seen = detector.detect(picture)
-    if seen is None:
-        return False
-    if (seen.points >= 0).all() and (seen.points <= np.array(info.size_px) - 1).all():
-        labels[number] = seen.points
-    return seen.faces > 1
+def _inside(points: Points, info: VideoInfo) -> bool:
+    """Whether all points lie in the picture."""
+    return bool((points >= 0).all() and (points <= np.array(info.size_px) - 1).all())
 
 
 def _require_face(info: VideoInfo, labels: dict[int, Points], looked: int, one_eye: bool) -> None:

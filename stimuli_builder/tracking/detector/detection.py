@@ -23,22 +23,22 @@ class Detection:
         (18, 2) or, for one eye, (9, 2) in pixels, in the order of label files.
     iris : float64 array (eyes, 5, 2)
         Centre and four points of each iris's edge.
-    faces : int
-        Faces seen in the picture; the largest is the one given.
+    box : float64 array (4,)
+        Least x and y, then greatest x and y, of the face; of the eye in a close-up.
     """
 
     points: Points
     iris: Points
-    faces: int
+    box: Points
 
 
 class LidDetector(Protocol):
-    """Finds the eyes of a face in one picture, without a memory of the one before."""
+    """Finds the eyes of faces in one picture, without a memory of the one before."""
 
     eyes: int
 
-    def detect(self, picture: Picture) -> Detection | None:
-        """Return the eyes in an RGB picture (h, w, 3), or None where there are none."""
+    def detect(self, picture: Picture) -> list[Detection]:
+        """Return the eyes of each face in an RGB picture (h, w, 3), the largest first."""
 
 
 def eye_points(upper: Points, lower: Points) -> Points:

@@ -19,24 +19,22 @@ JITTERS = ((0, 0, 0.9), (0, 0, 1.1), (0.05, 0, 1.0), (0, 0.05, 1.0))
 
 
 class FaceMesh:
-    """Both eyes of the largest face in a picture."""
+    """Both eyes of every face in a picture."""
 
     eyes = 2
 
     def __init__(self, client: MeshClient):
         self._client = client
 
-    def detect(self, picture: Picture) -> Detection | None:
-        """Return the eyes of the largest face whose eyes are 10 px wide or more."""
-        faces = self._client.ask("faces", picture)["faces"]
-        if not faces:
-            return None
-        face = max(faces, key=lambda one: (one["box"][2] - one["box"][0]) * (one["box"][3] - one["box"][1]))
-        eyes = [eye_points(np.array(upper), np.array(lower)) for upper, lower, _ in face["eyes"]]
-        points = np.concatenate(eyes)
-        if min(eye_axis(eye)[2] for eye in eyes) < LEAST_EYE_PX:
-            return None
-        return Detection(points, np.array([iris for _, _, iris in face["eyes"]]), len(faces))
+    def detect(self, picture: Picture) -> list[Detection]:
+        """Return the eyes of the faces whose eyes are 10 px wide or more, the largest face first."""
+        eyes_of_faces = []
+        for face in self._client.ask("faces", picture)["faces"]:
+            eyes = [eye_points(np.array(upper), np.array(lower)) for upper, lower, _ in face["eyes"]]
+            if min(eye_axis(eye)[2] for eye in eyes) >= LEAST_EYE_PX:
+                iris = np.array([iris for _, _, iris in face["eyes"]])
+                eyes_of_faces.append(Detection(np.concatenate(eyes), iris, np.array(face["box"])))
+        return sorted(eyes_of_faces, key=lambda one: -float(np.prod(one.box[2:] - one.box[:2])))
 
 
 class CloseUp:
@@ -87,17 +85,18 @@ class CloseUp:
             for upper, lower, _ in answers
         ]
 
-    def detect(self, picture: Picture) -> Detection | None:
+    def detect(self, picture: Picture) -> list[Detection]:
         """Return the eye in the region found before."""
         if self._region is None:
-            return None
+            return []
         ((upper, lower, iris),) = self._client.ask("eye", picture, regions=[self._region])["eyes"]
         up, low = np.array(upper), np.array(lower)
         # One-eye files begin at the image-left canthus, whichever that is.
         if up[0, 0] > up[-1, 0]:
             up, low = up[::-1], low[::-1]
         points = eye_points(up, low[::-1])
-        return Detection(points, np.array([iris]), 1)
+        box = np.concatenate([points.min(0), points.max(0)])
+        return [Detection(points, np.array([iris]), box)]
 
 
 @contextmanager

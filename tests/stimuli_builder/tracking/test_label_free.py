@@ -224,7 +224,7 @@ def test_points_stay_where_they_are_when_a_picture_is_enlarged(detector, shared_
     with open_detector(one_eye=False) as mesh:
         for picture in pictures:
             large = cv2.resize(picture, None, fx=3, fy=3, interpolation=cv2.INTER_CUBIC)
-            moved.append((mesh.detect(large).points + 0.5) / 3 - 0.5 - mesh.detect(picture).points)
+            moved.append((mesh.detect(large)[0].points + 0.5) / 3 - 0.5 - mesh.detect(picture)[0].points)
     assert np.mean(moved, axis=(0, 1)) == pytest.approx([0, 0], abs=0.15)
 
 

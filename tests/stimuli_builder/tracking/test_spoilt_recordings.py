@@ -287,6 +287,20 @@ def test_of_two_faces_the_larger_is_taken_and_counted(face, tmp_path):
         assert points + np.array([110, 0]) == pytest.approx(one.points[number], abs=3)
 
 
+def test_of_two_faces_that_change_size_one_is_tracked_throughout(face, tmp_path):
+    video = tmp_path / "crossing.mp4"
+    wide = [np.full((360, 640), 128, np.uint8) for _ in face]
+    for number, (picture, one) in enumerate(zip(wide, face, strict=True)):
+        for start, share in ((0, 1 - number / 71), (320, number / 71)):
+            side = 2 * round(120 + 40 * share)
+            shown = cv2.resize(one[:, 140:460], (side, side), interpolation=cv2.INTER_AREA)
+            picture[20 : 20 + side, start : start + side] = shown
+    write_frames(video, wide, fps=30)
+    seen = survey(scan_video(video), one_eye=False)
+    assert seen.several_faces > 6
+    assert len({points.mean(0)[0] > 320 for points in seen.points.values()}) == 1
+
+
 def test_a_face_on_its_side_is_refused_or_its_eyes_lie_where_they_are(face, tmp_path):
     video = tmp_path / "side.mp4"
     turned = [np.ascontiguousarray(np.rot90(picture)) for picture in face]
