@@ -107,9 +107,12 @@ def save_report(contents: "Contents", folder: Path, more: bool = False, with_r: 
     files = ", ".join(path.name for path in paths)
     typer.echo("\n".join(wrap(f"written to {folder}: {files}")))
     if with_r:
-        with saying("R"):
-            said = verify_with_r(paths)
-        typer.echo(said)
+        for said in verify_with_r(paths, _say_model):
+            typer.echo(said)
+
+
+def _say_model(script: str) -> None:
+    typer.echo(f"{script}: R fits the model anew, which takes minutes; Ctrl-C leaves it unverified", err=True)
 
 
 @contextmanager

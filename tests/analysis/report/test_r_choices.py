@@ -45,7 +45,7 @@ def written(contents: Contents, folder: Path) -> Path:
 @needs_r
 @pytest.mark.parametrize("ties", [0.0, 0.2])
 def test_r_agrees_with_abilities_differences_and_tests(tmp_path, ties) -> None:
-    said = verify_with_r([written(of_pairs(tmp_path, ties), tmp_path)])
+    (said,) = verify_with_r([written(of_pairs(tmp_path, ties), tmp_path)])
     assert "Every number agrees with R." in said
     robust = ("robust se", "difference robust se", "difference robust p", "robust p Holm")
     tests = ("difference p Holm", "equal abilities", "advantage of a side", "factor chi2")
@@ -55,7 +55,7 @@ def test_r_agrees_with_abilities_differences_and_tests(tmp_path, ties) -> None:
 
 @needs_r
 def test_r_agrees_with_thresholds_and_their_differences(tmp_path) -> None:
-    said = verify_with_r([written(of_thresholds(tmp_path), tmp_path)])
+    (said,) = verify_with_r([written(of_thresholds(tmp_path), tmp_path)])
     assert "Every number agrees with R." in said
     for table in ("threshold", "spread", "difference", "p Holm"):
         assert re.search(rf"^{table} .*agree$", said, re.MULTILINE), said
@@ -70,7 +70,7 @@ def test_r_finds_a_changed_number(tmp_path, made, table) -> None:
     *key, value = line.split(",")
     script.write_text(text.replace(line, ",".join([*key, repr(float(value) + 0.01)])), encoding="utf-8")
     with pytest.raises(InputError, match=rf"{table} .*DIFFER"):
-        verify_with_r([script])
+        list(verify_with_r([script]))
 
 
 def test_no_name_of_a_person_or_cell_stands_in_code(tmp_path) -> None:
