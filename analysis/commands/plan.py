@@ -1,18 +1,16 @@
 """`analysis plan`: how many participants, clips and faces a study needs, before there are data."""
 
-from dataclasses import asdict
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from analysis.commands.output import JsonOption, save_json
+from analysis.commands.output import JsonOption
+from analysis.commands.plan_choices import pairs, thresholds
 from analysis.commands.plan_options import (
     AlphaOption,
     PlotOption,
     PowerOption,
     SeedOption,
-    ShapeChoice,
     SimulationsOption,
     SizesOption,
     counts_in,
@@ -20,10 +18,8 @@ from analysis.commands.plan_options import (
     levels_in,
     numbers_in,
 )
-from analysis.commands.synthetic import StatisticChoice, bar, say_power
-
-if TYPE_CHECKING:
-    from analysis.power.designs import Design
+from analysis.commands.plan_simulation import simulate
+from analysis.commands.synthetic import StatisticChoice
 
 plan = typer.Typer(
     name="plan",
@@ -34,6 +30,8 @@ plan = typer.Typer(
 
 def register(app: typer.Typer) -> None:
     """Add the commands to `app`."""
+    plan.command(name="pairs")(pairs)
+    plan.command(name="thresholds")(thresholds)
     app.add_typer(plan)
 
 
@@ -81,7 +79,7 @@ def anova(
         levels_in(within, "--within"), levels_in(between, "--between"), effects_in(effect or []), correlation,
         statistic.value, covariate,
     )  # fmt: skip
-    _simulate(design, "factorial design", (n, simulations, alpha, target, seed), plot, json)
+    simulate(design, "factorial design", (n, simulations, alpha, target, seed), plot, json)
 
 
 @plan.command(name="mixed")
@@ -131,7 +129,7 @@ def mixed(
         repeats,
         spreads,
     )
-    _simulate(design, "mixed model", (n, simulations, alpha, target, seed), plot, json)
+    simulate(design, "mixed model", (n, simulations, alpha, target, seed), plot, json)
 
 
 @plan.command(name="ordinal")
@@ -181,100 +179,4 @@ def ordinal(
         sd_slope,
         sd_clip,
     )
-    _simulate(design, "ordinal mixed model", (n, simulations, alpha, target, seed), plot, json)
-
-
-@plan.command(name="pairs")
-def pairs(
-    abilities: Annotated[
-        str, typer.Option(help="Log odds of the items: 0,0.3,0.6. One above another wins 73% of the time.")
-    ],
-    repeats: Annotated[int, typer.Option(help="Comparisons of each pair by a participant.", min=1)] = 1,
-    sd_rater: Annotated[float, typer.Option(help="SD of participants' own log odds of a pair.", min=0)] = 0.0,
-    tie: Annotated[float, typer.Option(help="Probability that two equal items tie (Davidson).")] = 0.0,
-    n: SizesOption = "10:60:10",
-    simulations: SimulationsOption = 500,
-    alpha: AlphaOption = 0.05,
-    target: PowerOption = 0.8,
-    seed: SeedOption = 1,
-    plot: PlotOption = None,
-    json: JsonOption = None,
-) -> None:
-    """Plan paired comparisons: whether items differ, and each item against the next best.
-
-    Examples:
-
-      analysis plan pairs --abilities 0,0.3,0.6,0.9 --n 10:40:10
-
-      analysis plan pairs --abilities 0,0.5 --repeats 4 --sd-rater 0.5
-
-      analysis plan pairs --abilities 0,0.3,0.6 --tie 0.2
-    """
-    from analysis.power.choices import PairsDesign
-
-    design = PairsDesign(numbers_in(abilities, "--abilities"), repeats, sd_rater, tie)
-    _simulate(design, "paired comparisons", (n, simulations, alpha, target, seed), plot, json)
-
-
-@plan.command(name="thresholds")
-def thresholds(
-    levels: Annotated[str, typer.Option(help="Stimuli shown: 100,120,140,160.")],
-    threshold: Annotated[float, typer.Option(help="Mean threshold of the first condition.")],
-    difference: Annotated[float, typer.Option(help="How much higher that of the second is.")],
-    spread: Annotated[float, typer.Option(help="Spread of a person's function.")],
-    sd_people: Annotated[float, typer.Option(help="SD of thresholds over people.")] = 0.0,
-    sd_difference: Annotated[float, typer.Option(help="SD of differences over people.")] = 0.0,
-    trials: Annotated[int, typer.Option(help="Trials of each stimulus in a condition.", min=1)] = 10,
-    guess: Annotated[float, typer.Option(help="Guess rate: 0 for yes/no, 0.5 for two alternatives.")] = 0.0,
-    lapse: Annotated[float, typer.Option(help="Lapse rate.")] = 0.0,
-    function: Annotated[ShapeChoice, typer.Option(help="Shape of the function.")] = ShapeChoice.NORMAL,
-    n: SizesOption = "6:30:6",
-    simulations: SimulationsOption = 500,
-    alpha: AlphaOption = 0.05,
-    target: PowerOption = 0.8,
-    seed: SeedOption = 1,
-    plot: PlotOption = None,
-    json: JsonOption = None,
-) -> None:
-    """Plan a comparison of thresholds in two conditions, each person in both.
-
-    Examples:
-
-      analysis plan thresholds --levels 100,120,140,160 --threshold 130 --difference 8 --spread 12
-    """
-    from analysis.power.choices import ThresholdDesign
-
-    design = ThresholdDesign(
-        numbers_in(levels, "--levels"), trials, threshold, difference, sd_people, sd_difference, spread,
-        guess, lapse, function.value, seed,
-    )  # fmt: skip
-    _simulate(design, "thresholds", (n, simulations, alpha, target, seed), plot, json)
-
-
-def _simulate(
-    design: "Design",
-    name: str,
-    asked: tuple[str, int, float, float, int],
-    plot: Path | None,
-    json: Path | None,
-) -> None:
-    from importlib.metadata import version
-
-    from analysis.power.designs import sample_size_text, simulate_design
-    from analysis.power.simulate import sample_sizes
-    from analysis.report.formats import wrap
-
-    n, simulations, alpha, target, seed = asked
-    sizes = sample_sizes(n)
-    with bar("simulating", len(sizes) * simulations) as advance:
-        result = simulate_design(design, name, sizes, simulations, alpha, seed, advance)
-    text = sample_size_text(result, design, target, version("palpebra"))
-    numbers = asdict(result) | {"power": result.power.tolist(), "se": result.se.tolist()}
-    save_json(json, numbers | {"smallest_n": result.smallest_n(target), "text": text}, True)
-    if plot is not None:
-        from analysis.power.figure import save_power_figure
-
-        save_power_figure(result, plot, target)
-        typer.echo(f"written: {plot}")
-    say_power(result, target)
-    typer.echo("\n" + "\n".join(wrap(text)))
+    simulate(design, "ordinal mixed model", (n, simulations, alpha, target, seed), plot, json)

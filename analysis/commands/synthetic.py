@@ -122,7 +122,8 @@ def synthesise_command(
 
       analysis synthesise sliders-demo --effect character=9 --effect eeriness/blink=4 --out scales.csv
     """
-    from analysis.synthetic.synthesise import make_plans, synthesise, write_ratings
+    from analysis.synthetic.ratings_file import write_ratings
+    from analysis.synthetic.synthesise import make_plans, synthesise
 
     if not out.parent.is_dir():
         raise InputError(f"{out}: the folder {out.parent} does not exist; make it first")

@@ -10,7 +10,7 @@ import typer
 from analysis.commands.output import JsonOption, save_json, saying, show_tables
 
 if TYPE_CHECKING:
-    from analysis.thresholds.people import Answers
+    from analysis.thresholds.answers import Answers
 
 
 class FunctionChoice(StrEnum):
@@ -81,7 +81,8 @@ def thresholds(
         threshold_table,
         threshold_text,
     )
-    from analysis.thresholds.people import fit_thresholds, read_answers, with_population
+    from analysis.thresholds.answers import read_answers
+    from analysis.thresholds.people import fit_thresholds, with_population
     from experiments.errors import InputError
 
     if not 0 <= guess < 1:

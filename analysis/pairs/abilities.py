@@ -1,6 +1,5 @@
-"""Abilities of items, their contrasts, and how well the model holds."""
+"""Abilities of items and their contrasts."""
 
-from dataclasses import dataclass, field
 from itertools import combinations
 
 import numpy as np
@@ -9,7 +8,8 @@ from scipy import stats
 
 from analysis.pairs.comparisons import LEFT, RIGHT, Comparisons
 from analysis.pairs.connected import refuse_disconnected, separated
-from analysis.pairs.factors import FactorTest, ItemFactors, factor_tests
+from analysis.pairs.factors import ItemFactors, factor_tests
+from analysis.pairs.goodness import goodness_of_fit
 from analysis.pairs.likelihood import (
     Counts,
     Fit,
@@ -21,102 +21,13 @@ from analysis.pairs.likelihood import (
     sandwich,
     scores,
 )
-from analysis.pairs.transitivity import Transitivity, transitivity
+from analysis.pairs.pairs_result import SCALES, Contrast, Item, PairsResult, Parameter
+from analysis.pairs.transitivity import transitivity
 from analysis.within.adjustments import holm
 from experiments.errors import InputError
 
 Array = NDArray[np.float64]
 Z_95 = float(stats.norm.ppf(0.975))
-
-
-@dataclass(frozen=True)
-class Item:
-    """One item: ability against the first item in sorted order, on the method's scale."""
-
-    name: str
-    ability: float
-    se: float
-    p: float
-    ci_low: float
-    ci_high: float
-    se_robust: float | None
-    se_centred: float
-    centred: float
-    rank: int
-    wins: int
-    losses: int
-    ties: int
-
-
-@dataclass(frozen=True)
-class Contrast:
-    """Difference of two abilities, and its Holm-corrected p.
-
-    `se_robust` has raters as clusters, `p_robust` is its t test on as many df as raters less one,
-    `p_robust_holm` corrected like the model's.
-    """
-
-    first: str
-    second: str
-    difference: float
-    se: float
-    z: float
-    p: float
-    p_holm: float
-    se_robust: float | None = None
-    p_robust: float | None = None
-    p_robust_holm: float | None = None
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """One more parameter of the model, or a test of it."""
-
-    estimate: float
-    se: float
-    z: float
-    p: float
-
-
-@dataclass(frozen=True)
-class Goodness:
-    """Likelihood-ratio statistic against the saturated model of the pairs."""
-
-    deviance: float
-    df: int
-    p: float
-    ordered: bool
-
-
-@dataclass(frozen=True)
-class PairsResult:
-    """Everything `analysis pairs` knows of a table; `docs/analysis.md` says what each key is."""
-
-    method: Method
-    scale: str
-    reference: str
-    items: tuple[Item, ...]
-    contrasts: tuple[Contrast, ...]
-    covariance: tuple[tuple[float, ...], ...]
-    n_comparisons: int
-    n_ties: int
-    n_participants: int | None
-    log_likelihood: float
-    goodness: Goodness
-    order_effect: Parameter | None
-    log_nu: Parameter | None
-    tie_probability_max: float | None
-    factors: tuple[FactorTest, ...]
-    transitivity: Transitivity
-    firth: bool
-    decisions: tuple[str, ...] = field(default_factory=tuple)
-
-
-SCALES: dict[Method, str] = {
-    "bradley-terry": "log odds of winning",
-    "davidson": "log odds of winning, given that there is no tie",
-    "thurstone": "standard deviations of the difference of two items (case V; x 1.414 for those of an item)",
-}
 
 
 def fit_abilities(
@@ -302,31 +213,3 @@ def _clustered(
 def _parameter(fitted: Fit, index: int) -> Parameter:
     estimate, se = float(fitted.parameters[index]), float(np.sqrt(fitted.covariance[index, index]))
     return Parameter(estimate, se, estimate / se, _two_sided(estimate, se))
-
-
-def goodness_of_fit(model: Model, counts: Counts, fitted: Fit) -> Goodness:
-    """Compare with the saturated model of the pairs: only this pair form tells a fit.
-
-    Pairs are taken together over their two orders unless the model has an order effect.
-    """
-    outcomes, expected = counts.outcomes, counts.totals[:, None] * fitted.shares
-    if not model.order_effect:
-        outcomes, expected = _unordered(counts, outcomes), _unordered(counts, expected)
-    ratio = np.where(outcomes > 0, outcomes / np.where(expected > 0, expected, 1.0), 1.0)
-    deviance = float(2 * np.sum(outcomes * np.log(ratio)))
-    df = outcomes.shape[0] * (outcomes.shape[1] - 1) - model.names
-    return Goodness(
-        deviance, df, float(stats.chi2.sf(deviance, df)) if df > 0 else float("nan"), model.order_effect
-    )
-
-
-def _unordered(counts: Counts, values: Array) -> Array:
-    """Add up both orders of a pair (m, o): the item that comes first in the alphabet as the left one."""
-    swapped = counts.left > counts.right
-    turned = values.copy()
-    turned[swapped, LEFT], turned[swapped, RIGHT] = values[swapped, RIGHT], values[swapped, LEFT]
-    low, high = np.minimum(counts.left, counts.right), np.maximum(counts.left, counts.right)
-    _, index = np.unique(np.stack([low, high]), axis=1, return_inverse=True)
-    total = np.zeros((int(index.max()) + 1, values.shape[1]))
-    np.add.at(total, index.ravel(), turned)
-    return total

@@ -4,18 +4,16 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from decimal import Decimal
-from itertools import product, zip_longest
+from itertools import zip_longest
 from typing import Literal
 
 import numpy as np
-from scipy import special
 
 from analysis.paper.clause import own_clause
-from analysis.paper.printed import Rounded
+from analysis.paper.p_values import Kind, corners, p_range
 from analysis.report.numbers import share
 from analysis.within.eta_squared import partial_eta_squared_ci
 
-Kind = Literal["F", "t", "chi2", "r", "z"]
 Verdict = Literal["consistent", "inconsistent", "decision", "unchecked"]
 
 KINDS: tuple[Kind, ...] = ("F", "t", "chi2", "r", "z")
@@ -167,38 +165,6 @@ def _is_corrected(p: re.Match[str], tail: str) -> bool:
     return bool(_CORRECTED_BEFORE.search(tail[: p.start()]) or _CORRECTED_AFTER.search(tail[p.end() :]))
 
 
-def _corners(printed: str, whole_is_exact: bool = False) -> tuple[float, ...]:
-    """The ends of what rounds to a printed number."""
-    if whole_is_exact and "." not in printed:
-        return (float(printed),)
-    rounded = Rounded.of(printed)
-    return float(rounded.low), float(rounded.high)
-
-
-def p_range(kind: Kind, df: tuple[str, ...], value: str) -> tuple[float, float]:
-    """Smallest and largest p that a printed statistic allows, two-sided for t, r and z."""
-    low, high = _corners(value.lstrip("-"))
-    values = [max(low, 0.0), high]  # 0.00 can have been anything from 0 on
-    degrees = product(*(_corners(d, whole_is_exact=True) for d in df))
-    p = [_p(kind, at, v) for at in degrees for v in values]
-    return min(p), max(p)
-
-
-def _p(kind: Kind, df: tuple[float, ...], value: float) -> float:
-    if min(df, default=1.0) <= 0:
-        return float("nan")
-    if kind == "F":
-        return float(special.fdtrc(df[0], df[1], value))
-    if kind == "t":
-        return float(2 * special.stdtr(df[0], -value))
-    if kind == "chi2":
-        return float(special.chdtrc(df[0], value))
-    if kind == "r":
-        r = min(value, 1 - 1e-12)
-        return float(2 * special.stdtr(df[0], -r * np.sqrt(df[0] / (1 - r * r))))
-    return float(2 * special.ndtr(-value))
-
-
 def _p_problems(p: re.Match[str], allowed: tuple[float, float]) -> Iterator[str]:
     low, high = allowed
     printed = float(p["p"])
@@ -210,7 +176,7 @@ def _p_problems(p: re.Match[str], allowed: tuple[float, float]) -> Iterator[str]
     elif p["sign"] == ">":
         fits = high > printed
     else:
-        least, largest = _corners(p["p"])
+        least, largest = corners(p["p"])
         fits = low <= largest and high >= least
     if not fits:
         shown = _shown(low) if _shown(low) == _shown(high) else f"{_shown(low)} to {_shown(high)}"
@@ -230,9 +196,9 @@ def _crosses(p: re.Match[str], allowed: tuple[float, float], level: float = 0.05
 
 
 def _eta_problems(df: tuple[str, ...], value: str, eta: re.Match[str]) -> Iterator[str]:
-    first, second = (_corners(d, whole_is_exact=True) for d in df)
-    sizes = [f * a / (f * a + b) for f in _corners(value) for a in first for b in second if f > 0]
-    least, largest = _corners(eta["eta"])
+    first, second = (corners(d, whole_is_exact=True) for d in df)
+    sizes = [f * a / (f * a + b) for f in corners(value) for a in first for b in second if f > 0]
+    least, largest = corners(eta["eta"])
     before, after = eta["before"] or "", eta["after"] or ""
     partial = before.startswith("partial") or "p" in after
     # a generalised or plain eta squared may be smaller than the partial one, never larger
@@ -242,7 +208,7 @@ def _eta_problems(df: tuple[str, ...], value: str, eta: re.Match[str]) -> Iterat
     if eta["low"] is None or not partial:
         return
     low, high = float(eta["low"]), float(eta["high"])
-    f = np.maximum([float(value), *_corners(value)], 0.0)
+    f = np.maximum([float(value), *corners(value)], 0.0)
     df1, df2 = (np.full(3, float(n)) for n in df)
     bounds, *rounded = partial_eta_squared_ci(f, df1, df2, float(eta["level"]) / 100)
     # with few error df the interval of the noncentral F may end below the size, which is biased upwards

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from analysis.plans.prepare import refuse_unknown
 from analysis.plans.prepared import Prepared
 from analysis.plans.result import labels_of
-from analysis.thresholds.people import Answers
+from analysis.thresholds.answers import Answers
 from experiments.definition import Experiment
 from experiments.trials.threshold.declaration import YesNo, threshold_of
 from experiments.trials.threshold.grid import seconds, series_of

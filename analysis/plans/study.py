@@ -31,7 +31,7 @@ def study_contents(
     answers = with_verdicts(answers, runs) if runs else answers
     contents = plan.analyse(replace(prepare(experiment, plan, answers, pool), scale=scale))
     chosen, _ = pooled(answers.rows, pool, answers.source, definition_sha256(experiment))
-    evidence, numbers = evidence_section(chosen, runs)
+    evidence, numbers = evidence_section(chosen, runs, contents.synthetic)
     if evidence is None:
         return contents
     return replace(contents, evidence=evidence, numbers=contents.numbers | {"evidence": numbers})

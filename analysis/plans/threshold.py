@@ -11,7 +11,8 @@ from analysis.plans.prepared import Prepared
 from analysis.plans.series_answers import answers_of, series_labels
 from analysis.read.reading import Reading
 from analysis.report.contents import Contents
-from analysis.thresholds.people import Answers, counted, fit_thresholds
+from analysis.thresholds.answers import Answers, counted
+from analysis.thresholds.people import fit_thresholds
 from analysis.thresholds.series import SeriesFit, differences
 from experiments.definition import Experiment
 from experiments.errors import InputError

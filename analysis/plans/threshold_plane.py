@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from analysis.plans.prepared import Prepared
 from analysis.plans.series_answers import answers_of, series_labels
 from analysis.report.contents import Contents
-from analysis.thresholds.people import Answers
+from analysis.thresholds.answers import Answers
 from analysis.thresholds.plane_people import SeriesPlane, fit_planes, points_of
 from analysis.thresholds.series import Difference, differences
 from experiments.errors import InputError

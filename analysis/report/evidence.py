@@ -5,6 +5,7 @@ from typing import Any
 import pandas as pd
 
 from analysis.read.runs_file import VERDICT, RunEvidence
+from analysis.report.captions import marked
 from analysis.report.contents import Section
 from analysis.report.formats import Table
 from experiments.columns.base import VERDICTS
@@ -27,7 +28,9 @@ def verdict_counts(rows: pd.DataFrame) -> dict[str, int]:
     return {verdict: int(counts.get(verdict, 0)) for verdict in VERDICTS}
 
 
-def evidence_section(rows: pd.DataFrame, runs: RunEvidence | None) -> tuple[Section | None, dict[str, Any]]:
+def evidence_section(
+    rows: pd.DataFrame, runs: RunEvidence | None, synthetic: bool
+) -> tuple[Section | None, dict[str, Any]]:
     """The section, and its numbers as the JSON has them; nothing where the data have no verdicts."""
     counts = verdict_counts(rows)
     if not counts:
@@ -36,14 +39,14 @@ def evidence_section(rows: pd.DataFrame, runs: RunEvidence | None) -> tuple[Sect
     tables = [
         Table(
             "evidence-verdicts",
-            "Runs by verdict, before exclusions",
+            marked("Runs by verdict, before exclusions", synthetic),
             ("Verdict", "Runs"),
             tuple((verdict.replace("_", " "), str(number)) for verdict, number in counts.items()),
         )
     ]
     if runs is not None:
         numbers["signals"] = summaries(runs.signals.loc[runs.signals.index.isin(rows["run"].astype(str))])
-        tables += [_signals(numbers["signals"])] if numbers["signals"] else []
+        tables += [_signals(numbers["signals"], synthetic)] if numbers["signals"] else []
     return Section(TITLE, ABOUT, tuple(tables)), numbers
 
 
@@ -62,7 +65,7 @@ def summaries(signals: pd.DataFrame) -> dict[str, dict[str, float]]:
     return by_name
 
 
-def _signals(signals: dict[str, dict[str, float]]) -> Table:
+def _signals(signals: dict[str, dict[str, float]], synthetic: bool) -> Table:
     columns = {column.name.removeprefix("evidence_"): column for column in EVIDENCE_COLUMNS}
     said = {name: f"{name}: {one.description}" for name, one in columns.items()}
     said |= {name: f"{said[name]} In {one.unit}." for name, one in columns.items() if one.unit}
@@ -75,5 +78,8 @@ def _signals(signals: dict[str, dict[str, float]]) -> Table:
         for name, one in signals.items()
     )
     return Table(
-        "evidence-signals", "Signals of the runs", ("Signal", "Runs", "Median", "Least", "Greatest"), rows
+        "evidence-signals",
+        marked("Signals of the runs", synthetic),
+        ("Signal", "Runs", "Median", "Least", "Greatest"),
+        rows,
     )

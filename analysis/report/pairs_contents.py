@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from dataclasses import asdict, replace
 from typing import Any
 
-from analysis.pairs.abilities import PairsResult
 from analysis.pairs.comparisons import Comparisons
 from analysis.pairs.factors import FactorTest, ItemFactors
 from analysis.pairs.findings import Findings
+from analysis.pairs.pairs_result import PairsResult
 from analysis.plans.prepared import Prepared
 from analysis.plans.result import Labels, labels_of
 from analysis.report.captions import caption

@@ -5,8 +5,9 @@ from collections.abc import Sequence
 import matplotlib as mpl
 import numpy as np
 
-from analysis.pairs.abilities import Z_95, PairsResult
+from analysis.pairs.abilities import Z_95
 from analysis.pairs.findings import PairCount
+from analysis.pairs.pairs_result import PairsResult
 from analysis.report.contents import Picture
 from analysis.report.pictures import COLOURS, STYLE, in_both_formats, new_figure, write_note
 

@@ -3,9 +3,9 @@
 import math
 from collections.abc import Sequence
 
-from analysis.pairs.abilities import PairsResult
 from analysis.pairs.factors import FactorTest
 from analysis.pairs.findings import Findings
+from analysis.pairs.pairs_result import PairsResult
 from analysis.report.numbers import apa_p, fixed
 
 SIGNIFICANCE = 0.05

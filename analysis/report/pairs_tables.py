@@ -1,6 +1,6 @@
 """Paired comparisons as tables and words."""
 
-from analysis.pairs.abilities import Contrast, PairsResult
+from analysis.pairs.pairs_result import Contrast, PairsResult
 from analysis.report.captions import caption, marked
 from analysis.report.formats import Table
 from analysis.report.numbers import DASH, apa_p, fixed, p_value

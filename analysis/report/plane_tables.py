@@ -4,7 +4,7 @@ from analysis.report.captions import caption, marked
 from analysis.report.formats import Table
 from analysis.report.numbers import DASH, fixed, p_value
 from analysis.report.threshold_tables import estimate, table_of_people
-from analysis.thresholds.people import Average
+from analysis.thresholds.averages import Average
 from analysis.thresholds.plane_people import PlanesResult
 
 

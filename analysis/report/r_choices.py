@@ -13,8 +13,8 @@ from analysis.report.r_text import as_csv, head_of_script, r_number
 from analysis.report.templating import filled
 
 if TYPE_CHECKING:
+    from analysis.thresholds.answers import Answers
     from analysis.thresholds.likelihood import Trials
-    from analysis.thresholds.people import Answers
     from analysis.thresholds.psychometric import Threshold
     from analysis.thresholds.series import Difference, SeriesFit
 

@@ -1,9 +1,7 @@
 """Make the ratings of synthetic participants that give published (or wished) figures."""
 
-import csv
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,14 +14,11 @@ from analysis.synthetic.repair import Repaired, repair
 from analysis.synthetic.space import DesignSpace
 from analysis.synthetic.steps import Steps
 from analysis.synthetic.targets import Targets, make_targets
-from analysis.synthetic.trials import Totals, rating_rows
 from analysis.synthetic.wishes import with_wishes
 from analysis.synthetic.wishes_by_scale import refuse_off_scale, wishes_for
 from experiments.definition import Experiment
 from experiments.errors import InputError
-from experiments.files import whole_file
 from experiments.load import SHIPPED, load_experiment
-from experiments.trials.clip_rating.columns import RATINGS
 from experiments.trials.scales import RatedScale, scale_called, scales_of
 
 ATTEMPTS = 40
@@ -220,32 +215,3 @@ def _onward(progress: Callable[[int, int], None] | None, rounds: int) -> Callabl
     if progress is None:
         return None
     return lambda missed, step: progress(missed, rounds + step)
-
-
-def write_ratings(scales: Sequence[Synthetic], out: Path) -> int:
-    """Write the ratings as the server's CSV export, every row marked synthetic.
-
-    Parameters
-    ----------
-    scales : sequence of Synthetic
-        The same participants on every scale of the study, in order.
-    out : Path
-        The CSV file.
-
-    Returns
-    -------
-    int
-        Rows: one a trial and scale.
-    """
-    first = scales[0]
-    header = RATINGS.csv_header(first.experiment.factor_names)
-    rng = np.random.default_rng([first.seed, 1])
-    sums = [Totals(made.scale, made.sums) for made in scales]
-    count = 0
-    with whole_file(out) as temporary, temporary.open("w", newline="", encoding="utf-8") as handle:
-        writer = csv.DictWriter(handle, header, lineterminator="\n")
-        writer.writeheader()
-        for row in rating_rows(first.experiment, first.space, sums, rng):
-            writer.writerow(row)
-            count += 1
-    return count

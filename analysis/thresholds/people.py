@@ -1,59 +1,17 @@
 """Thresholds of every person and condition, and their mean over people."""
 
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import optimize, stats
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
-from analysis.read.number_columns import numbers
-from analysis.read.text_table import (
-    TextTable,
-    name_lines,
-    names_in_order,
-    read_text_table,
-    refuse_shared_roles,
-    texts_required,
-)
-from analysis.thresholds.likelihood import Shape, Trials
+from analysis.thresholds.answers import Answers, counted
+from analysis.thresholds.averages import Average, average
+from analysis.thresholds.likelihood import Shape
 from analysis.thresholds.population import Population, fit_population
 from analysis.thresholds.psychometric import Threshold, fit_threshold
 from experiments.errors import InputError
-
-Array = NDArray[np.float64]
-YES = frozenset({"1", "yes", "true", "correct", "seen", "y", "1.0"})
-NO = frozenset({"0", "no", "false", "wrong", "incorrect", "unseen", "n", "0.0"})
-
-
-@dataclass(frozen=True)
-class Answers:
-    """Rows of a table: stimulus x (n,), answer 0 or 1 (n,), and names of person and condition (n,).
-
-    Attributes
-    ----------
-    second : float64 array or None
-        A second stimulus variable (n,), where there is one.
-    order : tuple of str
-        Conditions in the order of their codes; empty where they have none, and are sorted.
-    """
-
-    x: Array
-    response: Array
-    participant: NDArray[np.object_] | None
-    condition: NDArray[np.object_] | None
-    source: str
-    synthetic: bool
-    decisions: tuple[str, ...]
-    second: Array | None = None
-    order: tuple[str, ...] = ()
-
-    def conditions(self) -> tuple[str, ...]:
-        """Names of the conditions in order; one, `all`, where there are none."""
-        if self.condition is None:
-            return ("all",)
-        return self.order or tuple(sorted({str(label) for label in self.condition}))
 
 
 @dataclass(frozen=True)
@@ -64,18 +22,6 @@ class PersonThreshold:
     condition: str
     fit: Threshold | None
     reason: str
-
-
-@dataclass(frozen=True)
-class Average:
-    """Mean of estimates with known errors over people; see `average`."""
-
-    people: int
-    mean: float
-    se: float
-    ci_low: float
-    ci_high: float
-    tau: float
 
 
 @dataclass(frozen=True)
@@ -99,77 +45,6 @@ class ThresholdsResult:
     n_trials: int
     decisions: tuple[str, ...]
     population: dict[str, Population] = field(default_factory=dict)
-
-
-def read_answers(
-    path: Path,
-    x: str,
-    response: str,
-    participant: str | None = None,
-    by: str | None = None,
-    second: str | None = None,
-) -> Answers:
-    """Read one row a trial: numbers `x` and `second`, and a `response` of 0/1, yes/no or correct/wrong.
-
-    Raises
-    ------
-    InputError
-        As `read_text_table`; a response that is neither, a stimulus that is no number.
-    """
-    named = [name for name in (participant, by) if name]
-    roles = [x, response, *named, *([second] if second else [])]
-    refuse_shared_roles(roles)
-    table = read_text_table(path, roles, ("synthetic",))
-    for name in named:
-        texts_required(table, name, factor=name == by)
-    values, answers = numbers(table, x), _binary(table, response)
-    keep = np.isfinite(values) & np.isfinite(answers)
-    across = numbers(table, second) if second else None
-    if across is not None:
-        keep &= np.isfinite(across)
-    if not keep.all():
-        lines = name_lines(table, ~keep)
-        table.decisions.append(f"{int((~keep).sum())} rows without stimulus or answer left out ({lines})")
-    if not keep.any():
-        raise InputError(f"{path.name}: no row has both '{x}' and '{response}'")
-    names = [
-        None if name is None else table.columns[name].astype(object).to_numpy()[keep]
-        for name in (participant, by)
-    ]
-    return Answers(
-        values[keep],
-        answers[keep],
-        names[0],
-        names[1],
-        path.name,
-        table.synthetic,
-        tuple(table.decisions),
-        None if across is None else across[keep],
-        () if by is None else names_in_order(table.columns[by], keep),
-    )
-
-
-def _binary(table: TextTable, response: str) -> Array:
-    texts = table.columns[response].astype(str).str.casefold().to_numpy()
-    values = np.full(texts.size, np.nan)
-    values[np.isin(texts, list(YES))], values[np.isin(texts, list(NO))] = 1.0, 0.0
-    unknown = np.isnan(values) & (texts != "") & (texts != "na") & (texts != "nan")
-    if unknown.any():
-        row = int(np.argmax(unknown))
-        raise InputError(
-            f"{table.source}: '{response}' is '{table.columns[response].iloc[row]}' in line {table.line(row)}"
-            "; expected 1 or 0 (yes or no, correct or wrong), or an empty cell (or NA) where there is none"
-        )
-    return values
-
-
-def counted(x: Array, response: Array) -> Trials:
-    """Count trials and positive answers at each level of x."""
-    levels, index = np.unique(x, return_inverse=True)
-    n, k = np.zeros(levels.size), np.zeros(levels.size)
-    np.add.at(n, index, 1.0)
-    np.add.at(k, index, response)
-    return Trials(levels, n, k)
 
 
 def fit_thresholds(
@@ -261,42 +136,3 @@ def mean_threshold(people: list[PersonThreshold], condition: str) -> MeanThresho
     known = [(fit.threshold, fit.threshold_se) for fit in own if fit.threshold_se]
     made = average(np.array([a for a, _ in known]), np.array([float(b or 0) for _, b in known]))
     return None if made is None else MeanThreshold(**vars(made), condition=condition)
-
-
-def average(y: Array, errors: Array) -> Average | None:
-    r"""Average estimates y (n,) over people, each weighted by 1 / (se^2 + tau^2); None below two people.
-
-    tau^2 maximises the restricted likelihood of
-
-    .. math::
-
-        y_i &\sim N(\mu, s_i^2 + \tau^2), \quad w_i = 1 / (s_i^2 + \tau^2) \tag{1} \\
-        -\log L_R &= \tfrac{1}{2} \{\log \textstyle\sum_i w_i - \sum_i \log w_i
-            + \sum_i w_i (y_i - \hat\mu)^2\} \tag{2} \\
-        \mathrm{se}^2 &= \textstyle\sum_i w_i (y_i - \hat\mu)^2 / \{(k - 1) \sum_i w_i\} \tag{3}
-
-    with y_i a person's estimate, s_i its standard error, mu the weighted mean and k the people; (3), with
-    t on k - 1 df, is Hartung and Knapp's (2001).
-    """
-    if len(y) < 2:
-        return None
-    s2 = errors**2
-
-    def restricted(log_tau2: float) -> float:
-        weights = 1 / (s2 + np.exp(log_tau2))
-        mu = np.sum(weights * y) / weights.sum()
-        return float(
-            0.5 * (np.log(weights.sum()) - np.sum(np.log(weights)) + np.sum(weights * (y - mu) ** 2))
-        )
-
-    span = float(np.var(y)) + float(s2.mean())
-    optimum = optimize.minimize_scalar(
-        restricted, bounds=(np.log(span) - 25, np.log(span) + 3), method="bounded"
-    )
-    tau2 = float(np.exp(optimum.x)) if optimum.fun < restricted(-np.inf) else 0.0
-    weights = 1 / (s2 + tau2)
-    mean = float(np.sum(weights * y) / weights.sum())
-    count = len(y)
-    se = float(np.sqrt(np.sum(weights * (y - mean) ** 2) / ((count - 1) * weights.sum())))
-    half = float(stats.t.ppf(0.975, count - 1)) * se
-    return Average(count, mean, se, mean - half, mean + half, float(np.sqrt(tau2)))

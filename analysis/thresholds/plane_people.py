@@ -6,8 +6,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.thresholds.people import Answers, Average, average
-from analysis.thresholds.plane import Plane, PlaneShape, Points, counted_points, fit_plane
+from analysis.thresholds.answers import Answers
+from analysis.thresholds.averages import Average, average
+from analysis.thresholds.plane import Plane, fit_plane
+from analysis.thresholds.plane_likelihood import PlaneShape, Points, counted_points
 from analysis.thresholds.plane_population import PEOPLE_MIN, PopulationPlane, fit_plane_population
 from experiments.errors import InputError
 

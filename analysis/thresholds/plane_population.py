@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from scipy import optimize, special, stats
 
 from analysis.thresholds.likelihood import Interval, normal_density
-from analysis.thresholds.plane import Plane, Points
+from analysis.thresholds.plane import Plane
+from analysis.thresholds.plane_likelihood import Points
 from experiments.errors import InputError
 
 Array = NDArray[np.float64]

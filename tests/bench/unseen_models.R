@@ -37,7 +37,7 @@ ord <- function(name, d, id, y, within=c(), between=c(), covariate=c(), item=c()
   fixed <- paste(c(covariate, paste(c(between, within), collapse="*")), collapse=" + ")
   m <- clmm(as.formula(paste(".y ~", fixed, "+", paste(sprintf("(1|%s)", c(id,item)), collapse="+"))), data=d, control=clmm.control(gradTol=1e-6))
   writeLines(toJSON(list(command=unbox("ordinal"), id=unbox(id), y=unbox(y), within=within, between=between, covariate=covariate, item=item,
-    loglik=num(as.numeric(logLik(m))), alpha=as.numeric(m$alpha), sds=as.numeric(unlist(lapply(VarCorr(m), function(v) attr(v,"stddev"))))), digits=I(17), null="null"), file.path(folder, paste0(name,".json")))
+    loglik=num(as.numeric(logLik(m))), eta=as.numeric(model.matrix(as.formula(paste("~", fixed)), d)[, -1, drop=FALSE] %*% m$beta), alpha=as.numeric(m$alpha), sds=as.numeric(unlist(lapply(VarCorr(m), function(v) attr(v,"stddev"))))), digits=I(17), null="null"), file.path(folder, paste0(name,".json")))
 }
 mixed("sleepstudy.days", shipped("sleepstudy","lme4"), "Subject","Reaction","Days")
 d <- shipped("sleepstudy","lme4"); d$late <- ifelse(d$Days>=5,"late","early"); mixed("sleepstudy.cov", d, "Subject","Reaction","late",covariate="Days", slopes="correlated")

@@ -15,7 +15,7 @@ from analysis.cli import app
 from analysis.plans.study import study_contents
 from analysis.plans.threshold import READING
 from analysis.read.study_answers import load_csv
-from analysis.thresholds.people import counted
+from analysis.thresholds.answers import counted
 from analysis.thresholds.psychometric import fit_threshold
 from experiments import rules
 from experiments.errors import InputError

@@ -10,11 +10,12 @@ from scipy import special, stats
 
 from analysis.cli import app
 from analysis.power import choices
-from analysis.power.choices import PairsDesign, ThresholdDesign
 from analysis.power.designs import sample_size_text, simulate_design
 from analysis.power.factorial import FactorialDesign
 from analysis.power.mixed_models import MixedDesign, Spreads
 from analysis.power.ordinal_models import OrdinalDesign
+from analysis.power.paired_comparisons import PairsDesign
+from analysis.power.thresholds import ThresholdDesign
 from experiments.command_line import run_command_line
 from experiments.errors import InputError
 

@@ -14,7 +14,8 @@ from analysis.pairs.comparisons import read_comparisons
 from analysis.pairs.factors import read_item_factors
 from analysis.read.long_csv import LongData, read_long_table
 from analysis.read.model_csv import read_model_input
-from analysis.thresholds.people import fit_thresholds, read_answers
+from analysis.thresholds.answers import read_answers
+from analysis.thresholds.people import fit_thresholds
 from analysis.within.cell_means import cell_table
 from experiments.errors import InputError
 

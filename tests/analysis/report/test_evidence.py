@@ -62,6 +62,11 @@ def test_counts_and_signals_stand_in_page_and_numbers(answers, runs, tmp_path) -
         "evidence_verdict: unclear",
         "evidence_verdict: unlikely",
     }
+    assert contents.evidence is not None
+    assert [table.title for table in contents.evidence.tables] == [
+        "Runs by verdict, before exclusions [SYNTHETIC DATA]",
+        "Signals of the runs [SYNTHETIC DATA]",
+    ]
     write_report(contents, tmp_path / "report")
     page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
     assert "Runs by verdict, before exclusions" in page

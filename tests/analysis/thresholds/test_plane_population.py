@@ -7,8 +7,9 @@ import pytest
 from scipy import integrate, special, stats
 
 from analysis.report.plane_tables import plane_tables
-from analysis.thresholds.people import Answers
-from analysis.thresholds.plane import Plane, Points, fit_plane
+from analysis.thresholds.answers import Answers
+from analysis.thresholds.plane import Plane, fit_plane
+from analysis.thresholds.plane_likelihood import Points
 from analysis.thresholds.plane_people import fit_planes
 from analysis.thresholds.plane_population import MarginalLikelihood, PopulationPlane, fit_plane_population
 from experiments.errors import InputError

@@ -8,8 +8,9 @@ import pandas as pd
 import pytest
 from scipy import special
 
+from analysis.thresholds.answers import Answers, counted
 from analysis.thresholds.likelihood import Trials
-from analysis.thresholds.people import Answers, counted, fit_thresholds, with_population
+from analysis.thresholds.people import fit_thresholds, with_population
 from analysis.thresholds.population import PopulationLikelihood, fit_population
 from experiments.errors import InputError
 

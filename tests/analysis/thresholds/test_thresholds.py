@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from analysis.cli import app
+from analysis.thresholds.answers import counted, read_answers
 from analysis.thresholds.likelihood import Trials
-from analysis.thresholds.people import PersonThreshold, counted, mean_threshold, read_answers
+from analysis.thresholds.people import PersonThreshold, mean_threshold
 from analysis.thresholds.psychometric import Threshold, fit_threshold
 from experiments.errors import InputError
 

@@ -1,0 +1,127 @@
+"""Answers of a table: a stimulus and a yes or no a trial, of whom and in which condition."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.read.number_columns import numbers
+from analysis.read.text_table import (
+    TextTable,
+    name_lines,
+    names_in_order,
+    read_text_table,
+    refuse_shared_roles,
+    texts_required,
+)
+from analysis.thresholds.likelihood import Trials
+from experiments.errors import InputError
+
+Array = NDArray[np.float64]
+
+
+YES = frozenset({"1", "yes", "true", "correct", "seen", "y", "1.0"})
+
+
+NO = frozenset({"0", "no", "false", "wrong", "incorrect", "unseen", "n", "0.0"})
+
+
+@dataclass(frozen=True)
+class Answers:
+    """Rows of a table: stimulus x (n,), answer 0 or 1 (n,), and names of person and condition (n,).
+
+    Attributes
+    ----------
+    second : float64 array or None
+        A second stimulus variable (n,), where there is one.
+    order : tuple of str
+        Conditions in the order of their codes; empty where they have none, and are sorted.
+    """
+
+    x: Array
+    response: Array
+    participant: NDArray[np.object_] | None
+    condition: NDArray[np.object_] | None
+    source: str
+    synthetic: bool
+    decisions: tuple[str, ...]
+    second: Array | None = None
+    order: tuple[str, ...] = ()
+
+    def conditions(self) -> tuple[str, ...]:
+        """Names of the conditions in order; one, `all`, where there are none."""
+        if self.condition is None:
+            return ("all",)
+        return self.order or tuple(sorted({str(label) for label in self.condition}))
+
+
+def read_answers(
+    path: Path,
+    x: str,
+    response: str,
+    participant: str | None = None,
+    by: str | None = None,
+    second: str | None = None,
+) -> Answers:
+    """Read one row a trial: numbers `x` and `second`, and a `response` of 0/1, yes/no or correct/wrong.
+
+    Raises
+    ------
+    InputError
+        As `read_text_table`; a response that is neither, a stimulus that is no number.
+    """
+    named = [name for name in (participant, by) if name]
+    roles = [x, response, *named, *([second] if second else [])]
+    refuse_shared_roles(roles)
+    table = read_text_table(path, roles, ("synthetic",))
+    for name in named:
+        texts_required(table, name, factor=name == by)
+    values, answers = numbers(table, x), _binary(table, response)
+    keep = np.isfinite(values) & np.isfinite(answers)
+    across = numbers(table, second) if second else None
+    if across is not None:
+        keep &= np.isfinite(across)
+    if not keep.all():
+        lines = name_lines(table, ~keep)
+        table.decisions.append(f"{int((~keep).sum())} rows without stimulus or answer left out ({lines})")
+    if not keep.any():
+        raise InputError(f"{path.name}: no row has both '{x}' and '{response}'")
+    names = [
+        None if name is None else table.columns[name].astype(object).to_numpy()[keep]
+        for name in (participant, by)
+    ]
+    return Answers(
+        values[keep],
+        answers[keep],
+        names[0],
+        names[1],
+        path.name,
+        table.synthetic,
+        tuple(table.decisions),
+        None if across is None else across[keep],
+        () if by is None else names_in_order(table.columns[by], keep),
+    )
+
+
+def _binary(table: TextTable, response: str) -> Array:
+    texts = table.columns[response].astype(str).str.casefold().to_numpy()
+    values = np.full(texts.size, np.nan)
+    values[np.isin(texts, list(YES))], values[np.isin(texts, list(NO))] = 1.0, 0.0
+    unknown = np.isnan(values) & (texts != "") & (texts != "na") & (texts != "nan")
+    if unknown.any():
+        row = int(np.argmax(unknown))
+        raise InputError(
+            f"{table.source}: '{response}' is '{table.columns[response].iloc[row]}' in line {table.line(row)}"
+            "; expected 1 or 0 (yes or no, correct or wrong), or an empty cell (or NA) where there is none"
+        )
+    return values
+
+
+def counted(x: Array, response: Array) -> Trials:
+    """Count trials and positive answers at each level of x."""
+    levels, index = np.unique(x, return_inverse=True)
+    n, k = np.zeros(levels.size), np.zeros(levels.size)
+    np.add.at(n, index, 1.0)
+    np.add.at(k, index, response)
+    return Trials(levels, n, k)
