@@ -60,6 +60,13 @@ describe("actual size", () => {
     expect(refreshRate(stamps)).toBeCloseTo(144, 0);
     expect(refreshRate([1, 2, 3])).toBeNull();
   });
+  it.each([59.94, 75, 120, 144, 165, 240, 300, 360, 480])("reads a rate of %f Hz from stamps rounded to a millisecond, a refresh missed now and then", (rate) => {
+    const seen = Array.from({ length: 64 }, (_, n) => n).filter((n) => n !== 20 && n !== 41);
+    for (const round of [Math.floor, Math.round]) {
+      const stamps = seen.map((n) => 1_764_000_000_000.123 + round(7.4 + (n * 1000) / rate));
+      expect(Math.abs((refreshRate(stamps) ?? 0) / rate - 1)).toBeLessThan(0.02);
+    }
+  });
 });
 
 describe("the refresh rate of a page that nobody looked at", () => {

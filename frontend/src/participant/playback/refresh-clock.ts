@@ -82,6 +82,7 @@ export function meanGap(stamps: readonly number[]): number | null {
   const gaps = stamps.slice(1).map((stamp, index) => stamp - (stamps[index] ?? stamp));
   const median = [...gaps].sort((a, b) => a - b)[Math.floor(gaps.length / 2)];
   if (!median) return null;
-  const regular = gaps.filter((gap) => Math.abs(gap - median) < median / 4);
+  // A rounded gap is one longer or shorter: on a screen of 240 Hz that is a quarter.
+  const regular = gaps.filter((gap) => Math.abs(gap - median) < Math.max(median / 4, 1.01));
   return regular.reduce((total, gap) => total + gap, 0) / regular.length;
 }
