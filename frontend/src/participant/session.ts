@@ -38,8 +38,6 @@ export interface Session {
   api: RunApi;
   /** What the server gave at the end. */
   completion: Completion | null;
-  /** Answered main and attention trials so far. */
-  answered: number;
 }
 
 /** The writes of a run, each kept in the outbox first. */
@@ -71,9 +69,17 @@ export class RunApi {
 }
 
 /** Trials of the main part and attention checks: what progress counts. */
-export function counted(run: RunState): TrialInfo[] {
+export function counted(run: Pick<RunState, "trials">): TrialInfo[] {
   return run.trials.filter((trial) => trial.kind !== "practice");
 }
+
+/** Those of them that do not come again. */
+export function done(run: Pick<RunState, "trials">): TrialInfo[] {
+  return counted(run).filter(isDone);
+}
+
+/** True where the trial was played as often as it is wanted. */
+export const isDone = ({ answered, plays_done, plays_wanted }: TrialInfo): boolean => answered && plays_done >= plays_wanted;
 
 export function receiptOf(outcome: Outcome): Receipt | null {
   return outcome.accepted ? ((outcome.body as { receipt?: Receipt } | null)?.receipt ?? null) : null;

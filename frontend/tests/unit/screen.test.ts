@@ -8,7 +8,7 @@ import { refreshRate, untilMeasured } from "../../src/participant/screen/refresh
 import { clipHeight, clipWidth, screenChange, zoomed, isPlausible, type ScreenShape } from "../../src/participant/screen/size";
 import { deviation, randomStart, settled, spreadPercent } from "../../src/participant/calibration/spread";
 import { distanceFrom } from "../../src/participant/calibration/distance";
-import type { Session } from "../../src/participant/session";
+import { done, type Session } from "../../src/participant/session";
 import { keyFor, valueOf } from "../../src/participant/trials/shared/scale-keys";
 import { clipSize } from "../../src/participant/trials/shared/stage";
 
@@ -60,13 +60,16 @@ describe("actual size", () => {
     expect(refreshRate(stamps)).toBeCloseTo(144, 0);
     expect(refreshRate([1, 2, 3])).toBeNull();
   });
-  it.each([59.94, 75, 120, 144, 165, 240, 300, 360, 480])("reads a rate of %f Hz from stamps rounded to a millisecond, a refresh missed now and then", (rate) => {
-    const seen = Array.from({ length: 64 }, (_, n) => n).filter((n) => n !== 20 && n !== 41);
-    for (const round of [Math.floor, Math.round]) {
-      const stamps = seen.map((n) => 1_764_000_000_000.123 + round(7.4 + (n * 1000) / rate));
-      expect(Math.abs((refreshRate(stamps) ?? 0) / rate - 1)).toBeLessThan(0.02);
-    }
-  });
+  it.each([59.94, 75, 120, 144, 165, 240, 300, 360, 480])(
+    "reads a rate of %f Hz from stamps rounded to a millisecond, a refresh missed now and then",
+    (rate) => {
+      const seen = Array.from({ length: 64 }, (_, n) => n).filter((n) => n !== 20 && n !== 41);
+      for (const round of [Math.floor, Math.round]) {
+        const stamps = seen.map((n) => 1_764_000_000_000.123 + round(7.4 + (n * 1000) / rate));
+        expect(Math.abs((refreshRate(stamps) ?? 0) / rate - 1)).toBeLessThan(0.02);
+      }
+    },
+  );
 });
 
 describe("the refresh rate of a page that nobody looked at", () => {
@@ -162,6 +165,16 @@ describe("repetitions", () => {
     replays.add(trial, 3);
     replays.drop(trial, 2);
     expect(replays.peek(3)?.play).toBe(3);
+  });
+  it("leave their trials undone", () => {
+    const [interrupted, answered] = [aTrial({ plays_done: 1, answered: true }), aTrial({ trial_index: 1, plays_done: 1, answered: true })];
+    const run = {
+      trials: [interrupted, answered, aTrial({ trial_index: 2 }), aTrial({ trial_index: 3, kind: "practice", answered: true })],
+    };
+    expect(done(run)).toHaveLength(2);
+    new Replays().add(interrupted, 2);
+    expect(done(run)).toEqual([answered]);
+    expect(done({ trials: [aTrial({ plays_done: 1, plays_wanted: 2, answered: true })] })).toEqual([]);
   });
   it("are owed where an earlier visit stopped before them", () => {
     expect(owed([aTrial(), aTrial({ plays_done: 1, plays_wanted: 2 }), aTrial({ plays_done: 1 })])).toMatchObject([{ play: 2 }]);

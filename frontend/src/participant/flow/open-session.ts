@@ -11,7 +11,7 @@ import { ClipCache } from "../preload/clip-cache";
 import { untilMeasured } from "../screen/refresh-rate";
 import { RunClock } from "../screen/run-clock";
 import { ScreenState } from "../screen/screen-state";
-import { counted, RunApi, type Session } from "../session";
+import { RunApi, type Session } from "../session";
 import type { TrialKind } from "../trials/kind";
 import { applyWrite } from "./kept-visit";
 import { owed, Replays } from "./replays";
@@ -64,7 +64,6 @@ export function openSession({ root, link, run, kind, checks, player, outbox, uns
     over,
     api: new RunApi(outbox),
     completion: null,
-    answered: counted(run).filter((trial) => trial.answered).length,
   };
   owed(run.trials).forEach(({ trial, play }) => session.replays.add(trial, play));
   return session;

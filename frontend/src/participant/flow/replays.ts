@@ -12,6 +12,7 @@ export class Replays {
   add(trial: TrialInfo, play: number): void {
     const known = this.queue.some((one) => one.trial.trial_index === trial.trial_index && one.play === play);
     if (!known) this.queue.push({ trial, play });
+    trial.plays_wanted = Math.max(trial.plays_wanted, play);
   }
 
   /** A play that was begun and broken off is not shown again. */

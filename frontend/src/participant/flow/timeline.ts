@@ -8,7 +8,7 @@ import { formPage } from "../screens/form";
 import { needsScreenSetup, screenSetup } from "../screens/screen-setup";
 import { textPage } from "../screens/text-page";
 import { codeNote } from "../screens/support";
-import { counted, type Session } from "../session";
+import { counted, done, isDone, type Session } from "../session";
 import { blockNodes, practiceNodes, restNodes } from "./blocks";
 import { enterStage } from "./stages";
 
@@ -54,9 +54,9 @@ function screenNode(session: Session, eyebrow: string): Node {
 /** The instructions at first; on a later visit a word of welcome before them. */
 function introduction(session: Session, eyebrow: string): Node {
   const { run, t } = session;
-  const total = counted(run).length;
-  const back = session.answered > 0;
-  const welcome = `# ${t("welcome_back_title")}\n\n${t("welcome_back", { done: session.answered, total })}\n\n`;
+  const trials = counted(run);
+  const back = trials.some((one) => one.answered);
+  const welcome = `# ${t("welcome_back_title")}\n\n${t("welcome_back", { done: done(run).length, total: trials.length })}\n\n`;
   const text = back ? welcome + run.texts.instructions.replace(/^(\s*)# /, "$1## ") : run.texts.instructions;
   return trial(textPage(session), { eyebrow, text, action: t("continue"), remarks: codeNote(session) });
 }
@@ -72,9 +72,7 @@ function middle(session: Session): Node[] {
 }
 
 function blockIsOpen(session: Session, block: number): boolean {
-  return session.run.trials.some(
-    (one) => one.block === block && one.kind !== "practice" && (!one.answered || one.plays_done < one.plays_wanted),
-  );
+  return counted(session.run).some((one) => one.block === block && !isDone(one));
 }
 
 function ending(session: Session): Node[] {
@@ -86,7 +84,7 @@ function openForms({ run }: Session, when: Form["when"]): Form[] {
 }
 
 function trialsLeft({ run }: Session): boolean {
-  return run.trials.some((one) => !one.answered || one.plays_done < one.plays_wanted);
+  return !run.trials.every(isDone);
 }
 
 function stageNode(session: Session, stage: Parameters<typeof enterStage>[1], node: Node): Node {

@@ -3,7 +3,7 @@ import { h } from "../../ui/element";
 import { markdown } from "../../ui/markdown";
 import { button, showPage } from "../../ui/page";
 import { progressBar } from "../../ui/progress";
-import { counted, type Session } from "../session";
+import { counted, done, type Session } from "../session";
 import type { Data, Parameters } from "./block-break";
 import { choose, codeNote, stopButton } from "./support";
 
@@ -11,9 +11,11 @@ export async function rest(session: Session, display: HTMLElement, { block, bloc
   const { t, run } = session;
   const started = performance.now();
   const total = counted(run).length;
-  const bar = progressBar(t("break_progress", { done: session.answered, total }));
-  bar.set(session.answered, total);
-  const count = h("p", { class: "count" }, t("break_progress", { done: session.answered, total }));
+  const so_far = done(run).length;
+  const progress = t("break_progress", { done: so_far, total });
+  const bar = progressBar(progress);
+  bar.set(so_far, total);
+  const count = h("p", { class: "count" }, progress);
   const wait = h("p", { class: "status", role: "status" });
   const footer = h("footer", { class: "actions" });
   const text = markdown(run.texts.block_break || `# ${t("break_part", { block, blocks })}`);

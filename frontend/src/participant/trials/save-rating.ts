@@ -13,7 +13,6 @@ export async function saveRating(session: Session, trial: TrialInfo, body: Ratin
   const evidence = await evidenceFor(session, trial, body.play);
   const { receipt } = await session.outbox.put("PUT", `/api/run/ratings/${id}`, { ...body, evidence }, id);
   trial.plays_done = body.play;
-  if (trial.kind !== "practice" && !trial.answered) session.answered += 1;
   trial.answered = true;
   const shift_ms = session.clock.shift();
   if (shift_ms !== 0) session.events.add("clock_changed", { shift_ms });
