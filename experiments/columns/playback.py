@@ -145,7 +145,7 @@ VIEWS: tuple[Column, ...] = (
 """Each view of the trial, as it was begun and as it ended."""
 
 ASSUMED_REFRESH_HZ = 60
-ONSET_DELAY_REFRESHES = {"Firefox/": 3, "Chrome/": 2}
+ONSET_DELAY_REFRESHES = {"Firefox/": 1, "Chrome/": 0}
 """Refreshes from drawing a picture to the frame buffer, by user agent; `make scope` measures them."""
 
 _REFRESH_MS = f"1000.0 / coalesce(t.refresh_rate_hz, {ASSUMED_REFRESH_HZ})"
@@ -161,7 +161,7 @@ PRESENTATION: tuple[Column, ...] = (
         "onset_delay_ms",
         "number",
         "Add this to recorded times of pictures, and take it off rt_from_first_frame: the time from drawing "
-        "a picture to the frame buffer as measured for the browser (2 refreshes in Chromium, 3 in Firefox), "
+        "a picture to the frame buffer as measured for the browser (none in Chromium, 1 refresh in Firefox), "
         "without the monitor's own delay. Empty for other browsers and where no frame was logged.",
         unit="ms",
         minimum=0,

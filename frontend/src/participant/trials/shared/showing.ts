@@ -1,5 +1,5 @@
 /** One showing of a clip: waits for the start key, plays, and notes what disturbed it. */
-import { isStartKey, listenKeys } from "../../../ui/keys";
+import { clickNothing, isStartKey, listenKeys } from "../../../ui/keys";
 import { h } from "../../../ui/element";
 import { MeantPress } from "../../../ui/meant-press";
 import { button } from "../../../ui/page";
@@ -38,11 +38,12 @@ export function waitForStart(
     go.addEventListener("click", start, { signal });
     stage.below.replaceChildren(h("h1", { class: "ready" }, prompt), go, h("p", { class: "count" }, note));
     stage.element.querySelector(".clip")?.addEventListener("click", start, { signal });
-    listenKeys((event) => {
+    const pressed = (event: KeyboardEvent): void => {
       if (!isStartKey(event)) return;
-      event.preventDefault();
+      clickNothing(event);
       start(event);
-    }, signal);
+    };
+    listenKeys(pressed, signal, go);
     window.addEventListener("resize", stage.fit, { signal });
     stage.fit();
     go.focus({ preventScroll: true });
