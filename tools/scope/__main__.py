@@ -110,9 +110,10 @@ def main() -> None:
     results = Results(options.results, options.again)
     with tempfile.TemporaryDirectory(prefix="palpebra-scope-") as made:
         folder = Path(made)
+        (folder / "display").mkdir()
         server = ServerProcess(folder / "data")
         try:
-            with Display(not options.ordinary_display) as display:
+            with Display(folder / "display", not options.ordinary_display) as display:
                 server.start()
                 print(f"display {display.name}, real-time priority: {'yes' if display.scan_out else 'no'}")
                 _take_all(Bench(options, display, server, folder, results))

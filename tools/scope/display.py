@@ -5,15 +5,12 @@ import ctypes.util
 import os
 import shutil
 import subprocess
-import tempfile
 import time
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 WIDTH_PX, HEIGHT_PX = 1280, 800
-MEMORY = Path("/dev/shm")
-"""Linux' files in memory: a frame buffer on a disk waits for that disk, which no graphics card does."""
 PRIORITY = 40
 KEYSYMS = {"space": 0x20, **{str(digit): 0x30 + digit for digit in range(10)}}
 
@@ -34,18 +31,15 @@ class Display:
         Give it real-time priority, as hardware that reads out a frame buffer waits for no program.
     """
 
-    def __init__(self, scan_out: bool = True) -> None:
-        self.scan_out = scan_out
+    def __init__(self, folder: Path, scan_out: bool = True) -> None:
+        self.folder, self.scan_out = folder, scan_out
+        self.framebuffer = folder / "Xvfb_screen0"
         self.name = ""
 
     def __enter__(self) -> Self:
-        self._folder = tempfile.TemporaryDirectory(
-            prefix="palpebra-display-", dir=MEMORY if MEMORY.is_dir() else None
-        )
-        self.framebuffer = Path(self._folder.name) / "Xvfb_screen0"
         reading, writing = os.pipe()
         screen = f"{WIDTH_PX}x{HEIGHT_PX}x24"
-        command = ["Xvfb", "-displayfd", str(writing), "-screen", "0", screen, "-fbdir", self._folder.name]
+        command = ["Xvfb", "-displayfd", str(writing), "-screen", "0", screen, "-fbdir", str(self.folder)]
         self._process = subprocess.Popen(
             [*command, "-nolisten", "tcp"], pass_fds=[writing], stderr=subprocess.DEVNULL
         )
@@ -79,7 +73,6 @@ class Display:
         self._keyboard.close()
         self._process.terminate()
         self._process.wait(timeout=10)
-        self._folder.cleanup()
 
 
 class Keyboard:

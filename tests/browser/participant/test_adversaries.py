@@ -81,7 +81,7 @@ def test_keys_of_the_operating_system_are_trusted(
     """What passes every look at whether events are the browser's own; docs/evidence.md says so."""
     study = strict.add_study(tmp_path / "clips", STUDY, frames=4)
     strict.start()
-    with Display(scan_out=False) as display:
+    with Display(tmp_path, scan_out=False) as display:
         browser = chromium.browser_type.launch(
             headless=False,
             executable_path=system_chromium(),

@@ -26,12 +26,12 @@ TRIES, PAIRS = 5, 3
 
 
 @pytest.fixture(scope="module")
-def display() -> Iterator[Display]:
+def display(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Display]:
     """A display of its own."""
     missing = missing_here()
     if missing:
         pytest.skip(missing)
-    with Display() as opened:
+    with Display(tmp_path_factory.mktemp("display")) as opened:
         yield opened
 
 
