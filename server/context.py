@@ -29,7 +29,8 @@ from server.versions import Versions
 
 SIMULATED_TIME = "x-palpebra-simulated-time"
 REFUSALS_PER_MINUTE, REFUSALS_OF_A_KIND = 20, 3
-"""Refusals that a process writes into the audit log a minute: in all, and for one account at one route."""
+"""Refusals that a process writes into the audit log a minute: in all, and for one account at one route; of
+nobody's as many again, so that strangers use up no room of those who are known."""
 RESUME_CODES_PER_MINUTE = 10
 """Resume codes that may be tried for one visit a minute."""
 
@@ -47,6 +48,7 @@ class Services:
     group_commit: GroupCommit
     sign_ins: SignInThrottle
     refusals: BoundedRecords
+    strangers: BoundedRecords
     passwords: PasswordWork
     stopping: Stopping
     results: ResultsCache
@@ -86,6 +88,7 @@ def open_services(settings: Settings, *, rehearses: bool = False) -> Services:
         group_commit=GroupCommit(database),
         sign_ins=SignInThrottle(settings, shared),
         refusals=BoundedRecords(REFUSALS_PER_MINUTE, REFUSALS_OF_A_KIND),
+        strangers=BoundedRecords(REFUSALS_PER_MINUTE, REFUSALS_OF_A_KIND),
         passwords=PasswordWork(),
         stopping=Stopping(),
         results=ResultsCache(),

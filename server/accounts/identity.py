@@ -20,6 +20,7 @@ from server.tokens import hash_token
 Scope = Literal["read", "personal", "write", "export"]
 COOKIE = "palpebra_session"
 _SEEN_EVERY = timedelta(minutes=1)
+_NO_SUCH = "This API token is unknown, revoked or expired; make a new one."
 FRESH_FOR = timedelta(minutes=15)
 """After signing in, what would outlive a stolen session may be changed for so long."""
 _cookie_scheme = APIKeyCookie(name=COOKIE, auto_error=False, description="A signed-in browser.")
@@ -182,8 +183,11 @@ def _by_token(services: Services, secret: str) -> Identity:
     with services.database.read() as session:
         token = repository.token_by_hash(session, hash_token(secret))
         expired = token is not None and token.expires_at is not None and token.expires_at <= now()
-        if token is None or token.revoked_at or expired or token.account.disabled_at:
-            raise UnknownToken("This API token is unknown, revoked or expired; make a new one.")
+        if token is None:
+            raise UnknownToken(_NO_SUCH)
+        if token.revoked_at or expired or token.account.disabled_at:
+            # A night's script goes on with one that has ended: no stranger who tries.
+            raise NotSignedIn(_NO_SUCH)
         account = token.account
         identity = Identity(
             account.id,
