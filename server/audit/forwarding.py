@@ -76,19 +76,44 @@ class _Stream(_Handler):
         self._connection = connection
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Send one message; OSError where that fails, after which the next one connects anew."""
+        """Send one message, over a new connection where the last was ended; OSError where that fails too."""
         line = f"<{self.encodePriority(self.facility, 'info')}>{self.format(record)}".encode()
-        if self._connection is None:
-            self.createSocket()
-        connection, self._connection = self._connection, None
-        if connection is None:
-            return
+        if self._connection is not None and not _ended(self._connection):
+            try:
+                self._send(line)
+            except OSError:
+                log.info("the connection to syslog was lost; the same message is sent over a new one")
+            else:
+                return
+        self._hang_up()
+        self.createSocket()
         try:
-            connection.sendall(b"%d " % len(line) + line)
+            self._send(line)
         except OSError:
-            connection.close()
+            self._hang_up()
             raise
-        self._connection = connection
+
+    def _send(self, line: bytes) -> None:
+        if self._connection is not None:
+            self._connection.sendall(b"%d " % len(line) + line)
+
+    def _hang_up(self) -> None:
+        if self._connection is not None:
+            self._connection.close()
+        self._connection = None
+
+
+def _ended(connection: socket.socket) -> bool:
+    """Whether the other side has hung up, as one that restarts does: what is sent then is lost, unsaid."""
+    connection.settimeout(0)
+    try:
+        return connection.recv(1) == b""
+    except (BlockingIOError, ssl.SSLWantReadError):
+        return False
+    except OSError:
+        return True
+    finally:
+        connection.settimeout(CONNECT_S)
 
 
 def _handler(address: str) -> SysLogHandler:

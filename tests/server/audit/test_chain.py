@@ -4,6 +4,7 @@ import json
 import socket
 import ssl
 import threading
+import time
 from concurrent.futures import ThreadPoolExecutor
 from datetime import timedelta
 from pathlib import Path
@@ -211,9 +212,10 @@ class _Collector(threading.Thread):
                 connection = self.context.wrap_socket(connection, server_side=True)
             with connection, connection.makefile("rb") as stream:
                 length = b"".join(iter(lambda: stream.read(1), b" "))
-                self.taken.append(stream.read(int(length)))
+                message = stream.read(int(length))
         except ssl.SSLError:
-            self.taken.append(b"refused")
+            message = b"refused"
+        self.taken.append(message)  # once the connection is closed
 
 
 def self_signed(folder: Path) -> Path:
@@ -258,6 +260,30 @@ def test_syslog_over_a_stream_gets_whole_messages(
     assert b'"action": "study created"' in sent
     assert verdict(services).hash.encode() in sent
     assert b"not for syslog" not in sent
+
+
+@pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
+@pytest.mark.parametrize("scheme", ["tcp", "tls"])
+def test_a_syslog_that_hung_up_gets_the_next_message_too(
+    services: Services, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scheme: str
+) -> None:
+    certificate = self_signed(tmp_path) if scheme == "tls" else None
+    if certificate is not None:
+        monkeypatch.setenv("SSL_CERT_FILE", str(certificate))
+    collector = _Collector(3, certificate)
+    collector.start()
+    address = f"{scheme}://localhost:{collector.listener.getsockname()[1]}"
+    told = open_services(services.settings.model_copy(update={"audit_syslog": address}))
+    for number in range(3):
+        with told.database.write() as session:
+            record(session, None, "study created", "study", f"s{number}")
+        deadline = time.monotonic() + 20
+        while len(collector.taken) <= number and time.monotonic() < deadline:
+            time.sleep(0.01)
+    told.database.close()
+    assert [f'"target": "s{number}"'.encode() in sent for number, sent in enumerate(collector.taken)] == [
+        True
+    ] * 3
 
 
 @pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
