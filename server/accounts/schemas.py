@@ -69,14 +69,13 @@ class NewToken(_In):
 
     name: Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=100)]
     scopes: Annotated[list[Scope], Field(min_length=1, max_length=4)]
+    # Null was a token without an end; older clients that send it get one that ends as late as any may.
     days: Annotated[int, Field(ge=1, le=TOKEN_DAYS_MAX)] | None = 365
 
     @field_validator("days")
     @classmethod
     def _ends(cls, days: int | None) -> int:
-        if days is None:
-            raise ValueError(f"expected 1 to {TOKEN_DAYS_MAX} days; no token is made without an end")
-        return days
+        return TOKEN_DAYS_MAX if days is None else days
 
 
 class ChangeAccount(_In):

@@ -85,7 +85,7 @@ def stored_recruiter(declared: Mapping[str, Any] | None) -> Recruiter:
         {
             name: value
             for name, value in (declared or {}).items()
-            if not name.startswith("redirect_") or re.fullmatch(WEB_ADDRESS, value)
+            if not name.startswith("redirect_") or (value and re.fullmatch(WEB_ADDRESS, value))
         }
     )
 

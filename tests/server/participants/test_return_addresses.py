@@ -68,3 +68,7 @@ def test_what_an_earlier_release_took_ends_no_visit(
     read = stored_recruiter(stored)
     assert (read.redirect_url, read.code_complete, read.kind) == ("", "DONE", "sona")
     participant.agree()
+
+
+def test_a_null_address_of_before_is_none() -> None:
+    assert stored_recruiter({"kind": "sona", "redirect_url": None}).redirect_url == ""
