@@ -88,8 +88,9 @@ def rewrap(
     )
     if carried.broken is not None:
         raise InputError(
-            f"the audit log was left under the old key, as it fits neither: {carried.broken}; all else is "
-            "carried over"
+            "second factors and the audit log were left as they are, as the log fits neither key: "
+            f"{carried.broken}; recruiters' ids are carried over. Where the key was changed twice, set the "
+            "one between, carry over the first to it, then that one to the last"
         )
     out.print(
         "the audit log's chain is made anew; note its head (server audit verify), older ones fit no more"

@@ -29,10 +29,11 @@ def accounts(session: Session) -> list[Account]:
     return list(session.scalars(select(Account).order_by(Account.id)))
 
 
-def with_second_factor(session: Session, before: datetime | None) -> list[Account]:
-    """Accounts with a second factor that was set up before a moment, at any where None; held."""
-    query = select(Account).where(Account.totp_confirmed_at.is_not(None)).with_for_update()
-    return list(session.scalars(query if before is None else query.where(Account.totp_confirmed_at < before)))
+def with_second_factor(session: Session) -> list[Account]:
+    """Accounts with a second factor; held."""
+    return list(
+        session.scalars(select(Account).where(Account.totp_confirmed_at.is_not(None)).with_for_update())
+    )
 
 
 def account(session: Session, account_id: int, *, fresh: bool = False, lock: bool = False) -> Account | None:

@@ -7,7 +7,7 @@ from sqlalchemy.orm import Session
 
 from experiments.errors import did_you_mean
 from server.accounts import repository, second_factor
-from server.accounts.audit import NOBODY, record
+from server.accounts.audit import NOBODY, SECOND_FACTOR_SET_UP, record
 from server.accounts.identity import Identity, account_of
 from server.accounts.passwords import Checked, hash_password, password_fits
 from server.accounts.tokens import end_everything
@@ -319,7 +319,7 @@ def confirm_second_factor(services: Services, identity: Identity, code: str) -> 
         if (current := repository.session_of(session, identity.account_id, identity.session_id)) is not None:
             current.second_factor = True
         account.recovery_code_hashes = [second_factor.hash_recovery_code(c) for c in codes]
-        record(session, identity, "second factor set up", "account", identity.name)
+        record(session, identity, SECOND_FACTOR_SET_UP, "account", identity.name)
     return codes
 
 

@@ -1,11 +1,12 @@
 """The chain of the audit log under another key of the server: every entry's hashes made anew."""
 
-from datetime import datetime
+from collections.abc import Iterator
 
 from sqlalchemy.orm import Session
 
 from server.audit import chain, repository
 from server.audit.sealing import linked
+from server.models import AuditEntry
 
 
 def reseal(session: Session, secret: bytes) -> tuple[int, str]:
@@ -28,11 +29,11 @@ def reseal(session: Session, secret: bytes) -> tuple[int, str]:
     return position, previous
 
 
-def first_under(session: Session, secret: bytes) -> datetime | None:
-    """When the first entry was made whose hash fits this key, whatever became of others; None of none."""
+def under(session: Session, secret: bytes) -> Iterator[AuditEntry]:
+    """The entries whose hash fits this key, whatever became of others, in the chain's order."""
     key, previous = chain.chain_key(secret), chain.START
     for entry in repository.chained(session):
-        if entry.chain_hash == chain.entry_hash(key, previous, linked(entry), entry.details_digest or ""):
-            return entry.at
-        previous = entry.chain_hash or ""
-    return None
+        digest, found = entry.details_digest or "", entry.chain_hash or ""
+        if found == chain.entry_hash(key, previous, linked(entry), digest):
+            yield entry
+        previous = found

@@ -22,6 +22,7 @@ from tests.helpers.databases import Called, run_server_command
 from tests.helpers.studies import Participant
 
 NEW = "another secret key, as long as they should be"
+THIRD = "a third one, and long enough to be one as well"
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,12 @@ def old_key(tmp_path: Path, settings: Settings) -> Path:
 @pytest.fixture
 def changed(settings: Settings) -> Settings:
     return settings.model_copy(update={"secret_key": NEW})
+
+
+@pytest.fixture
+def third(settings: Settings) -> Settings:
+    """Copied before any key was read: a copy keeps the key that was."""
+    return settings.model_copy(update={"secret_key": THIRD})
 
 
 def rewrap(changed: Settings, old_key: Path) -> Called:
@@ -125,7 +132,9 @@ def test_a_log_that_was_tampered_with_is_not_made_whole(
     assert called.returncode == 2
     assert "entry 3" in called.stderr
     again = open_services(changed)
-    assert failure(again, ada, ada.code()) is None  # the rest is carried over
+    assert (
+        failure(again, ada, ada.code()) is not None
+    )  # only a whole log says which key a phone was set up under
     with services.database.read() as session:
         assert "entry 3" in (verify(session, services.settings.key).broken or "")
     again.database.close()
@@ -138,8 +147,62 @@ def test_phones_that_were_carried_over_can_be_again(
     assert rewrap(changed, old_key).returncode == 0
     second = tmp_path / "second"
     second.write_text(NEW)
-    third = changed.model_copy(update={"secret_key": "a third one, and long enough to be one as well"})
+    third = changed.model_copy(update={"secret_key": THIRD})
     assert rewrap(third, second).returncode == 0
     again = open_services(third)
     assert failure(again, ada, ada.code()) is None
+    again.database.close()
+
+
+def test_a_phone_whose_set_up_is_the_first_entry_under_the_new_key_goes_on(
+    services: Services, changed: Settings, old_key: Path
+) -> None:
+    with services.database.write() as session:
+        account = service.create_account(session, "eva", "correct horse battery", "owner")
+    again = open_services(changed)
+    me = Identity(account.id, "eva", "owner")
+    eva = Phone("eva", service.start_second_factor(again, me))
+    service.confirm_second_factor(again, me, eva.code(-1))
+    called = rewrap(changed, old_key)
+    assert (called.returncode, "0 second factors" in called.stdout) == (0, True), called.stderr
+    assert failure(again, eva, eva.code()) is None
+    again.database.close()
+
+
+def test_a_key_that_was_changed_twice_spoils_no_phone_and_is_carried_over_in_two_steps(
+    services: Services, changed: Settings, third: Settings, old_key: Path, tmp_path: Path
+) -> None:
+    ada = with_phone(services, "ada")
+    between = open_services(changed)
+    bob = with_phone(between, "bob")
+    between.database.close()
+    second = tmp_path / "second"
+    second.write_text(NEW)
+    again = open_services(third)
+    with_phone(again, "eve")
+    for key in (old_key, second):
+        called = rewrap(third, key)
+        assert (called.returncode, "neither" in called.stderr) == (2, True)
+    with again.database.read() as session:
+        kept = {row.name: row.totp_secret or "" for row in session.scalars(select(Account))}
+    assert secret_of(services.settings.key, kept["ada"]) == ada.secret
+    assert secret_of(changed.key, kept["bob"]) == bob.secret
+    again.database.close()
+
+
+def test_two_steps_carry_over_what_was_set_up_under_each_key(
+    services: Services, changed: Settings, third: Settings, old_key: Path, tmp_path: Path
+) -> None:
+    ada = with_phone(services, "ada")
+    between = open_services(changed)
+    bob = with_phone(between, "bob")
+    between.database.close()
+    second = tmp_path / "second"
+    second.write_text(NEW)
+    assert rewrap(changed, old_key).returncode == 0
+    assert rewrap(third, second).returncode == 0
+    again = open_services(third)
+    for phone in (ada, bob):
+        assert failure(again, phone, phone.code()) is None
+    assert verdict(again).broken is None
     again.database.close()
