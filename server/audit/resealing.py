@@ -33,7 +33,7 @@ def under(session: Session, secret: bytes) -> Iterator[AuditEntry]:
     """The entries whose hash fits this key, whatever became of others, in the chain's order."""
     key, previous = chain.chain_key(secret), chain.START
     for entry in repository.chained(session):
-        digest, found = entry.details_digest or "", entry.chain_hash or ""
-        if found == chain.entry_hash(key, previous, linked(entry), digest):
+        digest, stored = entry.details_digest or "", entry.chain_hash or ""
+        if stored == chain.entry_hash(key, previous, linked(entry), digest):
             yield entry
-        previous = found
+        previous = stored

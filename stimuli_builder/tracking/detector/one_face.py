@@ -15,7 +15,7 @@ LIKE = 1.6
 a blink or an open mouth changes that."""
 TWICE = 0.5
 """Boxes of one frame that share more than this part of the area they cover together show one face."""
-MISSED, MOST_MISSED = 0.05, 10
+MISSED, MAX_MISSED = 0.05, 10
 """For each look at which it was not seen, at most ten, a face counts as this part of a width further away."""
 BESIDE = 0.1
 """Two pieces that are both seen in more than this part of the shorter one's frames are two people."""
@@ -85,13 +85,13 @@ def _continued(
     before: Sequence[Detection], missed: Sequence[int], now: Sequence[Detection]
 ) -> dict[int, int]:
     """Index of a detection -> index of the face before that it is, by the least total distance."""
-    never = NEAR + MISSED * MOST_MISSED
+    never = NEAR + MISSED * MAX_MISSED
     cost = np.full((len(before), len(now)), never)
     for row, (one, looks) in enumerate(zip(before, missed, strict=True)):
         for column, other in enumerate(now):
             away = _away(one, other)
             if away < NEAR and _like(_width(one), _width(other)):
-                cost[row, column] = away + MISSED * min(looks, MOST_MISSED)
+                cost[row, column] = away + MISSED * min(looks, MAX_MISSED)
     rows, columns = linear_sum_assignment(cost)
     pairs = zip(rows.tolist(), columns.tolist(), strict=True)
     return {column: row for row, column in pairs if cost[row, column] < never}
