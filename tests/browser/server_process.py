@@ -40,7 +40,9 @@ class ServerProcess:
     """
 
     def __init__(self, data_folder: Path, **further: str) -> None:
-        self.settings = Settings(data_folder=data_folder, secret_key="browser tests", **further)
+        self.settings = Settings(
+            data_folder=data_folder, secret_key="a key of the browser tests, long enough", **further
+        )
         self.further = {f"PALPEBRA_{name.upper()}": value for name, value in further.items()}
         self.port = free_port()
         self.log = data_folder.with_suffix(".log")
