@@ -31,6 +31,11 @@ class Detection:
     iris: Points
     box: Points
 
+    @property
+    def area_px2(self) -> float:
+        """Area of the box in square pixels."""
+        return float(np.prod(self.box[2:] - self.box[:2]))
+
 
 class LidDetector(Protocol):
     """Finds the eyes of faces in one picture, without a memory of the one before."""

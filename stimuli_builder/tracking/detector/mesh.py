@@ -34,7 +34,7 @@ class FaceMesh:
             if min(eye_axis(eye)[2] for eye in eyes) >= LEAST_EYE_PX:
                 iris = np.array([iris for _, _, iris in face["eyes"]])
                 eyes_of_faces.append(Detection(np.concatenate(eyes), iris, np.array(face["box"])))
-        return sorted(eyes_of_faces, key=lambda one: -float(np.prod(one.box[2:] - one.box[:2])))
+        return sorted(eyes_of_faces, key=lambda one: one.area_px2, reverse=True)
 
 
 class CloseUp:

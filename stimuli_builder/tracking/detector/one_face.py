@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from stimuli_builder.tracking.detector.detection import Detection
@@ -19,7 +18,6 @@ MISSED, MAX_MISSED = 0.05, 10
 """For each look at which it was not seen, at most ten, a face counts as this part of a width further away."""
 BESIDE = 0.1
 """Two pieces that are both seen in more than this part of the shorter one's frames are two people."""
-Values = NDArray[np.float64]
 Face = dict[int, Detection]
 """Frame -> where a face is in it."""
 
@@ -75,7 +73,7 @@ def _followed(seen: Mapping[int, Sequence[Detection]]) -> list[Face]:
 def _each_once(detections: Sequence[Detection]) -> list[Detection]:
     """The detections of one frame, largest first, without smaller ones of the same face."""
     kept: list[Detection] = []
-    for detection in sorted(detections, key=_area, reverse=True):
+    for detection in sorted(detections, key=lambda one: one.area_px2, reverse=True):
         if all(_overlap(detection, other) <= TWICE for other in kept):
             kept.append(detection)
     return kept
@@ -112,16 +110,15 @@ def _joined(first: Face, others: Sequence[Face]) -> tuple[Face, list[Face]]:
 
 def _away(before: Detection, now: Detection) -> float:
     """Distance of the middles of two faces, as part of the wider one's width."""
-    one, other = _sides(before), _sides(now)
     between = (now.box[:2] + now.box[2:] - before.box[:2] - before.box[2:]) / 2
-    return float(np.hypot(*between) / max(one[0], other[0], 1e-6))
+    return float(np.hypot(*between) / max(_width(before), _width(now), 1e-6))
 
 
 def _overlap(one: Detection, other: Detection) -> float:
     """Area that two boxes share, as part of the area they cover together."""
     sides = np.minimum(one.box[2:], other.box[2:]) - np.maximum(one.box[:2], other.box[:2])
     shared = float(np.prod(np.maximum(sides, 0)))
-    return shared / max(_area(one) + _area(other) - shared, 1e-6)
+    return shared / max(one.area_px2 + other.area_px2 - shared, 1e-6)
 
 
 def _like(one: float, other: float) -> bool:
@@ -129,24 +126,14 @@ def _like(one: float, other: float) -> bool:
     return max(one, other) <= LIKE * min(one, other)
 
 
-def _sides(detection: Detection) -> Values:
-    """Width and height of a face in pixels."""
-    return np.asarray(detection.box[2:] - detection.box[:2])
-
-
-def _area(detection: Detection) -> float:
-    """Area of a face in square pixels."""
-    return float(np.prod(_sides(detection)))
-
-
 def _summed_area(face: Mapping[int, Detection]) -> float:
     """Area of a face in square pixels, summed over its frames."""
-    return sum(_area(detection) for detection in face.values())
+    return sum(detection.area_px2 for detection in face.values())
 
 
 def _width(detection: Detection) -> float:
     """Width of a face in pixels."""
-    return float(_sides(detection)[0])
+    return float(detection.box[2] - detection.box[0])
 
 
 def _mean_width(face: Mapping[int, Detection]) -> float:
