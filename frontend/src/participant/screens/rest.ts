@@ -11,10 +11,10 @@ export async function rest(session: Session, display: HTMLElement, { block, bloc
   const { t, run } = session;
   const started = performance.now();
   const total = counted(run).length;
-  const so_far = done(run).length;
-  const progress = t("break_progress", { done: so_far, total });
+  const finished = done(run).length;
+  const progress = t("break_progress", { done: finished, total });
   const bar = progressBar(progress);
-  bar.set(so_far, total);
+  bar.set(finished, total);
   const count = h("p", { class: "count" }, progress);
   const wait = h("p", { class: "status", role: "status" });
   const footer = h("footer", { class: "actions" });
