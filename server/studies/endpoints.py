@@ -7,16 +7,18 @@ from server.accounts.identity import Viewer, Writer
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.numbers import Number
-from server.studies import service
-from server.studies.schemas import (
-    ChangeSettings,
-    ChangeStatus,
+from server.studies import creation, definitions, service
+from server.studies.clip_schemas import ClipOut
+from server.studies.definition_schemas import (
     Checked,
-    ClipOut,
     DefinitionText,
     EditDefinition,
     EditedDefinition,
     JudgedEdit,
+)
+from server.studies.schemas import (
+    ChangeSettings,
+    ChangeStatus,
     NewStudy,
     NewVersion,
     ShippedExperiment,
@@ -31,19 +33,19 @@ router = APIRouter(prefix="/api/admin", tags=["studies"], responses=ERROR_RESPON
 @router.get("/experiments")
 def list_experiments(services: ServicesDep, _identity: Viewer) -> list[ShippedExperiment]:
     """The experiments that come with the program."""
-    return service.shipped(services)
+    return creation.shipped(services)
 
 
 @router.post("/definitions/check")
 def check_definition(_identity: Viewer, body: DefinitionText) -> Checked:
     """Check a definition: every problem with its line and the nearest right name, or what it expands to."""
-    return service.check(body.toml)
+    return definitions.check(body.toml)
 
 
 @router.post("/definitions/edit")
 def edit_definition(_identity: Viewer, body: EditDefinition) -> EditedDefinition:
     """Write changed data into a definition: its comments, order and form stay. Nothing is stored."""
-    return service.edit(body)
+    return definitions.edit(body)
 
 
 @router.get("/studies")
@@ -56,7 +58,7 @@ def list_studies(services: ServicesDep, identity: Viewer) -> list[StudySummary]:
 @router.post("/studies", status_code=201)
 def create_study(services: ServicesDep, identity: Uploader, body: NewStudy) -> StudyDetail:
     """Create a draft from a shipped experiment, a definition, or uploaded clips."""
-    name = service.create(services, body, identity)
+    name = creation.create(services, body, identity)
     return get_study(services, identity, name)
 
 
@@ -77,7 +79,7 @@ def delete_study(services: ServicesDep, identity: Writer, study: str) -> None:
 @router.post("/studies/{study}/versions", status_code=201)
 def add_version(services: ServicesDep, identity: Writer, study: str, body: NewVersion) -> StudyDetail:
     """Store a changed definition as a new version; runs keep the version they began with."""
-    service.add_definition(services, study, body, identity)
+    creation.add_definition(services, study, body, identity)
     return get_study(services, identity, study)
 
 
@@ -85,7 +87,7 @@ def add_version(services: ServicesDep, identity: Writer, study: str, body: NewVe
 def judge_version(services: ServicesDep, identity: Viewer, study: str, body: DefinitionText) -> JudgedEdit:
     """Say, before a changed definition is saved, what changes and whether a new data series would begin."""
     with services.database.read() as session:
-        return service.judge_edit(session, study, body.toml, identity)
+        return definitions.judge_edit(session, study, body.toml, identity)
 
 
 @router.get("/studies/{study}/versions/{number}", response_class=PlainTextResponse)

@@ -7,10 +7,10 @@ from server.accounts.audit import record
 from server.accounts.identity import Identity
 from server.clock import now
 from server.errors import Conflict
+from server.studies.edits import for_edit
 from server.studies.importing import add_version, create_study
 from server.studies.life_schemas import ArchiveStudy, CloneStudy
 from server.studies.lookup import definition_of, find_study, version_numbered
-from server.studies.service import for_edit
 from server.workspaces.service import place_of_copy
 
 

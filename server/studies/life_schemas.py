@@ -3,17 +3,14 @@
 from datetime import datetime
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+from pydantic import BaseModel, Field, StringConstraints
 
 from server.numbers import Number
-from server.studies.schemas import Revision, StudyName
+from server.request_body import RequestBody
+from server.studies.fields import Revision, StudyName
 
 
-class _In(BaseModel):
-    model_config = ConfigDict(extra="forbid")
-
-
-class CloneStudy(_In):
+class CloneStudy(RequestBody):
     """A copy of a study under a name of its own."""
 
     name: StudyName
@@ -26,7 +23,7 @@ class CloneStudy(_In):
     )
 
 
-class ArchiveStudy(_In):
+class ArchiveStudy(RequestBody):
     """Put a study into the archive, or take it out."""
 
     revision: Revision

@@ -13,6 +13,8 @@ from server.clock import now
 from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.models import Link
+from server.studies.fields import Label
+from server.studies.link_schemas import LinkOut, LinkPage, NewLinks, Signing
 from server.studies.links import (
     LinkOptions,
     link_in_use,
@@ -25,7 +27,6 @@ from server.studies.links import (
     withdraw,
 )
 from server.studies.lookup import find_study
-from server.studies.schemas import Label, LinkOut, LinkPage, NewLinks, Signing
 from server.studies.signing import signing
 
 router = APIRouter(prefix="/api/admin/studies/{study}/links", tags=["links"], responses=ERROR_RESPONSES)

@@ -13,7 +13,7 @@ from experiments.own_clips import Placed, check_factorial, levels_of
 from experiments.schema.canonical import definition_sha256
 from server.errors import Conflict
 from server.storage.clips import ClipStore
-from server.studies.schemas import OwnClips
+from server.studies.clip_schemas import OwnClips
 from server.studies.templates import trial_of
 from server.transcoding.records import records_of
 from video_conversion.prepared import Prepared, clip_name

@@ -1,4 +1,4 @@
-"""What the study endpoints take and give."""
+"""What the endpoints of studies take and give: new ones, versions, status and settings, the list."""
 
 from datetime import datetime
 from typing import Annotated, Any, Literal
@@ -6,98 +6,12 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 from experiments.definition import Experiment
-from experiments.source_video import FrameRate, SourceVideo
 from server.models import Right
 from server.participants.recruiter import Recruiter
-
-StudyName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,59}$")]
-TomlText = Annotated[str, StringConstraints(max_length=500_000)]
-Label = Annotated[str, StringConstraints(strip_whitespace=True, max_length=200)]
-Revision = Annotated[int, Field(ge=1, le=2**31 - 1, description="The revision this edit started from.")]
-
-
-class _In(BaseModel):
-    model_config = ConfigDict(extra="forbid")
-
-
-class DefinitionText(_In):
-    """A definition to check."""
-
-    toml: TomlText
-
-
-class ProblemOut(BaseModel):
-    """One thing wrong in a definition."""
-
-    line: int | None
-    path: str
-    message: str
-
-
-class BlockOut(BaseModel):
-    """A block of the design."""
-
-    label: str
-    trials: int
-
-
-class LevelOut(BaseModel):
-    """A level of a factor."""
-
-    name: str
-    label: str
-
-
-class FactorOut(BaseModel):
-    """A factor and its levels."""
-
-    name: str
-    label: str
-    levels: list[LevelOut]
-
-
-class DesignOut(BaseModel):
-    """What a definition expands to."""
-
-    experiment: str
-    title: str
-    factors: list[FactorOut]
-    cells: int
-    exemplars: int
-    unique_clips: int
-    trials_per_participant: int
-    blocks: list[BlockOut]
-    expected_minutes: float
-    notes: list[str] = Field(description="Groups, and how often each clip or pair is expected to be shown.")
-    groups: list[str] = Field(description="Groups that links decide; empty where they decide none.")
-    turned_away: str = Field(description="Devices that can take no part, in a sentence; empty where all can.")
-
-
-class Checked(BaseModel):
-    """Whether a definition can be used, and what it expands to."""
-
-    problems: list[ProblemOut]
-    design: DesignOut | None
-
-
-class ChangeOut(BaseModel):
-    """One key of a definition that an edit changes."""
-
-    path: str
-    effect: Literal["wording", "measured"]
-    text: str = Field(description="The change in words.")
-
-
-class JudgedEdit(BaseModel):
-    """What saving an edited definition would do to the answers that are stored."""
-
-    changes: list[ChangeOut]
-    series: int = Field(description="Data series that answers to the edited definition would be of.")
-    present_series: int
-    runs: int = Field(description="Runs of the present series, previews aside.")
-    begins_series: bool = Field(
-        description="A new data series begins, and there are runs it is kept apart from."
-    )
+from server.request_body import RequestBody
+from server.studies.clip_schemas import LevelsPattern, LevelsTable, OwnClips
+from server.studies.definition_schemas import DesignOut
+from server.studies.fields import Label, Revision, StudyName, TomlText
 
 
 class ShippedExperiment(BaseModel):
@@ -109,35 +23,7 @@ class ShippedExperiment(BaseModel):
     clips_ready: bool = Field(description="True where `stimuli build` has made its clips on this server.")
 
 
-class LevelsTable(_In):
-    """A CSV with one row a clip: column `file`, then one column a factor; `exemplar` is optional."""
-
-    csv: Annotated[str, StringConstraints(max_length=2_000_000)]
-
-
-class LevelsPattern(_In):
-    """A pattern that file names follow, such as `{character}_{speed}_{exemplar}.mp4`."""
-
-    pattern: Annotated[str, StringConstraints(min_length=3, max_length=300)]
-
-
-Template = Literal["rating", "slider", "sliders", "acr", "dcr", "pairs", "just_noticeable"]
-
-
-class OwnClips(_In):
-    """What to ask about one's own clips, where no definition is given.
-
-    The template says what participants do; `low` and `high` are for rating and sliders alone.
-    """
-
-    template: Template = "rating"
-    title: Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=300)]
-    question: Label = "How natural was this clip?"
-    low: Label = "very unnatural"
-    high: Label = "very natural"
-
-
-class NewStudy(_In):
+class NewStudy(RequestBody):
     """A study from a shipped experiment, from a definition, or from uploaded clips."""
 
     name: StudyName
@@ -151,7 +37,7 @@ class NewStudy(_In):
     )
 
 
-class NewVersion(_In):
+class NewVersion(RequestBody):
     """A changed definition; it becomes a new version."""
 
     revision: Revision
@@ -161,75 +47,20 @@ class NewVersion(_In):
     levels: LevelsTable | LevelsPattern | None = None
 
 
-class ChangeStatus(_In):
+class ChangeStatus(RequestBody):
     """Open or close a study."""
 
     revision: Revision
     status: Literal["draft", "pilot", "live", "closed"]
 
 
-class ChangeSettings(_In):
+class ChangeSettings(RequestBody):
     """Pause, quota and recruiter."""
 
     revision: Revision
     paused: bool
     quota: Annotated[int, Field(ge=1, le=1_000_000)] | None
     recruiter: Recruiter | None
-
-
-class Signing(BaseModel):
-    """The study's secret for signed addresses, and how the recruiter's side signs with it."""
-
-    declared: bool = Field(description="The recruiter declares that addresses are signed.")
-    parameter: str = Field(description="Address parameter of the signature.")
-    secret_name: str = Field(description="Another name makes another secret.")
-    secret: str = Field(description="64 hexadecimal digits; who has it can sign for anybody.")
-    identifier: str = Field(description="A participant's id, as an example.")
-    signature: str = Field(description="HMAC-SHA-256 of that id, with the secret as key.")
-    query: str = Field(
-        description="What is added to the link after `?` for that participant, percent-encoded."
-    )
-    python: str = Field(description="The same signature in Python.")
-    shell: str = Field(description="The same signature by OpenSSL.")
-
-
-class NewLinks(_In):
-    """One general or preview link, or many personal ones: by their labels, or `count` numbered ones."""
-
-    kind: Literal["general", "personal", "preview"]
-    label: Label = ""
-    group: Annotated[str, StringConstraints(max_length=600)] = Field(
-        default="", description="Group of who comes by it, where links decide."
-    )
-    labels: Annotated[list[Label], Field(max_length=5000)] = []
-    count: Annotated[int, Field(ge=1, le=5000)] = 1
-    quota: Annotated[int, Field(ge=1, le=1_000_000)] | None = None
-    days: Annotated[int, Field(ge=1, le=3650)] | None = None
-    recruiter: Recruiter | None = None
-
-
-class LinkOut(BaseModel):
-    """A link into a study."""
-
-    id: str
-    kind: str
-    label: str
-    group_name: str = Field(description="Group of who comes by it; empty where links decide none.")
-    url: str
-    quota: int | None
-    expires_at: datetime | None
-    created_at: datetime
-    runs: int
-    complete: int
-    recruiter: dict[str, Any] | None
-
-
-class LinkPage(BaseModel):
-    """Links in the order they were made."""
-
-    links: list[LinkOut]
-    total: int
-    next: str | None = Field(description="Ask again with `after` = this; null at the end.")
 
 
 class SeriesOut(BaseModel):
@@ -283,95 +114,3 @@ class StudyDetail(BaseModel):
     versions: list[VersionOut]
     series: list[SeriesOut]
     recruiter: dict[str, Any] | None
-
-
-class ClipOut(BaseModel):
-    """A clip of a study, with the curve it shows."""
-
-    clip_sha256: str
-    url: str
-    file: str
-    cell: str
-    levels: dict[str, str]
-    exemplar: int
-    profile: str
-    fps: float
-    frames: int
-    width_px: int
-    height_px: int
-    bytes: int
-    closure: list[float]
-    source: SourceVideo | None = Field(
-        description="What it was converted from, without its frame map; null where it is shown as it came."
-    )
-
-
-class UploadedFile(BaseModel):
-    """One file of an upload: what it is, or why it cannot be used."""
-
-    name: str
-    bytes: int
-    state: Literal["waiting", "ready", "refused"] = Field(
-        description="Waiting: it is still looked into, or converted."
-    )
-    sha256: str | None = Field(default=None, description="Of the clip.")
-    fps: float | None = None
-    frames: int | None = None
-    width_px: int | None = None
-    height_px: int | None = None
-    problem: str | None = Field(default=None, description="Why it cannot be used, and what to do.")
-    same_as: str | None = Field(default=None, description="An earlier file with the same bytes.")
-    source: SourceVideo | None = Field(
-        default=None, description="What the clip was converted from; null where the file is shown as it came."
-    )
-
-
-class UploadProgress(BaseModel):
-    """How far an upload has been looked into and converted."""
-
-    files: int
-    waiting: int
-    refused: int
-    left_out: int = Field(description="Files that are set aside; they are none of `files`.")
-
-
-class LeaveOut(_In):
-    """Whether one file of an upload is left out of what is made of it."""
-
-    file: str = Field(max_length=300)
-    left_out: bool
-
-
-class AskFrameRate(_In):
-    """The frame rate that clips are to have: one for all, or each its own."""
-
-    fps: FrameRate | None
-
-
-class UploadOut(BaseModel):
-    """An upload waiting to become a study; it is deleted after a day."""
-
-    id: str
-    files: list[UploadedFile]
-    waiting: int = Field(description="Files that are still looked into, or converted.")
-    fps: float | None = Field(description="Frames per second asked for; null: each clip its own.")
-    has_manifest: bool
-    left_out: list[str] = Field(description="Names of the files that are set aside; they can be put back.")
-    tables: list[str] = Field(description="Names of CSV files in the upload.")
-    suggested_pattern: str | None
-
-
-class EditDefinition(_In):
-    """A definition's text, and what it shall say instead; without `data` the text is read only."""
-
-    toml: TomlText
-    data: dict[str, Any] | None = Field(default=None, description="The declaration as the TOML's tables.")
-
-
-class EditedDefinition(BaseModel):
-    """A definition as text and as data, with its problems, or what it expands to."""
-
-    toml: str
-    data: dict[str, Any] | None = Field(description="Null where the text is not TOML.")
-    problems: list[ProblemOut]
-    design: DesignOut | None

@@ -8,8 +8,9 @@ from experiments.schema.difference import changes_what_is_measured, difference
 from server.errors import NotFound
 from server.models import Study, StudyVersion
 from server.studies import repository
+from server.studies.definition_schemas import ChangeOut, JudgedEdit
 from server.studies.lookup import active_version, definition_of
-from server.studies.schemas import ChangeOut, JudgedEdit, SeriesOut
+from server.studies.schemas import SeriesOut
 
 
 def series_of(session: Session, study: Study) -> list[SeriesOut]:

@@ -9,7 +9,7 @@ from server.accounts.identity import Identity
 from server.models import Link, Study
 from server.participants.recruiter import NO_RECRUITER, Recruiter
 from server.participants.signatures import signature_of, signing_secret
-from server.studies.schemas import Signing
+from server.studies.link_schemas import Signing
 
 EXAMPLE_ID = "P-0001"
 USUAL_PARAMETER = "signature"

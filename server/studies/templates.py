@@ -6,7 +6,7 @@ from typing import Any
 
 from experiments.errors import InputError
 from experiments.trials.clip_rating.scales.scale import SCALE_NAME
-from server.studies.schemas import OwnClips
+from server.studies.clip_schemas import OwnClips
 
 Levels = dict[str, list[str]]
 """Factor -> the names of its levels."""

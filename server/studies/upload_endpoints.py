@@ -14,7 +14,7 @@ from server.accounts.identity import Viewer
 from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES, Invalid
 from server.studies import left_out, originals, uploads
-from server.studies.schemas import AskFrameRate, LeaveOut, UploadOut, UploadProgress
+from server.studies.clip_schemas import AskFrameRate, LeaveOut, UploadOut, UploadProgress
 from server.transcoding.records import ask_rate
 from server.workspaces.access import Uploader
 

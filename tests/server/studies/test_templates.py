@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from server.studies.schemas import OwnClips
+from server.studies.clip_schemas import OwnClips
 from server.studies.templates import trial_of
 from tests.helpers.admins import Admin
 from tests.helpers.studies import Participant
