@@ -7,6 +7,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from experiments.counted import counted
 from experiments.errors import InputError
 from stimuli_builder.blinks.events.recognise import LidEvent, Recognised
 from stimuli_builder.blinks.label_options import LabelOptions
@@ -101,15 +102,23 @@ def require_blinks(eye: EyeBlinks, options: LabelOptions) -> None:
     """Refuse a series without a blink."""
     if eye.blinks:
         return
-    deepest = 1 - np.nanmin(eye.smooth) / max(float(np.nanquantile(eye.smooth, 0.9)), 1e-9)
+    raise InputError(f"no blink in column '{eye.series.column}': {_why_none(eye, options)}")
+
+
+def _why_none(eye: EyeBlinks, options: LabelOptions) -> str:
+    """What a series without a blink holds instead, or why its blinks could not be measured."""
+    if eye.refused:
+        first = eye.refused[0]
+        more = f"{counted(len(eye.refused), 'dip')} could not be measured, the first"
+        return f"{more} at frame {first.minimum}: {first.reason}"
     others = Counter(event.kind.replace("_", " ") for event in eye.events if event.kind != "blink")
-    seen = ", ".join(f"{count} x {kind}" for kind, count in others.items())
-    lost = f"; {len(eye.refused)} minima could not be labelled" if eye.refused else ""
-    raise InputError(
-        f"no blink in column '{eye.series.column}': its deepest dip is {deepest:.0%} of the opening"
-        + (f", it has {seen}" if seen else f", a blink needs {options.minimum_depth:.0%} (--minimum-depth)")
-        + f"{lost}; is the column right, and --fps?"
-    )
+    deepest = 1 - np.nanmin(eye.smooth) / max(float(np.nanquantile(eye.smooth, 0.9)), 1e-9)
+    what = f"its deepest dip is {deepest:.0%} of the opening"
+    if others:
+        what += f", it has {', '.join(f'{count} x {kind}' for kind, count in others.items())}"
+    elif deepest < options.minimum_depth:
+        what += f", a blink needs {options.minimum_depth:.0%} (--minimum-depth)"
+    return f"{what}; is the column right, and --fps?"
 
 
 def rate_doubt(eye: EyeBlinks) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from experiments.counted import counted
 from experiments.errors import InputError
 from experiments.files import check_targets, temporary_beside
 from stimuli_builder.blinks.plots import check_figure_name
@@ -14,15 +15,17 @@ from stimuli_builder.tracking.labelfree import label_free_lesson, survey
 from stimuli_builder.tracking.labels import Labels, load_labels
 from stimuli_builder.tracking.learn import Lesson, learn, open_video
 from stimuli_builder.tracking.model import CoupledModel, TrainingOptions, load_model
+from stimuli_builder.tracking.outcome import TrackSummary
 from stimuli_builder.tracking.plot import plot_track
 from stimuli_builder.tracking.preview import write_preview
 from stimuli_builder.tracking.relabel import worst_frames, write_relabel
 from stimuli_builder.tracking.shapes import Points
-from stimuli_builder.tracking.track import TrackSummary, track_video
+from stimuli_builder.tracking.track import track_video
 from stimuli_builder.video import VideoInfo, declared_frames
 from stimuli_builder.video_clock import DamagedFileError
 from stimuli_builder.video_writer import check_video_name
 
+REASONS_TOLD = 6
 VIDEO_SUFFIXES = {".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm", ".mts", ".mpg", ".wmv"}
 
 
@@ -134,7 +137,7 @@ def _check(job: TrackJob) -> None:
         check_figure_name(job.plot)
 
 
-def _model(job: TrackJob, info: VideoInfo) -> tuple[CoupledModel, Mapping[int, Points]]:
+def _model(job: TrackJob, info: VideoInfo) -> tuple[CoupledModel, Mapping[int, Points | None]]:
     """A model from labels, from a file, or from what the detector sees; then with its detections."""
     if job.labels is not None:
         lesson = learn(info, job.labels, job.options, one_eye=job.one_eye, folds=job.folds, refine=job.refine)
@@ -148,7 +151,7 @@ def _model(job: TrackJob, info: VideoInfo) -> tuple[CoupledModel, Mapping[int, P
     return model, {}
 
 
-def _label_free(job: TrackJob, info: VideoInfo) -> tuple[CoupledModel, Mapping[int, Points]]:
+def _label_free(job: TrackJob, info: VideoInfo) -> tuple[CoupledModel, Mapping[int, Points | None]]:
     by_hand = _by_hand(job.relabel, info)
     with frame_progress() as progress:
         task = progress.add_task("finding eyes", total=info.frame_count)
@@ -162,7 +165,7 @@ def _label_free(job: TrackJob, info: VideoInfo) -> tuple[CoupledModel, Mapping[i
     print(f"{line}{more}; training on them", flush=True)
     lesson = label_free_lesson(info, seen, job.options, one_eye=job.one_eye, by_hand=by_hand)
     report_modes(lesson)
-    return lesson.model, seen.points
+    return lesson.model, seen.hints
 
 
 def _by_hand(path: Path | None, info: VideoInfo) -> Labels | None:
@@ -170,7 +173,7 @@ def _by_hand(path: Path | None, info: VideoInfo) -> Labels | None:
 
 
 def _relabel(
-    path: Path, info: VideoInfo, model: CoupledModel, out: Path, hints: Mapping[int, Points]
+    path: Path, info: VideoInfo, model: CoupledModel, out: Path, hints: Mapping[int, Points | None]
 ) -> None:
     before = _by_hand(path, info)
     worst = worst_frames(out, model.eyes, info.fps, hints)
@@ -187,6 +190,11 @@ def _report(out: Path, summary: TrackSummary, prepared_s: float) -> None:
         f"{summary.end_to_end_fps:,.0f} frames/s with decoding; "
         f"{summary.total_s:,.1f} s after {prepared_s:,.1f} s for the model"
     )
+    usual = sorted(summary.reasons.items(), key=lambda entry: -entry[1][0])
+    for (status, _), (number, first, whole) in usual[:REASONS_TOLD]:
+        print(f"{counted(number, 'frame')} {status}, the first is {first}: {whole}")
+    if summary.tracked == summary.doubtful:
+        sys.stderr.write("warning: no frame is beyond doubt; look at a --preview before using any number\n")
 
 
 def _pictures(job: TrackJob, info: VideoInfo, model: CoupledModel) -> None:

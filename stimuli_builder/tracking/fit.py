@@ -1,11 +1,13 @@
 """Fitting the coupled AAM to one picture: the steepest-descent algebra, and buffers kept between frames."""
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from stimuli_builder.compiled import compiled
 from stimuli_builder.tracking import kernels
 from stimuli_builder.tracking.kernel_arrays import Buffers, MeshArrays, ModelArrays
 from stimuli_builder.tracking.light import light_between
@@ -32,6 +34,8 @@ class Fit:
         In the reduced picture.
     residuals : float64 array (eyes,)
         Root mean square grey levels.
+    spreads : float64 array (eyes,)
+        Standard deviation of the picture's grey levels over each eye.
     iterations : int
         0 if the fit broke down.
     light : (float, float)
@@ -43,6 +47,7 @@ class Fit:
     pose: Values
     vertices: NDArray[np.float32]
     residuals: Values
+    spreads: Values
     iterations: int
     light: tuple[float, float] = (1.0, 0.0)
 
@@ -161,4 +166,22 @@ class Fitter:
         light = (1.0, 0.0)
         if iterations:
             light = light_between(self._buffers.look, self._buffers.sampled, self.model.weights)
-        return Fit(c, pose, self._buffers.vertices.copy(), residuals, int(iterations), light)
+        spreads = grey_spreads(self._buffers.sampled, self.model.mesh.ends, self.model.eyes)
+        return Fit(c, pose, self._buffers.vertices.copy(), residuals, spreads, int(iterations), light)
+
+
+@compiled
+def grey_spreads(levels: NDArray[np.float32], ends: NDArray[np.int64], eyes: int) -> Values:
+    """Standard deviation of grey levels (N,) over each eye, (eyes,); eye e has those up to ends[e]."""
+    spreads = np.empty(eyes)
+    first = 0
+    for eye in range(eyes):
+        part = levels[first : ends[eye]]
+        total, squares = 0.0, 0.0
+        for x in range(part.shape[0]):
+            total += part[x]
+            squares += part[x] * part[x]
+        mean = total / part.shape[0]
+        spreads[eye] = math.sqrt(max(squares / part.shape[0] - mean * mean, 0.0))
+        first = ends[eye]
+    return spreads

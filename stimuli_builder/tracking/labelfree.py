@@ -43,6 +43,9 @@ MODES = 6
 SPREADS = 8.0
 UNLIKE_SHARE = 0.02
 """A detection is left out where the others leave more of it than 8 spreads and 2% of the eye's width."""
+UPRIGHT_DEG = 60
+"""A line through both eyes that is turned further against the picture's rows tells a picture on its side or
+upside down: left and right, above and below an eye are then not what they are called."""
 STEADY = 3.0
 """Eyes' widths over the frames looked at stay within this factor, or they belong to no one face."""
 
@@ -59,11 +62,19 @@ class Survey:
         Frames looked at.
     several_faces : int
         Frames among them with more than one face; the one larger over the recording was taken.
+    unseen : frozenset of int
+        Frames looked at in which the eyes of that face were not seen.
     """
 
     points: dict[int, Points]
     looked_at: int
     several_faces: int
+    unseen: frozenset[int] = frozenset()
+
+    @property
+    def hints(self) -> dict[int, Points | None]:
+        """Every frame looked at and what was seen of the eyes there, None for nothing; see `track_video`."""
+        return {**self.points, **dict.fromkeys(self.unseen)}
 
 
 def survey(info: VideoInfo, *, one_eye: bool, advance: Callable[[int], None] | None = None) -> Survey:
@@ -86,9 +97,15 @@ def survey(info: VideoInfo, *, one_eye: bool, advance: Callable[[int], None] | N
             if advance is not None:
                 advance(number)
     several = sum(len(faces) > 1 for faces in seen.values())
-    labels = {n: face.points for n, face in one_face(seen).items() if _inside(face.points, info)}
+    eyes_seen = {n: face.points for n, face in one_face(seen).items() if _inside(face.points, info)}
+    labels = (
+        eyes_seen
+        if one_eye
+        else {n: points for n, points in eyes_seen.items() if abs(turn_deg(points)) < UPRIGHT_DEG}
+    )
+    _require_upright(info, eyes_seen, labels)
     _require_face(info, labels, len(seen), one_eye)
-    return Survey(labels, len(seen), several)
+    return Survey(labels, len(seen), several, frozenset(seen.keys() - labels.keys()))
 
 
 def _first(info: VideoInfo, step: int) -> list[Picture]:
@@ -111,6 +128,23 @@ def _every(step: int) -> Callable[[Any], Picture]:
 def _inside(points: Points, info: VideoInfo) -> bool:
     """Whether all points lie in the picture."""
     return bool((points >= 0).all() and (points <= np.array(info.size_px) - 1).all())
+
+
+def turn_deg(points: Points) -> float:
+    """Angle of the line from the first eye's middle to the second's, clockwise in the picture, in degrees."""
+    x, y = points[EYE_POINTS:].mean(0) - points[:EYE_POINTS].mean(0)
+    return float(np.degrees(np.arctan2(y, x)))
+
+
+def _require_upright(info: VideoInfo, eyes_seen: dict[int, Points], upright: dict[int, Points]) -> None:
+    turned = [points for n, points in eyes_seen.items() if n not in upright]
+    if len(turned) <= len(upright):
+        return
+    quarter = int(np.median([round(turn_deg(points) / 90) % 4 for points in turned]))
+    raise InputError(
+        f"{info.path}: the face is turned by {90 * quarter} degrees clockwise on {len(turned)} of "
+        f"{len(eyes_seen)} frames that show one: the file's rotation is wrong; turn the video upright first"
+    )
 
 
 def _require_face(info: VideoInfo, labels: dict[int, Points], looked: int, one_eye: bool) -> None:

@@ -15,7 +15,7 @@ from experiments.files import whole_text
 from stimuli_builder.tracking.shapes import EYE_POINTS
 
 if TYPE_CHECKING:
-    from stimuli_builder.tracking.track import TrackedFrame
+    from stimuli_builder.tracking.outcome import TrackedFrame
 
 COLUMN_MEANINGS = {
     "frame": "frame number from 0",

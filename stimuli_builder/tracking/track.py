@@ -3,20 +3,19 @@
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from types import MappingProxyType
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import InputError
 from stimuli_builder.tracking.certainty import DIFFERING_SHARE, doubt, lid_difference, stated_errors
-from stimuli_builder.tracking.fit import Fit, Fitter
+from stimuli_builder.tracking.fit import Fit, Fitter, grey_spreads
 from stimuli_builder.tracking.light import Light
 from stimuli_builder.tracking.model import CoupledModel
+from stimuli_builder.tracking.outcome import Status, TrackedFrame, TrackSummary
 from stimuli_builder.tracking.picture import (
     reduced,
     reduced_points,
@@ -38,10 +37,12 @@ from stimuli_builder.tracking.table import TrackWriter
 from stimuli_builder.video import Picture, VideoInfo, frames
 from stimuli_builder.video_clock import DamagedFileError
 
-Status = Literal["tracked", "reinitialised", "doubtful", "lost"]
-
 SCALE_RANGE = (0.5, 2.0)
 FROZEN = "the same picture as the frame before"
+UNSEEN = "the detector sees no such eyes here"
+FLAT_SHARE = 0.25
+"""Spread of grey levels, as part of the other eye's or the labelled ones', below which there is no eye to be
+seen: a shut eye has 0.7 of an open one's or more in two recordings, plain things over it 0 to 0.05."""
 BLANK_RANGE = 12
 """Grey levels between the darkest and the brightest pixel below which a picture shows nothing."""
 WORSE = 1.1
@@ -49,54 +50,6 @@ WORSE = 1.1
 NEAR_EVERY_FRAME = 30
 NEAR_LATER_EVERY = 5
 WHOLE_EVERY = 30
-
-
-@dataclass(frozen=True)
-class TrackedFrame:
-    """One frame's outcome; `points` and `distances` are None exactly when `status` is 'lost'.
-
-    Attributes
-    ----------
-    points : float64 array (9 * eyes, 2) or None
-        In pixels of the video.
-    distances : float64 array (eyes,) or None
-        In pixels, image-left eye first.
-    residual : float or None
-        Root mean square grey levels over all base pixels; None if no fit came to an end.
-    errors : float64 array (9 * eyes,) or None
-        Stated error of each point in pixels.
-    """
-
-    status: Status
-    reason: str
-    points: Points | None
-    distances: NDArray[np.float64] | None
-    residual: float | None
-    iterations: int
-    errors: NDArray[np.float64] | None = None
-
-
-@dataclass
-class TrackSummary:
-    """Counts and speeds of one run; `fit_s` is processor time of fitting alone."""
-
-    frames: int = 0
-    tracked: int = 0
-    reinitialised: int = 0
-    doubtful: int = 0
-    lost: int = 0
-    fit_s: float = 0.0
-    total_s: float = 0.0
-
-    @property
-    def fit_fps(self) -> float:
-        """Frames fitted per second of fitting."""
-        return self.frames / max(self.fit_s, 1e-9)
-
-    @property
-    def end_to_end_fps(self) -> float:
-        """Frames per second with decoding and writing."""
-        return self.frames / max(self.total_s, 1e-9)
 
 
 class Tracker:
@@ -113,10 +66,19 @@ class Tracker:
         self._light = Light()
         self._before: Points | None = None
         self._loss = ""
+        self._unseen = False
         low, high = SCALE_RANGE
         sizes = np.hypot(model.poses[:, 0], model.poses[:, 1])
         self._sizes = (float(low * sizes.min()), float(high * sizes.max()))
+        self._usual_spread = float(grey_spreads(model.appearance[0], model.mesh.ends, model.eyes).max())
         self._to_parameters = _to_parameters(model)
+
+    def look(self, hint: Points | None) -> None:
+        """Take in that a detector looks at the next frame: after one that sees nothing, fits are doubtful.
+
+        A patch of cheek or wall may pass for eyes, and between two looks nobody else tells.
+        """
+        self._unseen = hint is None
 
     def step(self, picture: Picture, hint: Points | None = None) -> TrackedFrame:
         """Fit the next frame, searching for the eyes where they are not where they were.
@@ -247,6 +209,7 @@ class Tracker:
         difference = None if hint is None else lid_difference(points, hint)
         errors = stated_errors(self.model, fit, None if difference is None else difference * widths(points))
         why = doubt(self.model, fit, points, errors, difference, before)
+        why = why or self._flat(fit) or (UNSEEN if self._unseen else "")
         self._before = points
         if not why:
             self._light = self._light.following(*fit.light)
@@ -254,6 +217,17 @@ class Tracker:
             status, reason = "doubtful", why or reason
         distances = inter_eyelid_distances(points, self.model.markers)
         return TrackedFrame(status, reason, points, distances, _overall(fit), fit.iterations, errors)
+
+    def _flat(self, fit: Fit) -> str:
+        """Which eye's picture is too even to show one; a detector and its model draw lids all the same."""
+        usual = max(float(fit.spreads.max()), self._usual_spread)
+        eye = int(fit.spreads.argmin())
+        return (
+            f"{self._name(eye)} covered: its picture is flat" if fit.spreads[eye] < FLAT_SHARE * usual else ""
+        )
+
+    def _name(self, eye: int) -> str:
+        return ("left eye", "right eye")[eye] if self.model.eyes == 2 else "eye"
 
     def _fault(self, fit: Fit, picture: Picture) -> str:
         """Why a fit is not believed, or an empty string."""
@@ -267,9 +241,10 @@ class Tracker:
         excess = fit.residuals / self.model.residual_limits
         eye = int(excess.argmax())
         if excess[eye] > 1:
-            name = ("left eye", "right eye")[eye] if self.model.eyes == 2 else "eye"
             limit = self.model.residual_limits[eye]
-            return f"{name} covered or changed: residual {fit.residuals[eye]:.1f} above {limit:.1f}"
+            return (
+                f"{self._name(eye)} covered or changed: residual {fit.residuals[eye]:.1f} above {limit:.1f}"
+            )
         return ""
 
 
@@ -291,7 +266,7 @@ def track_video(
     info: VideoInfo,
     out: Path,
     advance: Callable[[TrackSummary], None] | None = None,
-    hints: Mapping[int, Points] = MappingProxyType({}),
+    hints: Mapping[int, Points | None] = MappingProxyType({}),
 ) -> TrackSummary:
     """Track every frame of a video into a CSV; memory does not grow with its length.
 
@@ -299,8 +274,8 @@ def track_video(
     ----------
     advance : callable, optional
         Called after each frame with the counts so far, for a progress bar.
-    hints : mapping of int to float64 array, optional
-        Frame -> points of a detector, see `Tracker.step`.
+    hints : mapping of int to float64 array or None, optional
+        Frame looked at by a detector -> its points, or None where it saw no such eyes; see `Tracker.step`.
 
     Raises
     ------
@@ -319,23 +294,17 @@ def track_video(
         pictures = frames(info.path, lambda full: reduced(full, model.reduction))
         for picture in islice(pictures, info.frame_count):
             before = time.thread_time()
+            if summary.frames in hints:
+                tracker.look(hints[summary.frames])
             frame = tracker.step(picture, hints.get(summary.frames))
             summary.fit_s += time.thread_time() - before
             writer.write(summary.frames, float(info.times_s[summary.frames]), frame)
-            _count(summary, frame)
+            summary.count(frame)
             if advance is not None:
                 advance(summary)
         _refuse_nothing(info, summary)
     summary.total_s = time.perf_counter() - begun
     return summary
-
-
-def _count(summary: TrackSummary, frame: TrackedFrame) -> None:
-    summary.frames += 1
-    summary.tracked += frame.status != "lost"
-    summary.doubtful += frame.status == "doubtful"
-    summary.reinitialised += frame.status == "reinitialised"
-    summary.lost += frame.status == "lost"
 
 
 def _refuse_nothing(info: VideoInfo, summary: TrackSummary) -> None:

@@ -78,7 +78,7 @@ def main() -> None:
         lesson = label_free_lesson(info, seen, TrainingOptions(), one_eye=one_eye)
         with tempfile.TemporaryDirectory() as bare:
             out = Path(bare) / "track.csv"
-            summary = track_video(lesson.model, info, out, None, seen.points)
+            summary = track_video(lesson.model, info, out, None, seen.hints)
             rows = {int(row["frame"]): row for row in track_rows(out)}
         names = point_columns(labels.eyes)
         points = {

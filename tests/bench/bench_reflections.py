@@ -70,7 +70,7 @@ def tell(name: str, case: str, info: VideoInfo, one_eye: bool, labels: Labels, f
     """Track one reflected clip and print its line."""
     seen = survey(info, one_eye=one_eye)
     lesson = label_free_lesson(info, seen, TrainingOptions(), one_eye=one_eye)
-    track_video(lesson.model, info, folder / "track.csv", None, seen.points)
+    track_video(lesson.model, info, folder / "track.csv", None, seen.hints)
     rows = list(track_rows(folder / "track.csv"))
     names = point_columns(labels.eyes)
     found = [numbers(row, names, name).reshape(-1, 2) for row in rows]

@@ -167,7 +167,7 @@ def recordings(folder: Path) -> None:
         if (cache_folder() / "face-mesh-0.10.21" / "ready").exists():
             seen = survey(info, one_eye=one_eye)
             free = label_free_lesson(info, seen, TrainingOptions(), one_eye=one_eye).model
-            tell(f"{name}, no labels, lids", compared(info, free, seen.points, labels.frames, along=False))
+            tell(f"{name}, no labels, lids", compared(info, free, seen.hints, labels.frames, along=False))
 
 
 def main() -> None:

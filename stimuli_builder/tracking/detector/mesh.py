@@ -6,12 +6,15 @@ from typing import Any
 
 import numpy as np
 
+from experiments.errors import InputError
 from stimuli_builder.tracking.detector.detection import Detection, LidDetector, eye_points
 from stimuli_builder.tracking.detector.mesh_client import MeshClient, detector_environment
 from stimuli_builder.tracking.shapes import Points, eye_axis
 from stimuli_builder.video import Picture
 
 LEAST_EYE_PX = 10
+FACES_ASKED = 5
+"""Pictures of a close-up in which a whole face is looked for: what is no close-up gives lids of a cheek."""
 REGION_SIDES = (0.9, 1.2, 1.5, 1.9, 2.4)
 """Sides of the regions tried in a close-up, as parts of the picture's height."""
 REGION_SHIFTS = (-0.18, 0.0, 0.18)
@@ -101,11 +104,28 @@ class CloseUp:
 
 @contextmanager
 def open_detector(*, one_eye: bool, first: Sequence[Picture] = ()) -> Iterator[LidDetector]:
-    """Start the detector; for a close-up of one eye `first` holds pictures (h, w, 3) to find the eye in."""
+    """Start the detector; for a close-up of one eye `first` holds pictures (h, w, 3) to find the eye in.
+
+    Raises
+    ------
+    InputError
+        Most pictures meant as close-ups show a whole face.
+    """
     with MeshClient(detector_environment()) as client:
         if not one_eye:
             yield FaceMesh(client)
             return
+        _refuse_faces(FaceMesh(client), first)
         close_up = CloseUp(client)
         close_up.look_for(first)
         yield close_up
+
+
+def _refuse_faces(mesh: FaceMesh, pictures: Sequence[Picture]) -> None:
+    few = pictures[:: max(1, len(pictures) // FACES_ASKED)][:FACES_ASKED]
+    faces = sum(bool(mesh.detect(picture)) for picture in few)
+    if 2 * faces > len(few):
+        raise InputError(
+            f"a whole face is seen on {faces} of {len(few)} frames looked at, and --one-eye is for close-ups "
+            "of one eye; leave it out"
+        )

@@ -1,4 +1,5 @@
 import json
+import re
 from pathlib import Path
 
 import pandas as pd
@@ -298,3 +299,20 @@ def test_moved_ends_that_cannot_be(stimuli, series_file, tmp_path, row, words):
     ended = stimuli(*common, "--review", review)
     assert ended.code == 2
     assert words in ended.err
+
+
+def test_a_blink_that_a_gap_cuts_is_told_by_its_frame_and_not_as_too_shallow(stimuli, series_file, tmp_path):
+    table = pd.read_csv(series_file)
+    lowest = int(table["gap_l"].iloc[: len(table) // 4].idxmin())
+    table.loc[lowest + 8 :, "gap_l"] = None
+    table.to_csv(series_file, index=False)
+    out = tmp_path / "b.csv"
+    ended = stimuli("blinks", series_file, "--column", "gap_l", "--fps", 300, "--out", out, "--allow-gaps")
+    assert (ended.code, ended.err.count("\n")) == (2, 1)
+    told = re.search(
+        r"1 dip could not be measured, the first at frame (\d+): its beginning or end", ended.err
+    )
+    assert told
+    assert abs(int(told[1]) - lowest) < 8
+    assert "deepest dip" not in ended.err
+    assert not out.exists()

@@ -27,8 +27,9 @@ from stimuli_builder.tracking.labels import load_labels
 from stimuli_builder.tracking.model import TrainingOptions
 from stimuli_builder.tracking.relabel import worst_frames, write_relabel
 from stimuli_builder.tracking.shapes import widths
-from stimuli_builder.tracking.track import FROZEN, Tracker, track_video
+from stimuli_builder.tracking.track import FROZEN, UNSEEN, Tracker, track_video
 from stimuli_builder.video import frames, rgb, scan_video
+from tests.stimuli_builder.tracking.test_bad_input import write_frames
 
 
 @settings(deadline=None, max_examples=30)
@@ -251,3 +252,51 @@ def test_a_video_without_a_face_is_refused_in_one_line(detector, recording):
     with pytest.raises(InputError, match="add --one-eye; or label frames by hand") as refused:
         survey(scan_video(recording.video), one_eye=False)
     assert "\n" not in str(refused.value)
+
+
+def test_a_fit_where_the_detector_sees_nothing_is_doubtful_until_it_sees_the_eyes_again(lesson, recording):
+    tracker, seen = Tracker(lesson.model), {0: recording.points[0], 4: None, 8: recording.points[8]}
+    outcomes = []
+    for number in range(12):
+        if number in seen:
+            tracker.look(seen[number])
+        frame = tracker.step(recording.pictures[number], seen.get(number))
+        outcomes.append((frame.status, frame.reason))
+    assert outcomes[:4] == [("tracked", "")] * 4
+    assert outcomes[4:8] == [("doubtful", UNSEEN)] * 4
+    assert outcomes[8:] == [("tracked", "")] * 4
+
+
+def test_frames_in_which_no_face_is_seen_are_told_from_frames_not_looked_at(
+    detector, shared_data, tmp_path, monkeypatch
+):
+    monkeypatch.setattr("stimuli_builder.tracking.labelfree.LOOKED_AT", 36)
+    pictures = [picture.copy() for picture in frames(shared_data / "face_video" / "single_face.mp4")]
+    for picture in pictures[40:56]:
+        face, strip = np.full_like(picture, 128), slice(140, 190)
+        face[strip, 220:370] = picture[strip, 220:370]
+        picture[:] = face
+    clip, out = tmp_path / "strip.mp4", tmp_path / "t.csv"
+    write_frames(clip, pictures, fps=30)
+    info = scan_video(clip)
+    seen = survey(info, one_eye=False)
+    assert seen.hints.keys() == set(range(0, 72, 2))
+    assert seen.unseen == {n for n, points in seen.hints.items() if points is None} == set(range(40, 56, 2))
+    lesson = label_free_lesson(info, seen, TrainingOptions(), one_eye=False, refine=False)
+    track_video(lesson.model, info, out, None, seen.hints)
+    with out.open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert {row["status"] for row in rows[40:56]} <= {"doubtful", "lost"}
+    assert UNSEEN in {row["reason"] for row in rows[40:56]}
+    assert {row["status"] for row in rows[:40] + rows[58:]} == {"tracked"}
+
+
+def test_a_whole_face_is_refused_as_a_close_up_and_a_close_up_is_not(detector, shared_data, monkeypatch):
+    monkeypatch.setattr("stimuli_builder.tracking.labelfree.LOOKED_AT", 12)
+    folder = shared_data / "face_video"
+    with pytest.raises(
+        InputError, match=r"a whole face is seen on (\d) of \1 frames .* leave it out"
+    ) as refused:
+        survey(scan_video(folder / "single_face.mp4"), one_eye=True)
+    assert "\n" not in str(refused.value)
+    assert len(survey(scan_video(folder / "short_human_3blink.mp4"), one_eye=True).points) > 10

@@ -38,7 +38,7 @@ def test_track_has_the_promised_columns(track):
     assert list(rows[0]) == track_columns(2)
     assert [row["frame"] for row in rows] == [str(n) for n in range(200)]
     assert float(rows[100]["time_s"]) == pytest.approx(0.5)
-    assert {row["status"] for row in rows} == {"tracked"}
+    assert {(row["status"], row["reason"]) for row in rows} == {("tracked", "")}
     assert all(float(row["left_distance_px"]) >= 0 for row in rows)
 
 
