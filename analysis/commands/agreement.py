@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from analysis.commands.output import JsonOption, names_in, save_json, saying, show_tables
+from analysis.commands.output import JsonOption, names_in, save_json, saying, show_tables, show_text
 
 
 class LevelChoice(StrEnum):
@@ -60,7 +60,7 @@ def reliability(
     save_json(json, asdict(result), data.synthetic)
     if scores is not None:
         _save_scores(scores, result.scores, case or "case")
-    typer.echo(reliability_text(result, file.stem, data.synthetic))
+    show_text(reliability_text(result, file.stem, data.synthetic))
     show_tables(items_table(result, file.stem, data.synthetic))
 
 
@@ -90,7 +90,7 @@ def agreement(
     with saying("resampling items"):
         result = raters.agreement(votes, level.value)
     save_json(json, asdict(result), votes.synthetic)
-    typer.echo(agreement_text(result, file.stem, votes.synthetic))
+    show_text(agreement_text(result, file.stem, votes.synthetic))
     if result.icc:
         show_tables(intraclass_table(result, file.stem, votes.synthetic))
 

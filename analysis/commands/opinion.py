@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from analysis.commands.output import JsonOption, save_json, saying, show_tables
+from analysis.commands.output import JsonOption, save_json, saying, show_tables, show_text
 
 
 class RepeatsChoice(StrEnum):
@@ -48,7 +48,7 @@ def opinion(
         votes = read_votes(file, item, participant, rating)
     result = fit_opinion(votes, repeats.value)
     save_json(json, asdict(result), votes.synthetic)
-    typer.echo(opinion_text(result, file.stem, votes.synthetic))
+    show_text(opinion_text(result, file.stem, votes.synthetic))
     show_tables(
         scores_table(result, file.stem, votes.synthetic), raters_table(result, file.stem, votes.synthetic)
     )

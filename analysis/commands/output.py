@@ -45,6 +45,13 @@ def show_tables(*tables: "Table") -> None:
         typer.echo("\n" + as_text(table))
 
 
+def show_text(text: str) -> None:
+    """Print a sentence or several, in lines of at most 80 columns."""
+    from analysis.report.formats import wrap
+
+    typer.echo("\n".join(wrap(text)))
+
+
 def show(contents: "Contents") -> None:
     """Print who was left out and the tables, at most 80 columns wide."""
     from analysis.report.formats import as_text, wrap

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from analysis.commands.output import JsonOption, save_json, saying, show_tables
+from analysis.commands.output import JsonOption, save_json, saying, show_tables, show_text
 
 
 class MethodChoice(StrEnum):
@@ -68,7 +68,6 @@ def pairs(
     from analysis.pairs.comparisons import read_comparisons
     from analysis.pairs.factors import read_item_factors
     from analysis.pairs.likelihood import Method
-    from analysis.report.formats import wrap
     from analysis.report.pairs_tables import abilities_table, contrasts_table, factors_table, pairs_text
 
     with saying("reading comparisons"):
@@ -79,7 +78,7 @@ def pairs(
     with saying("fitting"):
         result = fit_abilities(comparisons, chosen, order_effect=order_effect, firth=firth, factors=design)
     save_json(json, asdict(result), comparisons.synthetic)
-    typer.echo("\n".join(wrap(pairs_text(result, file.stem, comparisons.synthetic))))
+    show_text(pairs_text(result, file.stem, comparisons.synthetic))
     show_tables(abilities_table(result, file.stem, comparisons.synthetic))
     if design is not None:
         show_tables(factors_table(result, file.stem, comparisons.synthetic))

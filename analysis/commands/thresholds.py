@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from analysis.commands.output import JsonOption, save_json, saying, show_tables
+from analysis.commands.output import JsonOption, save_json, saying, show_tables, show_text
 
 if TYPE_CHECKING:
     from analysis.thresholds.answers import Answers
@@ -73,7 +73,6 @@ def thresholds(
 
       analysis thresholds trials.csv --x duration --second asymmetry --response correct --participant id
     """
-    from analysis.report.formats import wrap
     from analysis.report.threshold_tables import (
         means_table,
         people_table,
@@ -100,7 +99,7 @@ def thresholds(
         if hierarchical:
             result = with_population(result, answers, function.value, guess, upper)
     save_json(json, asdict(result), answers.synthetic)
-    typer.echo("\n".join(wrap(threshold_text(result, file.stem, answers.synthetic))))
+    show_text(threshold_text(result, file.stem, answers.synthetic))
     if result.population:
         show_tables(population_table(result, file.stem, answers.synthetic))
     if result.means:
@@ -133,7 +132,7 @@ def _planes(
             answers, "logistic" if function is FunctionChoice.LOGISTIC else "normal", guess, lapse
         )
     save_json(json, asdict(result), answers.synthetic)
-    typer.echo(plane_text(result, variables, name, answers.synthetic))
+    show_text(plane_text(result, variables, name, answers.synthetic))
     for table in plane_tables(result, variables, name, answers.synthetic):
         show_tables(table)
 

@@ -13,7 +13,7 @@ from analysis.plans.result import labels_of
 from analysis.report.captions import caption
 from analysis.report.contents import Contents, Part
 from analysis.report.formats import Table
-from analysis.report.numbers import DASH, fixed
+from analysis.report.numbers import DASH, fixed, interval
 from experiments import design
 from experiments.design import ClipSpec
 from experiments.trials.clip_rating.declaration import clip_rating_of
@@ -175,7 +175,7 @@ def _table(every: tuple[CellScore, ...], prepared: Prepared) -> Table:
             fixed(one.dmos),
             fixed(one.sd),
             str(one.n),
-            f"{fixed(one.ci_low)} to {fixed(one.ci_high)}",
+            interval((one.ci_low, one.ci_high)),
             DASH if one.differential is None else fixed(one.differential),
             _range(one.differential_low, one.differential_high),
         )
@@ -187,7 +187,7 @@ def _table(every: tuple[CellScore, ...], prepared: Prepared) -> Table:
 
 
 def _range(low: float | None, high: float | None) -> str:
-    return DASH if low is None or high is None else f"{fixed(low)} to {fixed(high)}"
+    return DASH if low is None or high is None else interval((low, high))
 
 
 def extremes(every: tuple[CellScore, ...]) -> tuple[str, ...]:

@@ -1,5 +1,6 @@
 """One analysis, complete: what tables, figures and report are made from."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
@@ -40,6 +41,14 @@ class Labels:
     def effect(self, factors: Sequence[str]) -> str:
         """Label of an effect of several factors, or of one."""
         return TIMES.join(map(self.factor, factors))
+
+    def in_words(self, text: str) -> str:
+        """A text in which factors and their interactions are called by their names, in labels."""
+        if not self.factors:
+            return text
+        names = "|".join(sorted(map(re.escape, self.factors), key=len, reverse=True))
+        effects = rf"(?<![\w:])(?:{names})(?::(?:{names}))*(?!\w|:\w)"
+        return re.sub(effects, lambda one: self.effect(one[0].split(":")), text)
 
     def cell(self, levels: Mapping[str, str]) -> str:
         """Labels of the levels, by the names of their factors."""

@@ -1,6 +1,6 @@
 """Sensitivity analyses beside the ANOVA: Bayes factors, robust companions, mixed and ordinal models."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from math import isfinite
 from typing import Any
@@ -94,7 +94,7 @@ def mixed_model(analysis: Analysis) -> Section:
         holds = (holds_for(effect.effect, random, random_slopes),) if random else ()
         rows.append((analysis.labels.effect(ours.factors), *cells, *holds))
     header = ("Effect", "F", "df", "p", "p of the ANOVA (GG)", *(("holds for",) if random else ()))
-    notes = (result.formula, *_parts(result.components), *result.notes)
+    notes = (f"Model: {result.formula}.", *_notes(analysis, result))
     table = Table(
         "mixed",
         caption("Linear mixed model", analysis.name, analysis.synthetic),
@@ -123,9 +123,17 @@ def mixed_model(analysis: Analysis) -> Section:
     )
 
 
-def _parts(components: Sequence[Any]) -> tuple[str, ...]:
-    said = ", ".join(f"{c.group} {c.term} {fixed(c.sd, 3)}" for c in components)
-    return (f"Standard deviations: {said}.",) if said else ()
+def _notes(analysis: Analysis, result: Any) -> tuple[str, ...]:
+    """Standard deviations of the random terms, a grouping after another, and what was doubtful; in labels."""
+    by_group: dict[str, list[str]] = {}
+    for one in result.components:
+        by_group.setdefault(one.group, []).append(f"{one.term} {fixed(one.sd, 3)}".strip())
+    said = "; ".join(
+        f"{group}{' ' if group == 'residual' else ': '}{', '.join(terms)}"
+        for group, terms in by_group.items()
+    )
+    sds = (f"Standard deviations: {said}.",) if said else ()
+    return tuple(analysis.labels.in_words(note) for note in (*sds, *result.notes))
 
 
 def ordinal_model(analysis: Analysis) -> Section:
@@ -148,7 +156,7 @@ def ordinal_model(analysis: Analysis) -> Section:
         rows.append((analysis.labels.effect(ours.factors), *cells))
     header = ("Effect", "χ²", "df", "p", "p of the ANOVA (GG)")
     thresholds = ", ".join(fixed(value) for value in result.thresholds)
-    notes = (result.formula, f"Thresholds: {thresholds}.", *_parts(result.components), *result.notes)
+    notes = (f"Model: {result.formula}.", f"Thresholds: {thresholds}.", *_notes(analysis, result))
     table = Table(
         "ordinal",
         caption("Ordinal mixed model", analysis.name, analysis.synthetic),
@@ -184,12 +192,12 @@ def bayes_factors(analysis: Analysis) -> Section:
         bf = pair.bayes_factor
         name = analysis.labels.pair(pair.effect, pair.level_a, pair.level_b)
         rows.append((name, fixed(pair.t), _factor(bf), _factor(1 / bf if bf else bf), _in_words(bf)))
-    header = ("Margin: pair", "t", "BF10", "BF01", "evidence")
+    header = ("Margin: pair", "t", "BF₁₀", "BF₀₁", "Evidence")
     table = Table(
         "bayes", caption("Bayes factors of pairs", analysis.name, analysis.synthetic), header, tuple(rows), 1
     )
     text = (
-        "BF10 says how much better a difference predicts the data than none, BF01 the reverse. JZS prior, "
+        "BF₁₀ says how much better a difference predicts the data than none, BF₀₁ the reverse. JZS prior, "
         "Cauchy scale r = √2/2. Between 1/3 and 3 the data do not tell."
     )
     return Section("Bayes factors", text, (table,))

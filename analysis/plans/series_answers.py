@@ -13,11 +13,11 @@ from experiments.trials.threshold.grid import seconds, series_of
 
 
 def series_labels(experiment: Experiment) -> dict[str, str]:
-    """Labels of the series: those of their levels, or their names."""
+    """Labels of the series: those of their levels, or their names in words."""
     labels = labels_of(experiment)
     return {
         series.name: ", ".join(labels.level(factor, level) for factor, level in series.levels.items())
-        or series.name
+        or series.name.replace("_", " ")
         for series in series_of(experiment)
     }
 

@@ -10,7 +10,7 @@ import pandas as pd
 from analysis.plans.prepared import Prepared
 from analysis.plans.rating_tests import analyse, further_sections, on_scale
 from analysis.plans.result import Analysis
-from analysis.report.captions import caption
+from analysis.report.captions import caption, in_words
 from analysis.report.contents import Contents, Part, Progress, Section
 from analysis.report.formats import Table
 from analysis.report.json_output import as_data, exclusions_data, study_data
@@ -63,7 +63,7 @@ def _of_scale(prepared: Prepared, scale: RatedScale) -> Analysis:
 
 def _part(scale: RatedScale, analysis: Analysis, prepared: Prepared) -> Part:
     """The part of one scale; `prepared` names it."""
-    title = f"{scale.name}{' (reverse-keyed)' if scale.reverse else ''}"
+    title = f"{in_words(scale.name)}{' (reverse-keyed)' if scale.reverse else ''}"
 
     def more(progress: Progress) -> tuple[Section, ...]:
         return further_sections(analysis, prepared, lambda step: progress(f"{scale.name}: {step}"))

@@ -88,18 +88,29 @@ class Part:
     brief: tuple[str, ...] = ()
 
     def under(self, key: str, title: str) -> "Part":
-        """The same as one of several parts: titled, keys of its tables and figures begin with `key`."""
+        """The same as one of several parts: titled, which its captions say; keys of tables and figures
+        begin with `key`."""
 
-        def draw() -> tuple[Picture, ...]:
-            return _keyed(key, self.draw())
+        def tables(made: tuple[Table, ...]) -> tuple[Table, ...]:
+            return tuple(replace(one, title=f"{title}: {one.title}") for one in _keyed(key, made))
+
+        def pictures(made: tuple[Picture, ...]) -> tuple[Picture, ...]:
+            return tuple(replace(one, caption=f"{title}: {one.caption}") for one in _keyed(key, made))
 
         def more(progress: Progress) -> tuple[Section, ...]:
             return tuple(
-                replace(one, tables=_keyed(key, one.tables), pictures=_keyed(key, one.pictures))
+                replace(one, tables=tables(one.tables), pictures=pictures(one.pictures))
                 for one in self.more(progress)
             )
 
-        return replace(self, title=title, tables=_keyed(key, self.tables), draw=draw, more=more, key=key)
+        return replace(
+            self,
+            title=title,
+            tables=tables(self.tables),
+            draw=lambda: pictures(self.draw()),
+            more=more,
+            key=key,
+        )
 
 
 def _keyed(key: str, made: tuple[_Keyed, ...]) -> tuple[_Keyed, ...]:

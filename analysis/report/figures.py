@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from analysis.plans.result import Analysis
+from analysis.report.captions import in_words
 from analysis.report.pictures import BESIDE, COLOURS, MARKERS, STYLE, new_figure, write_note
 from analysis.within.marginal_means import level_combinations, margin
 from experiments.error_bars import within_participant_errors
@@ -204,11 +205,11 @@ def _jitter(n: int) -> Floats:
     return spread
 
 
-def _asked(scale: RatedScale, language: str) -> str:
+def _asked(what: str, scale: RatedScale, language: str) -> str:
     """What the axis of ratings is called: the ends of the scale as participants read them."""
     low = f"{scale.minimum:g} {scale.low.get(language, '')}".strip()
     high = f"{scale.maximum:g} {scale.high.get(language, '')}".strip()
-    return f"Rating ({low} – {high})"
+    return f"{what} ({low} – {high})"
 
 
 def _dress(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
@@ -217,7 +218,8 @@ def _dress(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
     axes.set_ylabel(analysis.rating)
     if analysis.experiment is not None:
         scale = scale_called(analysis.experiment, None if analysis.rating == "response" else analysis.rating)
-        axes.set_ylabel(_asked(scale, analysis.experiment.languages[0]))
+        what = "Rating" if analysis.rating == "response" else in_words(scale.name)
+        axes.set_ylabel(_asked(what, scale, analysis.experiment.languages[0]))
         margin = (scale.maximum - scale.minimum) / 30
         axes.set_ylim(scale.minimum - margin, scale.maximum + margin)
         if scale.type == "points":

@@ -23,37 +23,55 @@ class Table:
 
 def as_text(table: Table, width: int = WIDTH) -> str:
     """Monospaced text at most `width` columns wide; long first cells wrap, mostly at ':'."""
-    rest = [max(len(row[i]) for row in (table.header, *table.rows)) for i in range(1, len(table.header))]
-    room = width - sum(rest) - _GAP * len(rest)
-    first = min(max(len(row[0]) for row in (table.header, *table.rows)), max(room, 12))
-    rule = "─" * min(width, first + sum(rest) + _GAP * len(rest))
-    lines = [table.title, rule, *_text_row(table.header, first, rest, table.text_columns), rule]
+    sizes = _column_widths(table, width)
+    rule = "─" * min(width, sum(sizes) + _GAP * (len(sizes) - 1))
+    lines = [*wrap(table.title, width), rule, *_text_row(table.header, sizes, table.text_columns), rule]
     for row in table.rows:
-        lines += _text_row(row, first, rest, table.text_columns)
+        lines += _text_row(row, sizes, table.text_columns)
     lines.append(rule)
     for note in table.notes:
         lines += wrap(note, width)
     return "\n".join(line.rstrip() for line in lines)
 
 
-def _text_row(row: Sequence[str], first: int, rest: list[int], text_columns: int) -> list[str]:
-    wrapped = _fold(row[0], first)
-    cells = [
-        cell.ljust(size) if i < text_columns else cell.rjust(size)
-        for i, (cell, size) in enumerate(zip(row[1:], rest, strict=True), start=1)
-    ]
-    lines = [part.ljust(first) for part in wrapped]
-    lines[0] = (" " * _GAP).join([lines[0], *cells])
+def _column_widths(table: Table, width: int) -> list[int]:
+    """The first column gives way down to 12, then the widest of those that can be broken at a space."""
+    columns = list(zip(table.header, *table.rows, strict=True))
+    sizes = [max(map(len, column)) for column in columns]
+    room = width - sum(sizes[1:]) - _GAP * (len(sizes) - 1)
+    sizes[0] = min(sizes[0], max(room, 12))
+    floors = [max((len(word) for cell in column for word in cell.split()), default=0) for column in columns]
+    spare = [size - floor - _GAP for size, floor in zip(sizes, floors, strict=True)]
+    while sum(sizes) + _GAP * (len(sizes) - 1) > width and max(spare[1:], default=0) > 0:
+        widest = max((i for i in range(1, len(sizes)) if spare[i] > 0), key=sizes.__getitem__)
+        sizes[widest] -= 1
+        spare[widest] -= 1
+    return sizes
+
+
+def _text_row(row: Sequence[str], sizes: Sequence[int], text_columns: int) -> list[str]:
+    cells = [_fold(cell, size) for cell, size in zip(row, sizes, strict=True)]
+    lines = []
+    for at in range(max(map(len, cells))):
+        parts = [cell[at] if at < len(cell) else "" for cell in cells]
+        lines.append(
+            (" " * _GAP).join(
+                part.ljust(size) if i < max(text_columns, 1) else part.rjust(size)
+                for i, (part, size) in enumerate(zip(parts, sizes, strict=True))
+            )
+        )
     return lines
 
 
 def _fold(text: str, width: int) -> list[str]:
-    lines: list[str] = []
-    while len(text) > width:
-        cut = max(text.rfind(":", 0, width), text.rfind(" ", 0, width)) + 1 or width
-        lines.append(text[:cut].rstrip())
-        text = "  " + text[cut:].lstrip()
-    return [*lines, text]
+    """Lines of at most `width`, later ones indented; a word that is longer is cut."""
+    lines, indent = list[str](), ""
+    while len(indent + text) > width:
+        room = width - len(indent)
+        cut = max(text.rfind(":", 0, room), text.rfind(" ", 0, room)) + 1 or room
+        lines.append(indent + text[:cut].rstrip())
+        text, indent = text[cut:].lstrip(), "  "
+    return [*lines, indent + text]
 
 
 def wrap(text: str, width: int = WIDTH, indent: str = "  ") -> list[str]:

@@ -4,7 +4,7 @@ import re
 
 from analysis.report.contents import Contents, DrawnPart, Picture, Section
 from analysis.report.formats import Table
-from analysis.report.italics import pieces
+from analysis.report.italics import heading_pieces, pieces
 
 NEEDS = r"\usepackage{array,booktabs,graphicx,longtable}"
 """What a document must load for the tables."""
@@ -67,10 +67,11 @@ def as_latex(table: Table, position: str = "") -> str:
     `position` is the option of a floating table: `[H]` keeps it where it stands.
     """
     caption = f"\\caption{{{latex_text(table.title)}}}\\label{{tab:{table.key}}}"
-    header = f"\\toprule\n{_row(table.header)}\n\\midrule\n"
+    heads = " & ".join(_in_italics(heading_pieces(cell)) for cell in table.header)
+    header = f"\\toprule\n{heads} \\\\\n\\midrule\n"
     rows = "\n".join(_row(row) for row in table.rows)
     columns = _columns(table)
-    notes = "".join(f"\\par\\smallskip{{\\footnotesize {latex_text(note)}\\par}}\n" for note in table.notes)
+    notes = "".join(f"\\par\\smallskip{{\\footnotesize {_sentence(note)}\\par}}\n" for note in table.notes)
     if len(table.rows) > LONG:
         return (
             f"{{\\footnotesize\\setlength{{\\tabcolsep}}{{4pt}}\n\\begin{{longtable}}{{{columns}}}\n"
@@ -163,9 +164,12 @@ def _lines(title: str, lines: tuple[str, ...]) -> list[str]:
 
 
 def _sentence(text: str) -> str:
+    return _in_italics(pieces(text))
+
+
+def _in_italics(split: list[tuple[str, bool]]) -> str:
     return "".join(
-        rf"\textit{{{latex_text(piece)}}}" if is_symbol else latex_text(piece)
-        for piece, is_symbol in pieces(text)
+        rf"\textit{{{latex_text(piece)}}}" if is_symbol else latex_text(piece) for piece, is_symbol in split
     )
 
 

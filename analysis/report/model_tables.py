@@ -49,7 +49,7 @@ def ordinal_effects_table(result: OrdinalResult, name: str, synthetic: bool) -> 
     """Joint Wald tests of the effects on the logit scale."""
     rows = tuple((e.effect, fixed(e.chi2), str(e.df), p_value(e.p_value)) for e in result.effects)
     return Table(
-        "ordinal", caption("Ordinal mixed model", name, synthetic), ("Effect", "chi2", "df", "p"), rows, 1
+        "ordinal", caption("Ordinal mixed model", name, synthetic), ("Effect", "χ²", "df", "p"), rows, 1
     )
 
 

@@ -73,14 +73,14 @@ def _tests(axes: Axes, p: np.ndarray, names: list[str]) -> None:
     ticks = [SMALLEST, 0.001, 0.01, SIGNIFICANCE, 0.1, 1]
     axes.set_yticks(ticks, ["≤ .0001", ".001", ".01", ".05", ".1", "1"])
     axes.minorticks_off()
-    axes.set_ylabel("p")
+    axes.set_ylabel("p", style="italic")
     axes.legend(**BESIDE, frameon=False, fontsize=7)
 
 
 def _rules(axes: Axes, applied: np.ndarray, names: tuple[str, ...]) -> None:
     column, rule = np.nonzero(applied)
     axes.plot(column, rule, linestyle="none", marker="o", markersize=3.5, color="#333333")
-    axes.set_yticks(range(len(names)), names, fontsize=7)
+    axes.set_yticks(range(len(names)), [name.replace("_", " ") for name in names], fontsize=7)
     axes.set_ylim(len(names) - 0.5, -0.5)
     axes.set_xticks([])
     axes.spines["bottom"].set_visible(False)

@@ -3,7 +3,7 @@
 from analysis.opinion.scores import OpinionResult
 from analysis.report.captions import caption, marked
 from analysis.report.formats import Table
-from analysis.report.numbers import DASH, fixed, share
+from analysis.report.numbers import DASH, fixed, interval, share
 
 
 def scores_table(result: OpinionResult, name: str, synthetic: bool = False) -> Table:
@@ -15,7 +15,7 @@ def scores_table(result: OpinionResult, name: str, synthetic: bool = False) -> T
             fixed(item.mos),
             fixed(item.sd),
             str(item.n),
-            f"{fixed(item.ci_low)} to {fixed(item.ci_high)}" if item.n > 1 else DASH,
+            interval((item.ci_low, item.ci_high)) if item.n > 1 else DASH,
             fixed(item.recovered),
             fixed(item.recovered_se),
         )

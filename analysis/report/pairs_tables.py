@@ -3,7 +3,7 @@
 from analysis.pairs.pairs_result import Contrast, PairsResult
 from analysis.report.captions import caption, marked
 from analysis.report.formats import Table
-from analysis.report.numbers import DASH, apa_p, fixed, p_value
+from analysis.report.numbers import DASH, apa_p, fixed, interval, p_value
 
 
 def abilities_table(result: PairsResult, name: str, synthetic: bool = False) -> Table:
@@ -14,7 +14,8 @@ def abilities_table(result: PairsResult, name: str, synthetic: bool = False) -> 
     for item in sorted(result.items, key=lambda one: (one.rank, one.name)):
         errors = [item.se, *([item.se_robust] if item.se_robust is not None else [])]
         row = [item.name, str(item.rank), fixed(item.ability, 3), *(fixed(error, 3) for error in errors)]
-        row += [f"{fixed(item.ci_low)} to {fixed(item.ci_high)}", p_value(item.p)]
+        is_reference = item.name == result.reference
+        row += [DASH if is_reference else interval((item.ci_low, item.ci_high)), p_value(item.p)]
         rows.append((*row, f"{item.wins}/{item.losses}/{item.ties}"))
     said = f"Abilities in {result.scale}; '{result.reference}' is 0. W/L/T: won, lost, tied."
     if robust:
@@ -71,7 +72,7 @@ def factors_table(result: PairsResult, name: str, synthetic: bool = False) -> Ta
                 (f"  {level} - {test.reference}", "", "", "", f"{fixed(estimate, 3)} ({fixed(se, 3)})")
             )
     title = caption("Factors of the items", name, synthetic)
-    return Table("pair-factors", title, ("Factor", "chi2", "df", "p", "b (SE)"), tuple(rows), 1)
+    return Table("pair-factors", title, ("Factor", "χ²", "df", "p", "b (SE)"), tuple(rows), 1)
 
 
 def pairs_text(result: PairsResult, name: str, synthetic: bool = False) -> str:

@@ -54,7 +54,7 @@ def contents_of(
         name=experiment.name,
         title=experiment.title,
         lead=f"{people} participants, {len(prepared.rows)} trials of {len(fits)} series along "
-        f"{' and '.join(trial.stimulus.factors)}",
+        f"{' and '.join(variables)}",
         source=prepared.source,
         synthetic=prepared.synthetic,
         n_participants=people,
@@ -65,6 +65,7 @@ def contents_of(
                 tuple(tables),
                 (*sentences(fits, variables), *map(difference_sentence, differences)),
                 draw=lambda: (draw(fits, variables, prepared.synthetic, people),),
+                brief=(*sentences(fits, variables), *map(difference_sentence, differences)),
             ),
         ),
         methods=METHODS.format(
@@ -120,9 +121,9 @@ def _line_in_words(result: PlanesResult, second: str) -> str:
     known = (low is not None and low > 0) or (high is not None and high < 0)
     verdict = f"so that it depends on {second}" if known else "an interval that includes 0"
     return (
-        f"the threshold {of} was {fixed(fit.threshold, 3)} (95% CI {interval_text(fit.threshold_ci)}) where "
-        f"{second} is {pooled.middle:g}. Its tilt, the change per unit of {second}, was {fixed(fit.tilt, 3)} "
-        f"(95% CI {interval_text(fit.tilt_ci)}), {verdict}."
+        f"the threshold {of} was {fixed(fit.threshold, 3)}, 95% CI {interval_text(fit.threshold_ci)}, where "
+        f"{second} is {pooled.middle:g}. Its tilt, the change per unit of {second}, was "
+        f"{fixed(fit.tilt, 3)}, 95% CI {interval_text(fit.tilt_ci)}, {verdict}."
     )
 
 

@@ -2,7 +2,7 @@
 
 from analysis.report.captions import caption, marked
 from analysis.report.formats import Table
-from analysis.report.numbers import DASH, fixed, p_value
+from analysis.report.numbers import DASH, fixed, interval, p_value
 from analysis.report.threshold_tables import estimate, table_of_people
 from analysis.thresholds.averages import Average
 from analysis.thresholds.plane_people import PlanesResult
@@ -68,7 +68,7 @@ def _of_people(result: PlanesResult) -> tuple[str, ...]:
 
 
 def _average(one: Average) -> tuple[str, str]:
-    return fixed(one.mean, 3), f"{fixed(one.ci_low, 3)} to {fixed(one.ci_high, 3)}"
+    return fixed(one.mean, 3), interval((one.ci_low, one.ci_high), 3)
 
 
 def _line(result: PlanesResult, variables: tuple[str, str], name: str, synthetic: bool) -> Table:

@@ -4,7 +4,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from analysis.report.formats import as_markdown
-from analysis.report.italics import pieces
+from analysis.report.italics import heading_pieces, pieces, signed
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -30,14 +30,16 @@ def _environment() -> "Environment":
         keep_trailing_newline=True,
     )
     environment.filters["markdown_table"] = as_markdown
-    environment.filters["italics"] = _italics
+    environment.filters["italics"] = lambda text: _in_italics(pieces(signed(text)))
+    environment.filters["heading"] = lambda text: _in_italics(heading_pieces(text))
+    environment.filters["signed"] = signed
     return environment
 
 
-def _italics(text: str) -> "Markup":
-    """A sentence as HTML, symbols of statistics in italics."""
+def _in_italics(split: list[tuple[str, bool]]) -> "Markup":
+    """Pieces as HTML, symbols of statistics in italics."""
     from markupsafe import Markup, escape
 
     return Markup().join(
-        Markup("<i>{}</i>").format(piece) if is_symbol else escape(piece) for piece, is_symbol in pieces(text)
+        Markup("<i>{}</i>").format(piece) if is_symbol else escape(piece) for piece, is_symbol in split
     )

@@ -46,10 +46,11 @@ def contents_of(
     name, synthetic = experiment.name, prepared.synthetic
     people = prepared.rows["participant"].astype(str).nunique()
     merged, number = merge(fits), len(prepared.rows)
+    axis = experiment.factor(trial.stimulus.factor).label
     return Contents(
         name=name,
         title=experiment.title,
-        lead=f"{people} participants, {number} trials of {len(fits)} series along {trial.stimulus.factor}",
+        lead=f"{people} participants, {number} trials of {len(fits)} series along {axis}",
         source=prepared.source,
         synthetic=synthetic,
         n_participants=people,
@@ -59,7 +60,7 @@ def contents_of(
             Part(
                 _tables(fits, merged, differences, name, synthetic),
                 sentences(fits, merged, differences),
-                draw=lambda: (draw(fits, experiment.factor(trial.stimulus.factor).label, synthetic, people),),
+                draw=lambda: (draw(fits, axis, synthetic, people),),
                 beside=lambda key: _r_files(prepared, fits, differences, key),
                 brief=sentences((), merged, differences),
             ),

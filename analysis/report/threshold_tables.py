@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from analysis.report.captions import caption, marked
 from analysis.report.formats import Table
-from analysis.report.numbers import DASH, fixed, p_value
+from analysis.report.numbers import DASH, fixed, interval, p_value
 from analysis.thresholds.likelihood import Interval
 from analysis.thresholds.people import PersonThreshold, ThresholdsResult
 from analysis.thresholds.plane_people import PersonPlane
@@ -43,7 +43,7 @@ def means_table(result: ThresholdsResult, name: str, synthetic: bool = False) ->
             str(mean.people),
             fixed(mean.mean, 3),
             fixed(mean.se, 3),
-            f"{fixed(mean.ci_low, 3)} to {fixed(mean.ci_high, 3)}",
+            interval((mean.ci_low, mean.ci_high), 3),
             fixed(mean.tau, 3),
         )
         for mean in result.means
@@ -142,4 +142,4 @@ def interval_text(interval: Interval) -> str:
     """Both ends; `open` where the likelihood never falls far enough."""
     low = "open" if interval.low is None else fixed(interval.low, 3)
     high = "open" if interval.high is None else fixed(interval.high, 3)
-    return f"{low} to {high}"
+    return f"[{low}, {high}]"

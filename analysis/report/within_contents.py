@@ -34,7 +34,7 @@ def contents_of(
     return Contents(
         name=analysis.name,
         title=analysis.title,
-        lead=f"{analysis.n_participants} participants, {' × '.join(analysis.anova.factors)}",
+        lead=f"{analysis.n_participants} participants, {analysis.labels.effect(analysis.anova.factors)}",
         source=analysis.source,
         synthetic=analysis.synthetic,
         n_participants=analysis.n_participants,

@@ -8,11 +8,12 @@ from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from analysis.report.contents import Contents, DrawnPart, Picture, Section
 from analysis.report.formats import Table
-from analysis.report.italics import pieces
+from analysis.report.italics import heading_pieces, pieces, signed
 
 if TYPE_CHECKING:
     from docx.document import Document
     from docx.table import _Cell
+    from docx.text.paragraph import Paragraph
 
 
 EPOCH = datetime(2000, 1, 1, tzinfo=UTC)
@@ -77,9 +78,17 @@ def _add_lines(document: "Document", heading: str, lines: tuple[str, ...], of: s
 
 
 def _add_sentence(document: "Document", text: str) -> None:
-    paragraph = document.add_paragraph(style="List Bullet")
-    for piece, is_symbol in pieces(_sayable(text)):
-        paragraph.add_run(piece).italic = is_symbol
+    _add_runs(document.add_paragraph(style="List Bullet"), pieces(signed(_sayable(text))))
+
+
+def _add_runs(paragraph: "Paragraph", split: list[tuple[str, bool]], points: float | None = None) -> None:
+    """Write pieces of text, symbols of statistics in italics."""
+    from docx.shared import Pt
+
+    for piece, is_symbol in split:
+        run = paragraph.add_run(piece)
+        run.italic = is_symbol or None
+        run.font.size = None if points is None else Pt(points)
 
 
 def _add_part(document: "Document", part: DrawnPart, synthetic: bool) -> None:
@@ -104,7 +113,7 @@ def _add_part(document: "Document", part: DrawnPart, synthetic: bool) -> None:
 
 def _add_section(document: "Document", section: Section, level: int, synthetic: bool) -> None:
     document.add_heading(_sayable(section.title), level)
-    document.add_paragraph(_sayable(section.text))
+    _add_runs(document.add_paragraph(), pieces(signed(_sayable(section.text))))
     for picture in section.pictures:
         _add_picture(document, picture, synthetic)
     for table in section.tables:
@@ -123,20 +132,21 @@ def _add_picture(document: "Document", picture: Picture, synthetic: bool) -> Non
 def _add_table(document: "Document", table: Table) -> None:
     document.add_paragraph(_sayable(table.title), style="Caption")
     grid = document.add_table(rows=1 + len(table.rows), cols=len(table.header), style="Light List")
-    for cells, row in zip(grid.rows, (table.header, *table.rows), strict=True):
-        for position, (cell, text) in enumerate(zip(cells.cells, row, strict=True)):
-            _fill(cell, text, right=position >= table.text_columns)
+    head = [heading_pieces(_sayable(text)) for text in table.header]
+    body = [[[(signed(_sayable(text)), False)] for text in row] for row in table.rows]
+    for cells, row in zip(grid.rows, (head, *body), strict=True):
+        for position, (cell, split) in enumerate(zip(cells.cells, row, strict=True)):
+            _fill(cell, split, right=position >= table.text_columns)
     for note in table.notes:
-        document.add_paragraph(_sayable(note), style="Body Text 3")
+        _add_runs(document.add_paragraph(style="Body Text 3"), pieces(signed(_sayable(note))))
     document.add_paragraph()
 
 
-def _fill(cell: "_Cell", text: str, right: bool) -> None:
+def _fill(cell: "_Cell", split: list[tuple[str, bool]], right: bool) -> None:
     from docx.enum.text import WD_ALIGN_PARAGRAPH
-    from docx.shared import Pt
 
     paragraph = cell.paragraphs[0]
-    paragraph.add_run(_sayable(text)).font.size = Pt(TABLE_POINTS)
+    _add_runs(paragraph, split, TABLE_POINTS)
     if right:
         paragraph.alignment = WD_ALIGN_PARAGRAPH.RIGHT
 

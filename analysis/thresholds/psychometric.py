@@ -8,6 +8,8 @@ from scipy import special, stats
 from analysis.thresholds.likelihood import BOUND, LAPSE_MAX, Array, Interval, Likelihood, Shape, Trials
 from experiments.errors import InputError
 
+NORMAL_95 = float(special.ndtri(0.975))
+
 
 @dataclass(frozen=True)
 class Threshold:
@@ -17,6 +19,8 @@ class Threshold:
     ----------
     threshold : float
         Where F is one half: the underlying F50, in the unit of x.
+    threshold_se : float or None
+        See `error_of`.
     x75 : float or None
         Where the whole function is .75; None where it never is. With a guess rate of 0.5 and no lapses it is
         the threshold, with 0 it is not.
@@ -96,7 +100,8 @@ def fit_threshold(
     empty = Interval(None, None)
     location_ci = model.profile(0, best, value) if intervals else empty
     spread_ci = model.profile(1, best, value) if intervals else empty
-    error = model.standard_error(best) if lapsed > BOUND or lapse is not None else None
+    curvature = model.standard_error(best) if lapsed > BOUND or lapse is not None else None
+    error = error_of(curvature, location_ci)
     level = _level(model, best, 0.75)
     grown = 1.0 if shape == "weibull" else unit
     return Threshold(
@@ -130,6 +135,19 @@ def _scale(trials: Trials, shape: Shape) -> tuple[float, float]:
     """Centre and unit in which x is fitted: steps and tolerances are absolute, units of x are anyone's."""
     unit = float(trials.x.max() - trials.x.min())
     return (0.0 if shape == "weibull" else float(np.average(trials.x, weights=trials.n))), unit
+
+
+def error_of(curvature: float | None, interval: Interval) -> float | None:
+    """Standard error of a threshold: of the curvature, or of the profile where that says nothing.
+
+    Where answers switch at one level the likelihood's maximum is a ridge of ever steeper slopes: the
+    curvature there gives no error, or one beyond the whole interval, though the profile of the threshold is
+    closed. Then half of the 95% interval counts as 1.96 errors. None where the interval is open too.
+    """
+    if interval.low is None or interval.high is None:
+        return curvature
+    width = interval.high - interval.low
+    return curvature if curvature and curvature < width else width / (2 * NORMAL_95)
 
 
 def refuse_unfit(trials: Trials, shape: Shape) -> None:

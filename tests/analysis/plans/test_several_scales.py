@@ -13,6 +13,7 @@ from analysis.cli import app
 from analysis.plans.clip_rating import READING
 from analysis.plans.study import study_contents
 from analysis.read.study_answers import load_csv
+from analysis.report.captions import in_words
 from analysis.report.write import write_report
 from experiments import design
 from experiments.load import load_experiment
@@ -64,7 +65,8 @@ def test_each_scale_has_its_part_and_all_their_reliability(tmp_path, rows) -> No
     )
     assert done.exit_code == 0, done.output
     report = (out / "report.md").read_text(encoding="utf-8")
-    assert all(f"## {scale.name}" in report for scale in SCALES)
+    assert all(f"## {in_words(scale.name)}" in report for scale in SCALES)
+    assert f"{in_words(SCALES[0].name)}: Ratings by condition, sliders_demo" in report
 
     numbers = json.loads((out / "results.json").read_text(encoding="utf-8"))
     assert [one["scale"] for one in numbers["scales"]] == [scale.name for scale in SCALES]
@@ -76,8 +78,8 @@ def test_each_scale_has_its_part_and_all_their_reliability(tmp_path, rows) -> No
     assert numbers["cronbach_alpha"]["alpha"] > 0.5
     figures = {path.name.split("-")[0]: path.read_text(encoding="utf-8") for path in out.glob("*.svg")}
     assert figures.keys() == {scale.name for scale in SCALES}
-    assert "Rating (1 not at all – 5 very)" in figures["naturalness"]
-    assert "Rating (0 wide awake – 100 very tired)" in figures["tiredness"]
+    assert "Naturalness (1 not at all – 5 very)" in figures["naturalness"]
+    assert "Tiredness (0 wide awake – 100 very tired)" in figures["tiredness"]
 
 
 def test_each_scale_has_its_companions_models_and_multiverse(tmp_path, rows) -> None:

@@ -156,3 +156,18 @@ def test_answers_rarer_than_guessing_gives_are_named() -> None:
     assert said.startswith("at 20 2 of 32 answers are yes, fewer than a guess rate of 0.5 gives")
     assert not fit_threshold(trials, "normal", 0.05, 0.0).notes
     assert not fit_threshold(Trials(x, n, np.array([12.0, 18, 27, 31])), "normal", 0.5, 0.0).notes
+
+
+@pytest.mark.parametrize(("n", "k"), [([13, 20, 10, 17], [1, 0, 5, 17]), ([12, 14, 19, 15], [0, 1, 8, 15])])
+def test_where_slopes_grow_without_end_the_error_is_that_of_the_profile(n: list[int], k: list[int]) -> None:
+    """The curvature on such a ridge gave no error, or 68 for an interval half a unit wide: people were lost."""
+    steep = Trials(np.arange(4.0), np.array(n, float), np.array(k, float))
+    fit = fit_threshold(steep, "normal", 0.02, 0.02)
+    assert fit.threshold_se is not None
+    assert fit.threshold_ci.low is not None
+    assert fit.threshold_ci.high is not None
+    width = fit.threshold_ci.high - fit.threshold_ci.low
+    assert fit.threshold_se == pytest.approx(width / (2 * 1.959964), rel=0.05)
+    mean = mean_threshold([PersonThreshold(name, "all", fit, "") for name in "ab"], "all")
+    assert mean is not None
+    assert mean.people == 2
