@@ -51,6 +51,15 @@ _SIGNS = str.maketrans(
 )
 
 
+_BROKEN = re.compile(
+    r"(?<=[=<>(\[,]) ?\n *(?=[\w.-])"
+    r"| ?\n *(?==)"
+    r"|(?<=\b[pP]) ?\n *(?=[<>])|(?<=\b[FtrX]) ?\n *(?=[(\[])|(?<=%) ?\n *(?=CI)|(?<=CI) ?\n *(?=[\[(])"
+    r"|(?<=partial) ?\n *(?=η|eta)"
+)
+"""The end of a line within a statistic: of no paragraph, item or cell."""
+
+
 def read_document(path: Path) -> str:
     """The text of a file by its suffix, one paragraph, list item or table cell a line.
 
@@ -75,7 +84,7 @@ def read_document(path: Path) -> str:
     if suffix == ".docx":
         return plain(_docx(path))
     if suffix == ".pdf":
-        return plain(_pdf(path))
+        return unbroken(plain(_pdf(path)))
     if suffix not in KINDS:
         raise InputError(f"{path.name}: cannot read '{suffix}'; expected {', '.join(KINDS)} or .toml")
     try:
@@ -85,13 +94,18 @@ def read_document(path: Path) -> str:
     if suffix in (".html", ".htm"):
         return plain(html_text(text))
     if suffix == ".tex":
-        return plain(tex_text(text))
-    return plain(re.sub(r"[*_`\\]", "", text) if suffix == ".md" else text)
+        return unbroken(plain(tex_text(text)))
+    return unbroken(plain(re.sub(r"[*_`\\]", "", text) if suffix == ".md" else text))
 
 
 def plain(text: str) -> str:
     """Text with one kind of space and minus, and no raised or lowered signs."""
     return re.sub(r" {2,}", " ", text.translate(_SIGNS))
+
+
+def unbroken(text: str) -> str:
+    """Text whose lines end within no statistic; for files in which a line is no paragraph."""
+    return _BROKEN.sub(" ", text)
 
 
 class _Text(HTMLParser):

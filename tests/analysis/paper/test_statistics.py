@@ -1,5 +1,7 @@
 """Statistics in running text: read, recomputed, and told when they do not fit."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -268,3 +270,30 @@ def test_notes_of_a_word_file_are_read(tmp_path) -> None:
         "F(1, 30) = 4.56, p = .41": "decision",
         "z = 1.96, p = .050": "consistent",
     }
+
+
+@pytest.mark.parametrize("suffix", [".txt", ".tex", ".md"])
+@pytest.mark.parametrize(
+    "at",
+    [
+        "F(1,|31)",
+        "31)|= 9.93",
+        "=|9.93,",
+        "9.93,|p",
+        "p|= .004",
+        "partial|η2",
+        "95%|CI",
+        "CI|[.03",
+        "[.03,|.45",
+    ],
+)
+def test_a_line_may_end_within_a_statistic(tmp_path: Path, suffix: str, at: str) -> None:
+    """LaTeX breaks lines anywhere: of 20 statistics of a report in PDF 5 could not be read."""
+    said = "It was so, F(1, 31) = 9.93, p = .004, partial η2 = .24, 95% CI [.03, .45]."
+    broken = said.replace(at.replace("|", " "), at.replace("|", "\n"))
+    assert broken != said
+    path = tmp_path / f"paper{suffix}"
+    path.write_text(broken.replace("%", "\\%") if suffix == ".tex" else broken, encoding="utf-8")
+    checked = check_text(read_document(path))
+    (one,) = checked.statistics
+    assert (one.p, one.effect_size, one.verdict, checked.unread) == ("= .004", ".24", "consistent", ())

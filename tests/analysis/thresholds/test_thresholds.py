@@ -160,7 +160,7 @@ def test_answers_rarer_than_guessing_gives_are_named() -> None:
 
 @pytest.mark.parametrize(("n", "k"), [([13, 20, 10, 17], [1, 0, 5, 17]), ([12, 14, 19, 15], [0, 1, 8, 15])])
 def test_where_slopes_grow_without_end_the_error_is_that_of_the_profile(n: list[int], k: list[int]) -> None:
-    """The curvature on such a ridge gave no error, or 68 for an interval half a unit wide: people were lost."""
+    """The curvature on such a ridge gave no error, or 68 for an interval of half a unit: people were lost."""
     steep = Trials(np.arange(4.0), np.array(n, float), np.array(k, float))
     fit = fit_threshold(steep, "normal", 0.02, 0.02)
     assert fit.threshold_se is not None
