@@ -3,7 +3,6 @@
 import gc
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from importlib.metadata import version
 
 from fastapi import APIRouter, FastAPI
 from fastapi.routing import APIRoute
@@ -11,6 +10,7 @@ from fastapi.routing import APIRoute
 from server import health, pages
 from server.accounts import endpoints as accounts
 from server.accounts import people
+from server.accounts.refusals import note_refusal
 from server.capsules import endpoints as capsules
 from server.changes import ChangesTold
 from server.clips import endpoints as clips
@@ -51,6 +51,9 @@ from server.studies import link_endpoints as links
 from server.studies import upload_endpoints as uploads
 from server.workspaces import endpoints as workspaces
 from server.workspaces import grant_endpoints as grants
+
+API_VERSION = "1"
+"""Of the API, not of the program: which weaknesses that may have is nobody's business who asks."""
 
 
 def _routers() -> tuple[APIRouter, ...]:
@@ -125,7 +128,7 @@ def create_app(settings: Settings | None = None, *, rehearses: bool = False) -> 
 
     app = FastAPI(
         title="Palpebra",
-        version=version("palpebra"),
+        version=API_VERSION,
         summary="Factorial rating studies of short clips: participants, ratings, data.",
         openapi_url="/api/openapi.json",
         docs_url=None,
@@ -136,7 +139,7 @@ def create_app(settings: Settings | None = None, *, rehearses: bool = False) -> 
     app.state.services = services
     for router in _routers():
         app.include_router(router)
-    install_error_handlers(app)
+    install_error_handlers(app, note_refusal)
     app.add_middleware(ChangesTold, changes=services.changes)
     app.add_middleware(ExperimentersLane)  # inside the door: a body that comes slowly holds no place
     app.add_middleware(Door, settings=services.settings)

@@ -10,7 +10,7 @@ from sqlalchemy.exc import OperationalError
 from experiments.errors import InputError, did_you_mean
 from server.context import Services, open_services
 from server.migrate import current_revision, known_revision, upgrade
-from server.settings import Settings
+from server.settings import KEY_LENGTH_MIN, Settings
 
 out = Console(soft_wrap=True, highlight=False)
 Word = TypeVar("Word", bound=str)
@@ -26,6 +26,12 @@ def migrated_services(settings: Settings | None = None) -> Iterator[Services]:
             raise InputError(
                 f"the database has revision {revision}, which this program does not know; "
                 "it was written by a newer version, install that one"
+            )
+        if revision is None and services.settings.has_short_key and not services.settings.is_local:
+            raise InputError(
+                f"PALPEBRA_SECRET_KEY: expected at least {KEY_LENGTH_MIN} random characters for a new "
+                f"database, got {len(services.settings.secret_key)}; leave it out to have one made in the "
+                "data folder"
             )
         upgrade(services.database)
         yield services

@@ -9,10 +9,10 @@ from experiments.counted import counted
 from experiments.errors import InputError
 from server.cli_common import migrated_services, out
 from server.db import open_database
-from server.identities.repository import rewrap_all
 from server.migrate import current_revision, newest_revision
 from server.operations import cli_snapshots
 from server.operations.cli import copy
+from server.operations.new_key import carry_over
 from server.runs.erasure import replay
 from server.settings import Settings
 from server.tallies.recount import repair
@@ -67,11 +67,11 @@ def rewrap(
         Path, typer.Argument(help="The secret key of before, as data/secret_key was.", show_default=False)
     ],
 ) -> None:
-    """Make recruiters' ids readable again after the secret key was changed.
+    """Carry over what was kept under the old key, after the secret key was changed.
 
-    Their keys are wrapped under the secret key; this wraps them under the one of the settings. Move the
-    key file away from beside your backups afterwards and back up anew, but keep it: the backups made so far
-    open with it alone (server restore FILE --keys).
+    Recruiters' ids, second factors and the audit log's chain are made to fit the key of the settings. Move
+    the key file away from beside your backups afterwards and back up anew, but keep it: the backups made so
+    far open with it alone (server restore FILE --keys).
     Example: server database rewrap /media/safe/secret_key
     """
     try:
@@ -79,11 +79,21 @@ def rewrap(
     except OSError as error:
         raise InputError(f"{old_key_file} cannot be read: {error.strerror or error}") from error
     with migrated_services() as services, services.database.write() as session:
-        done, left = rewrap_all(session, old)
-    out.print(f"{done} keys wrapped anew; {left} are not under that key")
+        carried = carry_over(session, old, services.settings.key)
+    out.print(f"{carried.identities} keys wrapped anew; {carried.unreadable} are not under that key")
+    out.print(f"{counted(carried.second_factors, 'second factor')} carried over")
     out.print(
         "move palpebra-keys.json away and keep it with the backups made so far, which open with it alone "
         "(server restore FILE --keys); then back up anew"
+    )
+    if carried.broken is not None:
+        raise InputError(
+            "second factors and the audit log were left as they are, as the log fits neither key: "
+            f"{carried.broken}; recruiters' ids are carried over. Where the key was changed twice, set the "
+            "one between, carry over the first to it, then that one to the last"
+        )
+    out.print(
+        "the audit log's chain is made anew; note its head (server audit verify), older ones fit no more"
     )
 
 

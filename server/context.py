@@ -17,7 +17,7 @@ from server.group_commit import GroupCommit
 from server.locks import Locks, open_locks
 from server.open_streams import OpenStreams
 from server.providers.clients import Providers
-from server.rate_limit import RateLimit
+from server.rate_limit import BoundedRecords, RateLimit
 from server.results.cache import ResultsCache
 from server.settings import Settings
 from server.shared_counts_repository import SharedCounts
@@ -28,6 +28,9 @@ from server.transcoding.preparing import Preparing
 from server.versions import Versions
 
 SIMULATED_TIME = "x-palpebra-simulated-time"
+REFUSALS_PER_MINUTE, REFUSALS_OF_A_KIND = 20, 3
+"""Refusals that a process writes into the audit log a minute: in all, and for one account at one route; of
+nobody's as many again, so that strangers use up no room of those who are known."""
 RESUME_CODES_PER_MINUTE = 10
 """Resume codes that may be tried for one visit a minute."""
 
@@ -44,6 +47,8 @@ class Services:
     versions: Versions
     group_commit: GroupCommit
     sign_ins: SignInThrottle
+    refusals: BoundedRecords
+    strangers: BoundedRecords
     passwords: PasswordWork
     stopping: Stopping
     results: ResultsCache
@@ -82,6 +87,8 @@ def open_services(settings: Settings, *, rehearses: bool = False) -> Services:
         versions=Versions(),
         group_commit=GroupCommit(database),
         sign_ins=SignInThrottle(settings, shared),
+        refusals=BoundedRecords(REFUSALS_PER_MINUTE, REFUSALS_OF_A_KIND),
+        strangers=BoundedRecords(REFUSALS_PER_MINUTE, REFUSALS_OF_A_KIND),
         passwords=PasswordWork(),
         stopping=Stopping(),
         results=ResultsCache(),

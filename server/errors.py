@@ -1,6 +1,7 @@
 """One base class, one handler, one JSON shape for everything the server refuses."""
 
 import logging
+from collections.abc import Awaitable, Callable
 from http import HTTPStatus
 from typing import Any, ClassVar
 
@@ -23,11 +24,13 @@ log = logging.getLogger("palpebra")
 class ApiError(Exception):
     """Base of every refusal: a status, a code for programs, a sentence for people.
 
-    Subclasses set `status` and `code`; the message says what was expected, what came, and what to do.
+    Subclasses set `status` and `code`; the message says what was expected, what came, and what to do. Those
+    that tell of somebody who tries what is not hers are `audited`.
     """
 
     status: ClassVar[int] = 400
     code: ClassVar[str] = "bad_request"
+    audited: ClassVar[bool] = False
 
     def __init__(self, message: str, *, headers: dict[str, str] | None = None, **details: Any) -> None:
         super().__init__(message)
@@ -99,9 +102,21 @@ def refusal_response(refusal: ApiError, **headers: str) -> JSONResponse:
     return error_response(refusal.status, refusal.code, refusal.message, refusal.details, every)
 
 
-def install_error_handlers(app: FastAPI) -> None:
-    """Make `app` answer every refusal in the one shape."""
-    app.add_exception_handler(ApiError, _refused)
+def install_error_handlers(app: FastAPI, told: Callable[[Request, ApiError], Awaitable[None]]) -> None:
+    """Make `app` answer every refusal in the one shape.
+
+    Parameters
+    ----------
+    told : callable
+        Is told of each refusal that is `audited`, before it is answered.
+    """
+
+    async def refused(request: Request, error: Exception) -> JSONResponse:
+        if isinstance(error, ApiError) and error.audited:
+            await told(request, error)
+        return await _refused(request, error)
+
+    app.add_exception_handler(ApiError, refused)
     app.add_exception_handler(InputError, _bad_input)
     app.add_exception_handler(RequestValidationError, _not_valid)
     app.add_exception_handler(HTTPException, _http)
@@ -122,9 +137,16 @@ async def _bad_input(_request: Request, error: Exception) -> JSONResponse:
     return error_response(422, "bad_input", str(error))
 
 
-async def _not_valid(_request: Request, error: Exception) -> JSONResponse:
+async def _not_valid(request: Request, error: Exception) -> JSONResponse:
     if not isinstance(error, RequestValidationError):
         raise error
+    if any(
+        detail["loc"] == ("body",) and isinstance(detail.get("input"), bytes) for detail in error.errors()
+    ):
+        # Only a body that was not read as JSON is bytes still.
+        sent = request.headers.get("content-type", "none")[:100]
+        message = f"Expected a body with the Content-Type application/json, got {sent}."
+        return error_response(415, "unsupported_media_type", message)
     problems = [refused_value(detail) for detail in error.errors()]
     return error_response(422, "invalid", problems[0], {"problems": problems})
 

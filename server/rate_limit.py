@@ -62,3 +62,27 @@ class RateLimit:
             raise TooManyRequests(
                 f"Too many requests; please try again in {wait} s.", headers={"retry-after": str(wait)}
             )
+
+
+class BoundedRecords:
+    """What is written down of a flood: so many events a minute, one of each kind; the others are counted.
+
+    A flood must not fill the audit log, and with it the disk.
+    """
+
+    def __init__(self, per_minute: int, of_a_kind: int) -> None:
+        self._all, self._kinds = RateLimit(per_minute), RateLimit(of_a_kind)
+        self._lock, self._unwritten = threading.Lock(), 0
+
+    def written(self, kind: str = "") -> int | None:
+        """How many events were not written down since the last that was; None: do not write this one."""
+        try:
+            self._kinds.hit(kind)
+            self._all.hit("")
+        except TooManyRequests:
+            with self._lock:
+                self._unwritten += 1
+            return None
+        with self._lock:
+            unwritten, self._unwritten = self._unwritten, 0
+        return unwritten

@@ -7,6 +7,7 @@ from email.utils import parseaddr
 from functools import cached_property
 from pathlib import Path
 from typing import Literal, Self
+from urllib.parse import urlsplit
 
 from pydantic import AliasChoices, Field, field_validator, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
@@ -14,6 +15,8 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 from experiments.database_url import with_driver
 from server.providers.declaration import LOCAL_HOSTS, Provider, ProviderId
 
+KEY_LENGTH_MIN = 32
+"""Characters of a secret key that somebody sets; the ones that are made here have 64."""
 REPOSITORY = Path(__file__).resolve().parent.parent
 
 
@@ -47,7 +50,8 @@ class Settings(BaseSettings):
     )
     secret_key: str = Field(
         default="",
-        description="Key from which tokens are derived; empty: data_folder/secret_key, made at first start.",
+        description="Key from which tokens are derived, at least 32 random characters; empty: "
+        "data_folder/secret_key, made at first start.",
     )
     frontend_folder: Path = Field(
         default=REPOSITORY / "frontend" / "dist",
@@ -61,12 +65,19 @@ class Settings(BaseSettings):
     max_upload_bytes: int = Field(
         default=2 * 1024**3, ge=1024, description="Largest request of an experimenter, clip uploads included."
     )
+    max_uploads_bytes: int = Field(
+        default=64 * 1024**3,
+        ge=1024,
+        description="What one account's uploads may hold until they become studies, or a day is over.",
+    )
     run_starts_per_minute: int = Field(
         default=3000, ge=1, description="Runs that may be started by one link a minute."
     )
     audit_syslog: str = Field(
         default="",
-        description="Syslog that gets the audit log too, without details: /dev/log, or host:port (UDP).",
+        pattern=r"^(/.+|((tcp|tls)://)?(\[[0-9A-Fa-f:.]+(%\w+)?\]|[^/:\[\]]+)(:\d+)?)?$",
+        description="Syslog that gets the audit log too, without details: /dev/log, host:port (UDP), or "
+        "tls://host:port (certificate checked), tcp://host:port; an IPv6 address in [].",
     )
     evidence: Literal["refuse", "record"] = Field(
         default="refuse",
@@ -83,6 +94,11 @@ class Settings(BaseSettings):
         default=120.0,
         gt=0,
         description="Minutes without a request after which an experimenter is signed out.",
+    )
+    owners_second_factor: bool = Field(
+        default=False,
+        description="Owners of the server are no more than experimenters until they sign in with a second "
+        "factor.",
     )
     logins_per_minute: int = Field(
         default=30,
@@ -251,6 +267,16 @@ class Settings(BaseSettings):
         if self.database_url:
             return self.database_url
         return f"sqlite:///{(self.data_folder / 'palpebra.sqlite').resolve()}"
+
+    @property
+    def is_local(self) -> bool:
+        """True where this machine alone reaches the server, so that no link leads here from elsewhere."""
+        return urlsplit(self.public_url).hostname in LOCAL_HOSTS
+
+    @property
+    def has_short_key(self) -> bool:
+        """Whether somebody set a secret key that can be guessed."""
+        return 0 < len(self.secret_key) < KEY_LENGTH_MIN
 
     @cached_property
     def key(self) -> bytes:

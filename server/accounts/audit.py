@@ -12,6 +12,8 @@ from server.models import AuditEntry
 
 NOBODY: Literal["nobody"] = "nobody"
 """The actor where somebody tried and was not recognised."""
+SECOND_FACTOR_SET_UP = "second factor set up"
+"""The entry that says under which key of the server a second factor is: its own hash is made with it."""
 
 
 def record(

@@ -17,7 +17,7 @@ from server.accounts.identity import (
     check_origin,
     identify,
 )
-from server.accounts.passwords import hash_password, password_fits
+from server.accounts.passwords import checked_password, hash_password
 from server.accounts.schemas import (
     AccountOut,
     ChangePassword,
@@ -153,11 +153,12 @@ async def attempt(
     key = throttle.key(body.name, address, device)
     await run_in_threadpool(throttle.enter, key, address, device)
     stored = await run_in_threadpool(service.stored_password, services, body.name)
-    fits = await services.passwords.run(lambda: password_fits(body.password, stored))
+    checked = await services.passwords.run(lambda: checked_password(body.password, stored))
+    fits = checked.stored is not None
     if fits and not device:
         await run_in_threadpool(throttle.codes.check, body.name.casefold())
     token, failure = await run_in_threadpool(
-        service.open_session, services, body.name, stored if fits else None, body.code, user_agent
+        service.open_session, services, body.name, checked, body.code, user_agent
     )
     if token is not None:
         await run_in_threadpool(throttle.names.succeeded, key)

@@ -1,6 +1,6 @@
 """Who is asking: a signed-in browser or an API token, and what each may do."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from typing import Annotated, Final, Literal
 from urllib.parse import urlsplit
@@ -20,6 +20,7 @@ from server.tokens import hash_token
 Scope = Literal["read", "personal", "write", "export"]
 COOKIE = "palpebra_session"
 _SEEN_EVERY = timedelta(minutes=1)
+_NO_SUCH = "This API token is unknown, revoked or expired; make a new one."
 FRESH_FOR = timedelta(minutes=15)
 """After signing in, what would outlive a stolen session may be changed for so long."""
 _cookie_scheme = APIKeyCookie(name=COOKIE, auto_error=False, description="A signed-in browser.")
@@ -33,11 +34,26 @@ class NotSignedIn(ApiError):
     code = "not_signed_in"
 
 
+class UnknownToken(NotSignedIn):
+    """The session's cookie or the API token is nobody's."""
+
+    audited = True
+
+
 class NotAllowed(ApiError):
     """The account's role or the token's scope is not enough."""
 
     status = 403
     code = "not_allowed"
+    audited = True
+
+
+class SecondFactorNeeded(ApiError):
+    """What is asked for opens only to who signed in with a second factor."""
+
+    status = 403
+    code = "second_factor_needed"
+    audited = True
 
 
 class SignInAgain(ApiError):
@@ -55,6 +71,8 @@ class Identity:
     ----------
     role : str
         On the server; what may be done with a study is asked by `server.studies.lookup.find_study`.
+    held_back : bool
+        An owner who is no more than an experimenter until she signs in with a second factor.
     second_factor : bool
         The session began with one, or the token's account has one.
     signed_in_at : datetime or None
@@ -68,6 +86,7 @@ class Identity:
     scopes: frozenset[str] | None = None
     second_factor: bool = False
     signed_in_at: datetime | None = None
+    held_back: bool = False
 
     @property
     def sees_persons(self) -> bool:
@@ -111,7 +130,11 @@ def _address_of(origin: str) -> str:
 def identify(request: Request, services: Services) -> Identity:
     """The identity of a request, which acts for it from here on; NotSignedIn where there is none."""
     identity = _recognised(request, services)
+    needed = services.settings.owners_second_factor and identity.role == "owner"
+    if needed and not identity.second_factor:
+        identity = replace(identity, role="experimenter", held_back=True)
     act_for(identity.account_id)
+    request.state.identity = identity
     return identity
 
 
@@ -130,7 +153,9 @@ def _by_cookie(services: Services, cookie: str) -> Identity:
     with services.database.read() as session:
         signed_in = repository.session_by_token(session, hash_token(cookie))
         since = now() - services.settings.session_idle
-        if signed_in is None or _has_ended(signed_in, since) or signed_in.account.disabled_at:
+        if signed_in is None:
+            raise UnknownToken("Your session has ended; please sign in again.")
+        if _has_ended(signed_in, since) or signed_in.account.disabled_at:
             raise NotSignedIn("Your session has ended; please sign in again.")
         account = signed_in.account
         identity = Identity(
@@ -158,8 +183,11 @@ def _by_token(services: Services, secret: str) -> Identity:
     with services.database.read() as session:
         token = repository.token_by_hash(session, hash_token(secret))
         expired = token is not None and token.expires_at is not None and token.expires_at <= now()
-        if token is None or token.revoked_at or expired or token.account.disabled_at:
-            raise NotSignedIn("This API token is unknown, revoked or expired; make a new one.")
+        if token is None:
+            raise UnknownToken(_NO_SUCH)
+        if token.revoked_at or expired or token.account.disabled_at:
+            # A night's script goes on with one that has ended: no stranger who tries.
+            raise NotSignedIn(_NO_SUCH)
         account = token.account
         identity = Identity(
             account.id,
@@ -183,7 +211,7 @@ class _Access:
     Parameters
     ----------
     fresh : bool, optional
-        Browsers alone that signed in within `FRESH_FOR`.
+        Of browsers those alone that signed in within `FRESH_FOR`.
     """
 
     def __init__(self, role: Role, *scopes: Scope, fresh: bool = False) -> None:
@@ -197,6 +225,11 @@ class _Access:
         _bearer: Annotated[object, Depends(_bearer_scheme)],
     ) -> Identity:
         identity = identify(request, services)
+        if identity.held_back and self.role == "owner":
+            raise SecondFactorNeeded(
+                "On this server owners need a second factor: set one up under My account, or sign in again "
+                "with it."
+            )
         if ROLES.index(identity.role) < ROLES.index(self.role):
             raise NotAllowed(f"This needs the role {self.role} on this server; yours is {identity.role}.")
         if identity.scopes is not None:
@@ -205,7 +238,7 @@ class _Access:
             if identity.scopes.isdisjoint(self.scopes):
                 scopes = " or ".join(f"'{scope}'" for scope in self.scopes)
                 raise NotAllowed(f"This needs a token with the scope {scopes}.")
-        if self.fresh:
+        if self.fresh and identity.scopes is None:
             must_be_fresh(identity)
         return identity
 
@@ -229,6 +262,8 @@ ReportReader = Annotated[Identity, Depends(_Access("viewer", "export", "personal
 WRITER = _Access("viewer", "write")
 Writer = Annotated[Identity, Depends(WRITER)]
 """May change things."""
+Eraser = Annotated[Identity, Depends(_Access("viewer", "write", fresh=True))]
+"""May do what cannot be undone: a browser that signed in a short while ago, or a token that may change."""
 Myself = Annotated[Identity, Depends(_Access("viewer"))]
 """A signed-in browser: one's own account, and what no token opens."""
 FreshMyself = Annotated[Identity, Depends(_Access("viewer", fresh=True))]

@@ -5,6 +5,7 @@ import os
 import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from functools import cache
 from typing import TypeVar
 
@@ -65,10 +66,31 @@ def hash_password(password: str, name: str) -> str:
     return _hasher().hash(password)
 
 
-def password_fits(password: str, stored: str | None) -> bool:
-    """True where `password` has the hash `stored`; takes as long where there is none."""
-    fits = _hasher().verify(password, stored or _nobody())
-    return fits and bool(stored)
+@dataclass(frozen=True)
+class Checked:
+    """The hash that a password fits.
+
+    Attributes
+    ----------
+    stored : str or None
+        As it was read; None where the password fits none.
+    renewed : str or None
+        A hash of the same password by today's parameters, where the stored one has others.
+    """
+
+    stored: str | None
+    renewed: str | None = None
+
+
+def checked_password(password: str, stored: str | None) -> Checked:
+    """Compare a password with the hash `stored`; takes as long where there is none."""
+    fits, renewed = _hasher().verify_and_update(password, stored or _nobody())
+    return Checked(stored, renewed) if fits and stored else Checked(None)
+
+
+def password_fits(password: str, stored: str) -> bool:
+    """True where `password` has the hash `stored`."""
+    return checked_password(password, stored).stored is not None
 
 
 class PasswordWork:

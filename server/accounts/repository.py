@@ -29,6 +29,13 @@ def accounts(session: Session) -> list[Account]:
     return list(session.scalars(select(Account).order_by(Account.id)))
 
 
+def with_second_factor(session: Session) -> list[Account]:
+    """Accounts with a second factor; held."""
+    return list(
+        session.scalars(select(Account).where(Account.totp_confirmed_at.is_not(None)).with_for_update())
+    )
+
+
 def account(session: Session, account_id: int, *, fresh: bool = False, lock: bool = False) -> Account | None:
     """An account by its number.
 

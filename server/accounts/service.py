@@ -7,9 +7,9 @@ from sqlalchemy.orm import Session
 
 from experiments.errors import did_you_mean
 from server.accounts import repository, second_factor
-from server.accounts.audit import NOBODY, record
+from server.accounts.audit import NOBODY, SECOND_FACTOR_SET_UP, record
 from server.accounts.identity import Identity, account_of
-from server.accounts.passwords import hash_password, password_fits
+from server.accounts.passwords import Checked, hash_password, password_fits
 from server.accounts.tokens import end_everything
 from server.clock import now
 from server.context import Services
@@ -26,6 +26,12 @@ class WrongCredentials(ApiError):
 
     status = 401
     code = "wrong_credentials"
+
+
+class WrongProof(WrongCredentials):
+    """The present password, or the code in its place, does not fit."""
+
+    audited = True
 
 
 class SecondFactorRequired(ApiError):
@@ -58,23 +64,24 @@ def stored_password(services: Services, name: str) -> str | None:
 
 
 def open_session(
-    services: Services, name: str, checked: str | None, code: str | None, user_agent: str
+    services: Services, name: str, checked: Checked, code: str | None, user_agent: str
 ) -> tuple[str | None, ApiError | None]:
     """After a right password: the token of a new session (the cookie's value), or why there is none.
 
     Parameters
     ----------
-    checked : str or None
-        The stored hash that the password fitted, None where it fitted none. The account is held meanwhile, so
-        that a code works once however many ask at once; failures are written down too.
+    checked : Checked
+        The stored hash that the password fitted. The account is held meanwhile, so that a code works once
+        however many ask at once; failures are written down too.
     """
     with services.database.write() as session:
         account = repository.account_named(session, name, lock=True)
-        if account is None or account.disabled_at is not None or account.password_hash != checked:
+        if account is None or account.disabled_at is not None or account.password_hash != checked.stored:
             failure: ApiError | None = WrongCredentials("Name or password are wrong.")
         else:
             failure = second_factor_failure(services, account, code)
         if account is not None and failure is None:
+            account.password_hash = checked.renewed or account.password_hash
             token = begin_session(services, session, account, user_agent)
             record(session, identity_of(account), "signed in", "account", account.name)
             return token, None
@@ -200,7 +207,7 @@ def must_fit(password: str, stored: str) -> None:
     if not stored:
         raise Conflict("This account has no password; an owner of the server can give it one.")
     if not password_fits(password, stored):
-        raise WrongCredentials("The present password is wrong.")
+        raise WrongProof("The present password is wrong.")
 
 
 def own_code_failure(services: Services, identity: Identity, code: str) -> ApiError | None:
@@ -213,7 +220,8 @@ def own_code_failure(services: Services, identity: Identity, code: str) -> ApiEr
             return Conflict(
                 "This account has neither password nor second factor; set up a second factor first."
             )
-        return second_factor_failure(services, account, code)
+        failure = second_factor_failure(services, account, code)
+        return WrongProof(failure.message) if isinstance(failure, WrongCredentials) else failure
 
 
 def check_known(session: Session, name: str) -> None:
@@ -311,7 +319,7 @@ def confirm_second_factor(services: Services, identity: Identity, code: str) -> 
         if (current := repository.session_of(session, identity.account_id, identity.session_id)) is not None:
             current.second_factor = True
         account.recovery_code_hashes = [second_factor.hash_recovery_code(c) for c in codes]
-        record(session, identity, "second factor set up", "account", identity.name)
+        record(session, identity, SECOND_FACTOR_SET_UP, "account", identity.name)
     return codes
 
 

@@ -17,7 +17,7 @@ from contextlib import asynccontextmanager
 from fastapi.concurrency import run_in_threadpool
 
 from server.errors import ApiError, TooManyRequests
-from server.rate_limit import RateLimit
+from server.rate_limit import BoundedRecords, RateLimit
 from server.settings import Settings
 from server.shared_counts_repository import SharedCounts
 from server.tokens import derived_token, new_token
@@ -119,7 +119,7 @@ class SignInThrottle:
         self.per_range = limit("range", settings.logins_per_minute)
         self.overall = limit("overall", settings.logins_per_minute_overall)
         self._letters = RateLimit(LETTERS_FROM_A_RANGE, name="letters", shared=shared, window_s=FORGOTTEN_S)
-        self._records, self._unwritten = RateLimit(RECORDS_PER_MINUTE), 0
+        self._records = BoundedRecords(RECORDS_PER_MINUTE, RECORDS_PER_MINUTE)
         self.per_device = limit("device", settings.logins_per_minute)
         self.logouts = limit("logouts", settings.logins_per_minute)
 
@@ -165,17 +165,8 @@ class SignInThrottle:
         return True
 
     def written(self) -> int | None:
-        """How many failed sign-ins were not written down since the last; None: do not write this one.
-
-        A flood must not fill the audit log, and with it the disk.
-        """
-        try:
-            self._records.hit(_EVERYBODY)
-        except TooManyRequests:
-            self._unwritten += 1
-            return None
-        unwritten, self._unwritten = self._unwritten, 0
-        return unwritten
+        """How many failed sign-ins were not written down since the last; None: do not write this one."""
+        return self._records.written()
 
     def _hidden(self, text: str) -> str:
         return hashlib.blake2b(text.encode("utf-8", "replace"), key=self._salt, digest_size=16).hexdigest()

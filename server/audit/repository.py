@@ -32,6 +32,17 @@ def chained(session: Session, after: int = 0) -> Iterator[AuditEntry]:
         session.expunge_all()
 
 
+def chain_pages(session: Session) -> Iterator[list[AuditEntry]]:
+    """The chain in its order, some entries at a time; what is changed of them is written before the next."""
+    last = 0
+    query = select(AuditEntry).order_by(AuditEntry.position).limit(BATCH)
+    while page := list(session.scalars(query.where(AuditEntry.position > last))):
+        last = page[-1].position or 0
+        yield page
+        session.flush()
+        session.expunge_all()
+
+
 def first_id(session: Session) -> int | None:
     """The number of the chain's first row."""
     return session.scalar(select(func.min(AuditEntry.id)).where(AuditEntry.position.is_not(None)))

@@ -32,13 +32,26 @@ class Verdict:
     broken: str | None
 
 
-def verify(session: Session, secret: bytes, kept: tuple[int, str] | None = None) -> Verdict:
-    """Check every entry; `kept` is a position and its hash, noted elsewhere, that the chain must hold."""
-    key, erased_runs = chain.chain_key(secret), repository.erased_runs(session)
+def verify(
+    session: Session, secret: bytes, kept: tuple[int, str] | None = None, before: bytes | None = None
+) -> Verdict:
+    """Check every entry.
+
+    Parameters
+    ----------
+    secret : bytes
+        The server's key.
+    kept : tuple of int and str, optional
+        A position and its hash, noted elsewhere, that the chain must hold.
+    before : bytes, optional
+        A key of before, under which entries at the beginning may be.
+    """
+    keys = _Keys(secret, before)
+    erased_runs = repository.erased_runs(session)
     position, previous, erased, seen = 0, chain.START, 0, kept is None
     broken: str | None = None
     for entry in repository.chained(session):
-        broken = _problem(key, position, previous, entry, erased_runs)
+        broken = keys.problem(position, previous, entry, erased_runs)
         if broken is not None:
             break
         position, previous = entry.position or 0, entry.chain_hash or ""
@@ -47,10 +60,29 @@ def verify(session: Session, secret: bytes, kept: tuple[int, str] | None = None)
     if broken is None and not seen and kept is not None:
         broken = f"entry {kept[0]}, whose hash was kept, is not in the chain: it was changed or cut off"
     first = repository.first_id(session)
-    before, stray = repository.unchained(session, first)
+    older, stray = repository.unchained(session, first)
     if broken is None and stray is not None:
         broken = f"row {stray} stands between the chain's rows without being in it: it was put in"
-    return Verdict(position, previous, erased, before, broken)
+    return Verdict(position, previous, erased, older, broken)
+
+
+class _Keys:
+    """The key of before, while entries fit it, and then for good the key of now."""
+
+    def __init__(self, secret: bytes, before: bytes | None) -> None:
+        self._now = chain.chain_key(secret)
+        self._old = None if before is None else chain.chain_key(before)
+
+    def problem(self, last: int, previous: str, entry: AuditEntry, erased_runs: set[str]) -> str | None:
+        """What is wrong with an entry; None where it fits."""
+        by_now = _problem(self._now, last, previous, entry, erased_runs)
+        if self._old is None:
+            return by_now
+        by_old = _problem(self._old, last, previous, entry, erased_runs)
+        if by_old is not None and by_now is None:
+            self._old = None
+            return None
+        return by_old
 
 
 def _problem(key: bytes, last: int, previous: str, entry: AuditEntry, erased_runs: set[str]) -> str | None:

@@ -12,7 +12,7 @@ from experiments.files import whole_file
 from server.methods.paragraph import Methods, declared, sentences
 from server.methods.repository import Number, numbers
 from server.models import Study
-from server.participants.recruiter import Recruiter
+from server.participants.recruiter import stored_recruiter
 from server.studies.lookup import definition_of
 from server.studies.series import version_of_series
 
@@ -43,7 +43,7 @@ class Counted:
 def counted(session: Session, study: Study, origin: str, series: int | None) -> Counted:
     """What the database has to say of a series: its declaration and every number."""
     version = version_of_series(session, study, series)
-    recruiter = Recruiter.model_validate(study.recruiter).kind if study.recruiter else "generic"
+    recruiter = stored_recruiter(study.recruiter).kind
     experiment = definition_of(version)
     counts = numbers(session, study.id, origin, version.series) | declared(experiment)
     return Counted(study.name, origin, version.series, experiment, recruiter, counts)

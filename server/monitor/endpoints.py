@@ -8,14 +8,13 @@ from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import StreamingResponse
 
-from server.accounts.identity import Identity, NotAllowed, NotSignedIn, Viewer, identify
+from server.accounts.identity import Identity, NotAllowed, NotSignedIn, SecondFactorNeeded, Viewer, identify
 from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES, NotFound
 from server.monitor import service
 from server.monitor.schemas import MonitorSnapshot
 from server.participants.schemas import Origin
 from server.studies.lookup import active_definition, study_with_rights
-from server.workspaces.rights import SecondFactorNeeded
 
 router = APIRouter(prefix="/api/admin/studies/{study}", tags=["monitor"], responses=ERROR_RESPONSES)
 EVERY_S = 2.0

@@ -7,11 +7,14 @@ import stat
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
+from datetime import timedelta
 from itertools import islice
 from pathlib import Path
 from urllib.parse import urlsplit
 
 from experiments.counted import counted
+from server.accounts.schemas import TOKEN_DAYS_MAX
+from server.clock import now
 from server.context import Services
 from server.db import COUNTING_POOL
 from server.identities.repository import readable
@@ -23,12 +26,17 @@ from server.operations.modes import open_to_others, own_folders
 from server.operations.shared_checks import connection_pool, ledger
 from server.row_policies_repository import OLDEST_POSTGRES as OLDEST_WITH_WALL
 from server.row_security_repository import ROLE
+from server.settings import KEY_LENGTH_MIN
 from server.tallies.recount import Recount
 
 RAISE_THE_WALL = (
     f"the server's own checks are the only wall: take PostgreSQL {OLDEST_WITH_WALL // 10000} or newer, as an "
     f"administrator of it CREATE ROLE {ROLE} NOLOGIN and GRANT it to the server's user, then run: "
     "server database upgrade"
+)
+LONGER_KEY = (
+    f"set PALPEBRA_SECRET_KEY to at least {KEY_LENGTH_MIN} random characters, keep the old one in a file, "
+    "and run: server database rewrap OLD_KEY_FILE"
 )
 LEAST_FREE_BYTES = 2 * 1024**3
 OLDEST_PYTHON, OLDEST_SQLITE, OLDEST_POSTGRES = (3, 11), (3, 38, 0), 130000
@@ -83,8 +91,8 @@ def secret_key(services: Services) -> Iterator[Finding]:
     settings = services.settings
     path = settings.data_folder / "secret_key"
     if settings.secret_key:
-        fine = len(settings.secret_key) >= 32
-        advice = "" if fine else "set PALPEBRA_SECRET_KEY to at least 32 random characters"
+        fine = not settings.has_short_key
+        advice = "" if fine else LONGER_KEY
         yield Finding("secret key", "ok" if fine else "warning", "from the environment", advice)
     elif not path.is_file():
         yield Finding("secret key", "ok", "will be made at the first start")
@@ -225,6 +233,19 @@ def people(services: Services) -> Iterator[Finding]:
     yield Finding("studies", "ok" if studies else "warning", str(studies), advice)
 
 
+def tokens(services: Services) -> Iterator[Finding]:
+    """API tokens of before they had to end within a year."""
+    with services.database.read() as session:
+        named = repository.tokens_ending_after(session, now() + timedelta(days=TOKEN_DAYS_MAX))
+    if named:
+        shown = ", ".join(f"{token} ({account})" for token, account in named[:5])
+        said = f"{counted(len(named), 'API token')} without an end or with one years ahead: {shown}"
+        advice = "ask their people to revoke them (My account) and make new ones"
+        yield Finding("API tokens", "warning", said + (", ..." if len(named) > 5 else ""), advice)
+    else:
+        yield Finding("API tokens", "ok", "each ends within a year")
+
+
 CHECKS: tuple[Callable[[Services], Iterator[Finding]], ...] = (
     python,
     data_folder,
@@ -239,6 +260,7 @@ CHECKS: tuple[Callable[[Services], Iterator[Finding]], ...] = (
     pages,
     public_address,
     people,
+    tokens,
     backups,
     snapshots,
 )

@@ -1,11 +1,12 @@
 """What the doctor, the metrics and backups ask of the whole database."""
 
+from datetime import datetime
 from typing import NamedTuple
 
-from sqlalchemy import Connection, Engine, func, select, text
+from sqlalchemy import Connection, Engine, func, or_, select, text
 from sqlalchemy.orm import Session
 
-from server.models import Account, Clip, Study, StudyRun
+from server.models import Account, ApiToken, Clip, Study, StudyRun
 
 
 class RunCount(NamedTuple):
@@ -52,6 +53,14 @@ def owner_count(session: Session) -> int:
     """Owners who may sign in."""
     query = select(func.count()).where(Account.disabled_at.is_(None), Account.role == "owner")
     return session.scalar(query) or 0
+
+
+def tokens_ending_after(session: Session, latest: datetime) -> list[tuple[str, str]]:
+    """Name and account of open API tokens that end after a moment, or never."""
+    query = select(ApiToken.name, Account.name).join(Account, Account.id == ApiToken.account_id)
+    late = or_(ApiToken.expires_at.is_(None), ApiToken.expires_at > latest)
+    query = query.where(ApiToken.revoked_at.is_(None), Account.disabled_at.is_(None), late)
+    return [(token, account) for token, account in session.execute(query.order_by(ApiToken.id))]
 
 
 def count_without_second_factor(session: Session) -> int:

@@ -21,7 +21,7 @@ from server.models import NO_SLOT, Link, Study, StudyRun
 from server.participants import grouping, repository, returning
 from server.participants.bounds import checked_device
 from server.participants.placing import assign_slot
-from server.participants.recruiter import NO_RECRUITER, Recruiter
+from server.participants.recruiter import Recruiter, stored_recruiter
 from server.participants.refusals import (
     LanguageUnknown,
     LinkExpired,
@@ -66,8 +66,7 @@ def find_link(session: Session, token: str) -> Link:
 
 def recruiter_of(link: Link) -> Recruiter:
     """The recruiter of a link, or of its study."""
-    declared = link.recruiter or link.study.recruiter
-    return Recruiter.model_validate(declared) if declared else NO_RECRUITER
+    return stored_recruiter(link.recruiter or link.study.recruiter)
 
 
 def link_state(services: Services, session: Session, token: str) -> LinkState:

@@ -12,8 +12,9 @@ signature_parameter: which address parameter has the signature of the participan
 signatures); without it addresses are not signed. secret_name: another name makes another secret.
 """
 
+import re
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 from urllib.parse import quote
 
 from pydantic import BaseModel, ConfigDict, StringConstraints
@@ -25,7 +26,8 @@ ID_PARAMETERS = {
     "mturk": "workerId",
     "generic": "participant",
 }
-WEB_ADDRESS = r"^(https?://.*)?$"
+WEB_ADDRESS = r"^(https?://[^/?#{}@\\\s\x00-\x1f\x7f]+([/?#][^\x00-\x1f\x7f]*)?)?$"
+"""The host is written out: what an address says of a participant must not decide where others are sent."""
 PROLIFIC_HOME = "https://app.prolific.com/"
 PROLIFIC_URL = "https://app.prolific.com/submissions/complete?cc={code}"
 
@@ -77,10 +79,18 @@ class Recruiter(BaseModel):
         return self.redirect(self.code_screened_out, run, parameters) if by_code else None
 
 
+def stored_recruiter(declared: Mapping[str, Any] | None) -> Recruiter:
+    """What a study or link has stored; an address that only an earlier release took is left out."""
+    return Recruiter.model_validate(
+        {
+            name: value
+            for name, value in (declared or {}).items()
+            if not name.startswith("redirect_") or (value and re.fullmatch(WEB_ADDRESS, value))
+        }
+    )
+
+
 def _filled_in(address: str, code: str, run: str, parameters: Mapping[str, str]) -> str | None:
     for name, value in {**parameters, "code": code, "run": run}.items():
         address = address.replace("{" + name + "}", quote(value, safe=""))
     return address or None
-
-
-NO_RECRUITER = Recruiter()

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from sqlalchemy.orm import Session
+
 from server.accounts import repository as accounts
 from server.accounts.audit import NOBODY, record
 from server.accounts.invitations import check_invitation, find_invitation
@@ -90,19 +92,45 @@ def finish(
 def finish_with_code(services: Services, browser: str, code: str, user_agent: str) -> Finished:
     """After the provider: the account's own second factor, which its session then has.
 
-    The account is held meanwhile, so that a code works once however many ask at once; where it has no second
-    factor any more, no code is one.
+    Wrong codes are counted outside of the transaction: on PostgreSQL a count is a transaction of its own.
+    """
+    with services.database.read() as session:
+        name = _name_behind(session, browser)
+    services.sign_ins.codes.check(name)
+    finished, failure = _finish_held(services, browser, code, user_agent)
+    if finished is not None:
+        services.sign_ins.codes.succeeded(name)
+        return finished
+    services.sign_ins.codes.failed(name)
+    raise failure or NotRecognised("This sign-in was finished before; please begin it again.")
+
+
+def _name_behind(session: Session, browser: str) -> str:
+    attempt = repository.attempt(session, hash_token(browser), hash_token(browser), "code")
+    account = accounts.account(session, attempt.account_id or 0) if attempt else None
+    if account is None:
+        raise _no_code_asked()
+    return account.name.casefold()
+
+
+def _no_code_asked() -> NotRecognised:
+    return NotRecognised("This sign-in has taken too long or asks for no code; please begin again.")
+
+
+def _finish_held(
+    services: Services, browser: str, code: str, user_agent: str
+) -> tuple[Finished | None, ApiError | None]:
+    """With the account held, so that a code works once however many ask at once.
+
+    Where it has no second factor any more, no code is one. Failures are written down too.
     """
     with services.database.write() as session:
         attempt = repository.attempt(session, hash_token(browser), hash_token(browser), "code")
         account = accounts.account(session, attempt.account_id or 0, lock=True) if attempt else None
         if attempt is None or account is None or account.disabled_at or account.totp_confirmed_at is None:
-            raise NotRecognised("This sign-in has taken too long or asks for no code; please begin again.")
-        name = account.name.casefold()
-        services.sign_ins.codes.check(name)
+            raise _no_code_asked()
         failure = code_failure(services, account, code)
         if failure is None and repository.end_attempt(session, attempt.id):
-            services.sign_ins.codes.succeeded(name)
             token = begin_session(
                 services, session, account, user_agent, second_factor=True, provider=attempt.provider
             )
@@ -110,10 +138,9 @@ def finish_with_code(services: Services, browser: str, code: str, user_agent: st
                 session, identity_of(account), "signed in", "account", account.name, provider=attempt.provider
             )
             told = Told(account.id, RECOVERY_CODE_USED) if is_recovery_code(code) else None
-            return Finished(attempt.next_page, session=token, told=told)
-        services.sign_ins.codes.failed(name)
+            return Finished(attempt.next_page, session=token, told=told), None
         record_failure(services, session, account)
-    raise failure or NotRecognised("This sign-in was finished before; please begin it again.")
+    return None, failure
 
 
 def sign_out(services: Services, provider_id: str, ended: SignedOut) -> None:

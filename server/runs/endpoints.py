@@ -5,7 +5,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query
 
 from server.accounts.audit import record
-from server.accounts.identity import Myself, PersonalReader, Writer
+from server.accounts.identity import Eraser, Myself, PersonalReader, Writer
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.runs import service
@@ -67,7 +67,7 @@ def include_run(services: ServicesDep, identity: Writer, study: str, run: str) -
 
 
 @router.post("/{run}/erase")
-def erase_run(services: ServicesDep, identity: Writer, study: str, run: str, body: Erase) -> Erased:
+def erase_run(services: ServicesDep, identity: Eraser, study: str, run: str, body: Erase) -> Erased:
     """Delete one person's data for good (a request under data protection law)."""
     with services.database.write() as session:
         known = find_study(session, study, identity, "edit")

@@ -5,12 +5,18 @@ from sqlalchemy.orm import Session
 from experiments.definition import Experiment
 from experiments.errors import did_you_mean
 from experiments.schema.stored import load_stored
-from server.accounts.identity import Identity, NotAllowed, Operator
+from server.accounts.identity import Identity, NotAllowed, Operator, SecondFactorNeeded
 from server.errors import Conflict, NotFound
 from server.models import RIGHTS, Right, Study, StudyVersion
 from server.studies import repository
 from server.workspaces import repository as workspaces
-from server.workspaces.rights import SecondFactorNeeded, ordered
+from server.workspaces.rights import ordered
+
+
+class UnknownStudy(NotFound):
+    """There is no such study, or none that the account may see."""
+
+    audited = True
 
 
 def find_study(session: Session, name: str, identity: Identity | Operator, right: Right) -> Study:
@@ -36,7 +42,7 @@ def study_with_rights(
     study = workspaces.study_seen_by(session, name, identity)
     if study is None:
         names = workspaces.study_names_seen_by(session, identity)
-        raise NotFound(f"There is no study '{name[:60]}'{did_you_mean(name, names)}")
+        raise UnknownStudy(f"There is no study '{name[:60]}'{did_you_mean(name, names)}")
     if isinstance(identity, Operator):
         return study, frozenset(RIGHTS)
     rights = workspaces.rights_on(session, [study], identity)[study.id]

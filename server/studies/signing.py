@@ -7,7 +7,7 @@ from sqlalchemy.orm import Session
 from server.accounts.audit import record
 from server.accounts.identity import Identity
 from server.models import Link, Study
-from server.participants.recruiter import NO_RECRUITER, Recruiter
+from server.participants.recruiter import stored_recruiter
 from server.participants.signatures import signature_of, signing_secret
 from server.studies.link_schemas import Signing
 
@@ -38,8 +38,7 @@ def signing(
     link : Link, optional
         Whose recruiter it is, where it has its own; the study's where None.
     """
-    declared = (link.recruiter if link else None) or study.recruiter
-    recruiter = Recruiter.model_validate(declared) if declared else NO_RECRUITER
+    recruiter = stored_recruiter((link.recruiter if link else None) or study.recruiter)
     used = recruiter.secret_name if name is None else name
     record(session, identity, "signing secret read", "study", study.name, secret_name=used)
     secret = signing_secret(key, study.pseudonym_key, used)

@@ -33,7 +33,9 @@ def upload_clips(
     Videos are looked into, and converted where browsers cannot play them, after the answer: see the progress.
     """
     settings = services.settings
-    identifier, folder = uploads.new_upload(settings.upload_folder, identity.account_id, fps)
+    identifier, folder = uploads.new_upload(
+        settings.upload_folder, identity.account_id, fps, settings.max_uploads_bytes
+    )
     try:
         for file in files or []:
             uploads.receive(folder, file.filename or "", file.file, settings.max_upload_bytes)
@@ -59,7 +61,9 @@ def upload_more(
     """
     folder = uploads.upload_folder(services.settings.upload_folder, upload, identity.account_id)
     uploads.check_room(folder)
-    sent, limit = files or [], services.settings.max_upload_bytes
+    settings = services.settings
+    uploads.check_quota(settings.upload_folder, identity.account_id, settings.max_uploads_bytes)
+    sent, limit = files or [], settings.max_upload_bytes
     if replaces is not None:
         if len(sent) != 1:
             raise Invalid(f"Expected one file in the place of '{replaces[:100]}', got {len(sent)}.")

@@ -19,19 +19,47 @@ from video_conversion.prepared import Prepared, clip_name
 KEEP_S = 24 * 3600
 MAX_KEPT_BYTES = 16 * 1024**3
 """Of all files of one upload."""
+MAX_UPLOADS = 200
+"""Of an account within a day."""
 _WHOSE = ".account"
 """File of an upload's folder with the number of the account that sent it."""
 
 
-def new_upload(folder: Path, account: int, fps: float | None = None) -> tuple[str, Path]:
-    """Make the folder of an account's new upload, and remove uploads older than a day."""
+def new_upload(
+    folder: Path, account: int, fps: float | None = None, quota: int = MAX_KEPT_BYTES
+) -> tuple[str, Path]:
+    """Make the folder of an account's new upload, and remove uploads older than a day.
+
+    Parameters
+    ----------
+    quota : int, optional
+        Bytes that all uploads of the account may hold together.
+
+    Raises
+    ------
+    UploadTooLarge
+        They hold as much already, or are too many.
+    """
     _sweep(folder)
+    check_quota(folder, account, quota, further=1)
     identifier = secrets.token_hex(16)
     upload = folder / identifier
     upload.mkdir(parents=True, mode=0o700)
     (upload / _WHOSE).write_text(str(account), encoding="ascii")
     ask_rate(upload, fps)
     return identifier, upload
+
+
+def check_quota(folder: Path, account: int, quota: int, further: int = 0) -> None:
+    """UploadTooLarge where an account's uploads, which wait a day, are as many or as large as they may be."""
+    own = [one for one in (folder.iterdir() if folder.is_dir() else ()) if _sender(one) == str(account)]
+    # What is made beside the files, and what is set aside, takes room too.
+    held = sum(path.stat().st_size for one in own for path in one.rglob("*") if path.is_file())
+    if held >= quota or len(own) + further > MAX_UPLOADS:
+        raise UploadTooLarge(
+            f"Your uploads of the last day hold {held / 1e9:.1f} GB in {len(own)} folders; at most "
+            f"{quota / 1e9:.1f} GB in {MAX_UPLOADS} are kept. Make studies of them, or wait a day."
+        )
 
 
 def _sweep(folder: Path) -> None:
@@ -58,7 +86,7 @@ def _sender(folder: Path) -> str | None:
     # Uploads that an older release took have no sender; they end within a day.
     try:
         return (folder / _WHOSE).read_text(encoding="ascii")
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         return None
 
 

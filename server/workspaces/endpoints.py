@@ -2,7 +2,7 @@
 
 from fastapi import APIRouter
 
-from server.accounts.identity import Founder, Myself, Owner
+from server.accounts.identity import Founder, FreshMyself, Myself, Owner
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.workspaces import service
@@ -50,7 +50,7 @@ def list_members(services: ServicesDep, identity: Myself, workspace: str) -> lis
 
 @router.put("/{workspace}/members/{account}", status_code=204)
 def set_member(
-    services: ServicesDep, identity: Myself, workspace: str, account: str, body: SetMember
+    services: ServicesDep, identity: FreshMyself, workspace: str, account: str, body: SetMember
 ) -> None:
     """Take an account into a workspace, or change its role there."""
     with services.database.write() as session:

@@ -2,7 +2,7 @@
 
 from fastapi import APIRouter
 
-from server.accounts.identity import Myself
+from server.accounts.identity import FreshMyself, Myself
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.studies.lookup import find_study
@@ -20,14 +20,14 @@ def list_grants(services: ServicesDep, identity: Myself, study: str) -> list[Gra
 
 
 @router.put("/grants/{account}", status_code=204)
-def set_grant(services: ServicesDep, identity: Myself, study: str, account: str, body: SetGrant) -> None:
+def set_grant(services: ServicesDep, identity: FreshMyself, study: str, account: str, body: SetGrant) -> None:
     """Grant an account rights on a study, beside those it has by its role; an empty list takes them back."""
     with services.database.write() as session:
         service.grant(session, find_study(session, study, identity, "own"), account, body.rights, identity)
 
 
 @router.put("/workspace", status_code=204)
-def move_study(services: ServicesDep, identity: Myself, study: str, body: MoveStudy) -> None:
+def move_study(services: ServicesDep, identity: FreshMyself, study: str, body: MoveStudy) -> None:
     """Put a study into another workspace in which one may make studies."""
     with services.database.write() as session:
         known = find_study(session, study, identity, "own")

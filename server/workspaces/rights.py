@@ -10,7 +10,6 @@ own: recruiters' ids, grants, the workspace a study belongs to; whoever owns a s
 from collections.abc import Collection, Iterable
 from typing import Final
 
-from server.errors import ApiError
 from server.models import RIGHTS, Right, Role
 
 OF_ROLE: Final[dict[Role, frozenset[Right]]] = {
@@ -21,13 +20,6 @@ OF_ROLE: Final[dict[Role, frozenset[Right]]] = {
 """What a role in a workspace lets somebody do with its studies."""
 MAKING_STUDIES: Final[tuple[Role, ...]] = ("experimenter", "owner")
 """The roles that may make studies in a workspace."""
-
-
-class SecondFactorNeeded(ApiError):
-    """The workspace opens only to who signed in with a second factor."""
-
-    status = 403
-    code = "second_factor_needed"
 
 
 def effective(role: Role | None, granted: Iterable[Right]) -> frozenset[Right]:

@@ -1,6 +1,7 @@
 """Every endpoint refuses in the one shape, whatever is wrong, and never with a 5xx."""
 
 import re
+from importlib.metadata import version
 from typing import Any
 
 import pytest
@@ -32,6 +33,24 @@ def test_every_endpoint_without_credentials_or_body(client: TestClient, study: A
 def test_bodies_that_are_not_what_was_asked_for(client: TestClient, study: Any, body: bytes) -> None:
     headers = {"content-type": "application/json"}
     assert_shape(client.post(f"/api/links/{study.link_token}/runs", content=body, headers=headers))
+
+
+@pytest.mark.parametrize(
+    "kind", ["text/plain", "application/x-www-form-urlencoded", "multipart/form-data", None]
+)
+def test_a_body_that_is_not_said_to_be_json_is_told_what_was_expected(
+    client: TestClient, study: Any, kind: str | None
+) -> None:
+    headers = {} if kind is None else {"content-type": kind}
+    answer = client.post(f"/api/links/{study.link_token}/runs", content=b"{}", headers=headers)
+    assert_shape(answer)
+    assert (answer.status_code, answer.json()["error"]["code"]) == (415, "unsupported_media_type")
+    assert "application/json" in answer.json()["error"]["message"]
+
+
+def test_strangers_are_not_told_the_version(client: TestClient) -> None:
+    said = client.get("/api/openapi.json").text
+    assert version("palpebra") not in said
 
 
 @pytest.mark.parametrize("path", ["/api/nothing", "/nothing", "/assets/participant/nothing.js"])

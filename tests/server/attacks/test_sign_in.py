@@ -12,7 +12,14 @@ import pytest
 from fastapi.testclient import TestClient
 
 from server.accounts import invitations, passwords, service
-from server.accounts.passwords import PasswordsBusy, PasswordWork, WeakPassword, check_strength, hash_password
+from server.accounts.passwords import (
+    Checked,
+    PasswordsBusy,
+    PasswordWork,
+    WeakPassword,
+    check_strength,
+    hash_password,
+)
 from server.accounts.throttle import BackOff, TooManyFailures, address_range, known_device, new_device
 from server.context import Services
 from server.models import Account, AdminSession
@@ -58,7 +65,10 @@ def test_of_six_who_use_one_recovery_code_or_one_time_code_one_gets_in(
     with services.database.write() as session:
         session.query(Account).update({"totp_last_step": None})
     for code in (codes[0], totp.now()):
-        got = together(SIX, lambda _, code=code: service.open_session(services, owner.name, stored, code, ""))
+        got = together(
+            SIX,
+            lambda _, code=code: service.open_session(services, owner.name, Checked(stored), code, ""),
+        )
         assert sum(token is not None for token, _ in got) == 1, got
     with services.database.read() as session:
         assert len(session.query(Account).one().recovery_code_hashes) == len(codes) - 1

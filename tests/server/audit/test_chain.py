@@ -2,16 +2,27 @@
 
 import json
 import socket
+import ssl
+import threading
+import time
 from concurrent.futures import ThreadPoolExecutor
+from datetime import timedelta
+from pathlib import Path
 from typing import Any
 
 import pytest
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
+from cryptography.x509.oid import NameOID
 from sqlalchemy import text
 
 from server.accounts.audit import record
 from server.audit import repository
 from server.audit.cli import _lines
 from server.audit.verify import Verdict, verify
+from server.clock import now
 from server.context import Services, open_services
 from server.db import open_database
 from tests.helpers.admins import Admin
@@ -177,7 +188,120 @@ def test_syslog_gets_each_entry_after_its_commit_without_details(services: Servi
     assert "not for syslog" not in sent
 
 
-@pytest.mark.parametrize("address", ["no-such-host.invalid:514", "/nowhere/socket"])
+class _Collector(threading.Thread):
+    """A syslog that takes one connection after the other, the first message of each; with TLS or without."""
+
+    def __init__(self, connections: int, certificate: Path | None) -> None:
+        super().__init__(daemon=True)
+        self.listener = socket.create_server(("127.0.0.1", 0))
+        self.listener.settimeout(20)
+        self.connections, self.taken, self.context = connections, list[bytes](), None
+        if certificate is not None:
+            self.context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
+            self.context.load_cert_chain(certificate)
+
+    def run(self) -> None:
+        with self.listener:
+            for _ in range(self.connections):
+                self._take()
+
+    def _take(self) -> None:
+        connection, _ = self.listener.accept()
+        try:
+            if self.context is not None:
+                connection = self.context.wrap_socket(connection, server_side=True)
+            with connection, connection.makefile("rb") as stream:
+                length = b"".join(iter(lambda: stream.read(1), b" "))
+                message = stream.read(int(length))
+        except ssl.SSLError:
+            message = b"refused"
+        self.taken.append(message)  # once the connection is closed
+
+
+def self_signed(folder: Path) -> Path:
+    """Certificate and key of localhost, in one file."""
+    key = ec.generate_private_key(ec.SECP256R1())
+    name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, "localhost")])
+    made = (
+        x509.CertificateBuilder()
+        .subject_name(name)
+        .issuer_name(name)
+        .public_key(key.public_key())
+        .serial_number(1)
+        .not_valid_before(now() - timedelta(days=1))
+        .not_valid_after(now() + timedelta(days=1))
+        .add_extension(x509.SubjectAlternativeName([x509.DNSName("localhost")]), critical=False)
+        .sign(key, hashes.SHA256())
+    )
+    form = (Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
+    path = folder / "localhost.pem"
+    path.write_bytes(made.public_bytes(Encoding.PEM) + key.private_bytes(*form))
+    return path
+
+
+@pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
+@pytest.mark.parametrize("scheme", ["tcp", "tls"])
+def test_syslog_over_a_stream_gets_whole_messages(
+    services: Services, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scheme: str
+) -> None:
+    certificate = self_signed(tmp_path) if scheme == "tls" else None
+    if certificate is not None:
+        monkeypatch.setenv("SSL_CERT_FILE", str(certificate))
+    collector = _Collector(1, certificate)
+    collector.start()
+    address = f"{scheme}://localhost:{collector.listener.getsockname()[1]}"
+    told = open_services(services.settings.model_copy(update={"audit_syslog": address}))
+    with told.database.write() as session:
+        record(session, None, "study created", "study", "s", note="not for syslog")
+    collector.join(20)
+    told.database.close()
+    [sent] = collector.taken
+    assert sent.startswith(b"<38>palpebra-audit: {")  # auth, info
+    assert b'"action": "study created"' in sent
+    assert verdict(services).hash.encode() in sent
+    assert b"not for syslog" not in sent
+
+
+@pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
+@pytest.mark.parametrize("scheme", ["tcp", "tls"])
+def test_a_syslog_that_hung_up_gets_the_next_message_too(
+    services: Services, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scheme: str
+) -> None:
+    certificate = self_signed(tmp_path) if scheme == "tls" else None
+    if certificate is not None:
+        monkeypatch.setenv("SSL_CERT_FILE", str(certificate))
+    collector = _Collector(3, certificate)
+    collector.start()
+    address = f"{scheme}://localhost:{collector.listener.getsockname()[1]}"
+    told = open_services(services.settings.model_copy(update={"audit_syslog": address}))
+    for number in range(3):
+        with told.database.write() as session:
+            record(session, None, "study created", "study", f"s{number}")
+        deadline = time.monotonic() + 20
+        while len(collector.taken) <= number and time.monotonic() < deadline:
+            time.sleep(0.01)
+    told.database.close()
+    assert [f'"target": "s{number}"'.encode() in sent for number, sent in enumerate(collector.taken)] == [
+        True
+    ] * 3
+
+
+@pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
+def test_a_syslog_whose_certificate_nobody_vouches_for_gets_nothing(
+    services: Services, tmp_path: Path
+) -> None:
+    collector = _Collector(1, self_signed(tmp_path))
+    collector.start()
+    address = f"tls://localhost:{collector.listener.getsockname()[1]}"
+    told = open_services(services.settings.model_copy(update={"audit_syslog": address}))
+    with told.database.write() as session:
+        record(session, None, "study created", "study", "s")
+    collector.join(20)
+    told.database.close()
+    assert collector.taken == [b"refused"]
+
+
+@pytest.mark.parametrize("address", ["no-such-host.invalid:514", "/nowhere/socket", "tls://localhost:1"])
 def test_a_syslog_that_is_away_costs_no_request(services: Services, address: str) -> None:
     told = open_services(services.settings.model_copy(update={"audit_syslog": address}))
     for number in range(2):

@@ -1,17 +1,22 @@
 """The tools that measure the server under load and attack do what their tables say they did."""
 
 import asyncio
+import socket
+import threading
 import time
+import urllib.request
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
 from tests.helpers.attacked import api_token
-from tools import attack, attacks
+from tools import attack, attacks, load_clips
 from tools.load_client import Tally
 from tools.load_measures import stored
+from tools.load_nginx import nginx, nginx_program
 from tools.load_scenarios import begin, prepare, run
-from tools.load_server import LoadServer, load_server
+from tools.load_server import CLIP_BYTES, LoadServer, load_server
 from tools.load_snapshots import divided
 
 RATERS, SECONDS, EVERY_S = 4, 3.0, 0.5
@@ -77,3 +82,85 @@ def test_each_attack_reaches_the_server(target: attacks.Target, name: str) -> No
     assert sum(answers.values()) > 0, answers
     if name in STATUSES:
         assert set(answers) <= STATUSES[name]
+
+
+def fetched_by_urllib(port: int, path: str) -> bytes:
+    with urllib.request.urlopen(f"http://127.0.0.1:{port}{path}") as answer:
+        content: bytes = answer.read()
+    return content
+
+
+def test_clips_as_fast_as_they_come_are_whole_ones_and_counted(server: LoadServer) -> None:
+    paths = load_clips.addresses(server)
+    assert 0 < len(paths) == len(set(paths)) <= load_clips.CLIPS_ASKED_FOR
+    assert len(fetched_by_urllib(server.port, paths[0])) == CLIP_BYTES
+    before = server.cpu_s()
+    got = load_clips.measured(server.port, paths, 1.0, server.cpu_s)
+    assert got.clips > 0
+    assert got.seconds >= 1.0
+    assert 0 < got.sender_s <= server.cpu_s() - before
+    assert got.per_core_s == pytest.approx(got.clips / got.sender_s)
+
+
+def test_clips_by_way_of_nginx_are_counted_as_nginxs(server: LoadServer, tmp_path: Path) -> None:
+    program = nginx_program()
+    if program is None:
+        pytest.skip("nginx is not installed here")
+    paths = load_clips.addresses(server)
+    with nginx(program, tmp_path, server.port) as proxy:
+        got = load_clips.measured(proxy.port, paths, 1.0, proxy.cpu_s)
+        servers_own = server.cpu_s()
+        again = load_clips.measured(proxy.port, paths, 1.0, proxy.cpu_s)
+        servers_own = server.cpu_s() - servers_own
+    assert min(got.clips, again.clips) > 0
+    # What nginx has it sends by itself: the server's part is that of a server that does nothing else.
+    assert servers_own < again.sender_s
+
+
+class _Answers(threading.Thread):
+    """One connection that is answered so, and closed."""
+
+    def __init__(self, answer: bytes) -> None:
+        super().__init__(daemon=True)
+        self.listener, self.answer = socket.create_server(("127.0.0.1", 0)), answer
+
+    def run(self) -> None:
+        with self.listener:
+            connection, _ = self.listener.accept()
+        with connection:
+            connection.recv(4096)
+            connection.sendall(self.answer)
+
+
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [
+        (b"HTTP/1.1 404 Not Found\r\ncontent-length: 2\r\n\r\nno", "expected a clip"),
+        (b"HTTP/1.1 200 OK\r\ncontent-length: 9\r\n\r\nabc", "ended within a clip"),
+    ],
+)
+def test_what_is_no_whole_clip_is_not_counted(answer: bytes, said: str) -> None:
+    answering = _Answers(answer)
+    answering.start()
+    with socket.create_connection(answering.listener.getsockname()) as connection:
+        connection.sendall(b"GET / HTTP/1.1\r\n\r\n")
+        with pytest.raises(RuntimeError, match=said):
+            load_clips._take(connection, memoryview(bytearray(1024)))
+
+
+def test_a_connection_closed_between_two_clips_counts_nothing() -> None:
+    answering = _Answers(b"")
+    answering.start()
+    with socket.create_connection(answering.listener.getsockname()) as connection:
+        connection.sendall(b"GET / HTTP/1.1\r\n\r\n")
+        assert load_clips._take(connection, memoryview(bytearray(1024))) is False
+
+
+def test_a_clip_in_two_pieces_behind_its_head_is_one() -> None:
+    content = bytes(range(256)) * 20
+    answering = _Answers(b"HTTP/1.1 200 OK\r\nContent-Length: %d\r\n\r\n" % len(content) + content)
+    answering.start()
+    with socket.create_connection(answering.listener.getsockname()) as connection:
+        connection.sendall(b"GET / HTTP/1.1\r\n\r\n")
+        assert load_clips._take(connection, memoryview(bytearray(1024))) is True
+        assert connection.recv(10) == b""

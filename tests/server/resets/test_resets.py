@@ -3,6 +3,7 @@
 import datetime
 import ssl
 from collections.abc import Callable
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -123,10 +124,12 @@ def test_a_box_is_not_filled(ada: Admin, stranger: TestClient, box: Letterbox) -
 
 
 def test_a_place_that_asks_too_often_waits(stranger: TestClient, settings: Settings, box: Letterbox) -> None:
-    answers = [
-        forget(stranger, f"name {number}").status_code for number in range(settings.logins_per_minute + 1)
-    ]
-    assert answers[-1] == 429
+    # The share refills meanwhile, so that a slow machine is refused a little later.
+    asked = (
+        forget(stranger, f"name {number}").status_code for number in range(3 * settings.logins_per_minute)
+    )
+    answers = list(takewhile(lambda status: status == 202, asked))
+    assert settings.logins_per_minute <= len(answers) < 3 * settings.logins_per_minute
 
 
 def test_one_new_password_ends_the_other_links(ada: Admin, stranger: TestClient, box: Letterbox) -> None:
