@@ -10,11 +10,12 @@ from fastapi.params import File
 from fastapi.responses import PlainTextResponse, StreamingResponse
 
 from experiments.source_video import FrameRate
-from server.accounts.identity import Viewer
+from server.accounts.identity import Identity, Viewer
 from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES, Invalid
 from server.studies import left_out, originals, uploads
 from server.studies.clip_schemas import AskFrameRate, LeaveOut, UploadOut, UploadProgress
+from server.studies.upload_quota import Quota
 from server.transcoding.records import ask_rate
 from server.workspaces.access import Uploader
 
@@ -32,13 +33,11 @@ def upload_clips(
 
     Videos are looked into, and converted where browsers cannot play them, after the answer: see the progress.
     """
-    settings = services.settings
-    identifier, folder = uploads.new_upload(
-        settings.upload_folder, identity.account_id, fps, settings.max_uploads_bytes
-    )
+    quota, limit = _quota(services, identity), services.settings.max_upload_bytes
+    identifier, folder = uploads.new_upload(quota, fps)
     try:
         for file in files or []:
-            uploads.receive(folder, file.filename or "", file.file, settings.max_upload_bytes)
+            uploads.receive(folder, file.filename or "", file.file, limit, quota)
         described = uploads.describe(identifier, folder)
     except BaseException:
         uploads.discard(folder)
@@ -61,16 +60,14 @@ def upload_more(
     """
     folder = uploads.upload_folder(services.settings.upload_folder, upload, identity.account_id)
     uploads.check_room(folder)
-    settings = services.settings
-    uploads.check_quota(settings.upload_folder, identity.account_id, settings.max_uploads_bytes)
-    sent, limit = files or [], settings.max_upload_bytes
+    quota, sent, limit = _quota(services, identity), files or [], services.settings.max_upload_bytes
     if replaces is not None:
         if len(sent) != 1:
             raise Invalid(f"Expected one file in the place of '{replaces[:100]}', got {len(sent)}.")
-        uploads.replace(folder, replaces, sent[0].filename or "", sent[0].file, limit)
+        uploads.replace(folder, replaces, sent[0].filename or "", sent[0].file, limit, quota)
         sent = []
     for file in sent:
-        uploads.receive_more(folder, file.filename or "", file.file, limit)
+        uploads.receive_more(folder, file.filename or "", file.file, limit, quota)
     return _progress(services, upload, identity.account_id)
 
 
@@ -103,6 +100,11 @@ def leave_file_out(services: ServicesDep, identity: Uploader, upload: str, body:
     folder = uploads.upload_folder(services.settings.upload_folder, upload, identity.account_id)
     (left_out.leave_out if body.left_out else left_out.put_back)(folder, body.file)
     return _progress(services, upload, identity.account_id)
+
+
+def _quota(services: Services, identity: Identity) -> Quota:
+    settings = services.settings
+    return Quota(settings.upload_folder, identity.account_id, settings.max_uploads_bytes)
 
 
 def _progress(services: Services, upload: str, account: int) -> UploadProgress:

@@ -2,7 +2,7 @@
 
 import re
 from pathlib import Path, PurePosixPath
-from typing import IO
+from typing import IO, Protocol
 
 from experiments.files import whole_file
 from experiments.own_clips import one_form
@@ -38,9 +38,31 @@ def safe_name(path: str) -> str:
     return name
 
 
-def copy(source: IO[bytes], target: Path, limit: int, called: str = "") -> None:
-    """Store what comes, as a whole or not at all; UploadTooLarge beyond `limit`, by the name `called`."""
-    written = 0
+class Room(Protocol):
+    """Bytes that there is room for."""
+
+    def room(self) -> int:
+        """Those that may come still."""
+        ...
+
+    def check(self) -> None:
+        """Look again, once they have come."""
+        ...
+
+    def full(self) -> UploadTooLarge:
+        """What is said where more come."""
+        ...
+
+
+def copy(source: IO[bytes], target: Path, limit: int, called: str = "", within: Room | None = None) -> None:
+    """Store what comes, as a whole or not at all.
+
+    Raises
+    ------
+    UploadTooLarge
+        It is larger than `limit`, said by the name `called`, or than the room.
+    """
+    written, room = 0, None if within is None else within.room()
     with whole_file(target) as temporary, temporary.open("wb") as stream:
         while piece := source.read(CHUNK_BYTES):
             written += len(piece)
@@ -48,4 +70,9 @@ def copy(source: IO[bytes], target: Path, limit: int, called: str = "") -> None:
                 raise UploadTooLarge(
                     f"'{called or target.name}' is larger than the {limit >> 20} MiB accepted."
                 )
+            if within is not None and room is not None and written > room:
+                raise within.full()
             stream.write(piece)
+        if within is not None:
+            stream.flush()
+            within.check()

@@ -3,6 +3,7 @@
 import secrets
 import shutil
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import IO
 
@@ -12,6 +13,7 @@ from server.errors import Invalid, NotFound
 from server.studies.clip_schemas import UploadedFile, UploadOut, UploadProgress
 from server.studies.left_out import files_aside
 from server.studies.packed import MAX_FILES, unpack
+from server.studies.upload_quota import Quota, mark, sender
 from server.studies.uploaded_file import UploadTooLarge, copy, safe_name
 from server.transcoding.records import ask_rate, asked_rate, records_of, videos_of, write_record
 from video_conversion.prepared import Prepared, clip_name
@@ -19,53 +21,32 @@ from video_conversion.prepared import Prepared, clip_name
 KEEP_S = 24 * 3600
 MAX_KEPT_BYTES = 16 * 1024**3
 """Of all files of one upload."""
-MAX_UPLOADS = 200
-"""Of an account within a day."""
-_WHOSE = ".account"
-"""File of an upload's folder with the number of the account that sent it."""
 
 
-def new_upload(
-    folder: Path, account: int, fps: float | None = None, quota: int = MAX_KEPT_BYTES
-) -> tuple[str, Path]:
+def new_upload(quota: Quota, fps: float | None = None) -> tuple[str, Path]:
     """Make the folder of an account's new upload, and remove uploads older than a day.
-
-    Parameters
-    ----------
-    quota : int, optional
-        Bytes that all uploads of the account may hold together.
 
     Raises
     ------
     UploadTooLarge
-        They hold as much already, or are too many.
+        The account's uploads hold as much as they may already, or are too many.
     """
+    folder = quota.folder
     _sweep(folder)
-    check_quota(folder, account, quota, further=1)
+    quota.check(further=1)
     identifier = secrets.token_hex(16)
     upload = folder / identifier
     upload.mkdir(parents=True, mode=0o700)
-    (upload / _WHOSE).write_text(str(account), encoding="ascii")
+    mark(upload, quota.account)
     ask_rate(upload, fps)
     return identifier, upload
 
 
-def check_quota(folder: Path, account: int, quota: int, further: int = 0) -> None:
-    """UploadTooLarge where an account's uploads, which wait a day, are as many or as large as they may be."""
-    own = [one for one in (folder.iterdir() if folder.is_dir() else ()) if _sender(one) == str(account)]
-    # What is made beside the files, and what is set aside, takes room too.
-    held = sum(path.stat().st_size for one in own for path in one.rglob("*") if path.is_file())
-    if held >= quota or len(own) + further > MAX_UPLOADS:
-        raise UploadTooLarge(
-            f"Your uploads of the last day hold {held / 1e9:.1f} GB in {len(own)} folders; at most "
-            f"{quota / 1e9:.1f} GB in {MAX_UPLOADS} are kept. Make studies of them, or wait a day."
-        )
-
-
 def _sweep(folder: Path) -> None:
     for old in folder.iterdir() if folder.is_dir() else ():
-        if time.time() - old.stat().st_mtime > KEEP_S:
-            shutil.rmtree(old, ignore_errors=True)
+        with suppress(FileNotFoundError):  # another worker sweeps too
+            if time.time() - old.stat().st_mtime > KEEP_S:
+                shutil.rmtree(old, ignore_errors=True)
 
 
 def discard(folder: Path) -> None:
@@ -77,33 +58,25 @@ def upload_folder(folder: Path, identifier: str, account: int) -> Path:
     """The folder of an account's upload; NotFound where there is none (identifiers are hexadecimal)."""
     upload = folder / identifier
     known = len(identifier) == 32 and set(identifier) <= set("0123456789abcdef") and upload.is_dir()
-    if not known or _sender(upload) != str(account):
+    if not known or sender(upload) != str(account):
         raise NotFound("There is no such upload, or it is older than a day; please upload the clips again.")
     return upload
 
 
-def _sender(folder: Path) -> str | None:
-    # Uploads that an older release took have no sender; they end within a day.
-    try:
-        return (folder / _WHOSE).read_text(encoding="ascii")
-    except (FileNotFoundError, NotADirectoryError):
-        return None
-
-
-def receive(folder: Path, name: str, source: IO[bytes], limit: int) -> None:
+def receive(folder: Path, name: str, source: IO[bytes], limit: int, quota: Quota) -> None:
     """Store one uploaded file, or unpack it where it is a zip; nothing is kept of a refused one."""
     if name.lower().endswith(".zip"):
         packed = folder / ".zip"
         try:
-            copy(source, packed, limit)
-            unpack(packed, folder)
+            copy(source, packed, limit, within=quota)
+            unpack(packed, folder, quota)
         finally:
             packed.unlink(missing_ok=True)
     else:
         target = folder / safe_name(name)
         if target.exists():
             raise Invalid(f"'{target.name}' came more than once; file names must differ.")
-        copy(source, target, limit)
+        copy(source, target, limit, within=quota)
 
 
 def check_room(folder: Path) -> None:
@@ -111,14 +84,21 @@ def check_room(folder: Path) -> None:
     # Files that begin with a dot are the worker's, and may go at any moment.
     kept = [path for path in folder.iterdir() if not path.name.startswith(".")]
     kept += files_aside(folder)
-    if len(kept) > MAX_FILES or sum(path.stat().st_size for path in kept) > MAX_KEPT_BYTES:
+    if len(kept) > MAX_FILES or sum(map(_size, kept)) > MAX_KEPT_BYTES:
         raise UploadTooLarge(
             f"An upload holds at most {MAX_FILES} files and {MAX_KEPT_BYTES >> 30} GiB; add the others "
             "to the study as a new version."
         )
 
 
-def receive_more(folder: Path, name: str, source: IO[bytes], limit: int) -> None:
+def _size(path: Path) -> int:
+    try:
+        return path.stat().st_size
+    except FileNotFoundError:  # replaced or left out meanwhile
+        return 0
+
+
+def receive_more(folder: Path, name: str, source: IO[bytes], limit: int, quota: Quota) -> None:
     """Store one more file of an upload that goes on; one that has come already is passed over.
 
     Raises
@@ -126,15 +106,15 @@ def receive_more(folder: Path, name: str, source: IO[bytes], limit: int) -> None
     Invalid
         Another file of this name has come.
     UploadTooLarge
-        The file is larger than this server takes.
+        The file is larger than this server takes, or than the account has room for.
     """
     target = folder / safe_name(name)
     if target.exists() and target.stat().st_size == _length(source):
         return
-    receive(folder, name, source, limit)
+    receive(folder, name, source, limit, quota)
 
 
-def replace(folder: Path, old: str, name: str, source: IO[bytes], limit: int) -> None:
+def replace(folder: Path, old: str, name: str, source: IO[bytes], limit: int, quota: Quota) -> None:
     """Put another file in the place of one that has been looked into, such as one that was refused.
 
     The new file is whole before the old one goes, and is looked into as any other.
@@ -146,7 +126,7 @@ def replace(folder: Path, old: str, name: str, source: IO[bytes], limit: int) ->
     Invalid
         It is still being looked into, or the new file's name is that of a third.
     UploadTooLarge
-        The new file is larger than this server takes.
+        The new file is larger than this server takes, or than the account has room for beside the old one.
     """
     target, asked = folder / safe_name(name), one_form(old)
     # Looked up among the names that there are: nothing else that is sent becomes a path.
@@ -161,7 +141,7 @@ def replace(folder: Path, old: str, name: str, source: IO[bytes], limit: int) ->
     check_names(clip_name(one) for one in (*others, target.name))
     staged = folder / f".{secrets.token_hex(8)}{target.suffix}"
     try:
-        copy(source, staged, limit, target.name)
+        copy(source, staged, limit, target.name, quota)
         known.unlink()
         write_record(folder, Prepared(name=known.name, asked_fps=None, replaced=True))
         staged.replace(target)

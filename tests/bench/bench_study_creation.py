@@ -23,6 +23,7 @@ from server.app import create_app
 from server.cli_common import migrated_services
 from server.settings import Settings
 from server.studies import uploads
+from server.studies.upload_quota import Quota
 from server.transcoding.records import RECORDS
 from tests.helpers.admins import PASSWORD
 from video_conversion.prepared import Prepared
@@ -108,7 +109,7 @@ def main() -> None:
             link = invitations.invite(services.database, "owner", "", None)[1]
         client = TestClient(create_app(settings), headers={"origin": "http://testserver"})
         client.post(f"/api/admin/invitations/{link}/account", json={"name": "ada", "password": PASSWORD})
-        upload, inside = uploads.new_upload(settings.upload_folder, 1)
+        upload, inside = uploads.new_upload(Quota(settings.upload_folder, 1, settings.max_uploads_bytes))
         lines = (json.dumps(prepared(inside, number).model_dump(mode="json")) for number in range(clips))
         (inside / RECORDS).write_text("\n".join(lines), encoding="utf-8")
         measure(client, upload)
