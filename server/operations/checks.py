@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator
 from datetime import timedelta
 from itertools import islice
 from pathlib import Path
-from urllib.parse import urlsplit
 
 from experiments.counted import counted
 from server.accounts.schemas import TOKEN_DAYS_MAX
@@ -23,7 +22,7 @@ from server.operations import repository
 from server.operations.backup_checks import backups, snapshots
 from server.operations.findings import Finding
 from server.operations.modes import open_to_others, own_folders
-from server.operations.shared_checks import connection_pool, ledger
+from server.operations.shared_checks import connection_pool, ledger, return_addresses
 from server.row_policies_repository import OLDEST_POSTGRES as OLDEST_WITH_WALL
 from server.row_security_repository import ROLE
 from server.settings import KEY_LENGTH_MIN
@@ -207,8 +206,7 @@ def pages(services: Services) -> Iterator[Finding]:
 def public_address(services: Services) -> Iterator[Finding]:
     """Participants reach the server by https, without which browsers give no exact playback."""
     settings = services.settings
-    host = urlsplit(settings.public_url).hostname or ""
-    local = host in ("localhost", "127.0.0.1", "::1")
+    local = settings.is_local
     fine = settings.is_https or local
     advice = "" if fine else "put https in front (docs/deployment.md) and set PALPEBRA_PUBLIC_URL=https://..."
     yield Finding("public address", "ok" if fine else "failed", settings.public_url, advice)
@@ -261,6 +259,7 @@ CHECKS: tuple[Callable[[Services], Iterator[Finding]], ...] = (
     public_address,
     people,
     tokens,
+    return_addresses,
     backups,
     snapshots,
 )

@@ -1,12 +1,12 @@
 """What the doctor, the metrics and backups ask of the whole database."""
 
 from datetime import datetime
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from sqlalchemy import Connection, Engine, func, or_, select, text
 from sqlalchemy.orm import Session
 
-from server.models import Account, ApiToken, Clip, Study, StudyRun
+from server.models import Account, ApiToken, Clip, Link, Study, StudyRun
 
 
 class RunCount(NamedTuple):
@@ -61,6 +61,16 @@ def tokens_ending_after(session: Session, latest: datetime) -> list[tuple[str, s
     late = or_(ApiToken.expires_at.is_(None), ApiToken.expires_at > latest)
     query = query.where(ApiToken.revoked_at.is_(None), Account.disabled_at.is_(None), late)
     return [(token, account) for token, account in session.execute(query.order_by(ApiToken.id))]
+
+
+def recruiters(session: Session) -> list[tuple[str, bool, dict[str, Any] | None]]:
+    """Each stored recruiter: its study's name, whether a link of it has it for itself, what is declared."""
+    of_studies = select(Study.name, Study.recruiter).where(Study.recruiter.is_not(None)).order_by(Study.id)
+    of_links = select(Study.name, Link.recruiter).join(Study, Study.id == Link.study_id).order_by(Link.id)
+    of_links = of_links.where(Link.recruiter.is_not(None), Link.revoked_at.is_(None))
+    return [(name, False, declared) for name, declared in session.execute(of_studies)] + [
+        (name, True, declared) for name, declared in session.execute(of_links)
+    ]
 
 
 def count_without_second_factor(session: Session) -> int:

@@ -1,4 +1,4 @@
-"""What the doctor looks at where hosts share: the ledger of erasures, and what stands before PostgreSQL."""
+"""What the doctor looks at further: the ledger of erasures, the pool of PostgreSQL, return addresses."""
 
 import shlex
 from collections.abc import Iterator
@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from server.context import Services
 from server.operations import erasures, repository
 from server.operations.findings import Finding
+from server.participants.recruiter import refused_addresses
 
 
 def ledger(services: Services) -> Iterator[Finding]:
@@ -43,3 +44,17 @@ def connection_pool(services: Services) -> Iterator[Finding]:
     )
     said = "a pool in transaction mode stands before PostgreSQL"
     yield Finding("sessions", "failed", said, advice)
+
+
+def return_addresses(services: Services) -> Iterator[Finding]:
+    """Return addresses that an earlier release took and nobody is sent to any more."""
+    with services.database.read() as session:
+        stored = repository.recruiters(session)
+    refused = [(study, of_link) for study, of_link, declared in stored if refused_addresses(declared)]
+    named = [f"{study} (links of it)" if of_link else study for study, of_link in dict.fromkeys(refused)]
+    if named:
+        said = f"refused today, so participants are sent nowhere: {', '.join(named[:5])}"
+        advice = "on the study's page, under Running, write the host of the address out; make such links anew"
+        yield Finding("return addresses", "warning", said + (", ..." if len(named) > 5 else ""), advice)
+    else:
+        yield Finding("return addresses", "ok", "each has a host that is written out")

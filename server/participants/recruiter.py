@@ -20,6 +20,8 @@ from urllib.parse import quote
 from pydantic import BaseModel, ConfigDict, StringConstraints
 
 Code = Annotated[str, StringConstraints(max_length=100)]
+Address = Annotated[str, StringConstraints(max_length=1000, pattern=r"^(https?://.*)?$")]
+"""As every release took it; what is taken today is narrower."""
 ID_PARAMETERS = {
     "prolific": "PROLIFIC_PID",
     "sona": "survey_code",
@@ -35,13 +37,16 @@ PROLIFIC_URL = "https://app.prolific.com/submissions/complete?cc={code}"
 class Recruiter(BaseModel):
     """How a recruiter sends participants and takes them back; see the module for each key."""
 
+    # What is sent is checked by `without_refused`: an address that an earlier release took may stay. What is
+    # stored is read by `stored_recruiter`.
+
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     kind: Literal["prolific", "sona", "mturk", "generic"] = "generic"
     id_parameter: Code = ""
-    redirect_url: Annotated[str, StringConstraints(max_length=1000, pattern=WEB_ADDRESS)] = ""
-    redirect_declined: Annotated[str, StringConstraints(max_length=1000, pattern=WEB_ADDRESS)] = ""
-    redirect_screened_out: Annotated[str, StringConstraints(max_length=1000, pattern=WEB_ADDRESS)] = ""
+    redirect_url: Address = ""
+    redirect_declined: Address = ""
+    redirect_screened_out: Address = ""
     code_complete: Code = ""
     code_failed_check: Code = ""
     code_screened_out: Code = ""
@@ -81,13 +86,44 @@ class Recruiter(BaseModel):
 
 def stored_recruiter(declared: Mapping[str, Any] | None) -> Recruiter:
     """What a study or link has stored; an address that only an earlier release took is left out."""
+    refused = refused_addresses(declared)
     return Recruiter.model_validate(
         {
             name: value
             for name, value in (declared or {}).items()
-            if not name.startswith("redirect_") or (value and re.fullmatch(WEB_ADDRESS, value))
+            if name not in refused and not (name.startswith("redirect_") and value is None)
         }
     )
+
+
+def refused_addresses(declared: Mapping[str, Any] | None) -> list[str]:
+    """The keys of return addresses that nobody is sent to."""
+    addresses = ((name, value) for name, value in (declared or {}).items() if name.startswith("redirect_"))
+    return [name for name, value in addresses if value and not re.fullmatch(WEB_ADDRESS, value)]
+
+
+def without_refused(recruiter: Recruiter, stored: Mapping[str, Any] | None = None) -> Recruiter:
+    """The recruiter as it was sent.
+
+    Parameters
+    ----------
+    stored : mapping, optional
+        The recruiter of before. An address in it that is refused today may be sent again as it is: a study
+        with one can be paused.
+
+    Raises
+    ------
+    ValueError
+        Another return address has a host that is not written out, or is no web address.
+    """
+    sent = recruiter.model_dump()
+    new = [name for name in refused_addresses(sent) if sent[name] != (stored or {}).get(name)]
+    if new:
+        raise ValueError(
+            f"{new[0]}: expected a web address such as https://example.org/done?id={{run}} whose host is "
+            f"written out, got '{sent[new[0]][:100]}'"
+        )
+    return recruiter
 
 
 def _filled_in(address: str, code: str, run: str, parameters: Mapping[str, str]) -> str | None:

@@ -3,9 +3,9 @@
 from datetime import datetime
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field, StringConstraints
+from pydantic import AfterValidator, BaseModel, Field, StringConstraints
 
-from server.participants.recruiter import Recruiter
+from server.participants.recruiter import Recruiter, without_refused
 from server.request_body import RequestBody
 from server.studies.fields import Label
 
@@ -38,7 +38,7 @@ class NewLinks(RequestBody):
     count: Annotated[int, Field(ge=1, le=5000)] = 1
     quota: Annotated[int, Field(ge=1, le=1_000_000)] | None = None
     days: Annotated[int, Field(ge=1, le=3650)] | None = None
-    recruiter: Recruiter | None = None
+    recruiter: Annotated[Recruiter, AfterValidator(without_refused)] | None = None
 
 
 class LinkOut(BaseModel):

@@ -9,8 +9,9 @@ from server.accounts.audit import record
 from server.accounts.identity import Identity
 from server.clips.address import clip_address
 from server.clock import now
-from server.errors import Conflict
+from server.errors import Conflict, Invalid
 from server.models import Study, StudyVersion, VersionClip
+from server.participants.recruiter import Recruiter, without_refused
 from server.studies import repository
 from server.studies.clip_schemas import ClipOut
 from server.studies.definitions import design_out
@@ -57,12 +58,19 @@ def change_settings(session: Session, name: str, order: ChangeSettings, identity
     """Pause or go on, set the quota, name the recruiter."""
     study = for_edit(session, name, order.revision, identity, "run")
     study.paused, study.quota = order.paused, order.quota
-    study.recruiter = order.recruiter.model_dump() if order.recruiter else None
+    study.recruiter = _checked_recruiter(order.recruiter, study.recruiter)
     study.revision += 1
     record(
         session, identity, "settings changed", "study", name, paused=order.paused, quota=order.quota,
         recruiter=order.recruiter.kind if order.recruiter else None,
     )  # fmt: skip
+
+
+def _checked_recruiter(sent: Recruiter | None, stored: dict[str, Any] | None) -> dict[str, Any] | None:
+    try:
+        return None if sent is None else without_refused(sent, stored).model_dump()
+    except ValueError as error:
+        raise Invalid(f"recruiter.{error}") from error
 
 
 def delete(session: Session, name: str, identity: Identity) -> None:

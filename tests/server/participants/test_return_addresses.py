@@ -7,6 +7,7 @@ from sqlalchemy import update
 
 from server.context import Services
 from server.models import Study
+from server.operations.shared_checks import return_addresses
 from server.participants.recruiter import stored_recruiter
 from tests.helpers.admins import Admin
 from tests.helpers.studies import Participant, StudyInDatabase
@@ -40,7 +41,9 @@ def test_no_link_leads_participants_elsewhere(
     body = {"kind": "general", "recruiter": {"kind": "generic", key: address}}
     answer = experimenter.send("POST", "/studies/short/links", body)
     assert answer.status_code == 422, answer.text
-    settings = {"revision": 1, "paused": False, "quota": None, "recruiter": {"kind": "generic", key: address}}
+    revision = experimenter.get("/studies/short").json()["summary"]["revision"]
+    recruiter = {"kind": "generic", key: address}
+    settings = {"revision": revision, "paused": False, "quota": None, "recruiter": recruiter}
     assert experimenter.send("PUT", "/studies/short/settings", settings).status_code == 422
 
 
@@ -68,6 +71,36 @@ def test_what_an_earlier_release_took_ends_no_visit(
     read = stored_recruiter(stored)
     assert (read.redirect_url, read.code_complete, read.kind) == ("", "DONE", "sona")
     participant.agree()
+
+
+@pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
+def test_a_study_with_an_address_of_before_is_paused_and_told_by_the_doctor(
+    services: Services, experimenter: Admin, study: StudyInDatabase
+) -> None:
+    """Its page sends all settings, the address too; another that is refused is not taken beside it."""
+    [fine] = return_addresses(services)
+    assert fine.verdict == "ok"
+    with services.database.write() as session:
+        stored = {"kind": "sona", "redirect_url": "https://{participant}/", "code_complete": "DONE"}
+        session.execute(update(Study).values(recruiter=stored))
+    detail = experimenter.get("/studies/short").json()
+    revision = detail["summary"]["revision"]
+    order = {"revision": revision, "paused": True, "quota": 7, "recruiter": detail["recruiter"]}
+    paused = experimenter.send("PUT", "/studies/short/settings", order)
+    assert (paused.status_code, paused.json()["summary"]["paused"]) == (200, True)
+    assert paused.json()["recruiter"]["redirect_url"] == "https://{participant}/"
+    [told] = return_addresses(services)
+    assert (told.verdict, "short" in told.state) == ("warning", True)
+    order["revision"] = paused.json()["summary"]["revision"]
+    order["recruiter"] = detail["recruiter"] | {"redirect_declined": "https://{other}/"}
+    refused = experimenter.send("PUT", "/studies/short/settings", order)
+    assert (refused.status_code, "redirect_declined" in refused.json()["error"]["message"]) == (422, True)
+    order["recruiter"] = detail["recruiter"] | {"redirect_url": "https://other.{participant}/"}
+    assert experimenter.send("PUT", "/studies/short/settings", order).status_code == 422
+    order["recruiter"] = detail["recruiter"] | {"redirect_url": "https://sona.example/{participant}"}
+    assert experimenter.send("PUT", "/studies/short/settings", order).status_code == 200
+    [fine] = return_addresses(services)
+    assert fine.verdict == "ok"
 
 
 def test_a_null_address_of_before_is_none() -> None:
