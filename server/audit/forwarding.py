@@ -3,6 +3,7 @@
 import json
 import logging
 import queue
+import re
 import socket
 import ssl
 import threading
@@ -15,6 +16,7 @@ from experiments.errors import InputError
 log = logging.getLogger("palpebra")
 UDP_PORT = 514
 TCP_PORTS = {"tcp": 601, "tls": 6514}
+HOST_AND_PORT = re.compile(r"(\[(?P<address>[0-9A-Fa-f:.]+(%\w+)?)\]|(?P<name>[^/:\[\]]+))(:(?P<port>\d+))?")
 CONNECT_S = 5.0
 WAITING_MAX = 1000
 """Entries that may wait for a syslog that is slow."""
@@ -135,6 +137,8 @@ def syslog_address(text: str) -> str | tuple[str, int]:
     ('logs.example.org', 5514)
     >>> syslog_address("logs.example.org")
     ('logs.example.org', 514)
+    >>> syslog_address("[2001:db8::5]:5514")
+    ('2001:db8::5', 5514)
     """
     if text.startswith("/"):
         if not Path(text).exists():
@@ -144,10 +148,10 @@ def syslog_address(text: str) -> str | tuple[str, int]:
 
 
 def _host_and_port(text: str, usual: int) -> tuple[str, int]:
-    host, _, port = text.partition(":")
-    if not host or (port and not port.isdigit()):
+    parts = HOST_AND_PORT.fullmatch(text)
+    if parts is None:
         raise InputError(
             "PALPEBRA_AUDIT_SYSLOG: expected /dev/log, host:port (UDP), tcp://host:port or tls://host:port, "
-            f"got '{text}'"
+            f"an IPv6 address as [2001:db8::5]:port, got '{text}'"
         )
-    return host, int(port or usual)
+    return parts["address"] or parts["name"], int(parts["port"] or usual)

@@ -16,15 +16,18 @@ from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
 from cryptography.x509.oid import NameOID
+from pydantic import ValidationError
 from sqlalchemy import text
 
 from server.accounts.audit import record
 from server.audit import repository
 from server.audit.cli import _lines
+from server.audit.forwarding import syslog_address
 from server.audit.verify import Verdict, verify
 from server.clock import now
 from server.context import Services, open_services
 from server.db import open_database
+from server.settings import Settings
 from tests.helpers.admins import Admin
 from tests.helpers.studies import Participant, StudyInDatabase
 
@@ -172,12 +175,17 @@ def test_the_export_ends_with_the_chains_head(services: Services) -> None:
     assert lines[-1] == {"complete": True, "entries": 2, "head": f"{head.position}:{head.hash}"}
 
 
-def test_syslog_gets_each_entry_after_its_commit_without_details(services: Services) -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
-        listener.bind(("127.0.0.1", 0))
+@pytest.mark.parametrize("host", ["127.0.0.1", "::1"])
+def test_syslog_gets_each_entry_after_its_commit_without_details(services: Services, host: str) -> None:
+    is_ipv6 = ":" in host
+    if is_ipv6 and not has_ipv6():
+        pytest.skip("this machine has no IPv6")
+    with socket.socket(socket.AF_INET6 if is_ipv6 else socket.AF_INET, socket.SOCK_DGRAM) as listener:
+        listener.bind((host, 0))
         listener.settimeout(10)
         port = listener.getsockname()[1]
-        settings = services.settings.model_copy(update={"audit_syslog": f"127.0.0.1:{port}"})
+        address = f"[{host}]:{port}" if is_ipv6 else f"{host}:{port}"
+        settings = services.settings.model_copy(update={"audit_syslog": address})
         told = open_services(settings)
         with told.database.write() as session:
             record(session, None, "study created", "study", "s", note="not for syslog")
@@ -186,6 +194,28 @@ def test_syslog_gets_each_entry_after_its_commit_without_details(services: Servi
     assert '"action": "study created"' in sent
     assert verdict(services).hash in sent
     assert "not for syslog" not in sent
+
+
+@pytest.mark.parametrize(
+    ("written", "read"),
+    [
+        ("[2001:db8::5]:5514", ("2001:db8::5", 5514)),
+        ("[::1]", ("::1", 514)),
+        ("[fe80::1%eth0]:514", ("fe80::1%eth0", 514)),
+    ],
+)
+def test_an_ipv6_address_of_syslog_stands_in_brackets(written: str, read: tuple[str, int]) -> None:
+    assert syslog_address(written) == read
+    for scheme in ("", "tcp://", "tls://"):
+        assert Settings(audit_syslog=scheme + written).audit_syslog == scheme + written
+
+
+@pytest.mark.parametrize(
+    "wrong", ["::1", "::1:514", "[logs]:514", "[::1", "[]", "a:b", "tcp://", "udp://a:1"]
+)
+def test_what_is_no_address_of_syslog_is_refused_at_the_start(wrong: str) -> None:
+    with pytest.raises(ValidationError):
+        Settings(audit_syslog=wrong)
 
 
 class _Collector(threading.Thread):
@@ -216,6 +246,16 @@ class _Collector(threading.Thread):
         except ssl.SSLError:
             message = b"refused"
         self.taken.append(message)  # once the connection is closed
+
+
+def has_ipv6() -> bool:
+    """Whether this machine's own IPv6 address can be bound; containers often have none."""
+    try:
+        with socket.socket(socket.AF_INET6, socket.SOCK_DGRAM) as probe:
+            probe.bind(("::1", 0))
+    except OSError:
+        return False
+    return True
 
 
 def self_signed(folder: Path) -> Path:
