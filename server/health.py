@@ -61,12 +61,14 @@ def is_locked(database: Database) -> bool:
         return False
 
 
+@router.head("/healthz", include_in_schema=False)
 @router.get("/healthz")
 async def healthz() -> Health:
     """The process answers."""
     return Health(status="ok")
 
 
+@router.head("/readyz", include_in_schema=False)
 @router.get("/readyz", responses={503: ERROR_RESPONSES["4XX"]})
 def readyz(services: ServicesDep) -> Health:
     """The database answers, is writable and has the newest revision; the disk has room, clips are read."""

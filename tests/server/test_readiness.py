@@ -59,6 +59,15 @@ def test_a_disk_that_fills_is_told_before_a_rating_fails(small_disk: Path) -> No
 def test_the_limit_is_a_setting(settings: Settings) -> None:
     with TestClient(create_app(settings.model_copy(update={"free_megabytes_min": 1e12}))) as client:
         assert "make room" in told(client)
+        assert_told_to_monitors(client, {"/healthz": 200, "/readyz": 503})
+
+
+def test_monitors_that_ask_by_head_are_told_the_same(client: TestClient) -> None:
+    assert_told_to_monitors(client, {"/healthz": 200, "/readyz": 200})
+
+
+def assert_told_to_monitors(client: TestClient, statuses: dict[str, int]) -> None:
+    assert {path: client.head(path).status_code for path in statuses} == statuses
 
 
 @pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
