@@ -77,8 +77,10 @@ def test_a_rating_counts_for_a_snapshot_that_it_was_under_way_with() -> None:
 
 @pytest.mark.parametrize("name", attacks.ATTACKS)
 def test_each_attack_reaches_the_server(target: attacks.Target, name: str) -> None:
-    seconds = 4.0 if name.startswith("300 ") else 0.5  # these wait for answers, or are made first
-    answers = asyncio.run(attacks.ATTACKS[name](target, time.monotonic() + seconds))
+    answers: dict[str, int] = {}
+    for seconds in (0.5, 4.0, 16.0, 64.0):  # a busy machine answers late, and what is sent is made first
+        if not answers:
+            answers = asyncio.run(attacks.ATTACKS[name](target, time.monotonic() + seconds))
     assert sum(answers.values()) > 0, answers
     if name in STATUSES:
         assert set(answers) <= STATUSES[name]
