@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from experiments.errors import InputError
 from experiments.files import whole_file
-from stimuli_builder.tracking.kernels import sample
 from stimuli_builder.tracking.mesh import BaseMesh, build_mesh, mesh_from
 from stimuli_builder.tracking.picture import reduced, reduced_points
+from stimuli_builder.tracking.sampling_kernels import sample
 from stimuli_builder.tracking.shapes import (
     EYE_POINTS,
     LidMarkers,

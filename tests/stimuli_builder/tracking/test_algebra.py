@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stimuli_builder.tracking import kernels
+from stimuli_builder.tracking import kernels, solving_kernels
 from stimuli_builder.tracking.fit import Fitter, linear_parts, similarity_directions, work_out
 from stimuli_builder.tracking.model import principal, train
 from stimuli_builder.tracking.shapes import default_markers, with_border
@@ -77,7 +77,7 @@ def test_quadratic_form_hessian_equals_the_direct_one(model, seed):
     descent = steepest_descent(model, c)
     direct = (descent * model.weights) @ descent.T
     fast = np.empty_like(direct)
-    kernels.hessian(work_out(model).hessian_forms, c, fast)
+    solving_kernels.hessian(work_out(model).hessian_forms, c, fast)
     lower = np.tril_indices(len(direct))
     assert np.abs(fast - direct)[lower].max() < 1e-12 * np.abs(direct).max()
 
@@ -106,12 +106,12 @@ def test_cholesky_solves(seed, size):
     root = rng.normal(size=(size, size + 3))
     matrix, right = root @ root.T, rng.normal(size=size)
     answer = right.copy()
-    assert kernels.solve(matrix.copy(), answer)
+    assert solving_kernels.solve(matrix.copy(), answer)
     assert np.allclose(matrix @ answer, right)
 
 
 def test_a_matrix_that_is_not_positive_definite_is_refused():
-    assert not kernels.solve(np.array([[1.0, 0.0], [2.0, 1.0]]) @ np.diag([1.0, -1.0]), np.ones(2))
+    assert not solving_kernels.solve(np.array([[1.0, 0.0], [2.0, 1.0]]) @ np.diag([1.0, -1.0]), np.ones(2))
 
 
 @settings(deadline=None, max_examples=25)
