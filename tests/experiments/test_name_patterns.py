@@ -28,7 +28,7 @@ def test_a_field_is_what_a_regular_expression_finds(texts: list[str], name: str)
 
 def test_many_fields_take_no_time() -> None:
     pattern = "".join(f"{{f{number}}}" for number in range(30))
-    began = time.monotonic()
+    began = time.process_time()
     assert NamePattern.read(pattern + "!").fit("a" * 255) is None
     assert NamePattern.read(pattern).fit("a" * 255) is not None
-    assert time.monotonic() - began < 10  # for ever as a regular expression
+    assert time.process_time() - began < 10  # for ever as a regular expression

@@ -37,10 +37,10 @@ def test_a_key_without_end_is_seen_wherever_it_stands(text: str) -> None:
 @pytest.mark.parametrize("beginning", ["", 'a = "', 'a = """', "[", "x = {y = "])
 @pytest.mark.parametrize("unit", ['\\"', '"', "'", "a.", 'a."', "a.'", '"\\', "' ", "a ", "a\n", ".", '.".'])
 def test_no_text_keeps_the_search_or_the_reader_busy(beginning: str, unit: str) -> None:
-    text, began = beginning + unit * (LONGEST // len(unit)), time.monotonic()
+    text, began = beginning + unit * (LONGEST // len(unit)), time.process_time()
     with pytest.raises(DefinitionError):
         toml_data(text)
-    assert time.monotonic() - began < SOON_S
+    assert time.process_time() - began < SOON_S
 
 
 @pytest.mark.parametrize("quotes", ['"', "'", '"""', "'''"])

@@ -80,7 +80,7 @@ def test_spaced_and_quoted_parts_of_a_header_are_told_apart() -> None:
 
 
 def test_a_header_that_is_all_spaces_is_told_at_once() -> None:
-    text, began = f'["a{" " * 100_000}b"]\nc = 1\n', time.monotonic()
+    text, began = f'["a{" " * 100_000}b"]\nc = 1\n', time.process_time()
     assert line_of(text, ("c",)) is None
     assert line_of(text, (f"a{' ' * 100_000}b", "c")) == 2
-    assert time.monotonic() - began < 5.0  # tried from each space anew, 15 s
+    assert time.process_time() - began < 5.0  # tried from each space anew, 15 s

@@ -12,7 +12,10 @@ from tests.helpers.admins import Admin
 from tests.helpers.studies import SHORT, StudyInDatabase
 
 SOON_S = 5.0
-"""Milliseconds' work on an idle machine; as a regular expression some of it took minutes."""
+"""Milliseconds' work; as a regular expression some of it took minutes.
+
+It is processor time, since other programs may keep a test waiting.
+"""
 
 
 @pytest.mark.parametrize(
@@ -28,7 +31,7 @@ SOON_S = 5.0
 def test_a_definition_that_no_program_reads_is_refused_in_words(
     experimenter: Admin, study: StudyInDatabase, toml: str, said: str
 ) -> None:
-    began = time.monotonic()
+    began = time.process_time()
     for path, body in (
         ("/studies/short/versions/check", {"toml": toml}),
         ("/studies", {"name": "other", "shipped": "exp1", "toml": toml}),
@@ -39,17 +42,17 @@ def test_a_definition_that_no_program_reads_is_refused_in_words(
     only_read = experimenter.send("POST", "/definitions/edit", {"toml": toml})
     assert (only_read.status_code, only_read.json()["data"]) == (200, None), only_read.text
     assert said in only_read.json()["problems"][0]["message"]
-    assert time.monotonic() - began < SOON_S
+    assert time.process_time() - began < SOON_S
 
 
 def test_of_a_hundred_thousand_unknown_keys_the_first_are_told_at_once(
     experimenter: Admin, study: StudyInDatabase
 ) -> None:
-    toml, began = "".join(f"[a{number}]\n" for number in range(30_000)), time.monotonic()
+    toml, began = "".join(f"[a{number}]\n" for number in range(30_000)), time.process_time()
     answer = experimenter.send("POST", "/studies/short/versions/check", {"toml": toml})
     assert answer.status_code == 422, answer.text
     assert re.search(r"and 3\d{4} more\)$", answer.json()["error"]["message"])
-    assert time.monotonic() - began < SOON_S
+    assert time.process_time() - began < SOON_S
 
 
 def test_a_long_text_of_words_and_dots_is_no_key(experimenter: Admin, study: StudyInDatabase) -> None:
@@ -72,12 +75,12 @@ def test_a_pattern_of_many_fields_is_tried_in_no_time(
     upload, folder = new_upload(services.settings.upload_folder, account, None)
     (folder / ("a_" * 120 + ".mp4")).write_bytes(b"no video")
     own: dict[str, Any] = {"title": "t", "question": "q", "low": "a", "high": "b"}
-    began = time.monotonic()
+    began = time.process_time()
     answer = experimenter.send(
         "POST", "/studies", {"name": "x", "upload": upload, "levels": {"pattern": pattern}, "own_clips": own}
     )
     assert (answer.status_code, "does not follow the pattern" in answer.text) == (422, True), answer.text
-    assert time.monotonic() - began < SOON_S
+    assert time.process_time() - began < SOON_S
 
 
 def test_a_table_with_a_cell_without_end_is_refused_in_words(

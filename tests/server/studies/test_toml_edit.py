@@ -148,19 +148,19 @@ def test_a_text_beyond_editing_is_refused_in_one_line() -> None:
 
 
 def test_a_key_of_twenty_thousand_parts_is_refused_before_it_is_read() -> None:
-    began = time.monotonic()
+    began = time.process_time()
     with pytest.raises(InputError, match="nested too deeply"):
         with_data("a" + ".a" * 40_000 + " = 1", {"title": "t"})
-    assert time.monotonic() - began < 2.0  # a reader takes ten seconds
+    assert time.process_time() - began < 2.0  # a reader takes ten seconds
 
 
 @pytest.mark.parametrize("around", ["{}", "x = {{{}}}"])
 def test_many_keys_of_many_parts_are_left_to_the_hand(around: str) -> None:
     keys = [".".join(["a"] * 30) + f".b{number} = 1" for number in range(100)]
-    text, began = around.format((", " if "x" in around else "\n").join(keys)), time.monotonic()
+    text, began = around.format((", " if "x" in around else "\n").join(keys)), time.process_time()
     with pytest.raises(InputError, match="by hand"):
         with_data(text, {"title": "t"})
-    assert time.monotonic() - began < 2.0  # tomlkit takes eight seconds
+    assert time.process_time() - began < 2.0  # tomlkit takes eight seconds
 
 
 def test_a_thousand_keys_of_three_parts_are_edited() -> None:
