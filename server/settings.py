@@ -13,6 +13,7 @@ from pydantic import AliasChoices, Field, field_validator, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from experiments.database_url import with_driver
+from server.audit.syslog_address import syslog_address
 from server.providers.declaration import LOCAL_HOSTS, Provider, ProviderId
 
 KEY_LENGTH_MIN = 32
@@ -68,14 +69,13 @@ class Settings(BaseSettings):
     max_uploads_bytes: int = Field(
         default=64 * 1024**3,
         ge=1024,
-        description="What one account's uploads may hold until they become studies, or a day is over.",
+        description="What one account's uploads may hold together; each is removed after a day.",
     )
     run_starts_per_minute: int = Field(
         default=3000, ge=1, description="Runs that may be started by one link a minute."
     )
     audit_syslog: str = Field(
         default="",
-        pattern=r"^(/.+|((tcp|tls)://)?(\[[0-9A-Fa-f:.]+(%\w+)?\]|[^/:\[\]]+)(:\d+)?)?$",
         description="Syslog that gets the audit log too, without details: /dev/log, host:port (UDP), or "
         "tls://host:port (certificate checked), tcp://host:port; an IPv6 address in [].",
     )
@@ -198,6 +198,13 @@ class Settings(BaseSettings):
     @classmethod
     def _with_driver(cls, value: str) -> str:
         return with_driver(value)
+
+    @field_validator("audit_syslog")
+    @classmethod
+    def _is_where_a_syslog_listens(cls, value: str) -> str:
+        if value:
+            syslog_address(value)
+        return value
 
     @field_validator("security_contact")
     @classmethod

@@ -30,10 +30,9 @@ def accounts(session: Session) -> list[Account]:
 
 
 def with_second_factor(session: Session) -> list[Account]:
-    """Accounts with a second factor; held."""
-    return list(
-        session.scalars(select(Account).where(Account.totp_confirmed_at.is_not(None)).with_for_update())
-    )
+    """Accounts with a second factor, by their numbers; held."""
+    query = select(Account).where(Account.totp_confirmed_at.is_not(None)).order_by(Account.id)
+    return list(session.scalars(query.with_for_update()))
 
 
 def account(session: Session, account_id: int, *, fresh: bool = False, lock: bool = False) -> Account | None:

@@ -7,6 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field, StringConstraints, field_vali
 
 from server.accounts.identity import Scope
 from server.models import Role
+from server.request_body import RequestBody
 from server.text import VisibleObject
 
 AccountName = Annotated[str, StringConstraints(strip_whitespace=True, pattern=r"^[\w.@+ -]{2,100}$")]
@@ -14,11 +15,7 @@ TOKEN_DAYS_MAX = 366
 Password = Annotated[str, StringConstraints(min_length=1, max_length=200)]
 
 
-class _In(BaseModel):
-    model_config = ConfigDict(extra="forbid")
-
-
-class SignIn(_In):
+class SignIn(RequestBody):
     """Name and password, and where a second factor is set up its code or a recovery code."""
 
     name: Annotated[str, StringConstraints(strip_whitespace=True, max_length=100)]
@@ -26,33 +23,33 @@ class SignIn(_In):
     code: Annotated[str, StringConstraints(strip_whitespace=True, max_length=40)] | None = None
 
 
-class NewAccount(_In):
+class NewAccount(RequestBody):
     """The account an invited person makes."""
 
     name: AccountName
     password: Password
 
 
-class ChangePassword(_In):
+class ChangePassword(RequestBody):
     """The present password and a new one."""
 
     password: Password
     new_password: Password
 
 
-class ConfirmCode(_In):
+class ConfirmCode(RequestBody):
     """A code from the authenticator app."""
 
     code: Annotated[str, StringConstraints(strip_whitespace=True, pattern=r"^\d{6}$")]
 
 
-class ConfirmPassword(_In):
+class ConfirmPassword(RequestBody):
     """The present password, asked for again before something is weakened; a code where there is none."""
 
     password: Password
 
 
-class NewInvitation(_In):
+class NewInvitation(RequestBody):
     """Whom to invite, as what on the server, and where the account will belong as what.
 
     Without a workspace it is the default one, and without a role in it the role on the server.
@@ -64,7 +61,7 @@ class NewInvitation(_In):
     label: Annotated[str, StringConstraints(strip_whitespace=True, max_length=200)] = ""
 
 
-class NewToken(_In):
+class NewToken(RequestBody):
     """An API token: its name, what it may do, and for how many days."""
 
     name: Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=100)]
@@ -79,7 +76,7 @@ class NewToken(_In):
         return min(days or TOKEN_DAYS_MAX, TOKEN_DAYS_MAX)
 
 
-class ChangeAccount(_In):
+class ChangeAccount(RequestBody):
     """What an owner may change of an account."""
 
     role: Role | None = None

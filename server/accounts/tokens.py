@@ -35,16 +35,16 @@ def open_tokens(session: Session, owner: Identity) -> list[ApiToken]:
 
 
 def create_token(
-    session: Session, owner: Identity, name: str, scopes: list[str], days: int | None
+    session: Session, owner: Identity, name: str, scopes: list[str], days: int
 ) -> tuple[ApiToken, str]:
-    """Make an API token and its secret, of which only the hash is kept; it ends after `days`, else a year."""
+    """Make an API token and its secret, of which only the hash is kept; it ends after `days`."""
     secret = new_token()
     row = ApiToken(
         account_id=owner.account_id,
         name=name,
         token_hash=hash_token(secret),
         scopes=sorted(set(scopes)),
-        expires_at=now() + timedelta(days=days or 365),
+        expires_at=now() + timedelta(days=days),
     )
     session.add(row)
     session.flush()

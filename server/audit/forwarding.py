@@ -3,7 +3,6 @@
 import json
 import logging
 import queue
-import re
 import socket
 import ssl
 import threading
@@ -12,11 +11,9 @@ from logging.handlers import SysLogHandler
 from pathlib import Path
 
 from experiments.errors import InputError
+from server.audit.syslog_address import syslog_address
 
 log = logging.getLogger("palpebra")
-UDP_PORT = 514
-TCP_PORTS = {"tcp": 601, "tls": 6514}
-HOST_AND_PORT = re.compile(r"(\[(?P<address>[0-9A-Fa-f:.]+(%\w+)?)\]|(?P<name>[^/:\[\]]+))(:(?P<port>\d+))?")
 CONNECT_S = 5.0
 WAITING_MAX = 1000
 """Entries that may wait for a syslog that is slow."""
@@ -52,7 +49,7 @@ def _send(address: str, waiting: "queue.Queue[str]") -> None:
         try:
             handler = handler or _handler(address)
             handler.emit(logging.makeLogRecord({"msg": line, "levelno": logging.INFO}))
-        except (OSError, InputError) as error:
+        except (OSError, ValueError) as error:  # ValueError: what is no name for DNS, or no socket
             log.warning("the audit log could not be sent to syslog: %s", error)
 
 
@@ -62,7 +59,7 @@ class _Handler(SysLogHandler):
 
 
 class _Stream(_Handler):
-    """Syslog over TCP, or TLS with the certificate checked; a message begins with its length (RFC 5425)."""
+    """Syslog over TCP (RFC 6587), or TLS with the certificate checked (RFC 5425): lengths before messages."""
 
     def __init__(self, host: str, port: int, *, tls: bool) -> None:
         self._host, self._port, self._tls = host, port, tls
@@ -74,7 +71,7 @@ class _Stream(_Handler):
         connection = socket.create_connection((self._host, self._port), timeout=CONNECT_S)
         if self._tls:
             context = ssl.create_default_context()
-            connection = context.wrap_socket(connection, server_hostname=self._host)
+            connection = context.wrap_socket(connection, server_hostname=self._host.partition("%")[0])
         self._connection = connection
 
     def emit(self, record: logging.LogRecord) -> None:
@@ -119,39 +116,15 @@ def _ended(connection: socket.socket) -> bool:
 
 
 def _handler(address: str) -> SysLogHandler:
-    scheme, _, rest = address.rpartition("://")
+    place = syslog_address(address)
     handler: SysLogHandler
-    if scheme:
-        host, port = _host_and_port(rest, TCP_PORTS[scheme])
-        handler = _Stream(host, port, tls=scheme == "tls")
+    if place.transport in ("tcp", "tls"):
+        handler = _Stream(place.host, place.port, tls=place.transport == "tls")
+    elif place.transport == "udp":
+        handler = _Handler((place.host, place.port), facility=SysLogHandler.LOG_AUTH)
+    elif Path(place.host).exists():
+        handler = _Handler(place.host, facility=SysLogHandler.LOG_AUTH)
     else:
-        handler = _Handler(syslog_address(address), facility=SysLogHandler.LOG_AUTH)
+        raise InputError(f"PALPEBRA_AUDIT_SYSLOG: there is no socket {place.host}")
     handler.setFormatter(logging.Formatter("palpebra-audit: %(message)s"))
     return handler
-
-
-def syslog_address(text: str) -> str | tuple[str, int]:
-    """A socket's path, or host and port (UDP).
-
-    >>> syslog_address("logs.example.org:5514")
-    ('logs.example.org', 5514)
-    >>> syslog_address("logs.example.org")
-    ('logs.example.org', 514)
-    >>> syslog_address("[2001:db8::5]:5514")
-    ('2001:db8::5', 5514)
-    """
-    if text.startswith("/"):
-        if not Path(text).exists():
-            raise InputError(f"PALPEBRA_AUDIT_SYSLOG: there is no socket {text}")
-        return text
-    return _host_and_port(text, UDP_PORT)
-
-
-def _host_and_port(text: str, usual: int) -> tuple[str, int]:
-    parts = HOST_AND_PORT.fullmatch(text)
-    if parts is None:
-        raise InputError(
-            "PALPEBRA_AUDIT_SYSLOG: expected /dev/log, host:port (UDP), tcp://host:port or tls://host:port, "
-            f"an IPv6 address as [2001:db8::5]:port, got '{text}'"
-        )
-    return parts["address"] or parts["name"], int(parts["port"] or usual)

@@ -46,6 +46,8 @@ def carry_over(session: Session, old: bytes, secret: bytes) -> CarriedOver:
     InputError
         Nothing is under the old key: it never was this server's, or all was carried over before.
     """
+    # Accounts before the chain, as a sign-in holds them: in the other order the two wait for one another.
+    accounts.with_second_factor(session)
     hold_chain(session)
     before = verify(session, secret, before=old)
     done, left = rewrap_all(session, old)
@@ -66,6 +68,7 @@ def carry_over(session: Session, old: bytes, secret: bytes) -> CarriedOver:
 def _carry_factors(session: Session, old: bytes, secret: bytes) -> int:
     """Of a log that fits; who set one up since the key was changed did so under the key of now."""
     of_now = {entry.account_id for entry in under(session, secret) if entry.action == SECOND_FACTOR_SET_UP}
+    # Read anew: looking through the log lets go of what was read before.
     holders = [holder for holder in accounts.with_second_factor(session) if holder.id not in of_now]
     for holder in holders:
         holder.totp_secret = rewrapped(old, secret, holder.totp_secret or "")

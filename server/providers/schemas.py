@@ -5,14 +5,12 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
+from server.request_body import RequestBody
+
 NextPage = Annotated[
     str, StringConstraints(max_length=300, pattern=r"^/([^/\\\x00-\x20\x7f][^\\\x00-\x20\x7f]*)?$")
 ]
 """A page of the admin site, from its root on; never an address elsewhere."""
-
-
-class _In(BaseModel):
-    model_config = ConfigDict(extra="forbid")
 
 
 class ProviderOut(BaseModel):
@@ -29,13 +27,13 @@ class WaysIn(BaseModel):
     resets_by_mail: bool = Field(description="Whether forgotten passwords are reset by mail.")
 
 
-class BeginSignIn(_In):
+class BeginSignIn(RequestBody):
     """Where to go after signing in."""
 
     next: NextPage = "/"
 
 
-class BeginLink(_In):
+class BeginLink(RequestBody):
     """Who asks proves that she is the account's own person, not only somebody at her open browser."""
 
     proof: Annotated[str, StringConstraints(min_length=1, max_length=200)] = Field(
@@ -49,7 +47,7 @@ class Elsewhere(BaseModel):
     url: str
 
 
-class SecondFactorCode(_In):
+class SecondFactorCode(RequestBody):
     """The code of the authenticator app, or a recovery code."""
 
     code: Annotated[str, StringConstraints(strip_whitespace=True, min_length=6, max_length=40)]

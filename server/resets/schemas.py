@@ -2,9 +2,10 @@
 
 from typing import Annotated
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, StringConstraints
+from pydantic import AfterValidator, BaseModel, StringConstraints
 
 from server.accounts.schemas import Password
+from server.request_body import RequestBody
 
 _ATOM = r"[A-Za-z0-9!#$%&'*+/=?^_`{|}~-]+"
 _LABEL = r"[A-Za-z0-9]([A-Za-z0-9-]*[A-Za-z0-9])?"
@@ -30,31 +31,27 @@ own way; names of hosts beyond ASCII in their `xn--` form."""
 OneTimeToken = Annotated[str, StringConstraints(min_length=1, max_length=100)]
 
 
-class _In(BaseModel):
-    model_config = ConfigDict(extra="forbid")
-
-
-class ForgottenPassword(_In):
+class ForgottenPassword(RequestBody):
     """Whose password is forgotten: the name to sign in with, or the address of mail."""
 
     name: Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=200)]
 
 
-class NewPassword(_In):
+class NewPassword(RequestBody):
     """The link's token and the password to be."""
 
     token: OneTimeToken
     password: Password
 
 
-class NewAddress(_In):
+class NewAddress(RequestBody):
     """An address of mail for the own account, with the present password."""
 
     address: Address
     password: Password
 
 
-class ConfirmAddress(_In):
+class ConfirmAddress(RequestBody):
     """The link's token."""
 
     token: OneTimeToken

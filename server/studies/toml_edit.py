@@ -23,7 +23,7 @@ IDENTITY = ("name", "value", "rule", "kind")
 """Keys by which an element of a list is known again after an edit; else its content, then its place."""
 MAX_ELEMENTS = 2000
 """Elements of lists in a text that is edited: each is compared with each, while others wait."""
-MAX_LINES, MAX_LETTERS = 20_000, 2_000_000
+MAX_LINES = 20_000
 """Of a text that is edited: tomlkit makes an object of each line, empty ones too."""
 MAX_CUBES = 40_000
 """Of the parts of dotted keys, all together: 1,500 keys of three parts, some seconds of tomlkit at worst."""
@@ -39,10 +39,8 @@ def with_data(text: str, data: Mapping[str, Any]) -> str:
     """
     if is_deeper(data, MAX_DEPTH):
         raise InputError(TOO_DEEP)
-    if text.count("\n") > MAX_LINES or len(text) > MAX_LETTERS:
-        raise InputError(
-            f"expected at most {MAX_LINES} lines and {MAX_LETTERS} letters; edit such a text by hand"
-        )
+    if text.count("\n") > MAX_LINES:
+        raise InputError(f"expected at most {MAX_LINES} lines; edit such a text by hand")
     edited = _without_none(data)
     _refuse_too_many(_said_by(text), edited)
     if sum_of_cubes(text) > MAX_CUBES:

@@ -1,7 +1,8 @@
-"""What the uploads of one account may hold together, until they become studies or a day is over."""
+"""What the uploads of one account may hold together; each is removed after a day."""
 
 import os
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -66,7 +67,8 @@ class Quota:
     def _full(self, held: int) -> UploadTooLarge:
         return UploadTooLarge(
             f"Your uploads of the last day hold {held / 1e9:.1f} GB in {len(self._own())} folders; at most "
-            f"{self.bytes / 1e9:.1f} GB in {MAX_UPLOADS} are kept. Make studies of them, or wait a day."
+            f"{self.bytes / 1e9:.1f} GB in {MAX_UPLOADS} are kept. "
+            "Each is removed after a day; studies that were made of them stay."
         )
 
 
@@ -86,9 +88,14 @@ def sender(upload: Path) -> str | None:
 
 def _sizes(upload: Path) -> Iterator[int]:
     # Files and folders may go at any moment: the worker's own, and those that become a study.
-    for folder, _, names in os.walk(upload):
-        for name in names:
-            try:
-                yield Path(folder, name).lstat().st_size
-            except FileNotFoundError:
-                continue
+    try:
+        with os.scandir(upload) as entries:
+            for entry in entries:
+                yield from _sizes(Path(entry.path)) if entry.is_dir(follow_symlinks=False) else _size(entry)
+    except (FileNotFoundError, NotADirectoryError):
+        return
+
+
+def _size(entry: os.DirEntry[str]) -> Iterator[int]:
+    with suppress(FileNotFoundError):
+        yield entry.stat(follow_symlinks=False).st_size

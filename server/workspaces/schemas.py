@@ -2,26 +2,23 @@
 
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+from pydantic import BaseModel, Field, StringConstraints
 
 from server.models import Right, Role
+from server.request_body import RequestBody
 
 WorkspaceName = Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9-]{0,59}$")]
 Title = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=200)]
 
 
-class _In(BaseModel):
-    model_config = ConfigDict(extra="forbid")
-
-
-class NewWorkspace(_In):
+class NewWorkspace(RequestBody):
     """A workspace: its name in addresses, and the title people read."""
 
     name: WorkspaceName
     title: Title
 
 
-class ChangeWorkspace(_In):
+class ChangeWorkspace(RequestBody):
     """What an owner may change of a workspace."""
 
     title: Title
@@ -48,7 +45,7 @@ class MemberOut(BaseModel):
     disabled: bool
 
 
-class SetMember(_In):
+class SetMember(RequestBody):
     """The role somebody shall have in a workspace."""
 
     role: Role
@@ -61,13 +58,13 @@ class GrantOut(BaseModel):
     rights: list[Right]
 
 
-class SetGrant(_In):
+class SetGrant(RequestBody):
     """The rights an account shall have on a study beside those of its role; an empty list takes them back."""
 
     rights: Annotated[list[Right], Field(max_length=5)]
 
 
-class MoveStudy(_In):
+class MoveStudy(RequestBody):
     """Where a study shall belong."""
 
     workspace: Annotated[str, StringConstraints(max_length=60)]

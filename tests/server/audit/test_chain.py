@@ -1,6 +1,7 @@
 """The audit log's chain: whole, broken at each place, under many hands at once, and beside erasures."""
 
 import json
+import queue
 import socket
 import ssl
 import threading
@@ -22,7 +23,8 @@ from sqlalchemy import text
 from server.accounts.audit import record
 from server.audit import repository
 from server.audit.cli import _lines
-from server.audit.forwarding import syslog_address
+from server.audit.forwarding import _send
+from server.audit.syslog_address import syslog_address
 from server.audit.verify import Verdict, verify
 from server.clock import now
 from server.context import Services, open_services
@@ -205,17 +207,35 @@ def test_syslog_gets_each_entry_after_its_commit_without_details(services: Servi
     ],
 )
 def test_an_ipv6_address_of_syslog_stands_in_brackets(written: str, read: tuple[str, int]) -> None:
-    assert syslog_address(written) == read
+    assert syslog_address(written) == ("udp", *read)
     for scheme in ("", "tcp://", "tls://"):
         assert Settings(audit_syslog=scheme + written).audit_syslog == scheme + written
 
 
 @pytest.mark.parametrize(
-    "wrong", ["::1", "::1:514", "[logs]:514", "[::1", "[]", "a:b", "tcp://", "udp://a:1"]
+    "wrong",
+    ["::1", "::1:514", "[logs]:514", "[::1", "[]", "a:b", "tcp://", "udp://a:1", "a:65536", "a:0", "ftp://a"],
 )
 def test_what_is_no_address_of_syslog_is_refused_at_the_start(wrong: str) -> None:
-    with pytest.raises(ValidationError):
+    with pytest.raises(ValidationError, match="expected /dev/log, host:port"):
         Settings(audit_syslog=wrong)
+
+
+def test_a_colon_without_a_port_is_the_usual_port() -> None:
+    assert syslog_address("logs.example.org:") == ("udp", "logs.example.org", 514)
+
+
+def test_a_name_that_is_none_for_dns_costs_its_entry_and_no_later_one(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    waiting: queue.Queue[str] = queue.Queue()
+    for line in ("one", "two"):
+        waiting.put(line)
+    threading.Thread(target=_send, args=("a..b:514", waiting), daemon=True).start()
+    ends = time.monotonic() + 30
+    while caplog.text.count("could not be sent to syslog") < 2 and time.monotonic() < ends:
+        time.sleep(0.01)
+    assert caplog.text.count("could not be sent to syslog") == 2
 
 
 class _Collector(threading.Thread):

@@ -1,4 +1,4 @@
-"""What the uploads of one account may hold together, until they become studies or a day is over."""
+"""What the uploads of one account may hold together; each is removed after a day."""
 
 import io
 import zipfile
@@ -32,7 +32,7 @@ def test_an_account_that_holds_too_much_sends_no_more(
     assert first.status_code == 201
     refused = experimenter.client.post("/api/admin/uploads", files=FILE)
     assert refused.status_code == 413
-    assert "Make studies of them" in refused.json()["error"]["message"]
+    assert "removed after a day" in refused.json()["error"]["message"]
     path = f"/api/admin/uploads/{first.json()['id']}/files"
     little = {"files": ("more.csv", b"file\n", "text/csv")}
     assert experimenter.client.post(path, files=little).status_code == 200
@@ -49,7 +49,7 @@ def test_a_zip_that_unpacks_to_more_than_there_is_room_for_leaves_nothing(tmp_pa
             archive.writestr(f"{number}.csv", "file\n" * 300)
     _, folder = uploads.new_upload(Quota(tmp_path, 1, 3000))
     packed.seek(0)
-    with pytest.raises(UploadTooLarge, match="Make studies"):
+    with pytest.raises(UploadTooLarge, match="removed after a day"):
         uploads.receive(folder, "clips.zip", packed, LARGE, Quota(tmp_path, 1, 3000))
     assert held(tmp_path) < 100
     packed.seek(0)
