@@ -326,7 +326,7 @@ def list_tokens(services: ServicesDep, me: Myself) -> list[TokenOut]:
 def create_token(services: ServicesDep, me: FreshMyself, body: NewToken) -> NewTokenOut:
     """Make an API token; its secret is shown this once. It can do no more than the account."""
     with services.database.write() as session:
-        row, secret = tokens.create_token(session, me, body.name, list(body.scopes), body.days)
+        row, secret = tokens.create_token(session, me, body.name, list(body.scopes), body.days_granted)
         return NewTokenOut(**TokenOut.model_validate(row).model_dump(), token=secret)
 
 

@@ -3,7 +3,7 @@
 from datetime import datetime
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints, field_validator
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 from server.accounts.identity import Scope
 from server.models import Role
@@ -66,14 +66,16 @@ class NewToken(RequestBody):
 
     name: Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=100)]
     scopes: Annotated[list[Scope], Field(min_length=1, max_length=4)]
-    # Null was a token without an end; older clients that send it, or more days than any token has today, get
-    # one that ends as late as any may: the answer says when.
     days: Annotated[int, Field(ge=1, le=3650)] | None = 365
 
-    @field_validator("days")
-    @classmethod
-    def _ends(cls, days: int | None) -> int:
-        return min(days or TOKEN_DAYS_MAX, TOKEN_DAYS_MAX)
+    @property
+    def days_granted(self) -> int:
+        """Days after which it ends; the answer says when.
+
+        Null was a token without an end: older clients that send it, or more days than any token has today,
+        get one that ends as late as any may.
+        """
+        return min(self.days or TOKEN_DAYS_MAX, TOKEN_DAYS_MAX)
 
 
 class ChangeAccount(RequestBody):
