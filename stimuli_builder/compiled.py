@@ -12,7 +12,7 @@ Kernel = TypeVar("Kernel", bound=Callable[..., object])
 
 
 def compiled(kernel: Kernel) -> Kernel:
-    """Compile `kernel` with numba; one that calls kernels of other files takes `compiled_over` them.
+    """Compile `kernel` with numba; one with kernels or numbers of other files takes `compiled_over`.
 
     Sums may be reordered, but NaN and infinity keep their meaning.
     The cache on disk notices an edit only in the file that holds the caller.
@@ -21,7 +21,7 @@ def compiled(kernel: Kernel) -> Kernel:
 
 
 def compiled_over(*called: ModuleType) -> Callable[[Kernel], Kernel]:
-    """Compile a kernel that calls kernels of other files: its cache is made anew where one of them is edited.
+    """Compile a kernel that holds kernels or numbers of other files: made anew where one of them is edited.
 
     numba stamps a cache with the time and size of the caller's file; theirs are added.
     """

@@ -10,8 +10,9 @@ from math import atan2, exp, hypot, pi
 
 import numpy as np
 
+from stimuli_builder.actor import face as geometry
 from stimuli_builder.actor.face import arch, lower_margin, upper_margin, upper_open
-from stimuli_builder.compiled import compiled
+from stimuli_builder.compiled import compiled, compiled_over
 
 IRIS_RADIUS = 0.195
 PUPIL_SHARE = 0.40
@@ -58,7 +59,7 @@ def eyeball(u, v, top, low, gaze_u, gaze_v, iris):
     return colour + 34.0 * bell(low - v - 0.012, 0.009)
 
 
-@compiled
+@compiled_over(geometry)
 def upper_skin(u, v, top, closure, face_row, face_column, face, lid):
     """Skin above the opening: face above the crease, lid plate that moves with the margin below it."""
     bend = arch(u)
@@ -75,7 +76,7 @@ def upper_skin(u, v, top, closure, face_row, face_column, face, lid):
     return colour - 78.0 * bell(height, 0.016) * clamp(bend * 12.0)
 
 
-@compiled
+@compiled_over(geometry)
 def lower_skin(u, v, low, closure, to_row, to_column, side, scale, face):
     """Skin below the opening, carried to the nose and up with the lower lid, less so further down."""
     shut = max(closure, 0.0)
@@ -88,7 +89,7 @@ def lower_skin(u, v, low, closure, to_row, to_column, side, scale, face):
     return colour + rim * (17.0 * bell(depth - 0.012, 0.011) - 26.0 * bell(depth - 0.034, 0.012))
 
 
-@compiled
+@compiled_over(geometry)
 def lash_shade(u, v, top, low, closure, lashes):
     """Share of light that lashes leave; the upper ones point up when open and down when closed."""
     bend = arch(u)
@@ -110,7 +111,7 @@ def lash_shade(u, v, top, low, closure, lashes):
     return shade
 
 
-@compiled
+@compiled_over(geometry)
 def draw_eye(
     out,
     cover,

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from stimuli_builder.compiled import compiled
+from stimuli_builder.compiled import compiled, compiled_over
+from stimuli_builder.tracking import shapes
 from stimuli_builder.tracking.accuracy import HeldOut
 from stimuli_builder.tracking.fit import Fit
 from stimuli_builder.tracking.model import CoupledModel, believing
@@ -103,7 +104,7 @@ def doubt(
     return ""
 
 
-@compiled
+@compiled_over(shapes)
 def jump_px(points: Points, before: Points) -> float:
     """Greatest move of a canthus since the frame before, in pixels."""
     furthest = 0.0
@@ -114,7 +115,7 @@ def jump_px(points: Points, before: Points) -> float:
     return furthest
 
 
-@compiled
+@compiled_over(shapes)
 def lid_difference(points: Points, other: Points) -> float:
     """Mean distance of the lid points from another's lid curves, the worse eye's, as part of its width.
 
@@ -127,7 +128,7 @@ def lid_difference(points: Points, other: Points) -> float:
     return worst
 
 
-@compiled
+@compiled_over(shapes)
 def lid_offsets(points: Points, other: Points) -> Values:
     """Distance of each lid point from another's lid curve, as part of the other eye's width (eyes, 7)."""
     offsets = np.empty((len(points) // EYE_POINTS, len(UPPER_LID) + len(LOWER_LID)))

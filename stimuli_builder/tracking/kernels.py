@@ -137,7 +137,7 @@ def subtract_warp(directions, vertex_sums, out):
         out[k] -= total
 
 
-@compiled
+@compiled_over(sampling_kernels)
 def compare(appearance, weights, c, sampled, look, error, out):
     """Look of parameters c, its weighted error, and the error's appearance part of SD^T E into out (K,).
 
