@@ -142,7 +142,8 @@ def error_of(curvature: float | None, interval: Interval) -> float | None:
 
     Where answers switch at one level the likelihood's maximum is a ridge of ever steeper slopes: the
     curvature there gives no error, or one beyond the whole interval, though the profile of the threshold is
-    closed. Then half of the 95% interval counts as 1.96 errors. None where the interval is open too.
+    closed. It gives none either where the fitted lapse rate is 0 or 0.1, an end of its range. Then half of
+    the 95% interval counts as 1.96 errors. None where the interval is open too.
     """
     if interval.low is None or interval.high is None:
         return curvature

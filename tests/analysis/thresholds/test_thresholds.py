@@ -171,3 +171,14 @@ def test_where_slopes_grow_without_end_the_error_is_that_of_the_profile(n: list[
     mean = mean_threshold([PersonThreshold(name, "all", fit, "") for name in "ab"], "all")
     assert mean is not None
     assert mean.people == 2
+
+
+@pytest.mark.parametrize(("k", "lapse"), [([0, 2, 6, 11, 16, 19, 20], 0.0), ([0, 2, 6, 11, 15, 16, 16], 0.1)])
+def test_at_an_end_of_the_lapse_rate_the_error_is_that_of_the_profile(k: list[int], lapse: float) -> None:
+    """There the likelihood is cut off, and its curvature is no error: ordinary people were left out."""
+    fit = fit_threshold(Trials(np.arange(1.0, 8), np.full(7, 20.0), np.array(k, float)), "normal", 0.0, None)
+    assert fit.lapse == pytest.approx(lapse, abs=1e-8)
+    assert fit.threshold_ci.low is not None
+    assert fit.threshold_ci.high is not None
+    width = fit.threshold_ci.high - fit.threshold_ci.low
+    assert fit.threshold_se == pytest.approx(width / (2 * 1.959964), rel=1e-6)
