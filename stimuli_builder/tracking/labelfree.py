@@ -63,7 +63,7 @@ class Survey:
     several_faces : int
         Frames among them with more than one face; the one larger over the recording was taken.
     unseen : frozenset of int
-        Frames looked at in which the eyes of that face were not seen.
+        Frames looked at in which the eyes of that face were not seen, or not wholly in the picture.
     """
 
     points: dict[int, Points]

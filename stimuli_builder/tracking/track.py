@@ -39,7 +39,7 @@ from stimuli_builder.video_clock import DamagedFileError
 
 SCALE_RANGE = (0.5, 2.0)
 FROZEN = "the same picture as the frame before"
-UNSEEN = "the detector sees no such eyes here"
+UNSEEN = "the detector sees no such eyes here, or not wholly in the picture"
 FLAT_SHARE = 0.25
 """Spread of grey levels, as part of the other eye's or the labelled ones', below which there is no eye to be
 seen: a shut eye has 0.7 of an open one's or more in two recordings, plain things over it 0 to 0.05."""
@@ -275,7 +275,8 @@ def track_video(
     advance : callable, optional
         Called after each frame with the counts so far, for a progress bar.
     hints : mapping of int to float64 array or None, optional
-        Frame looked at by a detector -> its points, or None where it saw no such eyes; see `Tracker.step`.
+        Frame looked at by a detector -> its points, or None where it saw no such eyes, or not wholly in the
+        picture; see `Tracker.step`.
 
     Raises
     ------

@@ -291,6 +291,20 @@ def test_frames_in_which_no_face_is_seen_are_told_from_frames_not_looked_at(
     assert {row["status"] for row in rows[:40] + rows[58:]} == {"tracked"}
 
 
+@pytest.mark.parametrize(("cut_px", "unseen"), [(225, set()), (255, set(range(36, 72, 6)))])
+def test_eyes_that_reach_out_of_the_picture_count_as_unseen_and_the_reason_says_so(
+    detector, shared_data, tmp_path, monkeypatch, cut_px, unseen
+):
+    monkeypatch.setattr("stimuli_builder.tracking.labelfree.LOOKED_AT", 12)
+    pictures = [picture.copy() for picture in frames(shared_data / "face_video" / "single_face.mp4")]
+    for picture in pictures[36:]:
+        picture[:, :-cut_px] = picture[:, cut_px:].copy()
+        picture[:, -cut_px:] = 128
+    write_frames(tmp_path / "cut.mp4", pictures, fps=30)
+    assert survey(scan_video(tmp_path / "cut.mp4"), one_eye=False).unseen == unseen
+    assert UNSEEN.endswith("or not wholly in the picture")
+
+
 def test_a_whole_face_is_refused_as_a_close_up_and_a_close_up_is_not(detector, shared_data, monkeypatch):
     monkeypatch.setattr("stimuli_builder.tracking.labelfree.LOOKED_AT", 12)
     folder = shared_data / "face_video"
