@@ -1,6 +1,5 @@
 """One analysis, complete: what tables, figures and report are made from."""
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
@@ -42,13 +41,11 @@ class Labels:
         """Label of an effect of several factors, or of one."""
         return TIMES.join(map(self.factor, factors))
 
-    def in_words(self, text: str) -> str:
-        """A text in which factors and their interactions are called by their names, in labels."""
-        if not self.factors:
-            return text
-        names = "|".join(sorted(map(re.escape, self.factors), key=len, reverse=True))
-        effects = rf"(?<![\w:])(?:{names})(?::(?:{names}))*(?!\w|:\w)"
-        return re.sub(effects, lambda one: self.effect(one[0].split(":")), text)
+    def term(self, name: str) -> str:
+        """Label of a model's term, where ':' joins factors; one that holds anything else is left alone."""
+        factors, space, contrast = name.partition(" ")
+        parts = factors.split(":")
+        return self.effect(parts) + space + contrast if self.factors.keys() >= set(parts) else name
 
     def cell(self, levels: Mapping[str, str]) -> str:
         """Labels of the levels, by the names of their factors."""

@@ -5,6 +5,7 @@ from functools import partial
 from math import isfinite
 from typing import Any
 
+from analysis.plans.model_notes import notes_of
 from analysis.plans.random_factors import fit_with_random, holds_for, said_of_random
 from analysis.plans.result import Analysis
 from analysis.report.captions import caption
@@ -94,7 +95,7 @@ def mixed_model(analysis: Analysis) -> Section:
         holds = (holds_for(effect.effect, random, random_slopes),) if random else ()
         rows.append((analysis.labels.effect(ours.factors), *cells, *holds))
     header = ("Effect", "F", "df", "p", "p of the ANOVA (GG)", *(("holds for",) if random else ()))
-    notes = (f"Model: {result.formula}.", *_notes(analysis, result))
+    notes = (f"Model: {result.formula}.", *notes_of(result, analysis.labels))
     table = Table(
         "mixed",
         caption("Linear mixed model", analysis.name, analysis.synthetic),
@@ -123,19 +124,6 @@ def mixed_model(analysis: Analysis) -> Section:
     )
 
 
-def _notes(analysis: Analysis, result: Any) -> tuple[str, ...]:
-    """Standard deviations of the random terms, a grouping after another, and what was doubtful; in labels."""
-    by_group: dict[str, list[str]] = {}
-    for one in result.components:
-        by_group.setdefault(one.group, []).append(f"{one.term} {fixed(one.sd, 3)}".strip())
-    said = "; ".join(
-        f"{group}{' ' if group == 'residual' else ': '}{', '.join(terms)}"
-        for group, terms in by_group.items()
-    )
-    sds = (f"Standard deviations: {said}.",) if said else ()
-    return tuple(analysis.labels.in_words(note) for note in (*sds, *result.notes))
-
-
 def ordinal_model(analysis: Analysis) -> Section:
     """The cumulative-link mixed model's tests beside those of the ANOVA."""
     from analysis.models.ordinal import fit_ordinal
@@ -156,7 +144,7 @@ def ordinal_model(analysis: Analysis) -> Section:
         rows.append((analysis.labels.effect(ours.factors), *cells))
     header = ("Effect", "χ²", "df", "p", "p of the ANOVA (GG)")
     thresholds = ", ".join(fixed(value) for value in result.thresholds)
-    notes = (f"Model: {result.formula}.", f"Thresholds: {thresholds}.", *_notes(analysis, result))
+    notes = (f"Model: {result.formula}.", f"Thresholds: {thresholds}.", *notes_of(result, analysis.labels))
     table = Table(
         "ordinal",
         caption("Ordinal mixed model", analysis.name, analysis.synthetic),
