@@ -22,7 +22,10 @@ class Table:
 
 
 def as_text(table: Table, width: int = WIDTH) -> str:
-    """Monospaced text at most `width` columns wide; long first cells wrap, mostly at ':'."""
+    """Monospaced text, `width` columns wide where it can be broken; long first cells wrap, mostly at ':'.
+
+    Numbers, and words of the title, the notes and the later columns, stay whole, though they be wider.
+    """
     sizes = _column_widths(table, width)
     rule = "─" * min(width, sum(sizes) + _GAP * (len(sizes) - 1))
     lines = [*wrap(table.title, width), rule, *_text_row(table.header, sizes, table.text_columns), rule]
@@ -75,7 +78,10 @@ def _fold(text: str, width: int) -> list[str]:
 
 
 def wrap(text: str, width: int = WIDTH, indent: str = "  ") -> list[str]:
-    """Break a sentence into lines of at most `width`, later lines indented."""
+    """Break a sentence at its spaces into lines of at most `width`, later ones indented.
+
+    A longer word, such as a path that is to be copied, has a line of its own.
+    """
     lines, line = [], ""
     for word in text.split():
         if line and len(line) + 1 + len(word) > width:
