@@ -67,7 +67,7 @@ def as_latex(table: Table, position: str = "") -> str:
     `position` is the option of a floating table: `[H]` keeps it where it stands.
     """
     caption = f"\\caption{{{latex_text(table.title)}}}\\label{{tab:{table.key}}}"
-    heads = " & ".join(_in_italics(heading_pieces(cell)) for cell in table.header)
+    heads = " & ".join(_in_italics(head) for head in heading_pieces(table.header))
     header = f"\\toprule\n{heads} \\\\\n\\midrule\n"
     rows = "\n".join(_row(row) for row in table.rows)
     columns = _columns(table)

@@ -4,7 +4,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from analysis.report.formats import as_markdown
-from analysis.report.italics import heading_pieces, pieces, signed
+from analysis.report.italics import heading_pieces, pieces, signed, signed_cell
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -31,8 +31,8 @@ def _environment() -> "Environment":
     )
     environment.filters["markdown_table"] = as_markdown
     environment.filters["italics"] = lambda text: _in_italics(pieces(signed(text)))
-    environment.filters["heading"] = lambda text: _in_italics(heading_pieces(text))
-    environment.filters["signed"] = signed
+    environment.filters["headings"] = lambda header: [_in_italics(head) for head in heading_pieces(header)]
+    environment.filters["signed_cell"] = signed_cell
     return environment
 
 

@@ -8,7 +8,7 @@ from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from analysis.report.contents import Contents, DrawnPart, Picture, Section
 from analysis.report.formats import Table
-from analysis.report.italics import heading_pieces, pieces, signed
+from analysis.report.italics import heading_pieces, pieces, signed, signed_cell
 
 if TYPE_CHECKING:
     from docx.document import Document
@@ -132,8 +132,14 @@ def _add_picture(document: "Document", picture: Picture, synthetic: bool) -> Non
 def _add_table(document: "Document", table: Table) -> None:
     document.add_paragraph(_sayable(table.title), style="Caption")
     grid = document.add_table(rows=1 + len(table.rows), cols=len(table.header), style="Light List")
-    head = [heading_pieces(_sayable(text)) for text in table.header]
-    body = [[[(signed(_sayable(text)), False)] for text in row] for row in table.rows]
+    head = heading_pieces([_sayable(text) for text in table.header])
+    body = [
+        [
+            [(signed_cell(_sayable(text), position >= table.text_columns), False)]
+            for position, text in enumerate(row)
+        ]
+        for row in table.rows
+    ]
     for cells, row in zip(grid.rows, (head, *body), strict=True):
         for position, (cell, split) in enumerate(zip(cells.cells, row, strict=True)):
             _fill(cell, split, right=position >= table.text_columns)

@@ -1,7 +1,14 @@
 """Tables and sentences in the terminal: lines are wider than 80 columns only for what cannot be broken."""
 
+from io import BytesIO
+
+import docx
+
+from analysis.report.contents import Contents, DrawnPart
 from analysis.report.formats import Table, as_text, wrap
-from analysis.report.italics import heading_pieces, signed
+from analysis.report.italics import heading_pieces, signed, signed_cell
+from analysis.report.templating import filled
+from analysis.report.word import as_docx
 
 
 def lines_of(header: tuple[str, ...], *rows: tuple[str, ...], text_columns: int = 1) -> list[str]:
@@ -36,10 +43,19 @@ def test_a_table_that_fits_is_left_as_it_is() -> None:
     assert lines[2:5] == ["Effect  p of the whole", "─" * 22, "Face              .001"]
 
 
+def italic(*header: str) -> list[str]:
+    return [piece for head in heading_pieces(header) for piece, is_symbol in head if is_symbol]
+
+
 def test_symbols_at_the_head_of_columns_are_in_italics() -> None:
-    assert heading_pieces("F (df)") == [("F", True), (" (", False), ("df", True), (")", False)]
-    assert not any(italic for _, italic in heading_pieces("W/L/T"))
-    assert not any(italic for _, italic in heading_pieces("Factor"))
+    assert heading_pieces(["F (df)"]) == [[("F", True), (" (", False), ("df", True), (")", False)]]
+    assert italic("Effect", "F", "df", "p (ranks)", "SE") == ["F", "df", "p", "SE"]
+    assert italic("Factor", "W/L/T", "t", "p") == ["t", "p"]
+
+
+def test_levels_called_as_a_symbol_are_not_in_italics() -> None:
+    assert italic("Clip", "M", "F") == []
+    assert italic("Gender: M", "Gender: F", "p") == ["p"]
 
 
 def test_minus_stands_before_numbers_alone() -> None:
@@ -47,3 +63,24 @@ def test_minus_stands_before_numbers_alone() -> None:
         signed("t(11) = -6.28, [-.05, 0.30], 7-9, P-1 and x - y")
         == "t(11) = −6.28, [−.05, 0.30], 7-9, P-1 and x - y"
     )
+    assert signed("-3dB, -1.5dB, a/-3 and 1.2e-5, -1.2e-5") == "-3dB, -1.5dB, a/-3 and 1.2e-5, −1.2e-5"
+
+
+def test_ids_and_labels_in_tables_keep_their_hyphens() -> None:
+    for numbers in ("-0.31 (0.12)", "[-.05, 0.30]", "-1.2e-05", "-3"):
+        assert signed_cell(numbers, True) == numbers.replace("-", "−", 1)
+        assert signed_cell(numbers, False) == numbers
+    for name in ("id -7", "a/-3", "-3dB", "-3 dB", "_-3"):
+        assert signed_cell(name, True) == name
+
+
+def test_tables_of_reports_keep_the_names_in_their_first_column() -> None:
+    table = Table("k", "Title", ("Gender", "M", "F"), (("-3dB", "-1.5", "id -7"), ("-7", "2", "-.5")), 1)
+    contents = Contents("n", "Study", "Led", "rows.csv", False, 2, (), (), (), "Method", {})
+    part = DrawnPart("", (), table, (), (), "", (), ())
+    html = filled("report.html.j2", contents=contents, parts=(part,), version="1")
+    rows = docx.Document(BytesIO(as_docx(contents, (part,), "1"))).tables[0].rows
+    cells = [cell.text for row in rows for cell in row.cells]
+    assert cells == ["Gender", "M", "F", "-3dB", "−1.5", "id -7", "-7", "2", "−.5"]
+    assert [cell for cell in cells if f">{cell}</t" not in html] == []
+    assert "<i>" not in html
