@@ -116,15 +116,15 @@ def _ended(connection: socket.socket) -> bool:
 
 
 def _handler(address: str) -> SysLogHandler:
-    place = syslog_address(address)
+    listening = syslog_address(address)
     handler: SysLogHandler
-    if place.transport in ("tcp", "tls"):
-        handler = _Stream(place.host, place.port, tls=place.transport == "tls")
-    elif place.transport == "udp":
-        handler = _Handler((place.host, place.port), facility=SysLogHandler.LOG_AUTH)
-    elif Path(place.host).exists():
-        handler = _Handler(place.host, facility=SysLogHandler.LOG_AUTH)
+    if listening.transport in ("tcp", "tls"):
+        handler = _Stream(listening.host, listening.port, tls=listening.transport == "tls")
+    elif listening.transport == "udp":
+        handler = _Handler((listening.host, listening.port), facility=SysLogHandler.LOG_AUTH)
+    elif Path(listening.host).exists():
+        handler = _Handler(listening.host, facility=SysLogHandler.LOG_AUTH)
     else:
-        raise InputError(f"PALPEBRA_AUDIT_SYSLOG: there is no socket {place.host}")
+        raise InputError(f"PALPEBRA_AUDIT_SYSLOG: there is no socket {listening.host}")
     handler.setFormatter(logging.Formatter("palpebra-audit: %(message)s"))
     return handler
