@@ -4,16 +4,17 @@ import re
 
 MAX_DEPTH = 32
 """Tables and lists in one another; dotted keys make tables of any depth in a few letters each."""
-PART = r"""(?:[\w-]++|"(?:[^"\\\n]++|\\[^\n])*+"|'[^'\n]*+')"""
+PART = r"""(?:[\w-]++|"(?>(?:[^"\\\n]++|\\[^\n])*)"|'[^'\n]*+')"""
 """One part of a dotted key, bare or quoted."""
 _PARTS = re.compile(PART)
 _DOT = r"[ \t]*+\.[ \t]*+"
-# Possessive, and the rest of an unclosed string is swallowed: each letter is looked at a few times at most.
+# Without a way back, and the rest of an unclosed string is swallowed: each letter is looked at a few times at
+# most. Groups repeat in atomic ones: Debian 12's Python 3.11.2 matches their possessive repeats wrongly.
 _TOKEN = re.compile(
-    r'"""(?:[^"\\]++|\\.|"{1,2}+(?!"))*+(?:"{3,5}+|.*+)'
-    r"|'''(?:[^']++|'{1,2}+(?!'))*+(?:'{3,5}+|.*+)"
+    r'"""(?>(?:[^"\\]++|\\.|"{1,2}+(?!"))*)(?:"{3,5}+|.*+)'
+    r"|'''(?>(?:[^']++|'{1,2}+(?!'))*)(?:'{3,5}+|.*+)"
     r"|\#[^\n]*+"
-    rf"|(?P<key>{PART}(?:{_DOT}{PART}){{0,{MAX_DEPTH}}}+)(?P<beyond>{_DOT}{PART})?+"
+    rf"|(?P<key>{PART}(?>(?:{_DOT}{PART}){{0,{MAX_DEPTH}}}))(?>(?P<beyond>{_DOT}{PART})?)"
     r"""|["'].*+""",
     re.DOTALL,
 )

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 _SYMBOL = re.compile(r"(?<![\w'’])(?:SE|SD|[FtpMNnzrdWVqb])(?=(?:\([\d., ]+\))? ?[=<>≤≥] ?[-−]?[\d.])")
 _HEADING = re.compile(r"(?<![\w/'’])(?:SE|SD|SS|MS|df|dz|BF|[FtpnzrWb])(?![A-Za-z0-9_/'’])")
 _TESTS = re.compile(r"\b(?:df|p)\b|BF")
-_MINUS = re.compile(r"(?<![\w./])-(?=\.?\d[\d.]*+(?:e[-+]?\d++)?+(?!\w))")
+_MINUS = re.compile(r"(?<![\w./])-(?=\.?\d[\d.]*+(?>(?:e[-+]?\d++)?)(?!\w))")
 _LETTER = re.compile(r"(?!(?<=\d)e[-+]?\d)[^\W\d_]|[/_]")
 
 

@@ -98,7 +98,7 @@ def test_keys_and_mouse_answer_points_and_sliders(server: ServerProcess, tmp_pat
     client.close()
     said = analysed(server, study.name, tmp_path)
     assert "origin participant" in said
-    assert all(name in said for name in ("natural", "eerie", "Reliability of the scales"))
+    assert all(name in said for name in ("Natural", "Eerie", "Reliability of the scales"))
 
 
 @pytest.mark.parametrize(("width", "height"), [(390, 844), (720, 450)], ids=["phone", "200% zoom"])

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from server.context import Services
+from server.studies.upload_quota import Quota
 from server.studies.uploads import new_upload
 from tests.helpers.admins import Admin
 from tests.helpers.studies import SHORT, StudyInDatabase
@@ -72,7 +73,9 @@ def test_a_pattern_of_many_fields_is_tried_in_no_time(
     experimenter: Admin, services: Services, study: StudyInDatabase, pattern: str
 ) -> None:
     account = experimenter.get("/session").json()["account"]["id"]
-    upload, folder = new_upload(services.settings.upload_folder, account, None)
+    upload, folder = new_upload(
+        Quota(services.settings.upload_folder, account, services.settings.max_uploads_bytes)
+    )
     (folder / ("a_" * 120 + ".mp4")).write_bytes(b"no video")
     own: dict[str, Any] = {"title": "t", "question": "q", "low": "a", "high": "b"}
     began = time.process_time()
@@ -87,7 +90,9 @@ def test_a_table_with_a_cell_without_end_is_refused_in_words(
     experimenter: Admin, services: Services, study: StudyInDatabase
 ) -> None:
     account = experimenter.get("/session").json()["account"]["id"]
-    upload, folder = new_upload(services.settings.upload_folder, account, None)
+    upload, folder = new_upload(
+        Quota(services.settings.upload_folder, account, services.settings.max_uploads_bytes)
+    )
     (folder / "a.mp4").write_bytes(b"no video")
     csv = 'file,a\n"' + "x" * 200_000
     answer = experimenter.send("POST", "/studies", {"name": "x", "upload": upload, "levels": {"csv": csv}})
