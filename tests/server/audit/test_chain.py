@@ -299,18 +299,24 @@ def self_signed(folder: Path) -> Path:
     return path
 
 
+def sending_to_a_collector(
+    services: Services, messages: int, scheme: str, certificate: Path
+) -> tuple["_Collector", Services]:
+    """A syslog that takes so many messages, and a server whose audit log goes to it."""
+    collector = _Collector(messages, certificate if scheme == "tls" else None)
+    collector.start()
+    address = f"{scheme}://localhost:{collector.listener.getsockname()[1]}"
+    return collector, open_services(services.settings.model_copy(update={"audit_syslog": address}))
+
+
 @pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
 @pytest.mark.parametrize("scheme", ["tcp", "tls"])
 def test_syslog_over_a_stream_gets_whole_messages(
     services: Services, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scheme: str
 ) -> None:
-    certificate = self_signed(tmp_path) if scheme == "tls" else None
-    if certificate is not None:
-        monkeypatch.setenv("SSL_CERT_FILE", str(certificate))
-    collector = _Collector(1, certificate)
-    collector.start()
-    address = f"{scheme}://localhost:{collector.listener.getsockname()[1]}"
-    told = open_services(services.settings.model_copy(update={"audit_syslog": address}))
+    if scheme == "tls":
+        monkeypatch.setenv("SSL_CERT_FILE", str(self_signed(tmp_path)))
+    collector, told = sending_to_a_collector(services, 1, scheme, tmp_path / "localhost.pem")
     with told.database.write() as session:
         record(session, None, "study created", "study", "s", note="not for syslog")
     collector.join(20)
@@ -327,13 +333,9 @@ def test_syslog_over_a_stream_gets_whole_messages(
 def test_a_syslog_that_hung_up_gets_the_next_message_too(
     services: Services, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scheme: str
 ) -> None:
-    certificate = self_signed(tmp_path) if scheme == "tls" else None
-    if certificate is not None:
-        monkeypatch.setenv("SSL_CERT_FILE", str(certificate))
-    collector = _Collector(3, certificate)
-    collector.start()
-    address = f"{scheme}://localhost:{collector.listener.getsockname()[1]}"
-    told = open_services(services.settings.model_copy(update={"audit_syslog": address}))
+    if scheme == "tls":
+        monkeypatch.setenv("SSL_CERT_FILE", str(self_signed(tmp_path)))
+    collector, told = sending_to_a_collector(services, 3, scheme, tmp_path / "localhost.pem")
     for number in range(3):
         with told.database.write() as session:
             record(session, None, "study created", "study", f"s{number}")
@@ -350,10 +352,7 @@ def test_a_syslog_that_hung_up_gets_the_next_message_too(
 def test_a_syslog_whose_certificate_nobody_vouches_for_gets_nothing(
     services: Services, tmp_path: Path
 ) -> None:
-    collector = _Collector(1, self_signed(tmp_path))
-    collector.start()
-    address = f"tls://localhost:{collector.listener.getsockname()[1]}"
-    told = open_services(services.settings.model_copy(update={"audit_syslog": address}))
+    collector, told = sending_to_a_collector(services, 1, "tls", self_signed(tmp_path))
     with told.database.write() as session:
         record(session, None, "study created", "study", "s")
     collector.join(20)

@@ -168,15 +168,21 @@ def test_a_phone_whose_set_up_is_the_first_entry_under_the_new_key_goes_on(
     again.database.close()
 
 
-def test_a_key_that_was_changed_twice_spoils_no_phone_and_is_carried_over_in_two_steps(
-    services: Services, changed: Settings, third: Settings, old_key: Path, tmp_path: Path
-) -> None:
+def phones_of_two_keys(services: Services, changed: Settings, folder: Path) -> tuple[Phone, Phone, Path]:
+    """Ada's, set up under the first key, bob's under the second, and a file with the second."""
     ada = with_phone(services, "ada")
     between = open_services(changed)
     bob = with_phone(between, "bob")
     between.database.close()
-    second = tmp_path / "second"
+    second = folder / "second"
     second.write_text(NEW)
+    return ada, bob, second
+
+
+def test_a_key_that_was_changed_twice_spoils_no_phone_and_is_carried_over_in_two_steps(
+    services: Services, changed: Settings, third: Settings, old_key: Path, tmp_path: Path
+) -> None:
+    ada, bob, second = phones_of_two_keys(services, changed, tmp_path)
     again = open_services(third)
     with_phone(again, "eve")
     for key in (old_key, second):
@@ -192,12 +198,7 @@ def test_a_key_that_was_changed_twice_spoils_no_phone_and_is_carried_over_in_two
 def test_two_steps_carry_over_what_was_set_up_under_each_key(
     services: Services, changed: Settings, third: Settings, old_key: Path, tmp_path: Path
 ) -> None:
-    ada = with_phone(services, "ada")
-    between = open_services(changed)
-    bob = with_phone(between, "bob")
-    between.database.close()
-    second = tmp_path / "second"
-    second.write_text(NEW)
+    ada, bob, second = phones_of_two_keys(services, changed, tmp_path)
     assert rewrap(changed, old_key).returncode == 0
     assert rewrap(third, second).returncode == 0
     again = open_services(third)
