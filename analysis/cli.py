@@ -1,16 +1,11 @@
 """The command `analysis`: it only gathers the command groups."""
 
-import typer
-
+from experiments.command_groups import command_group
 from experiments.command_line import run_command_line
 from experiments.descriptions import leave_descriptions_out
 
-app = typer.Typer(
-    name="analysis",
-    help="From ratings to tables: within-participant ANOVA, means, pairs, figures and one report.",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    rich_markup_mode="rich",
+app = command_group(
+    "From ratings to tables: within-participant ANOVA, means, pairs, figures and one report.", name="analysis"
 )
 
 

@@ -5,16 +5,18 @@ from importlib import import_module
 from typing import Any
 
 import typer
-from typer.core import TyperCommand, TyperGroup
+from typer.core import TyperCommand
+
+from experiments.command_groups import WholeLineGroup, command_group
 
 Commands = Mapping[str, tuple[str, str]]
 """Command -> the module whose `register` adds it, and the line of help that lists it."""
 
 
-def lazy_group(commands: Commands) -> type[TyperGroup]:
+def lazy_group(commands: Commands) -> type[WholeLineGroup]:
     """A class of groups that have these commands."""
 
-    class LazyGroup(TyperGroup):
+    class LazyGroup(WholeLineGroup):
         """Imports a command's module when the command is called; its line in `--help` needs no import."""
 
         def __init__(self, **settings: Any):
@@ -35,21 +37,14 @@ def lazy_group(commands: Commands) -> type[TyperGroup]:
 
 def commands_of(module: str) -> dict[str, Any]:
     """The commands that a module registers, by name."""
-    part = typer.Typer(rich_markup_mode="rich", pretty_exceptions_enable=False, add_completion=False)
+    part = command_group("", add_completion=False)
     import_module(module).register(part)
     return dict(typer.main.get_group(part).commands)
 
 
 def lazy_app(name: str, summary: str, commands: Commands) -> typer.Typer:
     """The app of a command line with these commands."""
-    app = typer.Typer(
-        name=name,
-        cls=lazy_group(commands),
-        help=summary,
-        no_args_is_help=True,
-        pretty_exceptions_enable=False,
-        rich_markup_mode="rich",
-    )
+    app = command_group(summary, name=name, group_class=lazy_group(commands))
     # Typer makes no group where neither a command nor this is registered.
     app.callback()(lambda: None)
     return app

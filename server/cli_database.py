@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from experiments.command_groups import command_group
 from experiments.counted import counted
 from experiments.errors import InputError
 from server.cli_common import migrated_services, out
@@ -17,7 +18,7 @@ from server.runs.erasure import replay
 from server.settings import Settings
 from server.tallies.recount import repair
 
-app = typer.Typer(help="The database's tables.", no_args_is_help=True)
+app = command_group("The database's tables.")
 
 
 def register(parent: typer.Typer) -> None:

@@ -20,11 +20,11 @@ from analysis.commands.plan_options import (
 )
 from analysis.commands.plan_simulation import simulate
 from analysis.commands.synthetic import StatisticChoice
+from experiments.command_groups import command_group
 
-plan = typer.Typer(
+plan = command_group(
+    "Sample size by simulation: participants, clips and faces for a power, and a text that says so.",
     name="plan",
-    help="Sample size by simulation: participants, clips and faces for a power, and a text that says so.",
-    no_args_is_help=True,
 )
 
 

@@ -5,6 +5,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from experiments.command_groups import command_group
 from experiments.errors import InputError
 from server.accounts import invitations, notices, service
 from server.accounts.passwords import hash_password
@@ -15,8 +16,8 @@ from server.errors import ApiError
 from server.models import ROLES
 from server.settings import Settings
 
-app = typer.Typer(help="Accounts of experimenters.", no_args_is_help=True)
-account_app = typer.Typer(help="Let somebody in again who lost a password or a phone.", no_args_is_help=True)
+app = command_group("Accounts of experimenters.")
+account_app = command_group("Let somebody in again who lost a password or a phone.")
 
 
 def register(parent: typer.Typer) -> None:

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from experiments.command_groups import command_group
 from experiments.errors import InputError
 from experiments.files import whole_file
 from server.audit import repository
@@ -16,7 +17,7 @@ from server.audit.verify import verify
 from server.cli_common import migrated_services, out
 from server.context import Services
 
-app = typer.Typer(help="The audit log: verify its chain of hashes, export it.", no_args_is_help=True)
+app = command_group("The audit log: verify its chain of hashes, export it.")
 
 
 def register(parent: typer.Typer) -> None:

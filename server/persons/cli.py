@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from experiments.command_groups import command_group
 from experiments.errors import InputError
 from experiments.files import check_targets, whole_private_file
 from server.accounts.identity import OPERATOR
@@ -13,7 +14,7 @@ from server.persons.service import subject_access, visits_of
 from server.runs.erasure import erase
 from server.studies.lookup import find_study
 
-app = typer.Typer(help="One participant: subject access and erasure.", no_args_is_help=True)
+app = command_group("One participant: subject access and erasure.")
 StudyName = Annotated[str, typer.Argument(help="Name of the study.", show_default=False)]
 Run = Annotated[str, typer.Option("--run", help="Identifier of one of the person's runs.")]
 RecruitersId = Annotated[str, typer.Option("--id", help="What the recruiter calls the person.")]

@@ -8,6 +8,7 @@ import typer
 from rich.table import Table
 from sqlalchemy.orm import Session
 
+from experiments.command_groups import command_group
 from experiments.errors import InputError, did_you_mean
 from experiments.load import locate
 from experiments.manifest import Manifest, read_manifest
@@ -34,8 +35,8 @@ from server.studies.lookup import active_version, find_study, must_not_be_archiv
 from server.studies.planned import planned_experiment
 from server.studies.signing import signing
 
-study_app = typer.Typer(help="Studies on this server.", no_args_is_help=True)
-link_app = typer.Typer(help="Links for participants.", no_args_is_help=True)
+study_app = command_group("Studies on this server.")
+link_app = command_group("Links for participants.")
 STATUSES = ("draft", "pilot", "live", "closed")
 KINDS: dict[str, LinkKind] = {"general": "general", "personal": "personal", "preview": "preview"}
 

@@ -6,6 +6,7 @@ import typer
 from pydantic import TypeAdapter, ValidationError
 from rich.table import Table
 
+from experiments.command_groups import command_group
 from experiments.errors import InputError
 from server.accounts.identity import OPERATOR
 from server.cli_common import migrated_services, one_of, out
@@ -14,7 +15,7 @@ from server.studies.lookup import find_study
 from server.workspaces import repository, service
 from server.workspaces.schemas import WorkspaceName
 
-app = typer.Typer(help="Workspaces: laboratories that share this server.", no_args_is_help=True)
+app = command_group("Workspaces: laboratories that share this server.")
 WorkspaceArgument = Annotated[str, typer.Argument(help="Name of the workspace.")]
 AccountArgument = Annotated[str, typer.Argument(help="Name of the account.")]
 StudyArgument = Annotated[str, typer.Argument(help="Name of the study.")]

@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from experiments.command_groups import command_group
+
 MODEL_HELP = """
 The PCA blink model: learn from recorded blinks, make new ones, hand curves to animation programs.
 
@@ -34,7 +36,7 @@ PcaOption = Annotated[
 
 def register(app: typer.Typer) -> None:
     """Add `stimuli model` to `app`."""
-    model = typer.Typer(help=MODEL_HELP, no_args_is_help=True)
+    model = command_group(MODEL_HELP)
     model.command("fit")(fit)
     model.command("sample")(sample)
     model.command("textbook")(textbook)

@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from experiments.command_groups import command_group
+
 LIBRARY_HELP = """
 The blink profiles that ship with the project.
 
@@ -20,7 +22,7 @@ Examples:
 
 def register(app: typer.Typer) -> None:
     """Add `stimuli profiles` to `app`."""
-    profiles = typer.Typer(help=LIBRARY_HELP, no_args_is_help=False)
+    profiles = command_group(LIBRARY_HELP, no_args_is_help=False)
     profiles.callback(invoke_without_command=True)(_list_by_default)
     profiles.command("list")(list_profiles)
     profiles.command("plot")(plot_profiles)

@@ -5,15 +5,14 @@ from typing import Annotated
 
 import typer
 
+from experiments.command_groups import command_group
 from stimuli_builder.characters.cli_face import bake_face
 from stimuli_builder.characters.cli_samples import bake_samples
 from stimuli_builder.characters.retired import load_retired, restore
 from stimuli_builder.clips.characters import SHIPPED_FOLDER, geometry, shipped_names
 
-bake_app = typer.Typer(no_args_is_help=True, help="Render a character's atlas of baked pictures.")
-character_app = typer.Typer(
-    no_args_is_help=True, help="List the characters that are here, and bring back one of an earlier release."
-)
+bake_app = command_group("Render a character's atlas of baked pictures.")
+character_app = command_group("List the characters that are here, and bring back one of an earlier release.")
 
 
 @bake_app.callback()

@@ -24,7 +24,7 @@ def loaded(*arguments: str) -> set[str]:
 
 
 def test_help_needs_no_numerics() -> None:
-    assert not loaded("--help") & {"numpy", "pandas", "scipy", "sqlalchemy", "pydantic", "numba"}
+    assert not loaded("--help") & {"rich", "numpy", "pandas", "scipy", "sqlalchemy", "pydantic", "numba"}
 
 
 def test_anova_of_a_file_needs_no_database_no_page_and_no_figure(tmp_path: Path) -> None:
