@@ -32,17 +32,21 @@ def check_paper(
 
       analysis check-paper figures.toml
 
+    Exit code 1 where a statistic or figure does not fit.
     The shipped analysis/paper/published/FIGURES.toml shows the format of figures (docs/analysis.md).
     """
     from analysis.paper.printed import SHIPPED
 
     if file is None or file.suffix.lower() == ".toml":
-        _check_figures(file or SHIPPED, json)
+        wrong = _check_figures(file or SHIPPED, json)
     else:
-        _check_document(file, json)
+        wrong = _check_document(file, json)
+    if wrong:
+        raise typer.Exit(1)
 
 
-def _check_document(file: Path, json: Path | None) -> None:
+def _check_document(file: Path, json: Path | None) -> int:
+    """Print what a manuscript's statistics say; how many do not fit."""
     from analysis.paper.document import read_document
     from analysis.paper.statistics import check_text
     from analysis.report.formats import wrap
@@ -64,9 +68,11 @@ def _check_document(file: Path, json: Path | None) -> None:
             typer.echo("\n".join(wrap(f"- {statistic.text}: {problem}{grave}")))
     for fragment in result.unread:
         typer.echo("\n".join(wrap(f"- could not be read: {fragment}")))
+    return result.n_wrong
 
 
-def _check_figures(figures: Path, json: Path | None) -> None:
+def _check_figures(figures: Path, json: Path | None) -> int:
+    """Print what printed figures say of each other; how many problems they have, notes not counted."""
     from analysis.paper import check as checks
     from analysis.paper.printed import load_figures
     from analysis.report.formats import wrap
@@ -89,3 +95,4 @@ def _check_figures(figures: Path, json: Path | None) -> None:
             typer.echo("- nothing found")
     grave = sum(finding.kind != "note" for finding in findings)
     typer.echo(f"\n{grave} problems and {len(findings) - grave} notes")
+    return grave

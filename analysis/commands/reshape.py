@@ -34,6 +34,8 @@ def reshape(
     table = lengthen(file, columns, rating)
     with whole_file(out) as temporary:
         table.rows.to_csv(temporary, index=False, encoding="utf-8", lineterminator="\n")
+    for decision in table.decisions:
+        typer.echo(f"- {decision}")
     for factor in table.factors:
         typer.echo(f"- {factor}: {', '.join(dict.fromkeys(table.rows[factor]))}")
     typer.echo(

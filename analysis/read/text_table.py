@@ -167,7 +167,10 @@ def texts_required(table: TextTable, name: str, factor: bool = False) -> None:
     column = table.columns[name]
     if "" in column.cat.categories:
         row = int(np.argmax((column == "").to_numpy()))
-        raise InputError(f"{table.source}: '{name}' is empty in line {table.line(row)}; every row needs one")
+        declared = ", or declared missing," if table.source.lower().endswith((".sav", ".zsav")) else ""
+        raise InputError(
+            f"{table.source}: '{name}' is empty{declared} in line {table.line(row)}; every row needs one"
+        )
     folded: dict[str, str] = {}
     for text in column.cat.categories:
         other = folded.setdefault(text.casefold(), text)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from analysis.read.files.cells import Cells
 from analysis.read.files.open import reader_of
 from experiments.errors import InputError
 
@@ -19,12 +20,13 @@ FEWEST_COLUMNS = 3
 
 @dataclass(frozen=True)
 class LongTable:
-    """Rows, one a person and cell; the factors that the columns' names hold; what stayed beside."""
+    """Rows, one a person and cell; factors in the columns' names; what stayed beside; what was understood."""
 
     rows: pd.DataFrame
     factors: tuple[str, ...]
     n_columns: int
     beside: tuple[str, ...]
+    decisions: tuple[str, ...]
 
 
 def wide_hint(header: Sequence[str]) -> str:
@@ -90,7 +92,8 @@ def lengthen(path: Path, pattern: str, rating: str) -> LongTable:
             raise InputError(
                 f"{path.name} has a column '{name}' already; choose another name for the new one"
             )
-    cells = reader.cells(header).rows
+    read = reader.cells(header)
+    cells = _with_words(read, beside)
     parts = [
         cells[list(beside)].assign(
             **dict(zip(factors, levels_of_column, strict=True)), **{rating: cells[name]}
@@ -98,7 +101,14 @@ def lengthen(path: Path, pattern: str, rating: str) -> LongTable:
         for name, levels_of_column in levels.items()
     ]
     rows = pd.concat(parts).sort_index(kind="stable").reset_index(drop=True)
-    return LongTable(rows, factors, len(levels), beside)
+    return LongTable(rows, factors, len(levels), beside, read.decisions)
+
+
+def _with_words(read: Cells, beside: Sequence[str]) -> pd.DataFrame:
+    """Words in the place of the codes of what stays beside, where each code has a word of its own."""
+    words = {name: read.labels[name] for name in beside if name in read.labels}
+    distinct = {name: dict(of) for name, of in words.items() if len(set(of.values())) == len(of)}
+    return read.rows.assign(**{name: read.rows[name].replace(of) for name, of in distinct.items()})
 
 
 def _refuse_pattern(pattern: str, factors: tuple[str, ...]) -> None:

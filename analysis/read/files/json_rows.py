@@ -1,4 +1,4 @@
-"""JSON as programs for experiments write it: a list of objects, one a trial."""
+"""JSON as programs for experiments write it: a list of objects, one a trial; or lines of such JSON."""
 
 import json
 from pathlib import Path
@@ -24,7 +24,7 @@ def cells(path: Path, names: list[str]) -> Cells:
 
 def _objects(path: Path) -> list[dict[str, Any]]:
     try:
-        read = json.loads(path.read_text(encoding="utf-8-sig"))
+        read = _json_of(path.read_text(encoding="utf-8-sig"))
     except (ValueError, RecursionError) as error:  # of digits too: Python reads 4,300 of a whole number
         said = str(error).partition(";")[0]
         raise InputError(f"{path.name} is not JSON that can be read ({said})") from error
@@ -34,6 +34,17 @@ def _objects(path: Path) -> list[dict[str, Any]]:
     if not rows or not all(isinstance(row, dict) for row in rows):
         raise InputError(f"{path.name}: expected a list of objects, one a trial; save the data as CSV")
     return rows
+
+
+def _json_of(text: str) -> Any:
+    """The value of a text; of JSON lines (an object each, or a list of them as of JATOS) all objects."""
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError as error:
+        if not error.msg.startswith("Extra data"):
+            raise
+    values = [json.loads(line) for line in text.splitlines() if line.strip()]
+    return [row for value in values for row in (value if isinstance(value, list) else [value])]
 
 
 def _plain(value: Any) -> Any:

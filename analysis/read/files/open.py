@@ -17,7 +17,14 @@ _SAVE_AS = {
     ".rds": "CSV",
     ".rdata": "CSV",
 }
-_OF_SUFFIX = {".xlsx": "workbook", ".xlsm": "workbook", ".sav": "spss", ".zsav": "spss", ".json": "json_rows"}
+_OF_SUFFIX = {
+    ".xlsx": "workbook",
+    ".xlsm": "workbook",
+    ".sav": "spss",
+    ".zsav": "spss",
+    ".json": "json_rows",
+    ".jsonl": "json_rows",
+}
 
 
 class Reader(NamedTuple):
@@ -56,7 +63,7 @@ def _split_sheet(path: Path) -> tuple[Path, str | None]:
 
 def _sort(path: Path) -> str:
     if path.is_dir():
-        return "psych_ds"
+        return "folder"
     if not path.is_file():
         raise InputError(f"no file {path}; expected a CSV file with one row a trial")
     suffix = path.suffix.lower()

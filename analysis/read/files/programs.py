@@ -26,7 +26,8 @@ class Program:
 
 PROGRAMS = (
     Program("jsPsych", frozenset({"trial_type", "trial_index", "time_elapsed"}), "trial_type"),
-    Program("PsychoPy", frozenset({"expName", "psychopyVersion"}), None),
+    Program("PsychoPy", frozenset({"psychopyVersion"}), None),
+    Program("PsychoPy", frozenset({"expName", "frameRate"}), None),
     Program("Gorilla", frozenset({"Event Index", "Participant Private ID"}), "Zone Type"),
 )
 

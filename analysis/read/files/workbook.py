@@ -19,12 +19,14 @@ Rows = list[list[Any]]
 class Page:
     """A sheet from its first row that holds anything, which is row `first`, and its merged cells.
 
-    `merged` has a text like `A2:A4` and the rows and columns from and to, counted from 1.
+    `merged` has a text like `A2:A4` and the rows and columns from and to, counted from 1; `hidden` counts
+    rows with values that a filter or a person hid.
     """
 
     rows: Rows
     first: int
     merged: tuple[tuple[str, int, int, int, int], ...]
+    hidden: int
 
 
 _UNREADABLE = (
@@ -47,7 +49,11 @@ def cells(path: Path, sheet: str | None, names: list[str]) -> Cells:
     body = [(row + [None] * width)[:width] for row in page.rows[1:]]
     _refuse_merged(path, page, columns, names)
     _refuse_uncalculated(path, title, columns, body, names)
-    said = (f"read from the sheet '{title}' of {path.name}", *_dates_beside(page, columns, body, names))
+    said = (
+        f"read from the sheet '{title}' of {path.name}",
+        *_hidden_rows(page),
+        *_dates_beside(page, columns, body, names),
+    )
     return cells_of(columns, body, names, page.first + 1, decisions=said)
 
 
@@ -75,6 +81,13 @@ def _refuse_merged(path: Path, page: Page, columns: list[str], names: list[str])
                     f"{path.name}: the cells {text} of '{name}' are merged, and only the first of them holds "
                     "a value; unmerge them and fill every row"
                 )
+
+
+def _hidden_rows(page: Page) -> list[str]:
+    """Say that rows count which a filter hides from the person who looks at the sheet."""
+    if not page.hidden:
+        return []
+    return [f"{page.hidden} hidden rows of the sheet count too; delete them where they should not"]
 
 
 def _dates_beside(page: Page, columns: list[str], body: Rows, names: list[str]) -> list[str]:
@@ -137,7 +150,12 @@ def _page_of(path: Path, sheet: Any) -> Page:
         (str(area), area.min_row, area.min_col, area.max_row, area.max_col)
         for area in sheet.merged_cells.ranges
     )
-    return Page(rows[first:], first + 1, merged)
+    hidden = sum(
+        number <= len(rows) and any(value is not None for value in rows[number - 1])
+        for number, row in sheet.row_dimensions.items()
+        if row.hidden and number > first + 1
+    )
+    return Page(rows[first:], first + 1, merged, hidden)
 
 
 def _refuse_uncalculated(path: Path, title: str, columns: list[str], body: Rows, names: list[str]) -> None:

@@ -102,6 +102,7 @@ def test_docx_and_pdf(tmp_path) -> None:
     document.save(tmp_path / "m.docx")
     result = CliRunner().invoke(app, ["check-paper", str(tmp_path / "m.docx")])
     assert "1 statistics read, 1 checked, 1 do not fit, 0 could not be read" in result.output
+    assert result.exit_code == 1
     (tmp_path / "broken.docx").write_bytes(b"no zip")
     with pytest.raises(InputError, match="not a readable DOCX"):
         read_document(tmp_path / "broken.docx")

@@ -1,0 +1,100 @@
+"""Folders of tables, JSON lines and hidden rows: as programs and people leave them."""
+
+import json
+from pathlib import Path
+
+import openpyxl
+import pandas as pd
+import pyreadstat
+import pytest
+
+from analysis.read.long_csv import read_long_table
+from analysis.read.wide import lengthen
+from experiments.errors import InputError
+
+PEOPLE = ("p1", "p2", "p3")
+
+
+def folder_of(folder: Path, psychopy: bool = False) -> Path:
+    """A folder with a file a person, without a column of people."""
+    folder.mkdir()
+    for number, person in enumerate(PEOPLE):
+        rows = [f"calm,{number + 1}", f"wild,{number + 3}"]
+        head = "face,score"
+        if psychopy:
+            head, rows = f"{head},psychopyVersion", [",,2025.1", *(f"{row},2025.1" for row in rows)]
+        (folder / f"{person}.csv").write_text("\n".join([head, *rows]) + "\n", encoding="utf-8")
+    return folder
+
+
+@pytest.mark.parametrize("psychopy", [False, True], ids=["plain", "PsychoPy"])
+def test_a_folder_with_a_file_a_person_is_one_table(tmp_path, psychopy) -> None:
+    data = read_long_table(folder_of(tmp_path / "f", psychopy), "file", "score", ["face"])
+    assert data.rows["file"].astype(str).tolist() == [person for person in PEOPLE for _ in range(2)]
+    assert data.rows["score"].tolist() == [1, 3, 2, 4, 3, 5]
+    assert data.decisions[0] == "read 3 data files of the folder f"
+
+
+def test_broken_runs_and_copies_in_a_folder_are_named(tmp_path) -> None:
+    folder = folder_of(tmp_path / "f")
+    (folder / "p8.csv").write_text("", encoding="utf-8")
+    (folder / "p9.csv").write_text("face,score\n\n", encoding="utf-8")
+    (folder / "p3 (1).csv").write_bytes((folder / "p3.csv").read_bytes())
+    data = read_long_table(folder, "file", "score", ["face"])
+    assert list(data.decisions[1:3]) == [
+        "files without rows left out: p8.csv, p9.csv",
+        "files that are like another, byte for byte, count too: p3.csv",
+    ]
+
+
+def test_a_folder_without_tables_ends_in_one_line(tmp_path) -> None:
+    with pytest.raises(InputError, match=r"folder without data files; expected files .csv, one a person"):
+        read_long_table(tmp_path, "file", "score", ["face"])
+
+
+def test_a_column_counts_and_not_the_name_of_the_file(tmp_path) -> None:
+    (tmp_path / "data").mkdir()
+    (tmp_path / "dataset_description.json").write_text("{}", encoding="utf-8")
+    for person in PEOPLE:
+        text = f"id,face,score\n{person},calm,1\n{person},wild,2\n"
+        (tmp_path / "data" / f"id-x{person}_data.csv").write_text(text, encoding="utf-8")
+    data = read_long_table(tmp_path, "id", "score", ["face"])
+    assert set(data.rows["id"].astype(str)) == set(PEOPLE)
+    assert data.decisions[1] == ("'id' is p1 in id-xp1_data.csv; the column counts, not the name of the file")
+
+
+@pytest.mark.parametrize(("name", "lists"), [("jatos.json", True), ("lines.jsonl", False)])
+def test_lines_of_json_are_trials(tmp_path, name, lists) -> None:
+    trials = [[{"id": p, "face": f, "score": s} for s, f in enumerate(("calm", "wild"), 1)] for p in PEOPLE]
+    lines = trials if lists else [trial for person in trials for trial in person]
+    (tmp_path / name).write_text("\n".join(json.dumps(line) for line in lines), encoding="utf-8")
+    assert len(read_long_table(tmp_path / name, "id", "score", ["face"]).rows) == 6
+
+
+def test_rows_that_a_filter_hides_count_and_are_said(tmp_path) -> None:
+    book = openpyxl.Workbook()
+    for row in [("id", "face", "score"), *((p, f, 3) for p in PEOPLE for f in ("calm", "wild"))]:
+        book.active.append(row)
+    for number in (3, 4, 5000):
+        book.active.row_dimensions[number].hidden = True
+    book.save(tmp_path / "b.xlsx")
+    data = read_long_table(tmp_path / "b.xlsx", "id", "score", ["face"])
+    assert len(data.rows) == 6
+    assert data.decisions[1] == "2 hidden rows of the sheet count too; delete them where they should not"
+
+
+def test_words_of_codes_stay_where_a_wide_spss_file_is_made_long(tmp_path) -> None:
+    frame = pd.DataFrame({"id": [1.0, 2.0], "group": [1.0, 2.0], "a_x": [3.0, 4.0], "a_y": [5.0, 6.0]})
+    pyreadstat.write_sav(
+        frame, tmp_path / "w.sav", variable_value_labels={"group": {1: "young", 2: "old"}, "a_x": {3: "bad"}}
+    )
+    table = lengthen(tmp_path / "w.sav", "a_{face}", "score")
+    assert table.rows["group"].tolist() == ["young", "young", "old", "old"]
+    assert table.rows["score"].tolist() == ["3", "5", "4", "6"]
+
+
+def test_a_level_declared_missing_is_named_so(tmp_path) -> None:
+    frame = pd.DataFrame({"id": ["1", "1"], "face": ["calm", "wild"], "score": [1.0, 2.0]})
+    pyreadstat.write_sav(frame, tmp_path / "m.sav", missing_ranges={"face": ["wild"]})
+    with pytest.raises(InputError, match="'face' is empty, or declared missing, in line 2"):
+        read_long_table(tmp_path / "m.sav", "id", "score", ["face"])
