@@ -2,9 +2,10 @@
 
 import re
 
+from analysis.report.column_widths import text_share
 from analysis.report.contents import Contents, DrawnPart, Picture, Section
 from analysis.report.formats import Table
-from analysis.report.italics import heading_pieces, pieces
+from analysis.report.italics import heading_pieces, pieces, signed, signed_cell
 
 NEEDS = r"\usepackage{array,booktabs,graphicx,longtable}"
 """What a document must load for the tables."""
@@ -31,7 +32,6 @@ _TEXT = {
 }
 _LATEX = {**{sign: rf"\ensuremath{{{math}}}" for sign, math in _MATH.items()}, **_TEXT}
 _CONTROL = re.compile("[\\x00-\\x08\\x0b-\\x1f\\x7f-\\x9f\\ud800-\\udfff\\ufeff\\ufffe\\uffff]")
-_NEGATIVE = re.compile(r"(?<![\w.])-(?=[\d.])")
 
 _PREAMBLE = r"""% Set it with pdflatex, xelatex or lualatex, in the folder of the report.
 \documentclass[11pt,a4paper]{article}
@@ -52,13 +52,12 @@ NEEDS
 
 
 def latex_text(text: str) -> str:
-    """`text` with every character escaped that LaTeX gives a meaning; minus signs before numbers.
+    """`text` with every character escaped that LaTeX gives a meaning.
 
     White space of any length is one space: an empty line ends a paragraph, which no caption may hold.
     """
-    in_one_line = re.sub(r"[ \t\n]+", " ", text)
-    signed = _NEGATIVE.sub("−", _CONTROL.sub("\N{REPLACEMENT CHARACTER}", in_one_line))
-    return "".join(_LATEX.get(character, character) for character in signed)
+    in_one_line = _CONTROL.sub("\N{REPLACEMENT CHARACTER}", re.sub(r"[ \t\n]+", " ", text))
+    return "".join(_LATEX.get(character, character) for character in in_one_line)
 
 
 def as_latex(table: Table, position: str = "") -> str:
@@ -69,7 +68,7 @@ def as_latex(table: Table, position: str = "") -> str:
     caption = f"\\caption{{{latex_text(table.title)}}}\\label{{tab:{table.key}}}"
     heads = " & ".join(_in_italics(head) for head in heading_pieces(table.header))
     header = f"\\toprule\n{heads} \\\\\n\\midrule\n"
-    rows = "\n".join(_row(row) for row in table.rows)
+    rows = "\n".join(_row(row, table.text_columns) for row in table.rows)
     columns = _columns(table)
     notes = "".join(f"\\par\\smallskip{{\\footnotesize {_sentence(note)}\\par}}\n" for note in table.notes)
     if len(table.rows) > LONG:
@@ -86,14 +85,16 @@ def as_latex(table: Table, position: str = "") -> str:
     )
 
 
-def _row(cells: tuple[str, ...]) -> str:
-    return " & ".join(latex_text(cell) for cell in cells) + r" \\"
+def _row(cells: tuple[str, ...], text_columns: int) -> str:
+    """A row, with a minus sign before numbers alone: ids and labels keep their hyphens."""
+    signs = (signed_cell(cell, position >= text_columns) for position, cell in enumerate(cells))
+    return " & ".join(map(latex_text, signs)) + r" \\"
 
 
 def _columns(table: Table) -> str:
     kinds = ["l" if i < table.text_columns else "r" for i in range(len(table.header))]
     if max((len(row[0]) for row in table.rows if row), default=0) > WIDE:
-        kinds[0] = r">{\raggedright\arraybackslash}p{0.4\linewidth}"
+        kinds[0] = rf">{{\raggedright\arraybackslash}}p{{{text_share(table):.2f}\linewidth}}"
     return "".join(kinds)
 
 
@@ -127,7 +128,11 @@ def as_document(contents: Contents, parts: tuple[DrawnPart, ...], version: str) 
         body += _part(part, contents.synthetic)
     if contents.evidence:
         body += _section(contents.evidence, "section", contents.synthetic)
-    body += [r"\section{Method}", latex_text(contents.methods), f"Made by palpebra {latex_text(version)}."]
+    body += [
+        r"\section{Method}",
+        latex_text(signed(contents.methods)),
+        f"Made by palpebra {latex_text(version)}.",
+    ]
     text = "\n\n".join([*body, r"\end{document}"]) + "\n"
     preamble = _PREAMBLE.replace("DECLARED", _declared(text)).replace("ACTIVE", _active(text))
     return preamble.replace("NEEDS", NEEDS) + text
@@ -164,7 +169,7 @@ def _lines(title: str, lines: tuple[str, ...]) -> list[str]:
 
 
 def _sentence(text: str) -> str:
-    return _in_italics(pieces(text))
+    return _in_italics(pieces(signed(text)))
 
 
 def _in_italics(split: list[tuple[str, bool]]) -> str:

@@ -6,13 +6,15 @@ from io import BytesIO
 from typing import TYPE_CHECKING
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
+from analysis.report.column_widths import widths_cm
 from analysis.report.contents import Contents, DrawnPart, Picture, Section
 from analysis.report.formats import Table
 from analysis.report.italics import heading_pieces, pieces, signed, signed_cell
 
 if TYPE_CHECKING:
     from docx.document import Document
-    from docx.table import _Cell
+    from docx.table import Table as Grid
+    from docx.table import _Cell, _Row
     from docx.text.paragraph import Paragraph
 
 
@@ -21,6 +23,8 @@ EPOCH = datetime(2000, 1, 1, tzinfo=UTC)
 ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 WIDTH_CM = 16.0
 TABLE_POINTS = 8
+WHOLE = 14
+"""A table of more rows may be broken over pages; of its first rows one stays with the head."""
 _CONTROL = re.compile("[\\x00-\\x08\\x0b\\x0c\\x0e-\\x1f\\ufffe\\uffff]")
 
 
@@ -44,6 +48,7 @@ def as_docx(contents: Contents, parts: tuple[DrawnPart, ...], version: str) -> b
     import docx
 
     document = docx.Document()
+    _set_margins(document)
     properties = document.core_properties
     properties.title, properties.author, properties.comments = _sayable(contents.title), "palpebra", ""
     properties.created = properties.modified = EPOCH
@@ -62,6 +67,15 @@ def as_docx(contents: Contents, parts: tuple[DrawnPart, ...], version: str) -> b
     document.add_paragraph(_sayable(contents.methods))
     document.add_paragraph(f"Made by palpebra {version}.")
     return _same_bytes(document)
+
+
+def _set_margins(document: "Document") -> None:
+    """Lines as wide as figures are."""
+    from docx.shared import Cm, Length
+
+    section = document.sections[0]
+    beside = Length(((section.page_width or Cm(21.6)) - Cm(WIDTH_CM)) // 2)
+    section.left_margin = section.right_margin = beside
 
 
 def _sayable(text: str) -> str:
@@ -124,13 +138,14 @@ def _add_picture(document: "Document", picture: Picture, synthetic: bool) -> Non
     from docx.shared import Cm
 
     document.add_picture(BytesIO(picture.png), width=Cm(WIDTH_CM))
+    document.paragraphs[-1].paragraph_format.keep_with_next = True
     document.add_paragraph(
         _sayable(picture.caption) + (" (synthetic data)" if synthetic else ""), style="Caption"
     )
 
 
 def _add_table(document: "Document", table: Table) -> None:
-    document.add_paragraph(_sayable(table.title), style="Caption")
+    document.add_paragraph(_sayable(table.title), style="Caption").paragraph_format.keep_with_next = True
     grid = document.add_table(rows=1 + len(table.rows), cols=len(table.header), style="Light List")
     head = heading_pieces([_sayable(text) for text in table.header])
     body = [
@@ -143,9 +158,36 @@ def _add_table(document: "Document", table: Table) -> None:
     for cells, row in zip(grid.rows, (head, *body), strict=True):
         for position, (cell, split) in enumerate(zip(cells.cells, row, strict=True)):
             _fill(cell, split, right=position >= table.text_columns)
+    _lay_out(grid, widths_cm(table, WIDTH_CM), bool(table.notes))
     for note in table.notes:
         _add_runs(document.add_paragraph(style="Body Text 3"), pieces(signed(_sayable(note))))
     document.add_paragraph()
+
+
+def _lay_out(grid: "Grid", widths: list[float], noted: bool) -> None:
+    """Columns as wide as their cells need; the head on each page, and no row or short table in two halves."""
+    from docx.shared import Cm
+
+    grid.autofit = False
+    rows, lengths = list(grid.rows), [Cm(width) for width in widths]
+    for column, length in zip(grid.columns, lengths, strict=True):
+        column.width = length
+    whole = len(rows) <= WHOLE
+    for number, row in enumerate(rows):
+        _mark(row, "cantSplit")
+        last = number + 1 == len(rows)
+        keep = (whole and (noted or not last)) or number < 2 or (noted and last)
+        for cell, length in zip(row.cells, lengths, strict=True):
+            cell.width = length
+            cell.paragraphs[0].paragraph_format.keep_with_next = keep or None
+    _mark(rows[0], "tblHeader")
+
+
+def _mark(row: "_Row", name: str) -> None:
+    """Give a row a property that python-docx has no name for."""
+    from docx.oxml import OxmlElement
+
+    row._tr.get_or_add_trPr().append(OxmlElement(f"w:{name}"))
 
 
 def _fill(cell: "_Cell", split: list[tuple[str, bool]], right: bool) -> None:

@@ -192,7 +192,10 @@ def test_nothing_in_a_text_is_a_command(text) -> None:
 
 
 def test_a_negative_number_has_a_minus_sign_and_a_range_none() -> None:
-    assert latex_text("-0.5, 1-7, a-1") == r"\ensuremath{-}0.5, 1-7, a-1"
+    table = Table("k", "t", ("id", "n"), (("-7", "-0.5, 1-7"), ("-7", "id -7")), 1, ("-0.5, 1-7, a-1",))
+    made = as_latex(table)
+    assert "\n-7 & \\ensuremath{-}0.5, 1-7 \\\\\n-7 & id -7 \\\\\n" in made, "ids keep their hyphens"
+    assert r"\ensuremath{-}0.5, 1-7, a-1" in made
     assert latex_text("$<") == r"\$\ensuremath{<}"
 
 

@@ -9,6 +9,8 @@ import pytest
 from analysis.plans.clip_rating import PLAN, READING, contents
 from analysis.plans.prepare import prepare
 from analysis.read.study_answers import load_csv
+from analysis.report.column_widths import widths_cm
+from analysis.report.formats import Table
 from analysis.report.italics import pieces
 from analysis.report.write import write_report
 from experiments.load import load_experiment
@@ -48,6 +50,30 @@ def test_symbols_are_in_italics(report) -> None:
     italic = {run.text for paragraph in document.paragraphs for run in paragraph.runs if run.italic}
     assert {"F", "p", "M", "SE"} <= italic
     assert "<i>p</i> " in (report[1] / "report.html").read_text(encoding="utf-8")
+
+
+def test_tables_fit_the_page_and_keep_their_heads(report) -> None:
+    document = docx.Document(str(report[1] / "report.docx"))
+    section = document.sections[0]
+    room = section.page_width - section.left_margin - section.right_margin
+    for table in document.tables:
+        widths = [column.width for column in table.columns]
+        assert all(width is not None for width in widths)
+        assert sum(widths) <= room + 10_000, "a tenth of a millimetre may come of rounding"
+        assert [cell.width for cell in table.rows[1].cells] == widths
+        assert table.rows[0]._tr.xpath("./w:trPr/w:tblHeader"), "the head is on every page"
+        assert all(row._tr.xpath("./w:trPr/w:cantSplit") for row in table.rows)
+    widest = max(document.tables, key=lambda table: len(table.rows))
+    assert widest.columns[0].width > 2 * widest.columns[1].width, "texts are wider than numbers"
+
+
+@pytest.mark.parametrize(("room", "sums"), [(16.0, True), (3.0, False)])
+def test_columns_of_numbers_are_whole_and_texts_give_way(room, sums) -> None:
+    row = ("a label of many words that is longer than any line of a page can be, and longer still", "-1.25")
+    widths = widths_cm(Table("k", "t", ("Effect", "F"), (row,) * 3), room)
+    assert widths[1] == widths_cm(Table("k", "t", ("Effect", "F"), (("a", row[1]),)), 16.0)[1]
+    assert (abs(sum(widths) - room) < 1e-9) is sums
+    assert widths[0] >= 2.4
 
 
 def test_no_clock_is_in_the_file(report) -> None:
