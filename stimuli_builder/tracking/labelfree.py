@@ -38,7 +38,7 @@ LEAST_SEEN = 0.3
 """Share of the frames looked at that must show a face: below it, what was found is hardly one."""
 DETECTOR_SHARE = 0.02
 """What the detector's lids may be off that no held-out frame tells, as part of the eye's width. Against
-labels they are 2.9% off where those are good to 1%, 2.6% where good to 3%; a part is in held-out frames."""
+labels they are 2.4% off where those are good to 1%, 2.6% where good to 3%; a part is in held-out frames."""
 MODES = 6
 SPREADS = 8.0
 UNLIKE_SHARE = 0.02

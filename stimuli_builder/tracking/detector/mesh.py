@@ -2,23 +2,32 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
 from experiments.errors import InputError
 from stimuli_builder.tracking.detector.detection import Detection, LidDetector, eye_points
 from stimuli_builder.tracking.detector.mesh_client import MeshClient, detector_environment
-from stimuli_builder.tracking.shapes import Points, eye_axis
+from stimuli_builder.tracking.shapes import Points, eye_axis, widths
 from stimuli_builder.video import Picture
 
 LEAST_EYE_PX = 10
 FACES_ASKED = 5
 """Pictures of a close-up in which a whole face is looked for: what is no close-up gives lids of a cheek."""
+SAME_FACE = 0.2
+"""Parts of an eye's width within which a face lies where its mirror image does: 0.03 or less in a recording
+of a face, 0.3 or more where the mesh saw faces in a close-up."""
 REGION_SIDES = (0.9, 1.2, 1.5, 1.9, 2.4)
 """Sides of the regions tried in a close-up, as parts of the picture's height."""
 REGION_SHIFTS = (-0.18, 0.0, 0.18)
 JITTERS = ((0, 0, 0.9), (0, 0, 1.1), (0.05, 0, 1.0), (0, 0.05, 1.0))
+SIDE_OF_WIDTH = 2.9
+"""Side of the region in which a close-up's eye is read, in widths of the eye as found."""
+VIEWS = tuple((dy, turn) for dy in (-0.24, -0.16, -0.08) for turn in (-10, 0, 10))
+"""The eye is read in all of these and the mean is taken: shift down in its widths, turn in degrees."""
+LAID_ON = 9
+"""Pictures over which the region is laid on the eye."""
 
 
 class FaceMesh:
@@ -40,20 +49,38 @@ class FaceMesh:
         return sorted(eyes_of_faces, key=lambda one: one.area_px2, reverse=True)
 
 
+class Region(NamedTuple):
+    """A square that the iris network sees: middle and side in pixels, mirrored or not, turn in degrees."""
+
+    x: float
+    y: float
+    side: float
+    flip: bool
+    turn: float = 0.0
+
+    def views(self, width: float) -> "list[Region]":
+        """The regions about this one in which an eye of such a width in pixels is read."""
+        return [Region(self.x, self.y + dy * width, self.side, self.flip, turn) for dy, turn in VIEWS]
+
+
 class CloseUp:
-    """One eye that fills the picture, in a region found once by `look_for`."""
+    """One eye that fills the picture, read in regions that `look_for` lays on it once."""
 
     eyes = 1
 
     def __init__(self, client: MeshClient):
         self._client = client
-        self._region: tuple[float, float, float, bool] | None = None
+        self._views: list[Region] = []
 
     def look_for(self, pictures: Sequence[Picture]) -> None:
-        """Choose the region whose contour moves least when the region is moved, and opens and closes most."""
+        """Lay the regions on the eye.
+
+        A first region is the one whose contour moves least when it is moved, and opens and closes most. Those
+        that the eye is read in are laid, in two rounds, on the eye as they see it.
+        """
         height, width = pictures[0].shape[:2]
         regions = [
-            (width / 2 + dx * width, height / 2 + dy * height, side * height, flip)
+            Region(width / 2 + dx * width, height / 2 + dy * height, side * height, flip)
             for side in REGION_SIDES
             for dx in REGION_SHIFTS
             for dy in REGION_SHIFTS
@@ -65,13 +92,24 @@ class CloseUp:
         heights = np.array([self._heights(p, [regions[k] for k in best]) for p in pictures])
         low, high = np.percentile(heights, [3, 90], axis=0)
         travel = (high - low) / np.maximum(high, 1e-6)
-        self._region = regions[int(best[int(np.argmax(travel - 2 * spread[best]))])]
+        region = regions[int(best[int(np.argmax(travel - 2 * spread[best]))])]
+        self._views = region.views(region.side / SIDE_OF_WIDTH)
+        spread_out = pictures[:: max(1, len(pictures) // LAID_ON)][:LAID_ON]
+        for _ in range(2):
+            self._lay(spread_out, region.flip)
 
-    def _spread(self, picture: Picture, regions: Sequence[Any]) -> Points:
+    def _lay(self, pictures: Sequence[Picture], flip: bool) -> None:
+        """Lay the views on the eye's middle, in the median of pictures, with sides by its width."""
+        canthi = np.array([self._points(picture)[0][[0, 5]] for picture in pictures])
+        width = float(np.median(np.hypot(*(canthi[:, 1] - canthi[:, 0]).T)))
+        x, y = np.median(canthi.mean(1), axis=0).tolist()
+        self._views = Region(x, y, SIDE_OF_WIDTH * width, flip).views(width)
+
+    def _spread(self, picture: Picture, regions: Sequence[Region]) -> Points:
         """How far the canthi move, as part of the eye's width, when each region is jittered."""
         moved = [
-            (x + dx * side, y + dy * side, side * scale, flip)
-            for x, y, side, flip in regions
+            Region(x + dx * side, y + dy * side, side * scale, flip)
+            for x, y, side, flip, _ in regions
             for dx, dy, scale in ((0, 0, 1.0), *JITTERS)
         ]
         answers = self._client.ask("eye", picture, regions=moved)["eyes"]
@@ -81,25 +119,29 @@ class CloseUp:
         away = np.sqrt(((canthi[:, 1:] - canthi[:, :1]) ** 2).sum(-1)).mean((1, 2))
         return np.asarray(away / np.maximum(width, 1e-6))
 
-    def _heights(self, picture: Picture, regions: Sequence[Any]) -> list[float]:
+    def _heights(self, picture: Picture, regions: Sequence[Region]) -> list[float]:
         answers = self._client.ask("eye", picture, regions=list(regions))["eyes"]
         return [
             float(np.mean(np.array(lower)[3:6, 1]) - np.mean(np.array(upper)[3:6, 1]))
             for upper, lower, _ in answers
         ]
 
-    def detect(self, picture: Picture) -> list[Detection]:
-        """Return the eye in the region found before."""
-        if self._region is None:
-            return []
-        ((upper, lower, iris),) = self._client.ask("eye", picture, regions=[self._region])["eyes"]
-        up, low = np.array(upper), np.array(lower)
+    def _points(self, picture: Picture) -> tuple[Points, Points]:
+        """Nine points and the iris's five, the mean of all views."""
+        eyes = self._client.ask("eye", picture, regions=self._views)["eyes"]
+        up, low, iris = (np.mean([eye[part] for eye in eyes], axis=0) for part in range(3))
         # One-eye files begin at the image-left canthus, whichever that is.
         if up[0, 0] > up[-1, 0]:
             up, low = up[::-1], low[::-1]
-        points = eye_points(up, low[::-1])
+        return eye_points(up, low[::-1]), iris
+
+    def detect(self, picture: Picture) -> list[Detection]:
+        """Return the eye in the regions found before."""
+        if not self._views:
+            return []
+        points, iris = self._points(picture)
         box = np.concatenate([points.min(0), points.max(0)])
-        return [Detection(points, np.array([iris]), box)]
+        return [Detection(points, iris[None], box)]
 
 
 @contextmanager
@@ -123,9 +165,22 @@ def open_detector(*, one_eye: bool, first: Sequence[Picture] = ()) -> Iterator[L
 
 def _refuse_faces(mesh: FaceMesh, pictures: Sequence[Picture]) -> None:
     few = pictures[:: max(1, len(pictures) // FACES_ASKED)][:FACES_ASKED]
-    faces = sum(bool(mesh.detect(picture)) for picture in few)
+    faces = sum(_shows_a_face(mesh, picture) for picture in few)
     if 2 * faces > len(few):
         raise InputError(
             f"a whole face is seen on {faces} of {len(few)} frames looked at, and --one-eye is for close-ups "
             "of one eye; leave it out"
         )
+
+
+def _shows_a_face(mesh: FaceMesh, picture: Picture) -> bool:
+    """Whether a face is seen in a picture and, at the same place, in its mirror image.
+
+    In the iris and lashes of a close-up the mesh sees small faces, somewhere else in the mirror image.
+    """
+    seen, mirrored = mesh.detect(picture), mesh.detect(np.ascontiguousarray(picture[:, ::-1]))
+    if not seen or not mirrored:
+        return False
+    one = seen[0].points.reshape(2, -1, 2)
+    other = mirrored[0].points.reshape(2, -1, 2)[::-1] * [-1, 1] + [picture.shape[1] - 1, 0]
+    return bool(np.hypot(*(one - other).T).mean() < SAME_FACE * widths(seen[0].points))

@@ -2,7 +2,8 @@
 
 Runs in the environment of requirements.txt (numpy < 2) and imports nothing of this project. A message is
 the length of its JSON head (8 bytes, little endian), the head, and for a request the picture (RGB, uint8).
-Requests: {"op": "faces", "shape": [h, w, 3]}, or {"op": "eye", ..., "regions": [[x, y, side, flip]]}.
+Requests: {"op": "faces", "shape": [h, w, 3]}, or {"op": "eye", ..., "regions": [[x, y, side, flip, turn]]}:
+middle and side of a square in pixels, mirrored or not, turned clockwise by so many degrees.
 """
 
 import json
@@ -96,15 +97,22 @@ class Eye:
 
     def __call__(self, picture: Any, head: Any) -> Any:
         """Answer with lids and iris in each region."""
-        return {"eyes": [self._region(picture, *region) for region in head["regions"]]}
+        blurred: dict[int, Any] = {}
+        eyes = []
+        for region in head["regions"]:
+            blur = max(1, int(region[2] / SIDE))
+            if blur not in blurred:
+                blurred[blur] = cv2.blur(picture, (blur, blur))
+            eyes.append(self._region(blurred[blur], *region))
+        return {"eyes": eyes}
 
-    def _region(self, picture: Any, x: float, y: float, side: float, flip: bool) -> Any:
-        scale = SIDE / side
-        blur = max(1, int(1 / scale))
-        turn = np.array([[scale, 0, SIDE / 2 - scale * x], [0, scale, SIDE / 2 - scale * y]])
+    def _region(self, blurred: Any, x: float, y: float, side: float, flip: bool, turn: float) -> Any:
+        cos, sin = np.cos(np.radians(turn)), np.sin(np.radians(turn))
+        upright = SIDE / side * np.array([[cos, sin], [-sin, cos]])
+        away = np.array([SIDE / 2, SIDE / 2]) - upright @ [x, y]
         crop = cv2.warpAffine(
-            cv2.blur(picture, (blur, blur)),
-            turn,
+            blurred,
+            np.column_stack([upright, away]),
             (SIDE, SIDE),
             flags=cv2.INTER_LINEAR,
             borderMode=cv2.BORDER_REPLICATE,
@@ -119,7 +127,7 @@ class Eye:
             points = points.copy()
             if flip:
                 points[:, 0] = SIDE - 1 - points[:, 0]
-            landmarks[name] = (points - SIDE / 2) / scale + [x, y]
+            landmarks[name] = (points - away) @ np.linalg.inv(upright).T
         contour = landmarks["contour"]
         return [contour[list(UPPER)].tolist(), contour[list(LOWER)].tolist(), landmarks["iris"].tolist()]
 
