@@ -1,6 +1,7 @@
 """How numbers are printed: in tables and, in APA style, in sentences."""
 
 import math
+from collections.abc import Iterable
 
 DASH = "–"
 """Printed where a number does not exist."""
@@ -15,6 +16,20 @@ def fixed(value: float, digits: int = 2) -> str:
         return DASH
     text = f"{value:.{digits}f}"
     return text.lstrip("-") if float(text) == 0 else text
+
+
+def decimals(errors: Iterable[float | None], otherwise: int = 3) -> int:
+    """Decimals that show two digits of the smallest of standard errors; `otherwise` where none is above 0.
+
+    Examples
+    --------
+    >>> decimals([4.1, 12.0]), decimals([0.0032, None]), decimals([])
+    (1, 4, 3)
+    """
+    known = [error for error in errors if error is not None and 0 < error < math.inf]
+    if not known:
+        return otherwise
+    return min(max(1 - math.floor(math.log10(min(known))), 0), 6)
 
 
 def share(value: float, digits: int = 3) -> str:

@@ -14,9 +14,9 @@ from analysis.report.contents import Contents, Part, Picture
 from analysis.report.formats import Table
 from analysis.report.json_output import exclusions_data, study_data
 from analysis.report.left_out import left_out
-from analysis.report.numbers import apa_p, fixed, interval, p_value
+from analysis.report.numbers import apa_p, decimals, fixed, interval, p_value
 from analysis.report.r_choices import threshold_files
-from analysis.report.threshold_tables import means_table, people_table, threshold_table
+from analysis.report.threshold_tables import means_table, people_table, threshold_decimals, threshold_table
 from analysis.thresholds.likelihood import function
 from analysis.thresholds.people import ThresholdsResult
 from analysis.thresholds.psychometric import Threshold
@@ -113,12 +113,13 @@ def _tables(
 
 def differences_table(differences: "Sequence[Difference]", name: str, synthetic: bool) -> Table:
     """Series compared within people."""
+    digits = decimals(abs(d.difference / d.t) if d.t else None for d in differences)
     rows = tuple(
         (
             f"{d.first} - {d.second}" + ("" if d.what == "threshold" else f", {d.what}"),
             str(d.people),
-            fixed(d.difference, 3),
-            interval((d.ci_low, d.ci_high), 3),
+            fixed(d.difference, digits),
+            interval((d.ci_low, d.ci_high), digits),
             f"{fixed(d.t)} ({degrees(d.df)})",
             p_value(d.p_holm),
         )
@@ -151,17 +152,17 @@ def sentences(
 ) -> tuple[str, ...]:
     """The threshold of each series, over people where there are several, and the differences."""
     said = [f"{fit.label}: no function was fitted, {fit.reason}." for fit in fits if fit.reason]
-    means = {mean.condition: mean for mean in merged.means}
+    means, digits = {mean.condition: mean for mean in merged.means}, threshold_decimals(merged)
     for label, fit in merged.pooled.items():
         if label in means:
             mean = means[label]
-            low, high = fixed(mean.ci_low, 3), fixed(mean.ci_high, 3)
+            low, high = fixed(mean.ci_low, digits), fixed(mean.ci_high, digits)
             said.append(
-                f"{label}: the threshold of {mean.people} people was {fixed(mean.mean, 3)} on average, "
+                f"{label}: the threshold of {mean.people} people was {fixed(mean.mean, digits)} on average, "
                 f"95% CI [{low}, {high}]."
             )
         else:
-            said.append(f"{label}: the threshold over all trials was {fixed(fit.threshold, 3)}.")
+            said.append(f"{label}: the threshold over all trials was {fixed(fit.threshold, digits)}.")
         said += [f"{label}: {note}." for note in fit.notes]
     return (*said, *(difference_sentence(one) for one in differences))
 

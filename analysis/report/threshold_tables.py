@@ -4,21 +4,33 @@ from collections.abc import Sequence
 
 from analysis.report.captions import caption, marked
 from analysis.report.formats import Table
-from analysis.report.numbers import DASH, fixed, interval, p_value
+from analysis.report.numbers import DASH, decimals, fixed, interval, p_value
 from analysis.thresholds.likelihood import Interval
 from analysis.thresholds.people import PersonThreshold, ThresholdsResult
 from analysis.thresholds.plane_people import PersonPlane
 
 
+def threshold_decimals(result: ThresholdsResult) -> int:
+    """Decimals of every threshold of a result: what the most certain of them supports."""
+    return decimals(
+        [
+            *(fit.threshold_se for fit in result.pooled.values()),
+            *(fit.threshold_se for fit in result.population.values()),
+            *(mean.se for mean in result.means),
+        ]
+    )
+
+
 def threshold_table(result: ThresholdsResult, name: str, synthetic: bool = False) -> Table:
     """The fit over all trials of each condition."""
+    digits = threshold_decimals(result)
     rows = tuple(
         (
             condition,
-            fixed(fit.threshold, 3),
-            interval_text(fit.threshold_ci),
-            fixed(fit.spread, 3),
-            DASH if fit.x75 is None else fixed(fit.x75, 3),
+            fixed(fit.threshold, digits),
+            interval_text(fit.threshold_ci, digits),
+            fixed(fit.spread, digits),
+            DASH if fit.x75 is None else fixed(fit.x75, digits),
             fixed(fit.lapse, 3),
             p_value(fit.p),
             str(fit.n_trials),
@@ -37,14 +49,15 @@ def threshold_table(result: ThresholdsResult, name: str, synthetic: bool = False
 
 def means_table(result: ThresholdsResult, name: str, synthetic: bool = False) -> Table:
     """Each condition's threshold as the mean of those of single people, which is the answer for people."""
+    digits = threshold_decimals(result)
     rows = tuple(
         (
             mean.condition,
             str(mean.people),
-            fixed(mean.mean, 3),
-            fixed(mean.se, 3),
-            interval((mean.ci_low, mean.ci_high), 3),
-            fixed(mean.tau, 3),
+            fixed(mean.mean, digits),
+            fixed(mean.se, digits),
+            interval((mean.ci_low, mean.ci_high), digits),
+            fixed(mean.tau, digits),
         )
         for mean in result.means
     )
@@ -74,13 +87,14 @@ def _without_threshold(result: ThresholdsResult) -> list[str]:
 
 def population_table(result: ThresholdsResult, name: str, synthetic: bool = False) -> Table:
     """The model over all people of each condition."""
+    digits = threshold_decimals(result)
     rows = tuple(
         (
             condition,
-            fixed(fit.threshold, 3),
-            interval_text(fit.threshold_ci),
-            fixed(fit.threshold_sd, 3),
-            fixed(fit.spread, 3),
+            fixed(fit.threshold, digits),
+            interval_text(fit.threshold_ci, digits),
+            fixed(fit.threshold_sd, digits),
+            fixed(fit.spread, digits),
             fixed(fit.log_spread_sd, 3),
             str(fit.people),
         )
@@ -93,21 +107,22 @@ def population_table(result: ThresholdsResult, name: str, synthetic: bool = Fals
 
 def people_table(result: ThresholdsResult, name: str, synthetic: bool = False) -> Table:
     """Every person's threshold."""
+    digits = threshold_decimals(result)
     rows = [
         (
             one,
             None
             if one.fit is None
-            else (*estimate(one.fit.threshold, one.fit.threshold_ci), fixed(one.fit.spread, 3)),
+            else (*estimate(one.fit.threshold, one.fit.threshold_ci, digits), fixed(one.fit.spread, digits)),
         )
         for one in result.people
     ]
     return table_of_people(rows, ("Threshold", "95% CI", "Spread"), name, synthetic)
 
 
-def estimate(value: float, interval: Interval) -> tuple[str, str]:
+def estimate(value: float, interval: Interval, digits: int = 3) -> tuple[str, str]:
     """The cells of an estimate and its interval."""
-    return fixed(value, 3), interval_text(interval)
+    return fixed(value, digits), interval_text(interval, digits)
 
 
 def table_of_people(
@@ -138,8 +153,8 @@ def threshold_text(result: ThresholdsResult, name: str, synthetic: bool = False)
     return " ".join([*said, *(f"{decision}." for decision in result.decisions)])
 
 
-def interval_text(interval: Interval) -> str:
+def interval_text(interval: Interval, digits: int = 3) -> str:
     """Both ends; `open` where the likelihood never falls far enough."""
-    low = "open" if interval.low is None else fixed(interval.low, 3)
-    high = "open" if interval.high is None else fixed(interval.high, 3)
+    low = "open" if interval.low is None else fixed(interval.low, digits)
+    high = "open" if interval.high is None else fixed(interval.high, digits)
     return f"[{low}, {high}]"

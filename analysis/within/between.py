@@ -216,12 +216,19 @@ def _refuse_deficient(design: BetweenDesign) -> None:
         )
     if design.well_conditioned:
         return
-    for term, own in zip(design.terms, design.columns, strict=True):
+    # the last first: of what is determined together a covariate or its slopes are what was added
+    for term, own in reversed(list(zip(design.terms, design.columns, strict=True))):
         others = np.delete(design.matrix, own, axis=1)
-        if others.shape[1] and len(outside(design.matrix[:, own], others)) < len(own):
+        if term and others.shape[1] and len(outside(design.matrix[:, own], others)) < len(own):
+            way_out = "leave --covariate-by-group out" if _is_slope(design, term) else "leave one out"
             raise InputError(
-                f"'{':'.join(term)}' is determined by the other groups and covariates; leave one out"
+                f"'{':'.join(term)}' is determined by the other groups and covariates; {way_out}"
             )
+
+
+def _is_slope(design: BetweenDesign, term: tuple[str, ...]) -> bool:
+    """Whether a term lets the slope of a covariate differ between groups."""
+    return len(term) > 1 and any(covariate.name in term for covariate in design.covariates)
 
 
 def outside(own: Floats, others: Floats) -> Floats:

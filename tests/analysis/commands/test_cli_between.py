@@ -179,3 +179,22 @@ def test_a_group_of_one_participant_is_named(tmp_path) -> None:
     said = " ".join(result.output.split())
     assert "group alone is one participant: its own spread is unknown" in said
     assert "group g is one" not in said
+
+
+def test_slopes_that_a_group_of_one_does_not_tell_are_named(tmp_path) -> None:
+    """The intercept is not to be told from that group's slope either, and it has no name."""
+    file = tmp_path / "t.csv"
+    file.write_text(
+        HEAD
+        + "".join(
+            f"{who},{'h' if who == 7 else 'g'},{20 + who * who},{face},{who + k * (who % 3)}\n"
+            for who in range(8)
+            for k, face in enumerate("ab")
+        )
+    )
+    arguments = ("--within", "face", "--between", "group", "--covariate", "age", "--covariate-by-group")
+    result = anova(file, *arguments)
+    assert (
+        "'age:group' is determined by the other groups and covariates; leave --covariate-by-group out"
+        in str(result.exception)
+    )

@@ -182,3 +182,16 @@ def test_at_an_end_of_the_lapse_rate_the_error_is_that_of_the_profile(k: list[in
     assert fit.threshold_ci.high is not None
     width = fit.threshold_ci.high - fit.threshold_ci.low
     assert fit.threshold_se == pytest.approx(width / (2 * 1.959964), rel=1e-6)
+
+
+@pytest.mark.parametrize(("unit", "decimals"), [(1000.0, 0), (1.0, 2), (0.001, 5)])
+def test_thresholds_have_the_decimals_that_their_error_supports(
+    tmp_path: Path, unit: float, decimals: int
+) -> None:
+    shares = {1.0: 3, 2.0: 9, 3.0: 21, 4.0: 33, 5.0: 38}
+    lines = [f"{x * unit!r},{int(i < k)}" for x, k in shares.items() for i in range(40)]
+    (tmp_path / "t.csv").write_text("\n".join(["x,response", *lines]) + "\n")
+    result = CliRunner().invoke(app, ["thresholds", str(tmp_path / "t.csv"), "--x", "x"])
+    (row,) = (line.split() for line in result.output.splitlines() if line.startswith("all "))
+    assert {len(cell.strip("[],").partition(".")[2]) for cell in row[1:6]} == {decimals}, row
+    assert float(row[1]) == pytest.approx(2.89 * unit, rel=0.01)
