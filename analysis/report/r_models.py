@@ -1,6 +1,7 @@
 """A script in R that fits the mixed and ordinal models of a report anew, and compares."""
 
 from collections.abc import Sequence
+from itertools import count, product
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
@@ -9,6 +10,7 @@ from analysis.plans.result import Analysis
 from analysis.report.r_script import SCRIPT
 from analysis.report.r_text import as_csv, head_of_script, r_number
 from analysis.report.templating import filled
+from analysis.within.contrasts import effect_members
 
 if TYPE_CHECKING:
     from analysis.models.mixed_result import MixedResult
@@ -25,8 +27,8 @@ def model_files(
 ) -> dict[str, bytes]:
     """The script of one model and the ratings it reads, by file name.
 
-    No file for an ordinal model with slopes of a factor of three levels or more, whose contrasts share one
-    variance here: clmm has no such model. lme4 has, by its own deviance function.
+    The contrasts of a factor of three levels or more share one variance here, which neither lmer nor clmm
+    has: both packages' own likelihood functions are asked for it.
     """
     from analysis.models.mixed_result import MixedResult
 
@@ -35,8 +37,6 @@ def model_files(
     slopes = [c.term for c in model.components if c.group == "participant" and c.term != "intercept"]
     levels = dict(zip(analysis.anova.all_factors, analysis.anova.all_levels, strict=True))
     shared = any(len(levels[name]) > 2 for slope in slopes for name in slope.split(":"))
-    if shared and not is_mixed:
-        return {}
     own = "-".join(part for part in (key, kind) if part)
     script, data = f"{own}-{SCRIPT}", f"{own}-ratings.csv"
     names = {name: f"f{i}" for i, name in enumerate(model.factors, start=1)}
@@ -51,13 +51,14 @@ def model_files(
         mixed=is_mixed,
         ordinal=not is_mixed,
         df=with_df,
+        **({} if isinstance(model, MixedResult) else _estimates(model, names, levels)),
         printed=as_csv(
             _printed_mixed(model, names, with_df)
             if isinstance(model, MixedResult)
-            else _printed_ordinal(model)
+            else _printed_ordinal(model, names, levels)
         ).strip(),
         floor="1e-3",
-        limit="1e-3",
+        limit="1e-5",
     )
     return {script: text.encode(), data: _ratings(arguments, model.factors, names).encode()}
 
@@ -73,12 +74,52 @@ def _printed_mixed(model: "MixedResult", names: dict[str, str], with_df: bool) -
     return [*rows, ["mixed residual SD", "residual", r_number(model.sigma)]]
 
 
-def _printed_ordinal(model: "OrdinalResult") -> Rows:
+def _printed_ordinal(
+    model: "OrdinalResult", names: dict[str, str], levels: dict[str, tuple[str, ...]]
+) -> Rows:
+    thresholds = enumerate(model.thresholds, start=1)
     rows: Rows = [["ordinal likelihood", "log", r_number(model.log_likelihood)]]
-    for i, coefficient in enumerate(model.coefficients, start=1):
-        rows.append(["ordinal coefficient", str(i), r_number(coefficient.estimate)])
-        rows.append(["ordinal se", str(i), r_number(coefficient.se)])
-    return rows
+    rows += [["ordinal threshold", str(i), r_number(value)] for i, value in thresholds]
+    for key, coefficient in zip(_r_columns(model, names, levels), model.coefficients, strict=True):
+        rows.append(["ordinal coefficient", key, r_number(coefficient.estimate)])
+        rows.append(["ordinal se", key, r_number(coefficient.se)])
+    return [*rows, *(["ordinal SD", key, r_number(sd)] for key, sd in _spreads(model))]
+
+
+def _estimates(
+    model: "OrdinalResult", names: dict[str, str], levels: dict[str, tuple[str, ...]]
+) -> dict[str, list[str]]:
+    """Where the script takes clmm's likelihood: numbers in R, those of a kind with their names."""
+    named = zip(_r_columns(model, names, levels), model.coefficients, strict=True)
+    return {
+        "thresholds": [r_number(value) for value in model.thresholds],
+        "coefficients": [f"`{key}` = {r_number(coefficient.estimate)}" for key, coefficient in named],
+        "spreads": [f"`{key}` = {r_number(sd)}" for key, sd in _spreads(model)],
+    }
+
+
+def _r_columns(
+    model: "OrdinalResult", names: dict[str, str], levels: dict[str, tuple[str, ...]]
+) -> list[str]:
+    """R's names of the sum-coded coefficients, in the order of those here: R has f2:f3 before f1:f4."""
+    return [
+        ":".join(f"{names[model.factors[m]]}{k}" for m, k in zip(members, codes, strict=True))
+        for members in effect_members(len(model.factors))
+        for codes in product(*(range(1, len(levels[model.factors[m]])) for m in members))
+    ]
+
+
+def _grouping(name: str) -> str:
+    """The script's column of a grouping: the one that is no participant is its item."""
+    return name if name == "participant" else "item"
+
+
+def _spreads(model: "OrdinalResult") -> list[tuple[str, float]]:
+    """Standard deviations as the script calls them: a group's intercept by its name, slopes by number."""
+    slopes = count(1)
+    return [
+        (_grouping(c.group) if c.term == "intercept" else str(next(slopes)), c.sd) for c in model.components
+    ]
 
 
 def _ratings(

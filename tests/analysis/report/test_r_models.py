@@ -14,18 +14,24 @@ from analysis.plans.rating_tests import analyse
 from analysis.plans.sensitivity import mixed_model, ordinal_model
 from analysis.read.study_answers import load_csv
 from analysis.report.contents import Section
+from experiments.definition import Experiment
 from experiments.load import load_experiment
 from tests.analysis.ratings_file import rows_of, simulate, write_export
 from tests.analysis.report.r_process import needed, run_together
 
-EXP3 = load_experiment("exp3")
+EXP1, EXP3 = load_experiment("exp1"), load_experiment("exp3")
 
 
-def sections(folder: Path, levels: int) -> tuple[Section, Section]:
-    """The models of Exp 3 with its first levels, rated by seven people."""
+def first_levels(levels: int) -> Experiment:
+    """Exp 3 with the first levels of its factor, and without exclusions."""
     factor = EXP3.factors[0].model_copy(update={"levels": EXP3.factors[0].levels[:levels]})
-    experiment = EXP3.model_copy(update={"factors": (factor, *EXP3.factors[1:]), "exclusions": ()})
-    file = write_export(folder / "r.csv", experiment, rows_of(experiment, simulate(experiment, 7, trials=3)))
+    return EXP3.model_copy(update={"factors": (factor, *EXP3.factors[1:]), "exclusions": ()})
+
+
+def sections(folder: Path, experiment: Experiment, trials: int = 3) -> tuple[Section, Section]:
+    """The models of an experiment, rated by seven people."""
+    ratings = rows_of(experiment, simulate(experiment, 7, trials=trials))
+    file = write_export(folder / "r.csv", experiment, ratings)
     analysis = analyse(prepare(experiment, PLAN, load_csv(file, experiment, READING)))
     return mixed_model(analysis), ordinal_model(analysis)
 
@@ -38,8 +44,8 @@ def written(section: Section, folder: Path, key: str = "") -> list[Path]:
 
 
 def test_levels_stand_in_the_order_of_the_model(tmp_path) -> None:
-    factor = EXP3.factors[0].model_copy(update={"levels": EXP3.factors[0].levels[:2]})
-    experiment = EXP3.model_copy(update={"factors": (factor, *EXP3.factors[1:]), "exclusions": ()})
+    experiment = first_levels(2)
+    factor = experiment.factors[0]
     export = write_export(
         tmp_path / "r.csv", experiment, rows_of(experiment, simulate(experiment, 7, trials=3))
     )
@@ -61,10 +67,11 @@ def test_levels_stand_in_the_order_of_the_model(tmp_path) -> None:
 def of_r(tmp_path_factory) -> dict[str, str]:
     """What R says of the models of two levels, of four, and of an F that was changed."""
     needed("lme4", "lmerTest", "ordinal")
-    two, four, changed = (tmp_path_factory.mktemp(name) for name in ("two", "four", "changed"))
-    mixed, ordinal = sections(two, 2)
-    shared, none = sections(four, 4)
-    assert none.beside("") == {}
+    folders = ("two", "four", "factors", "changed")
+    two, four, factors, changed = (tmp_path_factory.mktemp(name) for name in folders)
+    mixed, ordinal = sections(two, first_levels(2))
+    shared, shared_ordinal = sections(four, first_levels(4))
+    _, of_four_factors = sections(factors, EXP1.model_copy(update={"exclusions": ()}), trials=2)
     altered = written(mixed, changed)[0]
     text = altered.read_text(encoding="utf-8")
     line = re.findall(r"^mixed F,f1,.*$", text, re.MULTILINE)[0]
@@ -74,10 +81,13 @@ def of_r(tmp_path_factory) -> dict[str, str]:
         written(mixed, two)[0],
         written(ordinal, two)[0],
         written(shared, four, "eeriness")[0],
+        written(shared_ordinal, four)[0],
+        written(of_four_factors, factors)[0],
         altered,
     ]
     assert {path.suffix for path in scripts} == {".R"}
-    return dict(zip(("mixed", "ordinal", "shared", "changed"), run_together(scripts), strict=True))
+    models = ("mixed", "ordinal", "shared", "shared ordinal", "four factors", "changed")
+    return dict(zip(models, run_together(scripts), strict=True))
 
 
 @pytest.mark.parametrize(
@@ -86,6 +96,8 @@ def of_r(tmp_path_factory) -> dict[str, str]:
         ("mixed", ("mixed criterion", "mixed F", "mixed residual SD")),
         ("ordinal", ("ordinal likelihood", "ordinal se")),
         ("shared", ("mixed criterion", "mixed F")),
+        ("shared ordinal", ("ordinal likelihood", "ordinal coefficient", "ordinal SD")),
+        ("four factors", ("ordinal likelihood", "ordinal threshold", "ordinal coefficient", "ordinal se")),
     ],
 )
 def test_r_agrees_with_models_also_where_contrasts_share_a_variance(of_r, model, tables) -> None:
@@ -99,7 +111,7 @@ def test_r_finds_a_changed_f(of_r) -> None:
 
 
 def test_no_name_stands_in_code(tmp_path) -> None:
-    mixed, ordinal = sections(tmp_path, 2)
+    mixed, ordinal = sections(tmp_path, first_levels(2))
     for path in written(mixed, tmp_path, "a") + written(ordinal, tmp_path, "a"):
         assert path.name.startswith("a-")
         text = path.read_text(encoding="utf-8")
