@@ -1,5 +1,6 @@
 """Reliability of a scale made of several items: Cronbach's alpha, McDonald's omega, items, scale scores."""
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,6 +19,8 @@ Floats = NDArray[np.float64]
 MIN_CASES = 3
 MIN_OMEGA_ITEMS = 3
 """One factor of two items is not identified."""
+FLAT = 1e-3
+"""Slope of the deviance a case, in units of log variance, below which a fit of one factor has ended."""
 
 
 @dataclass(frozen=True)
@@ -187,17 +190,32 @@ def _item(data: ItemAnswers, position: int, loading: float | None) -> ItemStatis
 def _one_factor(answers: Floats) -> tuple[Floats | None, str]:
     """Standardised loadings on one factor, the sum positive; None with the reason where there are none."""
     from statsmodels.multivariate.factor import Factor
+    from statsmodels.tools.sm_exceptions import ConvergenceWarning
 
     n, items = answers.shape
     if items < MIN_OMEGA_ITEMS:
         return None, f"omega needs {MIN_OMEGA_ITEMS} items or more"
     if n <= items:
         return None, f"omega needs more cases than items, got {n} and {items}"
-    correlations = np.corrcoef(answers, rowvar=False)
+    correlations: Floats = np.atleast_2d(np.corrcoef(answers, rowvar=False))
     if np.linalg.cond(correlations) > 1e8:
         return None, "an item follows from the others, so that omega is not defined"
-    fitted: Any = Factor(corr=correlations, n_factor=1, method="ml", nobs=n).fit(maxiter=500, tol=1e-10)
+    with warnings.catch_warnings():
+        # of where it ended the two refusals below tell more than that it did not converge
+        warnings.simplefilter("ignore", ConvergenceWarning)
+        fitted: Any = Factor(corr=correlations, n_factor=1, method="ml", nobs=n).fit(maxiter=500, tol=1e-10)
     loadings = np.asarray(fitted.loadings, dtype=np.float64)[:, 0]
     if not np.isfinite(loadings).all() or (np.abs(loadings) > 1 - 1e-6).any():
         return None, "one factor explains an item wholly (a Heywood case), so that omega is not defined"
+    if not _is_maximum(correlations, loadings):
+        return None, "the fit of one factor did not end, so that omega is not defined"
     return loadings * (np.sign(loadings.sum()) or 1.0), ""
+
+
+def _is_maximum(correlations: Floats, loadings: Floats) -> bool:
+    """Whether the likelihood of one factor is flat at these loadings, in each item's own variance."""
+    implied = np.outer(loadings, loadings)
+    np.fill_diagonal(implied, 1.0)
+    inverse = np.linalg.inv(implied)
+    slopes = np.diag(inverse @ (implied - correlations) @ inverse) * (1 - loadings**2)
+    return bool(np.abs(slopes).max() < FLAT)

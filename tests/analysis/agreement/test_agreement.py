@@ -1,6 +1,7 @@
 """Reliability and agreement against R (tests/golden/r/agreement.R) and a published example."""
 
 import json
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -156,3 +157,17 @@ def test_codes_for_missing_among_the_answers_are_named(tmp_path) -> None:
     path.write_text("\n".join(["q1,q2,q3", *rows]))
     (said,) = read_items(path, ["q1", "q2", "q3"]).decisions
     assert "'q2' holds -99 (line 6), by which missing values are often marked; they count" in said
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_factor_that_does_not_converge_is_a_reason_and_no_warning(tmp_path: Path, seed: int) -> None:
+    """Items that share nothing: statsmodels says on the error stream that it did not converge."""
+    file, out = tmp_path / "t.csv", tmp_path / "o.json"
+    answers = np.random.default_rng(seed).integers(1, 6, (20, 3))
+    file.write_text("\n".join(["a,b,c", *(",".join(map(str, row)) for row in answers)]) + "\n")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        result = CliRunner().invoke(app, ["reliability", str(file), "--items", "a,b,c", "--json", str(out)])
+    assert result.exit_code == 0, result.exception
+    told = json.loads(out.read_text())
+    assert (told["omega"] is None) == bool(told["omega_reason"])
