@@ -103,10 +103,9 @@ def draw(analysis: Analysis, spec: FigureSpec) -> Figure:
         axes = figure.add_subplot()
         _conditions(axes, analysis, spec)
         _dress(axes, analysis, spec)
-        bars = (
-            "Points, thin lines and clouds: participants. Bars: 95% CI within participants (Cousineau-Morey)."
-        )
-        write_note(figure, f"N = {analysis.n_participants}. {bars}", analysis.synthetic)
+        marks = "Points, thin lines and clouds" if spec.style == "points" else "Points and thin lines"
+        said = f"{marks}: participants. Bars: 95% CI within participants (Cousineau-Morey)."
+        write_note(figure, f"N = {analysis.n_participants}. {said}", analysis.synthetic)
     return figure
 
 

@@ -6,6 +6,7 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+from matplotlib.collections import PolyCollection
 
 from analysis.paper.document import plain
 from analysis.paper.statistics import check_text
@@ -13,6 +14,7 @@ from analysis.plans.clip_rating import READING, analyse_study
 from analysis.plans.result import Analysis, analyse_cells
 from analysis.plans.sensitivity import bayes_factors
 from analysis.read.study_answers import StudyAnswers, load_csv
+from analysis.report.figures import draw, figures_of
 from analysis.report.formats import Table, as_markdown, as_text, wrap
 from analysis.report.json_output import as_data
 from analysis.report.latex import as_latex, latex_text
@@ -211,3 +213,12 @@ def test_text_wraps_and_latex_escapes() -> None:
 
 def test_data_are_plain(analysis) -> None:
     assert as_data(analysis)["exclusions"]["n_runs"] == 20
+
+
+def test_the_note_under_a_figure_names_what_is_drawn(analysis: Analysis) -> None:
+    """Figures of lines have no clouds."""
+    for spec in figures_of(analysis):
+        figure = draw(analysis, spec)
+        has_clouds = bool(figure.axes[0].findobj(PolyCollection))
+        assert ("clouds" in figure.get_supxlabel()) is has_clouds
+        assert has_clouds is (spec.style == "points")
