@@ -7,7 +7,7 @@ import typer
 
 if TYPE_CHECKING:
     from stimuli_builder.tracking.learn import Lesson
-    from stimuli_builder.tracking.model import TrainingOptions
+    from stimuli_builder.tracking.training import TrainingOptions
 
 Video = Annotated[
     Path, typer.Argument(help="Recording: anything PyAV reads, colour or grey, upright or rotated.")
@@ -166,7 +166,7 @@ def train(
     from experiments.files import check_targets
     from stimuli_builder.tracking.cli_track import report_modes
     from stimuli_builder.tracking.learn import learn, open_video
-    from stimuli_builder.tracking.model import save_model
+    from stimuli_builder.tracking.model_file import save_model
 
     if labels is None:
         raise InputError("expected --labels with the label file of this video")
@@ -184,7 +184,7 @@ def train(
 def _options(
     shape: float, look: float, coupled: float, paper_modes: bool, base_pixels: int
 ) -> "TrainingOptions":
-    from stimuli_builder.tracking.model import TrainingOptions
+    from stimuli_builder.tracking.training import TrainingOptions
 
     if paper_modes:
         return TrainingOptions(shape, look, coupled, base_pixels=base_pixels)

@@ -14,13 +14,15 @@ from stimuli_builder.progress import frame_progress
 from stimuli_builder.tracking.labelfree import label_free_lesson, survey
 from stimuli_builder.tracking.labels import Labels, load_labels
 from stimuli_builder.tracking.learn import Lesson, learn, open_video
-from stimuli_builder.tracking.model import CoupledModel, TrainingOptions, load_model
+from stimuli_builder.tracking.model import CoupledModel
+from stimuli_builder.tracking.model_file import load_model
 from stimuli_builder.tracking.outcome import TrackSummary
 from stimuli_builder.tracking.plot import plot_track
 from stimuli_builder.tracking.preview import write_preview
 from stimuli_builder.tracking.relabel import worst_frames, write_relabel
 from stimuli_builder.tracking.shapes import Points
 from stimuli_builder.tracking.track import track_video
+from stimuli_builder.tracking.training import TrainingOptions
 from stimuli_builder.video import VideoInfo, declared_frames
 from stimuli_builder.video_clock import DamagedFileError
 from stimuli_builder.video_writer import check_video_name

@@ -1,17 +1,16 @@
 """Fitting the coupled AAM to one picture: the steepest-descent algebra, and buffers kept between frames."""
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stimuli_builder.compiled import compiled
 from stimuli_builder.tracking import kernels
 from stimuli_builder.tracking.kernel_arrays import Buffers, MeshArrays, ModelArrays
 from stimuli_builder.tracking.light import light_between
 from stimuli_builder.tracking.model import CoupledModel
+from stimuli_builder.tracking.sampling_kernels import grey_spreads
 from stimuli_builder.video import Picture
 
 Values = NDArray[np.float64]
@@ -168,20 +167,3 @@ class Fitter:
             light = light_between(self._buffers.look, self._buffers.sampled, self.model.weights)
         spreads = grey_spreads(self._buffers.sampled, self.model.mesh.ends, self.model.eyes)
         return Fit(c, pose, self._buffers.vertices.copy(), residuals, spreads, int(iterations), light)
-
-
-@compiled
-def grey_spreads(levels: NDArray[np.float32], ends: NDArray[np.int64], eyes: int) -> Values:
-    """Standard deviation of grey levels (N,) over each eye, (eyes,); eye e has those up to ends[e]."""
-    spreads = np.empty(eyes)
-    first = 0
-    for eye in range(eyes):
-        part = levels[first : ends[eye]]
-        total, squares = 0.0, 0.0
-        for x in range(part.shape[0]):
-            total += part[x]
-            squares += part[x] * part[x]
-        mean = total / part.shape[0]
-        spreads[eye] = math.sqrt(max(squares / part.shape[0] - mean * mean, 0.0))
-        first = ends[eye]
-    return spreads

@@ -15,7 +15,6 @@ from stimuli_builder.tracking.detector.mesh import open_detector
 from stimuli_builder.tracking.detector.one_face import one_face
 from stimuli_builder.tracking.labels import Labels, save_labels
 from stimuli_builder.tracking.learn import Lesson, lesson_from
-from stimuli_builder.tracking.model import TrainingOptions
 from stimuli_builder.tracking.shapes import (
     EYE_POINTS,
     Points,
@@ -25,6 +24,7 @@ from stimuli_builder.tracking.shapes import (
     similarity_between,
     widths,
 )
+from stimuli_builder.tracking.training import TrainingOptions
 from stimuli_builder.video import Picture, VideoInfo, frames, rgb
 
 Values = NDArray[np.float64]

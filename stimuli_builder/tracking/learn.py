@@ -9,7 +9,8 @@ from experiments.errors import InputError
 from stimuli_builder.tracking.accuracy import HeldOut, cross_validate, refined_labels, residual_limits
 from stimuli_builder.tracking.certainty import with_errors
 from stimuli_builder.tracking.labels import Labels, load_labels
-from stimuli_builder.tracking.model import CoupledModel, TrainingOptions, train
+from stimuli_builder.tracking.model import CoupledModel
+from stimuli_builder.tracking.training import TrainingOptions, train
 from stimuli_builder.video import VideoInfo, read_frames, scan_before_damage, scan_video
 
 WORTH_REFINING = 0.96

@@ -2,7 +2,10 @@
 
 # mypy: disable-error-code="no-untyped-def, no-untyped-call"
 
+import math
+
 import numpy as np
+from numpy.typing import NDArray
 
 from stimuli_builder.compiled import compiled
 
@@ -157,3 +160,20 @@ def sample(picture, vertices, triangles, starts, forms, px, py, out):
     ys = np.empty_like(out)
     warp(vertices, triangles, starts, forms, px, py, xs, ys)
     look_up(packed(picture, box), box, height, width, xs, ys, out)
+
+
+@compiled
+def grey_spreads(levels: NDArray[np.float32], ends: NDArray[np.int64], eyes: int) -> NDArray[np.float64]:
+    """Standard deviation of grey levels (N,) over each eye, (eyes,); eye e has those up to ends[e]."""
+    spreads = np.empty(eyes)
+    first = 0
+    for eye in range(eyes):
+        part = levels[first : ends[eye]]
+        total, squares = 0.0, 0.0
+        for x in range(part.shape[0]):
+            total += part[x]
+            squares += part[x] * part[x]
+        mean = total / part.shape[0]
+        spreads[eye] = math.sqrt(max(squares / part.shape[0] - mean * mean, 0.0))
+        first = ends[eye]
+    return spreads

@@ -1,264 +1,20 @@
-"""Tracking a video: every frame ends fitted, or with a status and a reason, never with a wrong number."""
+"""Tracking a recording into a table."""
 
-import math
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from itertools import islice
 from pathlib import Path
 from types import MappingProxyType
 
-import numpy as np
-from numpy.typing import NDArray
-
 from experiments.errors import InputError
-from stimuli_builder.tracking.certainty import DIFFERING_SHARE, doubt, lid_difference, stated_errors
-from stimuli_builder.tracking.fit import Fit, Fitter, grey_spreads
-from stimuli_builder.tracking.light import Light
 from stimuli_builder.tracking.model import CoupledModel
-from stimuli_builder.tracking.outcome import Status, TrackedFrame, TrackSummary
-from stimuli_builder.tracking.picture import (
-    reduced,
-    reduced_points,
-    restored_points,
-    same_picture,
-    shows_something,
-)
-from stimuli_builder.tracking.search import Finder, inside
-from stimuli_builder.tracking.shapes import (
-    EYE_POINTS,
-    Points,
-    inter_eyelid_distances,
-    similarity_between,
-    unmoved,
-    widths,
-    with_border,
-)
+from stimuli_builder.tracking.outcome import TrackSummary
+from stimuli_builder.tracking.picture import reduced
+from stimuli_builder.tracking.shapes import Points
 from stimuli_builder.tracking.table import TrackWriter
-from stimuli_builder.video import Picture, VideoInfo, frames
+from stimuli_builder.tracking.tracker import Tracker
+from stimuli_builder.video import VideoInfo, frames
 from stimuli_builder.video_clock import DamagedFileError
-
-SCALE_RANGE = (0.5, 2.0)
-FROZEN = "the same picture as the frame before"
-UNSEEN = "the detector sees no such eyes here, or not wholly in the picture"
-FLAT_SHARE = 0.25
-"""Spread of grey levels, as part of the other eye's or the labelled ones', below which there is no eye to be
-seen: a shut eye has 0.7 of an open one's or more in two recordings, plain things over it 0 to 0.05."""
-BLANK_RANGE = 12
-"""Grey levels between the darkest and the brightest pixel below which a picture shows nothing."""
-WORSE = 1.1
-"""A fit from the detector may have so much more residual than the one it replaces."""
-NEAR_EVERY_FRAME = 30
-NEAR_LATER_EVERY = 5
-WHOLE_EVERY = 30
-
-
-class Tracker:
-    """Follows the eyes from frame to frame; give it reduced pictures in order."""
-
-    def __init__(self, model: CoupledModel):
-        self.model = model
-        self._fitter = Fitter(model)
-        self._finder = Finder(self._fitter)
-        self._last: Fit | None = None
-        self._lost_frames = 0
-        self._started = False
-        self._picture: Picture | None = None
-        self._light = Light()
-        self._before: Points | None = None
-        self._loss = ""
-        self._unseen = False
-        low, high = SCALE_RANGE
-        sizes = np.hypot(model.poses[:, 0], model.poses[:, 1])
-        self._sizes = (float(low * sizes.min()), float(high * sizes.max()))
-        self._usual_spread = float(grey_spreads(model.appearance[0], model.mesh.ends, model.eyes).max())
-        self._to_parameters = _to_parameters(model)
-
-    def look(self, hint: Points | None) -> None:
-        """Take in that a detector looks at the next frame: after one that sees nothing, fits are doubtful.
-
-        A patch of cheek or wall may pass for eyes, and between two looks nobody else tells.
-        """
-        self._unseen = hint is None
-
-    def step(self, picture: Picture, hint: Points | None = None) -> TrackedFrame:
-        """Fit the next frame, searching for the eyes where they are not where they were.
-
-        Parameters
-        ----------
-        hint : float64 array (9 * eyes, 2), optional
-            Points of a detector in pixels of the video: a second start where the fit from the frame before
-            fails or lies elsewhere, and a witness.
-        """
-        blank = self._blank(picture)
-        if blank:
-            self._lost_frames += 1
-            self._loss = blank
-            return TrackedFrame("lost", blank, None, None, None, 0)
-        frozen = self._picture is not None and same_picture(picture, self._picture)
-        self._picture = picture
-        raw, picture = picture, self._light.evened(picture)
-        if self._last is not None and not self._lost_frames:
-            fit = self._fitter.fit(picture, self._last.c, self._last.pose)
-            fault = self._fault(fit, picture)
-            fit, fault = self._with_hint(picture, fit, fault, hint)
-            if fault:
-                fit, fault = self._in_other_light(raw, self._last, fit, fault)
-            if not fault:
-                return self._accepted(fit, "tracked", FROZEN if frozen else "", hint)
-            self._loss = fault
-        elif hint is not None:
-            fit = self._from(picture, hint)
-            if not self._fault(fit, picture):
-                started, loss = self._started, self._loss
-                again = f"found again after {loss}" if started else ""
-                return self._accepted(fit, "reinitialised" if started else "tracked", again, hint)
-        return self._search(raw, picture)
-
-    def _in_other_light(self, raw: Picture, start: Fit, fit: Fit, fault: str) -> tuple[Fit, str]:
-        """A failed fit, or where it passes one from the same start in the light of the picture there."""
-        begun = self._fitter.fit(self._light.evened(raw), start.c, start.pose, 1)
-        light = self._light.then(*begun.light)
-        if not light.believable or Light().then(*begun.light).steady:
-            return fit, fault
-        picture = light.evened(raw)
-        other = self._fitter.fit(picture, start.c, start.pose)
-        if self._fault(other, picture):
-            return fit, fault
-        self._light = light
-        return other, ""
-
-    def _blank(self, picture: Picture) -> str:
-        """Why a picture cannot show an eye, or an empty string."""
-        return "" if shows_something(picture, BLANK_RANGE, 4) else "a black or empty frame"
-
-    def _from(self, picture: Picture, hint: Points) -> Fit:
-        """Fit from a detector's points."""
-        shape = reduced_points(with_border(hint), self.model.reduction)
-        mean = self.model.mesh.vertices
-        pose = similarity_between(mean, shape)
-        away = (unmoved(shape, pose) - mean).ravel()
-        limit = 3 * self.model.sd
-        return self._fitter.fit(picture, np.clip(self._to_parameters @ away, -limit, limit), pose)
-
-    def _with_hint(self, picture: Picture, fit: Fit, fault: str, hint: Points | None) -> tuple[Fit, str]:
-        """The fit, or one started from the detector where that is nearer to it and no worse a picture."""
-        if hint is None:
-            return fit, fault
-        if not fault and lid_difference(self._points(fit), hint) < DIFFERING_SHARE / 2:
-            return fit, fault
-        other = self._from(picture, hint)
-        wrong = self._fault(other, picture)
-        if not wrong and (fault or _overall(other) < WORSE * _overall(fit)):
-            return other, ""
-        return fit, fault
-
-    def _points(self, fit: Fit) -> Points:
-        count = EYE_POINTS * self.model.eyes
-        return restored_points(fit.vertices[:count].astype(np.float64), self.model.reduction)
-
-    def _search(self, raw: Picture, picture: Picture) -> TrackedFrame:
-        best, fault = self._searched(picture)
-        for light in self._other_lights(best) if fault else ():
-            other, fault_there = self._searched(light.evened(raw))
-            if other is not None and not fault_there:
-                best, fault, self._light = other, "", light
-                break
-        if best is not None and not fault:
-            if self._started:
-                return self._accepted(best, "reinitialised", f"found again after {self._loss}")
-            return self._accepted(best, "tracked", "")
-        self._lost_frames += 1
-        self._loss = self._loss or fault or "no place in the picture resembles the labelled frames"
-        residual = _overall(best) if best is not None and best.iterations else None
-        return TrackedFrame("lost", self._loss, None, None, residual, best.iterations if best else 0)
-
-    def _other_lights(self, best: Fit | None) -> Iterator[Light]:
-        """The labelled light, where another was followed to the loss, and the one that a fit tells."""
-        if self._light != Light():
-            yield Light()
-        told = Light() if best is None else self._light.then(*best.light)
-        if told.believable and not told.steady:
-            yield told
-
-    def _searched(self, picture: Picture) -> tuple[Fit | None, str]:
-        """The first attempt that passes, or the last one with its fault; None where no start was likely."""
-        best: Fit | None = None
-        fault = ""
-        for attempt in self._attempts(picture):
-            best, fault = attempt, self._fault(attempt, picture)
-            if not fault:
-                break
-        return best, fault
-
-    def _attempts(self, picture: Picture) -> Iterator[Fit]:
-        """Fits from likely starts: near the last place often, over the whole picture now and then."""
-        count = self._lost_frames
-        if self._last is not None and (count < NEAR_EVERY_FRAME or count % NEAR_LATER_EVERY == 0):
-            near = self._finder.near(picture, self._last.pose)
-            if near is not None:
-                yield near
-        if count & (count - 1) == 0 or count % WHOLE_EVERY == 0:
-            anywhere = self._finder.anywhere(picture)
-            if anywhere is not None:
-                yield anywhere
-
-    def _accepted(self, fit: Fit, status: Status, reason: str, hint: Points | None = None) -> TrackedFrame:
-        before = self._before if status == "tracked" else None
-        self._last, self._lost_frames, self._started, self._loss = fit, 0, True, ""
-        points = self._points(fit)
-        difference = None if hint is None else lid_difference(points, hint)
-        errors = stated_errors(self.model, fit, None if difference is None else difference * widths(points))
-        why = doubt(self.model, fit, points, errors, difference, before)
-        why = why or self._flat(fit) or (UNSEEN if self._unseen else "")
-        self._before = points
-        if not why:
-            self._light = self._light.following(*fit.light)
-        if why or reason == FROZEN:
-            status, reason = "doubtful", why or reason
-        distances = inter_eyelid_distances(points, self.model.markers)
-        return TrackedFrame(status, reason, points, distances, _overall(fit), fit.iterations, errors)
-
-    def _flat(self, fit: Fit) -> str:
-        """Which eye's picture is too even to show one; a detector and its model draw lids all the same."""
-        usual = max(float(fit.spreads.max()), self._usual_spread)
-        eye = int(fit.spreads.argmin())
-        return (
-            f"{self._name(eye)} covered: its picture is flat" if fit.spreads[eye] < FLAT_SHARE * usual else ""
-        )
-
-    def _name(self, eye: int) -> str:
-        return ("left eye", "right eye")[eye] if self.model.eyes == 2 else "eye"
-
-    def _fault(self, fit: Fit, picture: Picture) -> str:
-        """Why a fit is not believed, or an empty string."""
-        if fit.iterations == 0:
-            return "the fit broke down"
-        if not inside(fit, picture):
-            return "the eyes left the picture"
-        size = float(np.hypot(*fit.pose[:2]))
-        if not self._sizes[0] < size < self._sizes[1]:
-            return f"the eyes would be {size / self._sizes[0] * SCALE_RANGE[0]:.2g} times their labelled size"
-        excess = fit.residuals / self.model.residual_limits
-        eye = int(excess.argmax())
-        if excess[eye] > 1:
-            limit = self.model.residual_limits[eye]
-            return (
-                f"{self._name(eye)} covered or changed: residual {fit.residuals[eye]:.1f} above {limit:.1f}"
-            )
-        return ""
-
-
-def _overall(fit: Fit) -> float:
-    squares = [residual * residual for residual in fit.residuals.tolist()]
-    return math.sqrt(sum(squares) / len(squares))
-
-
-def _to_parameters(model: CoupledModel) -> NDArray[np.float64]:
-    """Matrix (l, 2 V) from movements of the vertices to coupled parameters, least squares kept small."""
-    modes = model.shape_modes.reshape(len(model.sd), -1)
-    size = (modes**2).sum(1).mean() * model.sd.max() ** 2
-    ridge = 1e-3 * np.diag(size / np.maximum(model.sd, 1e-9) ** 2)
-    return np.asarray(np.linalg.solve(modes @ modes.T + ridge, modes))
 
 
 def track_video(
@@ -289,7 +45,7 @@ def track_video(
             f"{info.path}: {info.size_px[0]} x {info.size_px[1]} pixels, the model was trained on "
             f"{model.size_px[0]} x {model.size_px[1]}; label frames of this video"
         )
-    tracker, summary = Tracker(model), TrackSummary()
+    tracker, summary = Tracker(model, info.fps), TrackSummary()
     begun = time.perf_counter()
     with TrackWriter(out, model.eyes) as writer:
         pictures = frames(info.path, lambda full: reduced(full, model.reduction))

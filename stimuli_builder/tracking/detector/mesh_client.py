@@ -8,6 +8,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+import numpy as np
+
 from experiments.errors import InputError
 from stimuli_builder.environments import cache_folder, ensure_environment
 from stimuli_builder.video import Picture
@@ -53,13 +55,17 @@ class MeshClient:
             self._process.stdout.close()
 
     def ask(self, operation: str, picture: Picture, **more: object) -> Any:
-        """Send a picture (h, w, 3) and return the answer.
+        """Send a picture, uint8 (h, w, 3), and return the answer.
 
         Raises
         ------
+        ValueError
+            The picture is of another kind, a grey one say.
         InputError
             The worker ended.
         """
+        if picture.ndim != 3 or picture.shape[2] != 3 or picture.dtype != np.uint8:
+            raise ValueError(f"expected an RGB picture, uint8 (h, w, 3), got {picture.dtype} {picture.shape}")
         head = json.dumps({"op": operation, "shape": list(picture.shape), **more}).encode()
         stdin, stdout = self._process.stdin, self._process.stdout
         try:

@@ -1,8 +1,10 @@
 """Tracking without labels: contours, training on detections, doubts, relabelling; the real detector."""
 
 import csv
+import sys
 from dataclasses import replace
 from itertools import islice
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -15,6 +17,7 @@ from stimuli_builder.environments import cache_folder, ensure_environment
 from stimuli_builder.tracking.certainty import lid_difference, lid_offsets, with_errors
 from stimuli_builder.tracking.detector.detection import along, eye_points
 from stimuli_builder.tracking.detector.mesh import open_detector
+from stimuli_builder.tracking.detector.mesh_client import MeshClient
 from stimuli_builder.tracking.labelfree import (
     DETECTOR_SHARE,
     Survey,
@@ -24,10 +27,11 @@ from stimuli_builder.tracking.labelfree import (
     survey,
 )
 from stimuli_builder.tracking.labels import load_labels
-from stimuli_builder.tracking.model import TrainingOptions
 from stimuli_builder.tracking.relabel import worst_frames, write_relabel
 from stimuli_builder.tracking.shapes import widths
-from stimuli_builder.tracking.track import FROZEN, UNSEEN, Tracker, track_video
+from stimuli_builder.tracking.track import track_video
+from stimuli_builder.tracking.tracker import FROZEN, UNSEEN, Tracker
+from stimuli_builder.tracking.training import TrainingOptions
 from stimuli_builder.video import frames, rgb, scan_video
 from tests.stimuli_builder.tracking.test_bad_input import write_frames
 
@@ -336,3 +340,11 @@ def test_the_lids_of_a_close_up_lie_nearly_where_they_were_labelled(close_up):
     away = [lid_offsets(seen[n], points).mean() for n, points in labels.items()]
     # A single region read 2.9%; the labels are good to 1%.
     assert np.mean(away) < 0.027
+
+
+def test_a_grey_picture_is_refused_as_such_by_the_detector():
+    with (
+        MeshClient(Path(sys.executable)) as client,
+        pytest.raises(ValueError, match=r"expected an RGB picture, uint8 \(h, w, 3\), got uint8 \(4, 5\)"),
+    ):
+        client.ask("faces", np.zeros((4, 5), np.uint8))

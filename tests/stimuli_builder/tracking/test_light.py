@@ -5,7 +5,7 @@ import pytest
 
 from stimuli_builder.tracking.fit import Fitter
 from stimuli_builder.tracking.light import Light, light_between
-from stimuli_builder.tracking.track import Tracker
+from stimuli_builder.tracking.tracker import Tracker
 
 EYE_PX = 60
 

@@ -1,0 +1,79 @@
+"""A picture that stands still under noise or a codec is told; a person who hardly moves is not."""
+
+import csv
+import subprocess
+
+import numpy as np
+import pytest
+
+from stimuli_builder.actor.recording import Actor, ActorOptions
+from stimuli_builder.tracking.stillness import Stillness
+from stimuli_builder.tracking.track import track_video
+from stimuli_builder.tracking.tracker import STILL, Tracker
+from stimuli_builder.video import scan_video
+
+FPS = 60
+
+
+def noisy(picture, rng):
+    return np.clip(picture + rng.normal(0, 3, picture.shape), 0, 255).astype(np.uint8)
+
+
+def test_a_still_picture_under_noise_is_doubtful_after_two_seconds(lesson, recording):
+    rng, tracker = np.random.default_rng(1), Tracker(lesson.model, FPS)
+    frames = [tracker.step(noisy(recording.pictures[0], rng)) for _ in range(150)]
+    assert {frame.status for frame in frames[:119]} == {"tracked"}
+    assert {(frame.status, frame.reason) for frame in frames[119:]} == {("doubtful", STILL)}
+    moved = [tracker.step(noisy(np.roll(recording.pictures[0], 4 + n, 1), rng)) for n in range(3)]
+    assert [frame.status for frame in moved] == ["tracked"] * 3
+
+
+def test_a_still_picture_that_was_compressed_is_doubtful(lesson, recording, tmp_path):
+    rng, clip, out = np.random.default_rng(1), tmp_path / "still.mp4", tmp_path / "t.csv"
+    height, width = recording.pictures[0].shape
+    command = [
+        "ffmpeg",
+        "-loglevel",
+        "error",
+        "-f",
+        "rawvideo",
+        "-pix_fmt",
+        "gray",
+        "-s",
+        f"{width}x{height}",
+    ]
+    command += ["-r", str(FPS), "-i", "-", "-crf", "30", "-g", "30", "-pix_fmt", "yuv420p", str(clip)]
+    pictures = b"".join(noisy(recording.pictures[0], rng).tobytes() for _ in range(240))
+    subprocess.run(command, input=pictures, check=True)
+    track_video(lesson.model, scan_video(clip), out)
+    with out.open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert {row["status"] for row in rows[180:]} == {"doubtful"}
+    assert STILL in {row["reason"] for row in rows[180:]}
+
+
+def test_the_actor_who_holds_still_between_blinks_is_tracked(lesson):
+    actor = Actor(ActorOptions(seconds=4.0, fps=FPS, seed=3))
+    tracker = Tracker(lesson.model, FPS)
+    frames = [tracker.step(actor.frame(n)[0]) for n in range(240)]
+    assert STILL not in {frame.reason for frame in frames}
+
+
+@pytest.mark.parametrize(("drift_share", "still"), [(0.0, True), (0.004, False)])
+def test_a_slow_drift_under_noise_is_a_move(drift_share, still):
+    rng, lids = np.random.default_rng(2), Stillness(FPS)
+    eye = np.array([[0, 0], [20, -9], [40, -12], [60, -12], [80, -9], [100, 0], [75, 5], [50, 7], [25, 5.0]])
+    told = [
+        lids.after(eye + rng.normal(0, 0.1, eye.shape) + 100 * drift_share * np.sin(n / 30))
+        for n in range(400)
+    ]
+    assert not any(told[:119])
+    assert set(told[119:]) == {still}
+
+
+def test_two_seconds_begin_anew_after_a_frame_without_eyes():
+    lids, eye = Stillness(FPS), np.arange(18.0).reshape(9, 2)
+    assert [lids.after(eye) for _ in range(130)][119:] == [True] * 11
+    lids.forget()
+    assert not any(lids.after(eye) for _ in range(119))
+    assert lids.after(eye)
