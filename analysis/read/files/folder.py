@@ -5,6 +5,7 @@ keywords of a file's name are columns). Of any other folder the files `*.csv` in
 the file without its ending is a column `file` (decision 0910).
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from hashlib import sha256
 from pathlib import Path
@@ -29,6 +30,7 @@ def header(folder: Path) -> list[str]:
 def cells(folder: Path, names: list[str]) -> Cells:
     """The columns `names` of all data files, one below the other."""
     files, without_rows = data_files(folder)
+    _refuse_joined(files)
     parts = [_part(folder, path, names) for path in files]
     sort = "Psych-DS folder" if _is_psych_ds(folder) else "folder"
     said = [f"read {len(files)} data file{'s' if len(files) > 1 else ''} of the {sort} {folder.name}"]
@@ -78,6 +80,19 @@ def _has_rows(path: Path) -> bool:
     with path.open("rb") as file:
         lines = (line for line in file.read().splitlines() if line.strip(b"\r\n\t ,;"))
         return next(lines, None) is not None and next(lines, None) is not None
+
+
+def _refuse_joined(files: Sequence[Path]) -> None:
+    """Refuse a file into which others of the folder were joined: each of their rows would count twice."""
+    rows = {path: Counter(path.read_bytes().splitlines()[1:]) for path in files}
+    largest = max(files, key=lambda path: rows[path].total())
+    inside = [path for path in files if path != largest and rows[path] <= rows[largest]]
+    # answers of few kinds are alike by chance, but not as many of them as others have together
+    if len(inside) > 1 and sum(rows[path].total() for path in inside) == rows[largest].total():
+        raise InputError(
+            f"every row of {len(inside)} files ({_listed(inside)}) stands in {largest.name} too and would "
+            "count twice; move that file, or the others, out of the folder"
+        )
 
 
 def _copies(files: Sequence[Path]) -> list[Path]:

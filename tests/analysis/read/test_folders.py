@@ -47,6 +47,24 @@ def test_broken_runs_and_copies_in_a_folder_are_named(tmp_path) -> None:
     ]
 
 
+def test_a_file_into_which_the_others_were_joined_is_refused(tmp_path) -> None:
+    folder = folder_of(tmp_path / "f")
+    rows = [line for path in sorted(folder.iterdir()) for line in path.read_text().splitlines()[1:]]
+    (folder / "all.csv").write_text("\n".join(["face,score", *rows]) + "\n", encoding="utf-8")
+    with pytest.raises(
+        InputError, match=r"every row of 3 files \(p1.csv, p2.csv, p3.csv\) stands in all.csv"
+    ):
+        read_long_table(folder, "file", "score", ["face"])
+
+
+def test_answers_of_few_kinds_that_are_alike_by_chance_are_no_joined_file(tmp_path) -> None:
+    (tmp_path / "f").mkdir()
+    for number in range(5):
+        rows = ["calm,1", "wild,2"] * (4 if number == 2 else 3)
+        (tmp_path / "f" / f"p{number}.csv").write_text("\n".join(["face,score", *rows]), encoding="utf-8")
+    assert len(read_long_table(tmp_path / "f", "file", "score", ["face"]).rows) == 32
+
+
 def test_a_folder_without_tables_ends_in_one_line(tmp_path) -> None:
     with pytest.raises(InputError, match=r"folder without data files; expected files .csv, one a person"):
         read_long_table(tmp_path, "file", "score", ["face"])
