@@ -55,14 +55,14 @@ def find_candidates(depth: Depth) -> list[Candidate]:
         if prominence >= RIPPLE * height:
             base = height - float(prominence)
             left, right = (
-                tuple(_crossing(depth, int(peak), base + part * prominence, step) for part in LEVELS)
+                tuple(crossing(depth, int(peak), base + part * prominence, step) for part in LEVELS)
                 for step in (-1, 1)
             )
             candidates.append(Candidate(int(peak), height, float(prominence), left, right))  # type: ignore[arg-type]
     return candidates
 
 
-def _crossing(depth: Depth, peak: int, level: float, step: int) -> float:
+def crossing(depth: Depth, peak: int, level: float, step: int) -> float:
     """Where the depth first falls below a level on one side of the peak, between frames."""
     reach = int(REACH_S * depth.fps) + 1
     first = max(0, peak - reach)

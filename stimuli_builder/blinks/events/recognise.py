@@ -1,11 +1,19 @@
 """From lid series to events: what each dip is, how sure that is, and when it happened."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stimuli_builder.blinks.events.candidates import Candidate, deep_level, features_of, find_candidates
+from stimuli_builder.blinks.events.candidates import (
+    LEVELS,
+    RIPPLE,
+    Candidate,
+    crossing,
+    deep_level,
+    features_of,
+    find_candidates,
+)
 from stimuli_builder.blinks.events.generated import CLOSED_EYE_S
 from stimuli_builder.blinks.events.levels import Depth, depth_of
 from stimuli_builder.blinks.events.network import shipped_network
@@ -15,6 +23,11 @@ from stimuli_builder.blinks.series import BlinkSeries, runs
 
 SHORTEST_PIECE_S = 0.8
 LEAST_PROBABILITY = 0.5
+STILL_CLOSED = 0.8
+"""Part of its depth at which a lid that stays closed for half a second is for most of that time. A blink on a
+gaze shift down comes back to where the gaze leaves it, and the template takes that for its closed phase."""
+HALF_A_BLINK_S = 0.5
+"""A lid that closes or opens in a blink has reached the level it came from, or goes to, within this time."""
 ONE_BLINK_S = 0.2
 """Two dips closer than this are one blink seen twice by a noisy tracker; the likelier one stays."""
 
@@ -114,13 +127,36 @@ def _judge(piece: _Piece, fps: float, other: Array | None, events: list[LidEvent
             continue
         timing = _timed(candidate, piece.depth) if kind == "blink" else _crossed(candidate, fps)
         if kind == "blink" and timing.closed_to_s - timing.closed_from_s >= CLOSED_EYE_S:
-            kind = "closed_eye"
+            sure = shares[network.kinds.index("blink")] >= LEAST_PROBABILITY
+            above = _above_its_shoulders(timing, candidate, piece.depth) if sure else None
+            kind = "closed_eye" if above is None else "blink"
+            timing = timing if above is None else _crossed(above, fps)
         events.append(_event(kind, float(shares.max()), candidate, timing, piece.start, fps))
 
 
 def _cut(candidate: Candidate, depth: Depth) -> bool:
     """Whether a dip is at the edge of its piece: its beginning or end was not seen."""
     return candidate.left[1] <= 0 or candidate.right[1] >= depth.smooth.size - 1
+
+
+def _above_its_shoulders(timing: Timing, candidate: Candidate, depth: Depth) -> Candidate | None:
+    """The dip as it rises out of a level at which the lid lies before or after it; None for a closed eye."""
+    first, last = (round(time * depth.fps) for time in (timing.closed_from_s, timing.closed_to_s))
+    phase = depth.smooth[max(0, first) : last + 1]
+    if not phase.size or np.median(phase) >= STILL_CLOSED * candidate.depth:
+        return None
+    reach, peak = round(HALF_A_BLINK_S * depth.fps), candidate.peak
+    base = max(
+        float(depth.smooth[max(0, peak - reach) : peak + 1].min()),
+        float(depth.smooth[peak : peak + reach + 1].min()),
+    )
+    prominence = candidate.depth - base
+    if prominence < RIPPLE * candidate.depth:
+        return None
+    left, right = (
+        tuple(crossing(depth, peak, base + part * prominence, step) for part in LEVELS) for step in (-1, 1)
+    )
+    return replace(candidate, prominence=prominence, left=left, right=right)  # type: ignore[arg-type]
 
 
 def _timed(candidate: Candidate, depth: Depth) -> Timing:

@@ -140,6 +140,18 @@ def test_half_a_second_closed_parts_a_blink_from_a_closed_eye(hold, kind):
     assert kinds_of(lids([*blinks_at(3, 14), motion], 120.0), 120.0)[1] == kind
 
 
+@pytest.mark.parametrize(("gaze", "depth"), [(0.3, 0.7), (0.4, 1.0), (0.6, 1.0)])
+@pytest.mark.parametrize("fps", [120.0, 240.0])
+def test_a_blink_while_looking_down_is_no_closed_eye(fps, gaze, depth):
+    motions = [Motion("gaze_shift", 8, 0.08, 3.0, 0.1, gaze), Motion("blink", 8.8, 0.1, 0.04, 0.24, depth)]
+    (seen,) = recognise([eye(lids([*blinks_at(3, 5.5, 14, 17), *motions], fps), fps)])
+    assert "closed_eye" not in [event.kind for event in seen.events]
+    (blink,) = [event for event in seen.events if event.kind == "blink" and 8 < event.minimum_s < 11]
+    assert blink.minimum_s == pytest.approx(8.92, abs=0.03)
+    assert 0.15 < blink.end_s - blink.onset_s < 0.5
+    assert blink.closed_to_s - blink.closed_from_s < 0.3
+
+
 @pytest.mark.parametrize("fps", [30.0, 60.0, 120.0, 240.0, 600.0])
 def test_phases_of_known_blinks_are_found_between_frames(fps):
     distance = lids(blinks_at(2.013, 5.027, 9.1, 13.004, 16.018, hold=0.06), fps)
