@@ -13,6 +13,21 @@ from stimuli_builder.tracking.model import CoupledModel
 from stimuli_builder.tracking.shapes import LidMarkers
 
 FORMAT = 2
+ARRAYS = (
+    "shape_modes",
+    "appearance",
+    "weights",
+    "sd",
+    "examples",
+    "poses",
+    "patches",
+    "patch_frames",
+    "patch_corners",
+    "residual_limits",
+    "usual_residuals",
+    "point_errors",
+    "error_slope",
+)
 
 
 def save_model(model: CoupledModel, path: Path) -> None:
@@ -35,23 +50,6 @@ def save_model(model: CoupledModel, path: Path) -> None:
             eye_of=model.mesh.eye_of,
             **{name: getattr(model, name) for name in ARRAYS},
         )
-
-
-ARRAYS = (
-    "shape_modes",
-    "appearance",
-    "weights",
-    "sd",
-    "examples",
-    "poses",
-    "patches",
-    "patch_frames",
-    "patch_corners",
-    "residual_limits",
-    "usual_residuals",
-    "point_errors",
-    "error_slope",
-)
 
 
 def load_model(path: Path) -> CoupledModel:

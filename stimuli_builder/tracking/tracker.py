@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stimuli_builder.tracking.certainty import DIFFERING_SHARE, doubt, lid_difference, stated_errors
+from stimuli_builder.tracking.faults import Faults
 from stimuli_builder.tracking.fit import Fit, Fitter
 from stimuli_builder.tracking.light import Light
 from stimuli_builder.tracking.model import CoupledModel
@@ -17,8 +18,7 @@ from stimuli_builder.tracking.picture import (
     same_picture,
     shows_something,
 )
-from stimuli_builder.tracking.sampling_kernels import grey_spreads
-from stimuli_builder.tracking.search import Finder, inside
+from stimuli_builder.tracking.search import Finder
 from stimuli_builder.tracking.shapes import (
     EYE_POINTS,
     Points,
@@ -31,13 +31,9 @@ from stimuli_builder.tracking.shapes import (
 from stimuli_builder.tracking.stillness import Stillness
 from stimuli_builder.video import Picture
 
-SCALE_RANGE = (0.5, 2.0)
 FROZEN = "the same picture as the frame before"
 STILL = "the lids have not moved for two seconds: the picture may stand still"
 UNSEEN = "the detector sees no such eyes here, or not wholly in the picture"
-FLAT_SHARE = 0.25
-"""Spread of grey levels, as part of the other eye's or the labelled ones', below which there is no eye to be
-seen: a shut eye has 0.7 of an open one's or more in two recordings, plain things over it 0 to 0.05."""
 BLANK_RANGE = 12
 """Grey levels between the darkest and the brightest pixel below which a picture shows nothing."""
 WORSE = 1.1
@@ -60,6 +56,7 @@ class Tracker:
         self.model = model
         self._stillness = None if fps is None else Stillness(fps)
         self._fitter = Fitter(model)
+        self._faults = Faults(model)
         self._finder = Finder(self._fitter)
         self._last: Fit | None = None
         self._lost_frames = 0
@@ -69,10 +66,6 @@ class Tracker:
         self._before: Points | None = None
         self._loss = ""
         self._unseen = False
-        low, high = SCALE_RANGE
-        sizes = np.hypot(model.poses[:, 0], model.poses[:, 1])
-        self._sizes = (float(low * sizes.min()), float(high * sizes.max()))
-        self._usual_spread = float(grey_spreads(model.appearance[0], model.mesh.ends, model.eyes).max())
         self._to_parameters = _to_parameters(model)
 
     def look(self, hint: Points | None) -> None:
@@ -101,7 +94,7 @@ class Tracker:
         raw, picture = picture, self._light.evened(picture)
         if self._last is not None and not self._lost_frames:
             fit = self._fitter.fit(picture, self._last.c, self._last.pose)
-            fault = self._fault(fit, picture)
+            fault = self._faults.lost(fit, picture)
             fit, fault = self._with_hint(picture, fit, fault, hint)
             if fault:
                 fit, fault = self._in_other_light(raw, self._last, fit, fault)
@@ -110,7 +103,7 @@ class Tracker:
             self._loss = fault
         elif hint is not None:
             fit = self._from(picture, hint)
-            if not self._fault(fit, picture):
+            if not self._faults.lost(fit, picture):
                 started, loss = self._started, self._loss
                 again = f"found again after {loss}" if started else ""
                 return self._accepted(fit, "reinitialised" if started else "tracked", again, hint)
@@ -124,7 +117,7 @@ class Tracker:
             return fit, fault
         picture = light.evened(raw)
         other = self._fitter.fit(picture, start.c, start.pose)
-        if self._fault(other, picture):
+        if self._faults.lost(other, picture):
             return fit, fault
         self._light = light
         return other, ""
@@ -149,7 +142,7 @@ class Tracker:
         if not fault and lid_difference(self._points(fit), hint) < DIFFERING_SHARE / 2:
             return fit, fault
         other = self._from(picture, hint)
-        wrong = self._fault(other, picture)
+        wrong = self._faults.lost(other, picture)
         if not wrong and (fault or _overall(other) < WORSE * _overall(fit)):
             return other, ""
         return fit, fault
@@ -192,7 +185,7 @@ class Tracker:
         best: Fit | None = None
         fault = ""
         for attempt in self._attempts(picture):
-            best, fault = attempt, self._fault(attempt, picture)
+            best, fault = attempt, self._faults.lost(attempt, picture)
             if not fault:
                 break
         return best, fault
@@ -216,7 +209,7 @@ class Tracker:
         difference = None if hint is None else lid_difference(points, hint)
         errors = stated_errors(self.model, fit, None if difference is None else difference * widths(points))
         why = doubt(self.model, fit, points, errors, difference, before)
-        why = why or self._flat(fit) or (UNSEEN if self._unseen else "")
+        why = why or self._faults.flat(fit) or (UNSEEN if self._unseen else "")
         self._before = points
         if not why:
             self._light = self._light.following(*fit.light)
@@ -226,35 +219,6 @@ class Tracker:
             status, reason = "doubtful", why or reason
         distances = inter_eyelid_distances(points, self.model.markers)
         return TrackedFrame(status, reason, points, distances, _overall(fit), fit.iterations, errors)
-
-    def _flat(self, fit: Fit) -> str:
-        """Which eye's picture is too even to show one; a detector and its model draw lids all the same."""
-        usual = max(float(fit.spreads.max()), self._usual_spread)
-        eye = int(fit.spreads.argmin())
-        return (
-            f"{self._name(eye)} covered: its picture is flat" if fit.spreads[eye] < FLAT_SHARE * usual else ""
-        )
-
-    def _name(self, eye: int) -> str:
-        return ("left eye", "right eye")[eye] if self.model.eyes == 2 else "eye"
-
-    def _fault(self, fit: Fit, picture: Picture) -> str:
-        """Why a fit is not believed, or an empty string."""
-        if fit.iterations == 0:
-            return "the fit broke down"
-        if not inside(fit, picture):
-            return "the eyes left the picture"
-        size = float(np.hypot(*fit.pose[:2]))
-        if not self._sizes[0] < size < self._sizes[1]:
-            return f"the eyes would be {size / self._sizes[0] * SCALE_RANGE[0]:.2g} times their labelled size"
-        excess = fit.residuals / self.model.residual_limits
-        eye = int(excess.argmax())
-        if excess[eye] > 1:
-            limit = self.model.residual_limits[eye]
-            return (
-                f"{self._name(eye)} covered or changed: residual {fit.residuals[eye]:.1f} above {limit:.1f}"
-            )
-        return ""
 
 
 def _overall(fit: Fit) -> float:

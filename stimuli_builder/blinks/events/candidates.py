@@ -53,13 +53,16 @@ def find_candidates(depth: Depth) -> list[Candidate]:
     for peak, prominence in zip(peaks - 1, facts["prominences"], strict=True):
         height = float(depth.smooth[peak])
         if prominence >= RIPPLE * height:
-            base = height - float(prominence)
-            left, right = (
-                tuple(crossing(depth, int(peak), base + part * prominence, step) for part in LEVELS)
-                for step in (-1, 1)
-            )
-            candidates.append(Candidate(int(peak), height, float(prominence), left, right))  # type: ignore[arg-type]
+            candidates.append(candidate_at(depth, int(peak), float(prominence)))
     return candidates
+
+
+def candidate_at(depth: Depth, peak: int, prominence: float) -> Candidate:
+    """The dip whose deepest frame is `peak`, as it rises by `prominence` (a depth) above its surroundings."""
+    height = float(depth.smooth[peak])
+    levels = [height - prominence + part * prominence for part in LEVELS]
+    left, right = ([crossing(depth, peak, level, step) for level in levels] for step in (-1, 1))
+    return Candidate(peak, height, prominence, (left[0], left[1], left[2]), (right[0], right[1], right[2]))
 
 
 def crossing(depth: Depth, peak: int, level: float, step: int) -> float:

@@ -1,15 +1,14 @@
 """From lid series to events: what each dip is, how sure that is, and when it happened."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from stimuli_builder.blinks.events.candidates import (
-    LEVELS,
     RIPPLE,
     Candidate,
-    crossing,
+    candidate_at,
     deep_level,
     features_of,
     find_candidates,
@@ -117,20 +116,18 @@ def _judge(piece: _Piece, fps: float, other: Array | None, events: list[LidEvent
     beside = None if other is None else other[piece.start : piece.start + piece.depth.smooth.size]
     rows = features_of(piece.candidates, piece.depth, beside)
     for candidate, shares in zip(piece.candidates, network.probabilities(rows), strict=True):
-        kind = network.kinds[int(shares.argmax())]
-        if shares[network.kinds.index("blink")] >= LEAST_PROBABILITY:
-            kind = "blink"
+        sure = shares[network.kinds.index("blink")] >= LEAST_PROBABILITY
+        kind = "blink" if sure else network.kinds[int(shares.argmax())]
         if kind == "nothing":
             continue
         if _cut(candidate, piece.depth):
             cut += [piece.start + candidate.peak] if kind == "blink" else []
             continue
         timing = _timed(candidate, piece.depth) if kind == "blink" else _crossed(candidate, fps)
-        if kind == "blink" and timing.closed_to_s - timing.closed_from_s >= CLOSED_EYE_S:
-            sure = shares[network.kinds.index("blink")] >= LEAST_PROBABILITY
+        if kind == "blink" and timing.closed_s >= CLOSED_EYE_S:
             above = _above_its_shoulders(timing, candidate, piece.depth) if sure else None
-            kind = "closed_eye" if above is None else "blink"
             timing = timing if above is None else _crossed(above, fps)
+            kind = "closed_eye" if timing.closed_s >= CLOSED_EYE_S else "blink"
         events.append(_event(kind, float(shares.max()), candidate, timing, piece.start, fps))
 
 
@@ -153,10 +150,7 @@ def _above_its_shoulders(timing: Timing, candidate: Candidate, depth: Depth) -> 
     prominence = candidate.depth - base
     if prominence < RIPPLE * candidate.depth:
         return None
-    left, right = (
-        tuple(crossing(depth, peak, base + part * prominence, step) for part in LEVELS) for step in (-1, 1)
-    )
-    return replace(candidate, prominence=prominence, left=left, right=right)  # type: ignore[arg-type]
+    return candidate_at(depth, peak, prominence)
 
 
 def _timed(candidate: Candidate, depth: Depth) -> Timing:

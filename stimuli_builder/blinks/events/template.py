@@ -60,6 +60,11 @@ class Timing:
     amplitude: float
     misfit: float
 
+    @property
+    def closed_s(self) -> float:
+        """Length of the closed phase."""
+        return self.closed_to_s - self.closed_from_s
+
 
 @cache
 def shipped_forms() -> Forms:

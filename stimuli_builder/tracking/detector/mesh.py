@@ -26,6 +26,8 @@ SIDE_OF_WIDTH = 2.9
 """Side of the region in which a close-up's eye is read, in widths of the eye as found."""
 VIEWS = tuple((dy, turn) for dy in (-0.24, -0.16, -0.08) for turn in (-10, 0, 10))
 """The eye is read in all of these and the mean is taken: shift down in its widths, turn in degrees."""
+JITTERED = 4
+"""Pictures in which the regions tried are jittered."""
 LAID_ON = 9
 """Pictures over which the region is laid on the eye."""
 
@@ -47,6 +49,12 @@ class FaceMesh:
                 iris = np.array([iris for _, _, iris in face["eyes"]])
                 eyes_of_faces.append(Detection(np.concatenate(eyes), iris, np.array(face["box"])))
         return sorted(eyes_of_faces, key=lambda one: one.area_px2, reverse=True)
+
+
+def spread_out(pictures: Sequence[Picture], count: int) -> list[Picture]:
+    """So many of the pictures, or all where they are fewer, from the first to the last and evenly apart."""
+    chosen = np.linspace(0, len(pictures) - 1, min(count, len(pictures))).round()
+    return [pictures[int(number)] for number in chosen]
 
 
 class Region(NamedTuple):
@@ -77,6 +85,11 @@ class CloseUp:
 
         A first region is the one whose contour moves least when it is moved, and opens and closes most. Those
         that the eye is read in are laid, in two rounds, on the eye as they see it.
+
+        Raises
+        ------
+        InputError
+            The eye is seen less than 10 px wide.
         """
         height, width = pictures[0].shape[:2]
         regions = [
@@ -86,22 +99,25 @@ class CloseUp:
             for dy in REGION_SHIFTS
             for flip in (False, True)
         ]
-        few = pictures[:: max(1, len(pictures) // 4)][:4]
-        spread = np.mean([self._spread(picture, regions) for picture in few], axis=0)
+        spread = np.mean([self._spread(p, regions) for p in spread_out(pictures, JITTERED)], axis=0)
         best = np.argsort(spread)[:6]
         heights = np.array([self._heights(p, [regions[k] for k in best]) for p in pictures])
         low, high = np.percentile(heights, [3, 90], axis=0)
         travel = (high - low) / np.maximum(high, 1e-6)
         region = regions[int(best[int(np.argmax(travel - 2 * spread[best]))])]
         self._views = region.views(region.side / SIDE_OF_WIDTH)
-        spread_out = pictures[:: max(1, len(pictures) // LAID_ON)][:LAID_ON]
         for _ in range(2):
-            self._lay(spread_out, region.flip)
+            self._lay(spread_out(pictures, LAID_ON), region.flip)
 
     def _lay(self, pictures: Sequence[Picture], flip: bool) -> None:
         """Lay the views on the eye's middle, in the median of pictures, with sides by its width."""
         canthi = np.array([self._points(picture)[0][[0, 5]] for picture in pictures])
         width = float(np.median(np.hypot(*(canthi[:, 1] - canthi[:, 0]).T)))
+        if width < LEAST_EYE_PX:
+            raise InputError(
+                f"the eye of this close-up is seen {width:.0f} px wide, and {LEAST_EYE_PX} are needed; "
+                "leave out --one-eye if the video shows a face"
+            )
         x, y = np.median(canthi.mean(1), axis=0).tolist()
         self._views = Region(x, y, SIDE_OF_WIDTH * width, flip).views(width)
 
@@ -151,7 +167,7 @@ def open_detector(*, one_eye: bool, first: Sequence[Picture] = ()) -> Iterator[L
     Raises
     ------
     InputError
-        Most pictures meant as close-ups show a whole face.
+        Most pictures meant as close-ups show a whole face, or an eye less than 10 px wide.
     """
     with MeshClient(detector_environment()) as client:
         if not one_eye:
@@ -164,7 +180,7 @@ def open_detector(*, one_eye: bool, first: Sequence[Picture] = ()) -> Iterator[L
 
 
 def _refuse_faces(mesh: FaceMesh, pictures: Sequence[Picture]) -> None:
-    few = pictures[:: max(1, len(pictures) // FACES_ASKED)][:FACES_ASKED]
+    few = spread_out(pictures, FACES_ASKED)
     faces = sum(_shows_a_face(mesh, picture) for picture in few)
     if 2 * faces > len(few):
         raise InputError(

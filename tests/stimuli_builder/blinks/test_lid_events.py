@@ -152,6 +152,13 @@ def test_a_blink_while_looking_down_is_no_closed_eye(fps, gaze, depth):
     assert blink.closed_to_s - blink.closed_from_s < 0.3
 
 
+@pytest.mark.parametrize(("gaze", "hold"), [(0.5, 0.55), (0.5, 0.6), (0.6, 0.55)])
+def test_lids_shut_for_half_a_second_while_looking_down_are_a_closed_eye(gaze, hold):
+    motions = [Motion("gaze_shift", 8, 0.08, 3.0, 0.1, gaze), Motion("blink", 8.6, 0.1, hold, 0.24, 1.0)]
+    (seen,) = recognise([eye(lids([*blinks_at(3, 5.5, 14, 17), *motions], 120.0), 120.0)])
+    assert {event.kind for event in seen.events if 8 < event.minimum_s < 11} == {"closed_eye"}
+
+
 @pytest.mark.parametrize("fps", [30.0, 60.0, 120.0, 240.0, 600.0])
 def test_phases_of_known_blinks_are_found_between_frames(fps):
     distance = lids(blinks_at(2.013, 5.027, 9.1, 13.004, 16.018, hold=0.06), fps)

@@ -16,7 +16,7 @@ from experiments.errors import InputError
 from stimuli_builder.environments import cache_folder, ensure_environment
 from stimuli_builder.tracking.certainty import lid_difference, lid_offsets, with_errors
 from stimuli_builder.tracking.detector.detection import along, eye_points
-from stimuli_builder.tracking.detector.mesh import open_detector
+from stimuli_builder.tracking.detector.mesh import FACES_ASKED, open_detector, spread_out
 from stimuli_builder.tracking.detector.mesh_client import MeshClient
 from stimuli_builder.tracking.labelfree import (
     DETECTOR_SHARE,
@@ -320,26 +320,39 @@ def test_a_whole_face_is_refused_as_a_close_up_and_a_close_up_is_not(detector, s
     assert len(survey(scan_video(folder / "short_human_3blink.mp4"), one_eye=True).points) > 10
 
 
-@pytest.fixture(scope="module")
-def close_up(detector, shared_data):
-    """The real close-up's labels, and what is read in its labelled frames."""
+def test_a_close_up_in_whose_iris_the_mesh_sees_faces_is_read_where_it_was_labelled(detector, shared_data):
     clip = shared_data / "face_video" / "short_human_3blink.mp4"
     labels = load_labels(clip.with_name("short_human_3blink.points.json")).frames
     pictures = [picture.copy() for picture in frames(clip, read=rgb)]
-    with open_detector(one_eye=True, first=pictures[::8]) as eye:
-        return labels, {n: eye.detect(pictures[n])[0].points for n in labels}
-
-
-def test_a_close_up_in_whose_iris_the_mesh_sees_faces_is_read_all_the_same(close_up):
-    labels, seen = close_up
-    assert seen.keys() == labels.keys()
-
-
-def test_the_lids_of_a_close_up_lie_nearly_where_they_were_labelled(close_up):
-    labels, seen = close_up
+    first = pictures[:161:8]
+    with open_detector(one_eye=False) as mesh:
+        assert sum(bool(mesh.detect(p)) for p in spread_out(first, FACES_ASKED)) > FACES_ASKED / 2
+    with open_detector(one_eye=True, first=first) as eye:
+        seen = {n: eye.detect(pictures[n])[0].points for n in labels}
     away = [lid_offsets(seen[n], points).mean() for n, points in labels.items()]
     # A single region read 2.9%; the labels are good to 1%.
     assert np.mean(away) < 0.027
+
+
+@pytest.mark.parametrize("count", [1, 5, 9, 10, 13, 17, 18, 29, 40])
+def test_pictures_are_chosen_from_the_first_to_the_last(count):
+    pictures = [np.full((1, 1, 3), number, np.uint8) for number in range(count)]
+    chosen = [int(picture[0, 0, 0]) for picture in spread_out(pictures, 9)]
+    assert len(chosen) == min(count, 9)
+    assert (chosen[0], chosen[-1]) == (0, count - 1)
+    assert count == 1 or np.ptp(np.diff(chosen)) <= 1
+
+
+def test_a_close_up_whose_eye_is_seen_below_ten_px_is_refused(detector, shared_data):
+    clip = shared_data / "face_video" / "short_human_3blink.mp4"
+    pictures = [cv2.resize(p, (12, 9), interpolation=cv2.INTER_AREA) for p in frames(clip, read=rgb)]
+    message = r"seen \d px wide, and 10 are needed; leave out --one-eye"
+    with (
+        pytest.raises(InputError, match=message) as refused,
+        open_detector(one_eye=True, first=pictures[::24]),
+    ):
+        pass
+    assert "\n" not in str(refused.value)
 
 
 def test_a_grey_picture_is_refused_as_such_by_the_detector():

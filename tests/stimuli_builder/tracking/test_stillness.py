@@ -13,6 +13,7 @@ from stimuli_builder.tracking.tracker import STILL, Tracker
 from stimuli_builder.video import scan_video
 
 FPS = 60
+EYE = np.array([[0, 0], [20, -9], [40, -12], [60, -12], [80, -9], [100, 0], [75, 5], [50, 7], [25, 5.0]])
 
 
 def noisy(picture, rng):
@@ -62,13 +63,33 @@ def test_the_actor_who_holds_still_between_blinks_is_tracked(lesson):
 @pytest.mark.parametrize(("drift_share", "still"), [(0.0, True), (0.004, False)])
 def test_a_slow_drift_under_noise_is_a_move(drift_share, still):
     rng, lids = np.random.default_rng(2), Stillness(FPS)
-    eye = np.array([[0, 0], [20, -9], [40, -12], [60, -12], [80, -9], [100, 0], [75, 5], [50, 7], [25, 5.0]])
     told = [
-        lids.after(eye + rng.normal(0, 0.1, eye.shape) + 100 * drift_share * np.sin(n / 30))
+        lids.after(EYE + rng.normal(0, 0.1, EYE.shape) + 100 * drift_share * np.sin(n / 30))
         for n in range(400)
     ]
     assert not any(told[:119])
     assert set(told[119:]) == {still}
+
+
+@pytest.mark.parametrize(("first_scale", "still"), [(4.0, False), (0.25, True)])
+def test_the_width_that_counts_is_that_of_the_eye_now(first_scale, still):
+    """Eyes that were 4 times as wide move by 0.4% of their width now; some a quarter as wide, by 0.1%."""
+    rng, lids = np.random.default_rng(2), Stillness(FPS)
+    share = 0.001 if still else 0.004
+    for scale in np.linspace(first_scale, 1, 60):
+        lids.after(scale * EYE)
+    told = [lids.after(EYE + rng.normal(0, 100 * share, EYE.shape)) for _ in range(200)]
+    assert set(told[119:]) == {still}
+
+
+@pytest.mark.parametrize("fps", [1.0, 2.5, 5.0])
+def test_lids_that_are_alike_in_a_few_frames_are_not_called_still(fps):
+    """A calm person at a low rate: the eye is narrowed in each fifth frame, and the same in the others."""
+    lids, narrowed = Stillness(fps), EYE * [1, 0.8]
+    assert not any(lids.after(narrowed if n % 5 == 4 else EYE) for n in range(60))
+    told = [lids.after(EYE) for _ in range(20)]
+    assert not any(told[:5])
+    assert all(told[10:])
 
 
 def test_two_seconds_begin_anew_after_a_frame_without_eyes():
