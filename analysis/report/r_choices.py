@@ -46,6 +46,7 @@ def pairs_files(
         printed=as_csv(_printed_pairs(comparisons, findings)).strip(),
         floor="1e-3",
         limit="1e-5",
+        loose=[],
     )
     header = ["rater", "left", "right", "left_chosen", "right_chosen", *(["tied"] if ties else [])]
     return {script: text.encode(), data: as_csv([header, *_choices(comparisons, ties)]).encode()}
@@ -140,6 +141,7 @@ def threshold_files(
         printed=as_csv([[table, name, r_number(value)] for table, name, value in printed]).strip(),
         floor="1e-3",
         limit="1e-4",
+        loose=[],
     )
     return {script: text.encode(), data: as_csv(_trials(fitted, answers, people)).encode()}
 

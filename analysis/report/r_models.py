@@ -28,11 +28,15 @@ def model_files(
     """The script of one model and the ratings it reads, by file name.
 
     The contrasts of a factor of three levels or more share one variance here, which neither lmer nor clmm
-    has: both packages' own likelihood functions are asked for it.
+    has: both packages' own likelihood functions are asked for it. No file for an ordinal model with an SD at
+    its upper limit, where the likelihood has no maximum.
     """
     from analysis.models.mixed_result import MixedResult
+    from analysis.models.ordinal_maximum import SD_MAX
 
     is_mixed = isinstance(model, MixedResult)
+    if not is_mixed and max(c.sd for c in model.components) > SD_MAX - 1e-6:
+        return {}
     kind = "mixed" if is_mixed else "ordinal"
     slopes = [c.term for c in model.components if c.group == "participant" and c.term != "intercept"]
     levels = dict(zip(analysis.anova.all_factors, analysis.anova.all_levels, strict=True))
@@ -59,6 +63,7 @@ def model_files(
         ).strip(),
         floor="1e-3",
         limit="1e-5",
+        loose=[f'"{table}"' for table in ("mixed df", "ordinal se", "ordinal SD")],
     )
     return {script: text.encode(), data: _ratings(arguments, model.factors, names).encode()}
 

@@ -63,12 +63,21 @@ def test_levels_stand_in_the_order_of_the_model(tmp_path) -> None:
     assert columns[0].tolist() == (3 - columns[1]).tolist()
 
 
+def altered_coefficient(script: Path) -> Path:
+    """The script with one coefficient changed, in what is printed and where the likelihood is taken."""
+    text = script.read_text(encoding="utf-8")
+    (value,) = re.findall(r"^ordinal coefficient,f11,(.*)$", text, re.MULTILINE)
+    assert text.count(value) == 2
+    script.write_text(text.replace(value, repr(float(value) * 1.001)), encoding="utf-8")
+    return script
+
+
 @pytest.fixture(scope="module")
 def of_r(tmp_path_factory) -> dict[str, str]:
     """What R says of the models of two levels, of four, and of an F that was changed."""
     needed("lme4", "lmerTest", "ordinal")
-    folders = ("two", "four", "factors", "changed")
-    two, four, factors, changed = (tmp_path_factory.mktemp(name) for name in folders)
+    folders = ("two", "four", "factors", "changed", "turned")
+    two, four, factors, changed, turned = (tmp_path_factory.mktemp(name) for name in folders)
     mixed, ordinal = sections(two, first_levels(2))
     shared, shared_ordinal = sections(four, first_levels(4))
     _, of_four_factors = sections(factors, EXP1.model_copy(update={"exclusions": ()}), trials=2)
@@ -84,9 +93,10 @@ def of_r(tmp_path_factory) -> dict[str, str]:
         written(shared_ordinal, four)[0],
         written(of_four_factors, factors)[0],
         altered,
+        altered_coefficient(written(ordinal, turned)[0]),
     ]
     assert {path.suffix for path in scripts} == {".R"}
-    models = ("mixed", "ordinal", "shared", "shared ordinal", "four factors", "changed")
+    models = ("mixed", "ordinal", "shared", "shared ordinal", "four factors", "changed", "changed ordinal")
     return dict(zip(models, run_together(scripts), strict=True))
 
 
@@ -106,8 +116,9 @@ def test_r_agrees_with_models_also_where_contrasts_share_a_variance(of_r, model,
         assert re.search(rf"^{table} .*agree$", of_r[model], re.MULTILINE), of_r[model]
 
 
-def test_r_finds_a_changed_f(of_r) -> None:
+def test_r_finds_a_changed_f_and_a_changed_coefficient(of_r) -> None:
     assert re.search(r"^mixed F .*DIFFER$", of_r["changed"], re.MULTILINE)
+    assert re.search(r"^ordinal coefficient .*DIFFER$", of_r["changed ordinal"], re.MULTILINE)
 
 
 def test_no_name_stands_in_code(tmp_path) -> None:
