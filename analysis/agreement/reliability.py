@@ -11,7 +11,13 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from analysis.read.number_columns import numbers, unusual_numbers
-from analysis.read.text_table import name_lines, read_text_table, refuse_shared_roles, texts_required
+from analysis.read.text_table import (
+    TextTable,
+    name_lines,
+    read_text_table,
+    refuse_shared_roles,
+    texts_required,
+)
 from experiments.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -98,7 +104,7 @@ def read_items(
     for name, column in zip(items, answers.T, strict=True):
         unusual_numbers(table, name, column)
     if scale is not None:
-        _refuse_outside(table.source, items, answers, scale, table.lines)
+        _refuse_outside(table, items, answers, scale)
         turned = [name in reverse for name in items]
         answers[:, turned] = sum(scale) - answers[:, turned]
     keep: NDArray[np.bool_] = np.asarray(np.isfinite(answers).all(axis=1))
@@ -113,12 +119,14 @@ def read_items(
             raise InputError(f"{path.name}: every answer to '{name}' is {column[0]:g}; leave the item out")
     if np.ptp(answers[keep].sum(axis=1)) == 0:
         raise InputError(f"{path.name}: the sum of the items is the same in every case; turn with --reverse")
-    named = table.columns[case].astype(str) if case else pd.Series(table.lines).map("line {}".format)
+    cases = (
+        list(table.columns[case].astype(str)) if case else [f"line {table.line(i)}" for i in range(len(keep))]
+    )
     return ItemAnswers(
         answers[keep],
         tuple(items),
         tuple(reverse),
-        tuple(named.to_numpy()[keep]),
+        tuple(name for name, kept in zip(cases, keep, strict=True) if kept),
         table.source,
         table.synthetic,
         tuple(table.decisions),
@@ -136,14 +144,14 @@ def _refuse_items(items: Sequence[str], reverse: Sequence[str], scale: tuple[flo
 
 
 def _refuse_outside(
-    source: str, items: Sequence[str], answers: Floats, scale: tuple[float, float], lines: NDArray[np.int64]
+    table: TextTable, items: Sequence[str], answers: Floats, scale: tuple[float, float]
 ) -> None:
     outside = np.argwhere((answers < scale[0]) | (answers > scale[1]))
     if len(outside):
         row, column = outside[0]
         raise InputError(
-            f"{source}: '{items[column]}' is {answers[row, column]:g} in line {lines[row]}, outside the "
-            f"scale {scale[0]:g} to {scale[1]:g}"
+            f"{table.source}: '{items[column]}' is {answers[row, column]:g} in line {table.line(int(row))}, "
+            f"outside the scale {scale[0]:g} to {scale[1]:g}"
         )
 
 

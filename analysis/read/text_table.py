@@ -26,7 +26,8 @@ class TextTable:
     """Columns of text (categorical, kept as written, stripped) and what was decided while reading.
 
     `lines` (rows,) are where the rows stand in the file; `labels` has, of a column, the word for each code;
-    `numeric` are columns of numbers, not of texts like them; `reader` reads further columns of the file.
+    `numeric` are columns of numbers, not of texts like them; `reader` reads further columns of the file;
+    `files` (rows,) are the names of the files of a folder.
     """
 
     columns: pd.DataFrame
@@ -37,15 +38,16 @@ class TextTable:
     numeric: frozenset[str] = frozenset()
     decisions: list[str] = field(default_factory=list)
     reader: Reader | None = field(default=None, repr=False)
+    files: NDArray[np.str_] | None = field(default=None, repr=False)
 
     @property
     def synthetic(self) -> bool:
         """Whether a column `synthetic`, where it was read, marks a row as made and not given by a person."""
         return "synthetic" in self.columns and bool((self.columns["synthetic"] == "1").any())
 
-    def line(self, row: int) -> int:
-        """Line of the file on which data row `row` (from 0) begins."""
-        return int(self.lines[row])
+    def line(self, row: int) -> str:
+        """Line of the file on which data row `row` (from 0) begins: `7`, in a folder `7 of p1.csv`."""
+        return str(self.lines[row]) if self.files is None else f"{self.lines[row]} of {self.files[row]}"
 
 
 def read_text_table(path: Path, needed: Sequence[str] | None, optional: Sequence[str] = ()) -> TextTable:
@@ -68,9 +70,16 @@ def read_text_table(path: Path, needed: Sequence[str] | None, optional: Sequence
     if cells.rows.empty:
         raise InputError(f"{path.name} has a header but no rows{' that are trials' * bool(cells.decisions)}")
     table = TextTable(
-        cells.rows, path.name, cells.header, cells.lines, cells.labels, cells.numeric, reader=reader
+        cells.rows,
+        path.name,
+        cells.header,
+        cells.lines,
+        cells.labels,
+        cells.numeric,
+        list(cells.decisions),
+        reader,
+        cells.files,
     )
-    table.decisions.extend(cells.decisions)
     for name in names:
         table.columns[name] = _stripped(table.columns[name])
     _leave_out_empty_rows(table, names)
@@ -89,6 +98,7 @@ def _leave_out_empty_rows(table: TextTable, names: Sequence[str]) -> None:
         left = table.columns[~empty].reset_index(drop=True)
         table.columns = left.apply(lambda column: column.cat.remove_unused_categories())
         table.lines = table.lines[~empty]
+        table.files = None if table.files is None else table.files[~empty]
 
 
 def _names_to_read(
@@ -213,6 +223,6 @@ def _worded(
 def name_lines(table: TextTable, rows: NDArray[np.bool_]) -> str:
     """The lines of some rows in words, the first few only."""
     numbers = np.flatnonzero(rows)
-    named = ", ".join(str(table.line(int(row))) for row in numbers[:NAMED_ROWS])
+    named = ", ".join(table.line(int(row)) for row in numbers[:NAMED_ROWS])
     rest = len(numbers) - NAMED_ROWS
     return f"line{'s' if len(numbers) > 1 else ''} {named}{f' and {rest} more' if rest > 0 else ''}"

@@ -1,7 +1,7 @@
 """What every reader of a file gives: a header and cells of text."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -29,6 +29,8 @@ class Cells:
         Columns whose every cell is a number to the program that wrote the file, and no text like one.
     decisions : tuple of str
         What was understood, for the reader of the tables.
+    files : array of str or None
+        Name of the file in which each row stands, (rows,), where they are several.
     """
 
     rows: pd.DataFrame
@@ -37,6 +39,13 @@ class Cells:
     labels: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     numeric: frozenset[str] = frozenset()
     decisions: tuple[str, ...] = ()
+    files: NDArray[np.str_] | None = field(default=None, repr=False)
+
+    def of_rows(self, keep: NDArray[np.bool_]) -> "Cells":
+        """The rows to `keep` (rows,) alone."""
+        files = None if self.files is None else self.files[keep]
+        rows = self.rows[keep].reset_index(drop=True)
+        return replace(self, rows=rows, lines=self.lines[keep], files=files)
 
 
 def cells_of(

@@ -6,7 +6,9 @@ the file without its ending is a column `file` (decision 0910).
 """
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
 
@@ -15,35 +17,60 @@ import pandas as pd
 
 from analysis.read.files.cells import Cells
 from analysis.read.files.delimited import delimited_cells, delimited_header
+from analysis.read.files.joined import FEWEST_KINDS, joined_of, row_counts
 from experiments.errors import InputError
 
 DESCRIPTION = "dataset_description.json"
 NAMED_FILES = 5
+ORIGIN = "synthetic"
+"""A column that is read though only some files have it: what was generated must not pass as given."""
+
+
+@dataclass(frozen=True)
+class DataFile:
+    """A file with rows, the columns in it, and those that its name has in their place."""
+
+    path: Path
+    header: tuple[str, ...]
+    beside: Mapping[str, str]
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """All of them, each once."""
+        return tuple(dict.fromkeys([*self.header, *self.beside]))
+
+
+@dataclass(frozen=True)
+class Folder:
+    """What is known of a folder before its columns are read: its files, and what is said of them."""
+
+    files: tuple[DataFile, ...]
+    said: tuple[str, ...]
+
+    @property
+    def header(self) -> list[str]:
+        """Columns that every data file has, and that of the origin where one has it."""
+        every = [set(file.columns) for file in self.files]
+        shared = [name for name in self.files[0].columns if all(name in names for names in every)]
+        origin = ORIGIN not in shared and any(ORIGIN in names for names in every)
+        return [*shared, *[ORIGIN] * origin]
 
 
 def header(folder: Path) -> list[str]:
     """Columns that every data file has, and those of the files' names."""
-    columns = [[*delimited_header(path)[0], *names_of(folder, path)] for path in data_files(folder)[0]]
-    return [name for name in dict.fromkeys(columns[0]) if all(name in names for names in columns)]
+    return _known(folder).header
 
 
 def cells(folder: Path, names: list[str]) -> Cells:
     """The columns `names` of all data files, one below the other."""
-    files, without_rows = data_files(folder)
-    _refuse_joined(files)
-    parts = [_part(folder, path, names) for path in files]
-    sort = "Psych-DS folder" if _is_psych_ds(folder) else "folder"
-    said = [f"read {len(files)} data file{'s' if len(files) > 1 else ''} of the {sort} {folder.name}"]
-    if without_rows:
-        said.append(f"files without rows left out: {_listed(without_rows)}")
-    if copies := _copies(files):
-        said.append(f"files that are like another, byte for byte, count too: {_listed(copies)}")
-    said += _contradictions(folder, files, parts, names)
+    known = _known(folder)
+    parts = [_part(file, names) for file in known.files]
     return Cells(
         pd.concat([part.rows for part in parts], ignore_index=True),
-        tuple(header(folder)),
+        tuple(known.header),
         np.concatenate([part.lines for part in parts]),
-        decisions=tuple(said),
+        decisions=(*known.said, *_contradictions(known.files, parts, names)),
+        files=np.repeat([file.path.name for file in known.files], [len(part.lines) for part in parts]),
     )
 
 
@@ -55,20 +82,44 @@ def names_of(folder: Path, path: Path) -> dict[str, str]:
     return {key: value for key, dash, value in parts if dash}
 
 
-def data_files(folder: Path) -> tuple[list[Path], list[Path]]:
-    """The data files of the folder that have rows, in the order of their names, and those that have none."""
-    if _is_psych_ds(folder):
-        files = sorted((folder / "data").rglob("*_data.csv"))
-        expected = "data/..._data.csv in a Psych-DS folder"
-    else:
-        files = sorted(path for path in folder.iterdir() if path.suffix.lower() == ".csv")
-        expected = f"files .csv, one a person, or a Psych-DS folder ({DESCRIPTION})"
-    if not files:
-        raise InputError(f"{folder.name} is a folder without data files; expected {expected}")
-    filled = [path for path in files if _has_rows(path)]
+def _known(folder: Path) -> Folder:
+    """The folder as it is now; gone through once for the header and for the cells."""
+    paths = _data_paths(folder)
+    return _look_through(folder, tuple((p, p.stat().st_mtime_ns, p.stat().st_size) for p in paths))
+
+
+@lru_cache(maxsize=2)
+def _look_through(folder: Path, stamps: tuple[tuple[Path, int, int], ...]) -> Folder:
+    paths = [path for path, *_ in stamps]
+    filled = [path for path in paths if _has_rows(path)]
     if not filled:
         raise InputError(f"no data file of the folder {folder.name} has rows")
-    return filled, [path for path in files if path not in filled]
+    files = tuple(DataFile(path, tuple(delimited_header(path)[0]), names_of(folder, path)) for path in filled)
+    sort = "Psych-DS folder" if _is_psych_ds(folder) else "folder"
+    said = [f"read {len(files)} data file{'s' * (len(files) > 1)} of the {sort} {folder.name}"]
+    if without_rows := [path.name for path in paths if path not in filled]:
+        said.append(f"files without rows left out: {_listed(without_rows)}")
+    if copies := _copies(filled):
+        said.append(f"files that are like another, byte for byte, count too: {_listed(copies)}")
+    return Folder(files, (*said, *_columns_of_some(files), *_joined(files)))
+
+
+def _data_paths(folder: Path) -> list[Path]:
+    """The data files of the folder in the order of their names, but for hidden ones (macOS's `._p1.csv`)."""
+    if _is_psych_ds(folder):
+        found = (folder / "data").rglob("*_data.csv")
+        expected = "data/..._data.csv in a Psych-DS folder"
+    else:
+        found = (path for path in folder.iterdir() if path.suffix.lower() == ".csv")
+        expected = f"files .csv, one a person, or a Psych-DS folder ({DESCRIPTION})"
+    files = sorted(
+        path
+        for path in found
+        if path.is_file() and not any(part.startswith(".") for part in path.relative_to(folder).parts)
+    )
+    if not files:
+        raise InputError(f"{folder.name} is a folder without data files; expected {expected}")
+    return files
 
 
 def _is_psych_ds(folder: Path) -> bool:
@@ -76,56 +127,74 @@ def _is_psych_ds(folder: Path) -> bool:
 
 
 def _has_rows(path: Path) -> bool:
-    """Whether anything stands below the first line: of runs broken off programs write empty files."""
-    with path.open("rb") as file:
-        lines = (line for line in file.read().splitlines() if line.strip(b"\r\n\t ,;"))
-        return next(lines, None) is not None and next(lines, None) is not None
+    """Whether any cell below the header holds something: of runs broken off programs write empty files."""
+    if not path.read_bytes().strip(b"\xef\xbb\xbf\xff\xfe\0\r\n\t ,;"):
+        return False
+    rows = delimited_cells(path, list(dict.fromkeys(delimited_header(path)[0]))).rows
+    return any(rows[name].str.strip().any() for name in rows)
 
 
-def _refuse_joined(files: Sequence[Path]) -> None:
-    """Refuse a file into which others of the folder were joined: each of their rows would count twice."""
-    rows = {path: Counter(path.read_bytes().splitlines()[1:]) for path in files}
-    largest = max(files, key=lambda path: rows[path].total())
-    inside = [path for path in files if path != largest and rows[path] <= rows[largest]]
-    # answers of few kinds are alike by chance, but not as many of them as others have together
-    if len(inside) > 1 and sum(rows[path].total() for path in inside) == rows[largest].total():
-        raise InputError(
-            f"every row of {len(inside)} files ({_listed(inside)}) stands in {largest.name} too and would "
-            "count twice; move that file, or the others, out of the folder"
-        )
+def _columns_of_some(files: Sequence[DataFile]) -> list[str]:
+    """Name the columns that are left out because not every file has them."""
+    times = Counter(name for file in files for name in file.columns if name)
+    some = [name for name, count in times.items() if count < len(files)]
+    lines = [f"'{ORIGIN}' stands in some files alone; rows of the others are taken as given by people"]
+    left = [name for name in some if name != ORIGIN]
+    return [
+        *lines * (ORIGIN in some),
+        *[f"columns that only some files have left out: {_listed(left)}"] * bool(left),
+    ]
 
 
-def _copies(files: Sequence[Path]) -> list[Path]:
-    """Files whose bytes are those of a file before them."""
+def _joined(files: Sequence[DataFile]) -> list[str]:
+    """Refuse a file into which others of the folder were joined: each of their rows would count twice.
+
+    Where their rows are of few kinds, so that they may be alike by chance, it is said.
+    """
+    shared = [name for name in files[0].header if all(name in file.header for file in files)]
+    if not shared or len(files) <= 2:
+        return []
+    shared = list(dict.fromkeys(shared))
+    counts = {file.path: row_counts(delimited_cells(file.path, shared).rows) for file in files}
+    joined = joined_of(counts)
+    if joined is None:
+        return []
+    parts = [path.name for path in joined.parts]
+    where = f"every row of {len(parts)} files ({_listed(parts)}) stands in {joined.file.name} too"
+    if joined.kinds < FEWEST_KINDS:
+        return [f"{where}, by chance or since they were joined to it; all rows count"]
+    raise InputError(f"{where} and would count twice; move that file, or the others, out of the folder")
+
+
+def _copies(files: Sequence[Path]) -> list[str]:
+    """Names of files whose bytes are those of a file before them."""
     seen: set[bytes] = set()
     copies = []
     for path in files:
         digest = sha256(path.read_bytes()).digest()
         if digest in seen:
-            copies.append(path)
+            copies.append(path.name)
         seen.add(digest)
     return copies
 
 
-def _contradictions(
-    folder: Path, files: Sequence[Path], parts: Sequence[Cells], names: Sequence[str]
-) -> list[str]:
+def _contradictions(files: Sequence[DataFile], parts: Sequence[Cells], names: Sequence[str]) -> list[str]:
     """Say it where a column has another value than the name of the file it stands in."""
-    for path, part in zip(files, parts, strict=True):
-        for name, value in names_of(folder, path).items():
+    for file, part in zip(files, parts, strict=True):
+        for name, value in file.beside.items():
             own = part.rows[name].iloc[0] if name in names else value
             if own != value:
-                return [f"'{name}' is {own} in {path.name}; the column counts, not the name of the file"]
+                return [f"'{name}' is {own} in {file.path.name}; the column counts, not the name of the file"]
     return []
 
 
-def _listed(files: Sequence[Path]) -> str:
-    rest = len(files) - NAMED_FILES
-    return f"{', '.join(path.name for path in files[:NAMED_FILES])}{f' and {rest} more' if rest > 0 else ''}"
+def _listed(names: Sequence[str]) -> str:
+    rest = len(names) - NAMED_FILES
+    return f"{', '.join(names[:NAMED_FILES])}{f' and {rest} more' if rest > 0 else ''}"
 
 
-def _part(folder: Path, path: Path, names: list[str]) -> Cells:
-    own, beside = delimited_header(path)[0], names_of(folder, path)
-    there = delimited_cells(path, [name for name in names if name in own])
-    extra = {name: beside[name] for name in names if name not in own}
+def _part(file: DataFile, names: list[str]) -> Cells:
+    there = delimited_cells(file.path, [name for name in names if name in file.header])
+    # the origin of rows is empty in a file that lacks it
+    extra = {name: file.beside.get(name, "") for name in names if name not in file.header}
     return Cells(there.rows.assign(**extra)[names], there.header, there.lines)

@@ -30,6 +30,8 @@ def _objects(path: Path) -> list[dict[str, Any]]:
         raise InputError(f"{path.name} is not JSON that can be read ({said})") from error
     if isinstance(read, dict) and isinstance(read.get("trials"), list):
         read = read["trials"]
+    elif isinstance(read, dict) and path.suffix.lower() != ".json":
+        read = [read]  # lines of JSON, of which there is one
     rows = read if isinstance(read, list) else []
     if not rows or not all(isinstance(row, dict) for row in rows):
         raise InputError(f"{path.name}: expected a list of objects, one a trial; save the data as CSV")
@@ -43,7 +45,8 @@ def _json_of(text: str) -> Any:
     except json.JSONDecodeError as error:
         if not error.msg.startswith("Extra data"):
             raise
-    values = [json.loads(line) for line in text.splitlines() if line.strip()]
+    # splitlines would cut at U+2028 and U+0085 too, which may stand in the texts of JSON
+    values = [json.loads(line) for line in text.split("\n") if line.strip()]
     return [row for value in values for row in (value if isinstance(value, list) else [value])]
 
 

@@ -1,5 +1,6 @@
 """Open a file by what it is: the one place that knows all of them."""
 
+import re
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -25,6 +26,8 @@ _OF_SUFFIX = {
     ".json": "json_rows",
     ".jsonl": "json_rows",
 }
+
+_HEAD = 1 << 12
 
 
 class Reader(NamedTuple):
@@ -69,4 +72,13 @@ def _sort(path: Path) -> str:
     suffix = path.suffix.lower()
     if suffix in _SAVE_AS:
         raise InputError(f"{path.name}: files of {suffix} are not read; save it as {_SAVE_AS[suffix]}")
+    if suffix == ".txt" and _looks_like_json(path):
+        return "json_rows"
     return _OF_SUFFIX.get(suffix, "delimited")
+
+
+def _looks_like_json(path: Path) -> bool:
+    """Whether a text begins as an object of JSON, or a list of some: JATOS saves its results as `.txt`."""
+    with path.open("rb") as file:
+        start = file.read(_HEAD).removeprefix(b"\xef\xbb\xbf")
+    return re.match(rb'\s*(\{\s*["}]|\[\s*[\[{\]])', start) is not None

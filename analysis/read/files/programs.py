@@ -49,9 +49,9 @@ def trials_only(cells: Cells, asked: list[str], sorts: Cells | None) -> Cells:
         if sorts is not None:
             counts = sorts.rows.iloc[np.flatnonzero(~keep), 0].replace("", "no sort").value_counts()
             said += f" ({', '.join(f'{sort} {count}' for sort, count in counts.items())})"
-    rows = cells.rows[keep].reset_index(drop=True)
-    surveys = [answer for name in asked if (answer := _one_answer(rows, name))]
-    return replace(cells, rows=rows, lines=cells.lines[keep], decisions=(*cells.decisions, said, *surveys))
+    kept = cells.of_rows(keep)
+    surveys = [answer for name in asked if (answer := _one_answer(kept.rows, name))]
+    return replace(kept, decisions=(*cells.decisions, said, *surveys))
 
 
 def _one_answer(rows: pd.DataFrame, name: str) -> str:

@@ -87,6 +87,8 @@ def _hidden_rows(page: Page) -> list[str]:
     """Say that rows count which a filter hides from the person who looks at the sheet."""
     if not page.hidden:
         return []
+    if page.hidden == 1:
+        return ["1 hidden row of the sheet counts too; delete it where it should not"]
     return [f"{page.hidden} hidden rows of the sheet count too; delete them where they should not"]
 
 
