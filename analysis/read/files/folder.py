@@ -107,14 +107,14 @@ def _look_through(folder: Path, stamps: tuple[tuple[Path, int, int], ...]) -> Fo
 def _data_paths(folder: Path) -> list[Path]:
     """The data files of the folder in the order of their names, but for hidden ones (macOS's `._p1.csv`)."""
     if _is_psych_ds(folder):
-        found = (folder / "data").rglob("*_data.csv")
+        candidates = (folder / "data").rglob("*_data.csv")
         expected = "data/..._data.csv in a Psych-DS folder"
     else:
-        found = (path for path in folder.iterdir() if path.suffix.lower() == ".csv")
+        candidates = (path for path in folder.iterdir() if path.suffix.lower() == ".csv")
         expected = f"files .csv, one a person, or a Psych-DS folder ({DESCRIPTION})"
     files = sorted(
         path
-        for path in found
+        for path in candidates
         if path.is_file() and not any(part.startswith(".") for part in path.relative_to(folder).parts)
     )
     if not files:
