@@ -91,7 +91,9 @@ def _known(folder: Path) -> Folder:
 @lru_cache(maxsize=2)
 def _look_through(folder: Path, stamps: tuple[tuple[Path, int, int], ...]) -> Folder:
     paths = [path for path, *_ in stamps]
-    filled = [path for path in paths if _has_rows(path)]
+    tables = {path: _table(path) for path in paths}
+    # any cell that holds something: of runs broken off programs write empty files
+    filled = [path for path, rows in tables.items() if any(rows[name].str.strip().any() for name in rows)]
     if not filled:
         raise InputError(f"no data file of the folder {folder.name} has rows")
     files = tuple(DataFile(path, tuple(delimited_header(path)[0]), names_of(folder, path)) for path in filled)
@@ -101,7 +103,7 @@ def _look_through(folder: Path, stamps: tuple[tuple[Path, int, int], ...]) -> Fo
         said.append(f"files without rows left out: {_listed(without_rows)}")
     if copies := _copies(filled):
         said.append(f"files that are like another, byte for byte, count too: {_listed(copies)}")
-    return Folder(files, (*said, *_columns_of_some(files), *_joined(files)))
+    return Folder(files, (*said, *_columns_of_some(files), *_joined(files, tables)))
 
 
 def _data_paths(folder: Path) -> list[Path]:
@@ -126,12 +128,11 @@ def _is_psych_ds(folder: Path) -> bool:
     return (folder / DESCRIPTION).is_file()
 
 
-def _has_rows(path: Path) -> bool:
-    """Whether any cell below the header holds something: of runs broken off programs write empty files."""
+def _table(path: Path) -> pd.DataFrame:
+    """All cells of a file, each column once; none of a file that holds nothing."""
     if not path.read_bytes().strip(b"\xef\xbb\xbf\xff\xfe\0\r\n\t ,;"):
-        return False
-    rows = delimited_cells(path, list(dict.fromkeys(delimited_header(path)[0]))).rows
-    return any(rows[name].str.strip().any() for name in rows)
+        return pd.DataFrame()
+    return delimited_cells(path, list(dict.fromkeys(delimited_header(path)[0]))).rows
 
 
 def _columns_of_some(files: Sequence[DataFile]) -> list[str]:
@@ -146,16 +147,15 @@ def _columns_of_some(files: Sequence[DataFile]) -> list[str]:
     ]
 
 
-def _joined(files: Sequence[DataFile]) -> list[str]:
+def _joined(files: Sequence[DataFile], tables: Mapping[Path, pd.DataFrame]) -> list[str]:
     """Refuse a file into which others of the folder were joined: each of their rows would count twice.
 
     Where their rows are of few kinds, so that they may be alike by chance, it is said.
     """
-    shared = [name for name in files[0].header if all(name in file.header for file in files)]
+    shared = [name for name in dict.fromkeys(files[0].header) if all(name in file.header for file in files)]
     if not shared or len(files) <= 2:
         return []
-    shared = list(dict.fromkeys(shared))
-    counts = {file.path: row_counts(delimited_cells(file.path, shared).rows) for file in files}
+    counts = {file.path: row_counts(tables[file.path][shared]) for file in files}
     joined = joined_of(counts)
     if joined is None:
         return []

@@ -145,12 +145,17 @@ def test_a_header_alone_is_no_row_however_it_is_written(tmp_path, text) -> None:
     assert data.decisions[1] == "files without rows left out: p9.csv"
 
 
-def test_psych_ds_files_of_a_header_alone_are_left_out(tmp_path) -> None:
-    (tmp_path / "data").mkdir()
-    (tmp_path / "dataset_description.json").write_text("{}", encoding="utf-8")
+def psych_ds_of(folder: Path, named: str) -> None:
+    """A Psych-DS folder of two rows a person, in files called as `named` says."""
+    (folder / "data").mkdir()
+    (folder / "dataset_description.json").write_text("{}", encoding="utf-8")
     for person in PEOPLE:
         text = f"id,face,score\n{person},calm,1\n{person},wild,2\n"
-        (tmp_path / "data" / f"id-{person}_data.csv").write_text(text, encoding="utf-8")
+        (folder / "data" / named.format(person)).write_text(text, encoding="utf-8")
+
+
+def test_psych_ds_files_of_a_header_alone_are_left_out(tmp_path) -> None:
+    psych_ds_of(tmp_path, "id-{}_data.csv")
     (tmp_path / "data" / "id-p9_data.csv").write_bytes("id,face,score\n".encode("utf-16"))
     data = read_long_table(tmp_path, "id", "score", ["face"])
     assert set(data.rows["id"].astype(str)) == set(PEOPLE)
@@ -181,11 +186,7 @@ def test_a_folder_without_tables_ends_in_one_line(tmp_path) -> None:
 
 
 def test_a_column_counts_and_not_the_name_of_the_file(tmp_path) -> None:
-    (tmp_path / "data").mkdir()
-    (tmp_path / "dataset_description.json").write_text("{}", encoding="utf-8")
-    for person in PEOPLE:
-        text = f"id,face,score\n{person},calm,1\n{person},wild,2\n"
-        (tmp_path / "data" / f"id-x{person}_data.csv").write_text(text, encoding="utf-8")
+    psych_ds_of(tmp_path, "id-x{}_data.csv")
     data = read_long_table(tmp_path, "id", "score", ["face"])
     assert set(data.rows["id"].astype(str)) == set(PEOPLE)
     assert data.decisions[1] == ("'id' is p1 in id-xp1_data.csv; the column counts, not the name of the file")
