@@ -104,7 +104,7 @@ def materials(settings: dict[str, Any]) -> dict[str, Any]:
 
 
 def skin(look: dict[str, Any]) -> Any:
-    """Pigments in layers, pores, furrows and lid lines as relief, light scattered below the surface."""
+    """Pigments in layers, pores, furrows and lid lines as relief; skin_light.py adds the light below it."""
     n = Nodes("skin")
     warp, wet = n.attribute("warp", True), n.attribute("wet")
     pits = n.add("TexVoronoi", Vector=warp, Scale=8.5, Randomness=1.0)
@@ -115,8 +115,8 @@ def skin(look: dict[str, Any]) -> Any:
     ridge = n.math("ABSOLUTE", n.math("SUBTRACT", lines, 0.5))
     line = n.math("MULTIPLY", n.ramp(ridge, 0.0, 0.07, 1.0, 0.0), n.attribute("fine"))
     grain = n.noise(n.attribute("rest", True), 26.0, 2, 0.6)
-    height = n.math("MULTIPLY", grain, 0.0042)
-    for part, depth in ((pit, 0.012), (furrow, 0.0033), (line, 0.0056)):
+    height = n.math("MULTIPLY", grain, 0.0055)
+    for part, depth in ((pit, 0.012), (furrow, 0.0045), (line, 0.0065)):
         height = n.math("SUBTRACT", height, n.math("MULTIPLY", part, depth))
     dry = n.math("SUBTRACT", 1.0, wet)
     bump = n.add("Bump", Strength=1.0, Distance=1.0, Height=n.math("MULTIPLY", height, dry)).outputs[0]
@@ -124,20 +124,16 @@ def skin(look: dict[str, Any]) -> Any:
     n.put(_skin_colour(n, grain, pit, furrow, line), shader.inputs["Base Color"])
     n.put(n.math("SUBTRACT", n.attribute("rough"), n.math("MULTIPLY", wet, 0.26)), shader.inputs["Roughness"])
     dark = look["melanin"] > 0.9
-    # Random walks took 1.7 times the time a sample and left red blotches that few samples cannot settle.
-    shader.subsurface_method = "BURLEY"
     for name, value in (
         ("Normal", bump),
         ("Coat Normal", bump),
         ("Specular IOR Level", n.math("MULTIPLY", shine, 0.5)),
         ("Coat Weight", n.math("MULTIPLY", shine, 0.10 if dark else 0.13)),
         ("Coat Roughness", 0.26),
-        ("Subsurface Weight", 1.0),
-        ("Subsurface Radius", (1.0, 0.34, 0.17)),
-        ("Subsurface Scale", 0.05 if dark else 0.065),
         ("Sheen Weight", 0.0 if dark else 0.03),
     ):
         n.put(value, shader.inputs[name])
+    n.add("OutputAOV", aov_name="skin", Value=1.0)
     return n.surface(shader)
 
 
@@ -165,7 +161,7 @@ def eye(colour: Any, height: Any) -> Any:
     shaded = n.add("VectorMath", operation="SCALE")
     n.put(albedo, shaded.inputs[0])
     n.put(n.attribute("shade"), shaded.inputs["Scale"])
-    shader = n.add("BsdfPrincipled", Roughness=0.5, Specular_IOR_Level=0.2)
+    shader = n.add("BsdfPrincipled", Roughness=0.5, Specular_IOR_Level=0.0)
     n.put(shaded.outputs[0], shader.inputs["Base Color"])
     n.put(n.add("Bump", Strength=0.6, Distance=0.04, Height=relief).outputs[0], shader.inputs["Normal"])
     shader.subsurface_method = "RANDOM_WALK"

@@ -18,6 +18,7 @@ import bpy
 import numpy as np
 
 # Siblings, found in this script's own folder.
+from cycles_face_layers import FACE, HAIR, HAIR_NOISE, Layers, collection
 from cycles_face_materials import materials
 from mathutils import Vector
 
@@ -53,7 +54,8 @@ def add_part(part: dict[str, Any], arrays: dict[str, Any], material: Any) -> Any
     """Add a mesh or hair; returns its data block."""
     data = add_hair(part, arrays) if part["kind"] == "hair" else add_mesh(part, arrays)
     data.materials.append(material)
-    bpy.context.scene.collection.objects.link(bpy.data.objects.new(part["name"], data))
+    layer = collection(HAIR if part["kind"] == "hair" else FACE)
+    layer.objects.link(bpy.data.objects.new(part["name"], data))
     return data
 
 
@@ -159,12 +161,13 @@ def configure(settings: dict[str, Any]) -> None:
     render.resolution_x, render.resolution_y = settings["size_px"]
     render.resolution_percentage = 100
     render.threads_mode, render.threads = "FIXED", settings["threads"]
-    render.image_settings.file_format, render.image_settings.color_depth = "OPEN_EXR", "32"
+    render.image_settings.media_type = "MULTI_LAYER_IMAGE"
+    render.image_settings.file_format, render.image_settings.color_depth = "OPEN_EXR_MULTILAYER", "32"
+    render.film_transparent = True
     scene.view_settings.view_transform = "Raw"
     scene.cycles_curves.shape = "RIBBONS"
-    cycles.seed, cycles.use_adaptive_sampling = settings["seed"], False
-    cycles.use_denoising, cycles.denoiser = True, "OPENIMAGEDENOISE"
-    cycles.denoising_input_passes, cycles.denoising_prefilter = "RGB_ALBEDO_NORMAL", "ACCURATE"
+    cycles.seed, cycles.use_denoising = settings["seed"], False
+    cycles.use_adaptive_sampling, cycles.adaptive_threshold = True, HAIR_NOISE
     cycles.max_bounces, cycles.diffuse_bounces, cycles.glossy_bounces = 8, 1, 2
     cycles.use_light_tree = False
     cycles.transmission_bounces, cycles.transparent_max_bounces = 5, 12
@@ -173,8 +176,8 @@ def configure(settings: dict[str, Any]) -> None:
     cycles.filter_width = 1.3
 
 
-def render_box(box: list[int], size: list[int], draft: Path) -> Any:
-    """(height, width, 3) scene-linear float16 of one rectangle (x, y, width, height in px) of the frame."""
+def frame_box(box: list[int], size: list[int]) -> None:
+    """Render one rectangle (x, y, width, height in px) of the frame from now on."""
     x, y, width, height = box
     render = bpy.context.scene.render
     render.use_border = render.use_crop_to_border = True
@@ -182,28 +185,17 @@ def render_box(box: list[int], size: list[int], draft: Path) -> Any:
     low = size[1] - y - height
     render.border_min_x, render.border_max_x = (x + 0.25) / size[0], (x + width + 0.25) / size[0]
     render.border_min_y, render.border_max_y = (low + 0.25) / size[1], (low + height + 0.25) / size[1]
-    render.filepath = str(draft)
-    try:
-        bpy.ops.render.render(write_still=True)
-        image = bpy.data.images.load(str(draft))
-        image.colorspace_settings.name = "Non-Color"
-        pixels = np.empty(width * height * 4, np.float32)
-        image.pixels.foreach_get(pixels)
-        bpy.data.images.remove(image)
-    finally:
-        draft.unlink(missing_ok=True)
-    return pixels.reshape(height, width, 4)[::-1, :, :3].astype(np.float16)
 
 
-def render_job(job: dict[str, Any], settings: dict[str, Any], things: Things) -> None:
-    """Write every box of a job to the .npz job["out"], whole or not at all."""
+def render_job(job: dict[str, Any], settings: dict[str, Any], things: Things, layers: Layers) -> None:
+    """Write every box of a job, (height, width, 3) scene-linear float16, to the .npz job["out"], or none."""
     pose(things, job["pose"])
     out = Path(job["out"])
     draft = out.with_name(f".{out.name}.{os.getpid()}.exr")
     boxes = {}
     for name, box in job["boxes"].items():
-        bpy.context.scene.cycles.samples = job["samples"][name]
-        boxes[name] = render_box(box, settings["size_px"], draft)
+        frame_box(box, settings["size_px"])
+        boxes[name] = layers.picture(draft, job["samples"][name]).astype(np.float16)
     part = draft.with_suffix(".npz")
     try:
         np.savez(part, **boxes)
@@ -224,10 +216,11 @@ def main() -> None:
 
     try:
         things = build(settings)
+        layers = Layers(settings)
         answer({"device": use_device(settings["device"])})
         for line in sys.stdin:
             job, started = json.loads(line), time.monotonic()
-            render_job(job, settings, things)
+            render_job(job, settings, things, layers)
             answer({"out": job["out"], "seconds": time.monotonic() - started})
     except (RuntimeError, OSError) as error:
         answer({"error": (str(error).strip().splitlines() or ["no message"])[-1]})

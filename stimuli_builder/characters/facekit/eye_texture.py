@@ -100,7 +100,7 @@ def _sclera_colour(plane: _Plane, veins: Array, redness: float) -> Array:
     pink = pink * np.clip(1 + 0.35 * plane.noise(0.12), 0.2, 2)
     yellow = np.clip((np.abs(plane.x) - 0.5) / 0.5, 0, 1) * np.clip(1 + 0.4 * plane.noise(0.25), 0, 2)
     depth = pink[..., None] * np.array([0.10, 0.40, 0.44]) + yellow[..., None] * np.array([0.02, 0.05, 0.14])
-    depth = depth + redness * veins[..., None] * np.array([0.14, 0.85, 0.80])
+    depth = depth + redness * veins[..., None] * np.array([0.10, 0.60, 0.56])
     return np.asarray(white * np.exp(-depth))
 
 

@@ -166,8 +166,8 @@ class Brow:
         return height, normal / np.linalg.norm(normal, axis=1, keepdims=True), index[:, 0]
 
     def _draw(self, line: Array, hair: Hair, side: int, rng: np.random.Generator) -> None:
-        n = int(2300 * hair.brow)
-        fine = rng.random(n) < 0.5
+        n = int(3600 * hair.brow)
+        fine = rng.random(n) < 0.6
         along = rng.uniform(-0.06, 1.06, n) + rng.normal(0, 0.03, n)
         # Thin at both ends: hairs grow sparser towards the temple, they do not run together to a point.
         keep = rng.random(n) > np.interp(
@@ -197,7 +197,7 @@ class Brow:
         self._points, self._root = self._laid(
             along_lid, lean, length, rng.normal(26, 9, n), rng.uniform(0.012, 0.045, n), side
         )
-        self._radii = np.where(fine, 0.0022, 0.0042) * np.clip(rng.normal(1, 0.35, n), 0.4, 1.9)
+        self._radii = np.where(fine, 0.0015, 0.0031) * np.clip(rng.normal(1, 0.35, n), 0.4, 1.9)
 
     def _laid(
         self, along_lid: Array, lean: Array, length: Array, bend: Array, rise: Array, side: int

@@ -1,0 +1,83 @@
+"""Single wrong pixels of a layer of hair have their neighbours' light; all others stay."""
+
+import numpy as np
+import pytest
+
+from stimuli_builder.characters.facekit.hair_light import without_dots, without_specks
+
+BROWN = np.array([0.06, 0.035, 0.02], np.float32)
+
+
+def layer(cover: float = 0.6) -> np.ndarray:
+    """A field of brown hair of that coverage, each pixel a little lighter or darker."""
+    shade = np.random.default_rng(8).uniform(0.7, 1.3, (20, 30, 1))
+    light = BROWN * shade * cover
+    return np.concatenate([light, np.full((20, 30, 1), cover)], axis=-1).astype(np.float32)
+
+
+def test_a_layer_without_wrong_pixels_stays_as_it_is() -> None:
+    hair = layer()
+    hair[:, :6] = 0  # skin without hair
+    assert np.array_equal(without_specks(hair), hair)
+
+
+@pytest.mark.parametrize("place", [(7, 11), (0, 0), (19, 29)])
+def test_a_pixel_black_and_whole_gets_light_and_coverage_of_those_about_it(place: tuple[int, int]) -> None:
+    hair = layer()
+    hair[place] = (0, 0, 0, 1)
+    mended = without_specks(hair)
+    assert mended[place][3] == pytest.approx(0.6)
+    assert mended[place][:3] == pytest.approx(BROWN * 0.6, rel=0.2)
+    others = np.ones((20, 30), bool)
+    others[place] = False
+    assert np.array_equal(mended[others], hair[others])
+
+
+def test_a_glaring_pixel_keeps_its_coverage_and_loses_its_glare() -> None:
+    hair = layer()
+    hair[9, 9] = (2.0, 2.0, 2.0, 0.5)
+    assert without_specks(hair)[9, 9] == pytest.approx([*(BROWN * 0.5), 0.5], rel=0.25)
+
+
+def test_the_tip_of_a_hair_that_ends_alone_stays() -> None:
+    hair = np.zeros((9, 9, 4), np.float32)
+    hair[4, 2:6] = (*(BROWN * 0.3), 0.3)
+    assert np.array_equal(without_specks(hair), hair)
+
+
+def test_neighbouring_broken_pixels_take_from_those_that_are_whole() -> None:
+    hair = layer()
+    hair[5, 5] = hair[5, 6] = (0, 0, 0, 1)
+    assert without_specks(hair)[5, 5:7, 3] == pytest.approx([0.6, 0.6])
+
+
+def skin_with_a_lash() -> np.ndarray:
+    """Light skin, a little uneven, with one dark hair of a pixel's width across it."""
+    shade = np.random.default_rng(3).uniform(0.9, 1.1, (15, 20, 1))
+    picture = np.array([0.3, 0.18, 0.12]) * shade
+    picture[range(3, 12), range(4, 13)] *= 0.15
+    return picture.astype(np.float32)
+
+
+def test_a_dark_dot_on_skin_goes_and_a_lash_stays_to_its_ends() -> None:
+    picture = skin_with_a_lash()
+    dotted = picture.copy()
+    dotted[2, 15] = dotted[13, 2] = (0.01, 0.005, 0.003)
+    mended = without_dots(dotted)
+    assert mended[2, 15] == pytest.approx(picture[2, 15], rel=0.15)
+    assert mended[13, 2] == pytest.approx(picture[13, 2], rel=0.15)
+    inner = (slice(4, 11), slice(5, 12))
+    assert np.array_equal(mended[inner], picture[inner])
+
+
+def test_a_dot_in_the_corner_goes_too() -> None:
+    picture = skin_with_a_lash()
+    picture[0, 19] = 0
+    assert without_dots(picture)[0, 19].min() > 0.1
+
+
+def test_a_bright_catchlight_and_a_dark_pupil_stay() -> None:
+    picture = np.full((20, 20, 3), 0.1, np.float32)
+    picture[5:9, 5:9] = 5.0
+    picture[12:18, 3:9] = 0.001
+    assert np.array_equal(without_dots(picture), picture)
