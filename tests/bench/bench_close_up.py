@@ -1,13 +1,14 @@
 """How the lids of one eye are read in a close-up: the detector against exact or hand-placed lids.
 
-    PYTHONPATH=. python tests/bench/bench_close_up.py KIT.npz [FOLDER]
+    PYTHONPATH=. python tests/bench/bench_close_up.py KIT.npz [FOLDER] [FACES, all]
 
 KIT is ICT-FaceKit's packed file (docs/characters.md). Each eye of the rendered faces that ship, at nine
 closures, and of FOLDER's single_face (../shared/data/face_video; labels good to 3 to 6%) is enlarged to 416
 px of a picture of 640 x 480; FOLDER's short_human_3blink is a close-up. Mean distance of the lids from the
 true ones in percent of the eye's width: of all pictures, of those open, of those shut; correlation of the
-lid distance; and how long the eye was looked for and read. Needs the detector's environment, made at first
-use.
+lid distance; height of the widest opening beside the true one; and how long the eye was looked for and read.
+FACES are so many of the rendered faces, for a sample (0: recordings alone). The recordings come first, and
+each line is printed as soon as it is known. Needs the detector's environment, made at first use.
 """
 
 import sys
@@ -50,9 +51,9 @@ def from_left(eye: Points) -> Points:
     return eye if eye[0, 0] < eye[5, 0] else eye[MIRRORED]
 
 
-def rendered(kit) -> Iterator[Clip]:
+def rendered(kit, faces: int) -> Iterator[Clip]:
     rng = np.random.default_rng(0)
-    for name in FACES:
+    for name in FACES[:faces]:
         atlas = load_atlas(SHIPPED / name)
         scene = AtlasScene(kit, name, atlas.size_px)
         picture, pictures = linear_to_srgb(atlas.base_linear()), []
@@ -96,17 +97,23 @@ def tell(clip: Clip) -> None:
     markers = default_markers(1)
     gaps = np.array([[inter_eyelid_distances(eye, markers)[0] for eye in eyes] for eyes in (read, true)])
     wide, shut = gaps[1] > 0.6 * gaps[1].max(), gaps[1] < 0.25 * gaps[1].max()
+    widest = gaps[0, gaps[1].argmax()] / gaps[1].max()
     sys.stdout.write(
         f"{name:20} {away.mean():.1f}%, open {away[wide].mean():.1f}%, shut {away[shut].mean():.1f}%, "
-        f"r = {np.corrcoef(gaps)[0, 1]:.3f}; looked for {looked - begun:.0f} s, "
+        f"r = {np.corrcoef(gaps)[0, 1]:.3f}, widest {widest:.3f} of the true; "
+        f"looked for {looked - begun:.0f} s, "
         f"read in {(done - looked) / len(pictures) * 1000:.0f} ms\n"
     )
+    sys.stdout.flush()
 
 
 def main() -> None:
     folder = Path(sys.argv[2]) if len(sys.argv) > 2 else FOLDER
-    for clips in (rendered(load_facekit(Path(sys.argv[1]))), recorded(folder)):
-        for clip in clips:
+    faces = int(sys.argv[3]) if len(sys.argv) > 3 else len(FACES)
+    for clip in recorded(folder):
+        tell(clip)
+    if faces:
+        for clip in rendered(load_facekit(Path(sys.argv[1])), faces):
             tell(clip)
 
 
