@@ -40,7 +40,12 @@ def bake_face(
     size: Annotated[
         str | None, typer.Option(help="Size of the full frame in px [960x360 or 720x900].")
     ] = None,
-    samples: Annotated[int, typer.Option(min=1, max=4096, help="Cycles samples per pixel of the eyes.")] = 24,
+    samples: Annotated[
+        int,
+        typer.Option(
+            min=1, max=4096, help="Cycles samples per pixel of the eyes; hair has four times as many."
+        ),
+    ] = 24,
     frame_samples: Annotated[
         int, typer.Option(min=1, max=4096, help="Cycles samples per pixel of the still frame.")
     ] = 32,

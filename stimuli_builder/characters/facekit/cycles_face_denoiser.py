@@ -30,7 +30,10 @@ NAMES = ("libOpenImageDenoise.so.2", "libOpenImageDenoise.2.dylib", "OpenImageDe
 
 
 class Denoiser:
-    """One device of the library, on `threads` threads; it lives as long as the process."""
+    """One device of the library, on `threads` threads; it lives as long as the process.
+
+    Every call raises RuntimeError with the library's own words where it fails.
+    """
 
     def __init__(self, threads: int) -> None:
         self._library = _load()

@@ -12,16 +12,26 @@ import bpy
 import numpy as np
 import OpenEXR
 from cycles_face_denoiser import Denoiser
+from cycles_face_materials import DARK_MELANIN, SKIN_SHARE
 from hair_light import without_dots, without_specks
 from skin_light import REACH_CM, scattered
 
 FACE, HAIR = "face", "hair"
-SKIN_SHARE = "skin"
+FACE_PASSES = (
+    "Combined",
+    "Diffuse Direct",
+    "Diffuse Indirect",
+    "Diffuse Color",
+    "Denoising Normal",
+    "Denoising Albedo",
+    SKIN_SHARE,
+)
 HAIR_SAMPLES = 4
 """Samples of hair over those of skin: single hairs are thinner than a pixel, and most pixels have none."""
 HAIR_NOISE = 0.0002
+"""Cycles' adaptive threshold: so low that a pixel with any hair in it takes all its samples."""
 DARK_SKIN = 0.77
-"""Reach of light below the skin where melanin is above 0.9."""
+"""Reach of light below skin with more melanin than DARK_MELANIN, over that below light skin."""
 
 
 def collection(name: str) -> Any:
@@ -40,8 +50,7 @@ class Layers:
         self._face.name = FACE
         self._face.layer_collection.children[HAIR].indirect_only = True
         self._hair.layer_collection.children[FACE].holdout = True
-        for layer in (self._face, self._hair):
-            layer.cycles.denoising_store_passes = True
+        self._face.cycles.denoising_store_passes = True
         self._face.use_pass_diffuse_direct = self._face.use_pass_diffuse_indirect = True
         self._face.use_pass_diffuse_color = True
         mask = self._face.aovs.add()
@@ -49,7 +58,7 @@ class Layers:
         lights = settings["lights"]
         self._ground = np.array(lights["room"], np.float32) * lights["room_strength"]
         density = settings["size_px"][0] / settings["width_cm"]
-        share = DARK_SKIN if settings["look"]["melanin"] > 0.9 else 1.0
+        share = DARK_SKIN if settings["look"]["melanin"] > DARK_MELANIN else 1.0
         self._reach_px = tuple(reach * share * density for reach in REACH_CM)
         self._denoiser = Denoiser(settings["threads"])
 
@@ -66,9 +75,9 @@ class Layers:
 
         F = D(C - m A E) + m A S(D(E))                                                                     (1)
 
-        Letters: C the render, m share of skin, A its colour, E diffuse light on it, S scattered, D denoised.
-        A has no noise and is not smoothed. Noise is taken away before it is scattered, which would make
-        blotches of it that no denoiser takes for noise.
+        Letters: C the render, m share of skin, A colour and E diffuse light of the pixel, S scattered, D
+        denoised. A has no noise and is not smoothed. Noise is taken away before it is scattered, which would
+        make blotches of it that no denoiser takes for noise.
         """
         skin, colour = face[SKIN_SHARE], face["Diffuse Color"]
         light = face["Diffuse Direct"] + face["Diffuse Indirect"]
@@ -96,7 +105,13 @@ class Layers:
 
 
 def read_passes(file: Path, layer: str) -> dict[str, Any]:
-    """The passes of a file of many layers, by their names without the layer's."""
+    """The passes of a file of many layers, by their names without the layer's.
+
+    Raises
+    ------
+    RuntimeError
+        A pass that this module reads is not in the file.
+    """
     passes: dict[str, Any] = {}
     axes: dict[str, dict[str, Any]] = {}
     with OpenEXR.File(str(file)) as stored:
@@ -112,4 +127,7 @@ def read_passes(file: Path, layer: str) -> dict[str, Any]:
     for stem, parts in axes.items():
         planes = [parts[axis] for axis in sorted(parts)]
         passes[stem] = planes[0] if len(planes) == 1 else np.stack(planes, -1)
+    missing = [name for name in (FACE_PASSES if layer == FACE else ("Combined",)) if name not in passes]
+    if missing:
+        raise RuntimeError(f"Blender wrote no pass {missing[0]!r}, but {', '.join(sorted(passes))}")
     return passes

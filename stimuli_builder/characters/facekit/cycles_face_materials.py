@@ -12,6 +12,10 @@ BASE = (0.86, 0.73, 0.595)
 FILM_IOR = 1.376
 ROOM_MIRRORED = 0.5
 """Share of the room's light that the eyes mirror: half of what lies about them is the face itself."""
+SKIN_SHARE = "skin"
+"""Pass that says which share of a pixel is skin."""
+DARK_MELANIN = 0.9
+"""Optical depth of melanin above which skin scatters and shines as dark skin does."""
 ROUNDED = 3.0
 """Exponent of a lamp's outline as the eyes mirror it: 2 is an ellipse, and beyond 8 a square."""
 HOT = 1.8
@@ -123,7 +127,7 @@ def skin(look: dict[str, Any]) -> Any:
     shader, shine = n.add("BsdfPrincipled", IOR=1.4), n.attribute("shine")
     n.put(_skin_colour(n, grain, pit, furrow, line), shader.inputs["Base Color"])
     n.put(n.math("SUBTRACT", n.attribute("rough"), n.math("MULTIPLY", wet, 0.26)), shader.inputs["Roughness"])
-    dark = look["melanin"] > 0.9
+    dark = look["melanin"] > DARK_MELANIN
     for name, value in (
         ("Normal", bump),
         ("Coat Normal", bump),
@@ -133,12 +137,12 @@ def skin(look: dict[str, Any]) -> Any:
         ("Sheen Weight", 0.0 if dark else 0.03),
     ):
         n.put(value, shader.inputs[name])
-    n.add("OutputAOV", aov_name="skin", Value=1.0)
+    n.add("OutputAOV", aov_name=SKIN_SHARE, Value=1.0)
     return n.surface(shader)
 
 
 def _skin_colour(n: Nodes, grain: Any, pit: Any, furrow: Any, line: Any) -> Any:
-    """Light that both pigments leave: fine variation of albedo survives the denoiser."""
+    """Light that both pigments leave; its fine variation is multiplied in after the denoiser."""
     melanin, blood = n.attribute("mel"), n.attribute("hem")
     melanin = n.math("MULTIPLY", melanin, n.ramp(grain, 0.3, 0.7, 0.88, 1.14, False))
     for part, more in ((pit, 0.40), (furrow, 0.10), (line, 0.14)):

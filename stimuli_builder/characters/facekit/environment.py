@@ -10,18 +10,20 @@ PACKAGES = (f"bpy=={BPY_VERSION}", "openexr==3.5.3")
 
 
 def ensure_blender(folder: Path) -> Path:
-    """Python interpreter of an environment in `folder` that has bpy, installing it (360 MB) where it lacks.
+    """Python interpreter of an environment in `folder` with bpy (360 MB) and OpenEXR; installs what it lacks.
+
+    An environment that has other versions of them keeps those.
 
     Raises
     ------
     InputError
-        The environment cannot be made, or bpy does not start in it.
+        The environment cannot be made, or one of them does not start in it.
     """
     python = folder / "bin" / "python"
     if not python.exists():
         run_step([*uv(), "venv", str(folder), "--python", PYTHON_VERSION], "make Blender's environment")
-    if not all(_has(python, package) for package in PACKAGES):
-        run_step([*uv(), "pip", "install", "--python", str(python), *PACKAGES], "install Blender")
+    if missing := missing_packages(folder):
+        run_step([*uv(), "pip", "install", "--python", str(python), *missing], "install Blender")
     run_step(
         [str(python), "-c", "import bpy, OpenEXR"],
         "start Blender (it needs the libraries of docs/characters.md)",
@@ -29,7 +31,10 @@ def ensure_blender(folder: Path) -> Path:
     return python
 
 
-def _has(python: Path, package: str) -> bool:
-    """Whether an environment has `NAME==VERSION`, without starting it."""
-    name, version = package.split("==")
-    return any(python.parent.parent.glob(f"lib/python*/site-packages/{name.lower()}-{version}.dist-info"))
+def missing_packages(folder: Path) -> list[str]:
+    """What of PACKAGES an environment has in no version, without starting it."""
+    return [
+        package
+        for package in PACKAGES
+        if not any(folder.glob(f"lib/python*/site-packages/{package.split('==')[0]}-*.dist-info"))
+    ]

@@ -7,6 +7,8 @@ DOT = 0.5
 """A pixel this many times as bright as all about it but one is no hair, which goes on to both sides."""
 GLINT = 3.0
 """A pixel this many times as bright as the hair about it is one ray that met a lamp by chance."""
+ALONE = 1e-3
+"""Coverage about a pixel below which there is no hair to compare it with."""
 Light = NDArray[np.float32]
 
 
@@ -33,6 +35,7 @@ def without_specks(hair: Light) -> Light:
     out = np.where(broken[..., None], about, hair)
     colour = about[..., :3] / np.maximum(about[..., 3:], 1e-4)
     glare = light.sum(axis=-1) > GLINT * colour.sum(axis=-1) * np.maximum(cover, about[..., 3])
+    glare &= about[..., 3] > ALONE
     out[..., :3] = np.where(glare[..., None], colour * cover[..., None], out[..., :3])
     return np.asarray(out, np.float32)
 
@@ -51,7 +54,8 @@ def without_dots(picture: Light) -> Light:
     Returns
     -------
     float32 array (h, w, 3)
-        A dot has the median light of the eight pixels about it; all others stay.
+        A dot has the median light of the eight pixels about it; all others stay. The end of a hair
+        that is dark to its last pixel, which has one such neighbour too, loses that pixel.
     """
     padded = np.pad(picture, ((1, 1), (1, 1), (0, 0)), mode="reflect")
     about = np.stack(_shifted(padded, picture.shape))

@@ -91,6 +91,7 @@ def test_the_lid_covers_the_catchlight_once(face: Face) -> None:
         spot = raised > 0.7 * raised.max()
         assert spot.sum() > 10
         shown = iris[:, spot].mean(axis=1) / iris[0, spot].mean()
+        # The skin of a light lid has up to three quarters of the light that it covers, its lashes less.
         covered = int(np.argmax(shown < 0.7))
         assert 0 < covered < 100
         assert shown[: covered // 2].min() > EARLIEST_DIMMING.get(face.levels.name, 0.8)

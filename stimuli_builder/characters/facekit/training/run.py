@@ -15,7 +15,7 @@ from PIL import Image
 from experiments.errors import InputError
 from experiments.files import says_full
 from stimuli_builder.characters.facekit.assembly import STUDIO_EV
-from stimuli_builder.characters.facekit.bake import NOTICE
+from stimuli_builder.characters.facekit.bake import NOTICE, RECIPES
 from stimuli_builder.characters.facekit.development import develop, to_8_bit
 from stimuli_builder.characters.facekit.environment import ensure_blender
 from stimuli_builder.characters.facekit.identity import identity_of_seed
@@ -44,7 +44,14 @@ class SamplesOrder:
     def settings(self, kit: FaceKit) -> dict[str, Any]:
         """What must be the same for a stopped run to go on; the count may grow."""
         size = list(self.size_px)
-        return {"seed": self.seed, "size_px": size, "samples": self.samples, "kit": kit.fingerprint}
+        recipe = RECIPES["eyes"]
+        return {
+            "seed": self.seed,
+            "size_px": size,
+            "samples": self.samples,
+            "kit": kit.fingerprint,
+            "recipe": recipe,
+        }
 
 
 def make_samples(order: SamplesOrder, kit: FaceKit, report: Callable[[int, int, str], None]) -> None:

@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 from experiments.errors import InputError
 from stimuli_builder.characters.atlas import load_atlas
 from stimuli_builder.characters.facekit.bake import FaceBake, FaceOrder
+from stimuli_builder.characters.facekit.environment import PACKAGES, missing_packages
 from stimuli_builder.characters.facekit.framing import FRAMINGS, parse_size
 from stimuli_builder.characters.facekit.identity import (
     IDENTITIES_FILE,
@@ -27,7 +28,9 @@ from stimuli_builder.characters.facekit.scene import FaceScene
 from stimuli_builder.cli import app
 
 SIZE = (240, 90)
-BLENDER = Path(__file__).parents[4] / ".venv-bake" / "bin" / "python"
+ENVIRONMENT = Path(__file__).parents[4] / ".venv-bake"
+BLENDER = ENVIRONMENT / "bin" / "python"
+NO_BLENDER = not BLENDER.exists() or bool(missing_packages(ENVIRONMENT))
 
 
 def order(tmp_path: Path, levels: int = 9, rendered: int = 3) -> FaceOrder:
@@ -325,7 +328,16 @@ def test_a_gpu_that_vanishes_is_said_in_one_line(
         pass
 
 
-@pytest.mark.skipif(not BLENDER.exists(), reason="Blender's environment .venv-bake is not made here")
+def test_an_environment_of_before_gets_what_it_lacks_and_keeps_its_blender(tmp_path: Path) -> None:
+    assert missing_packages(tmp_path) == list(PACKAGES)
+    packages = tmp_path / "lib" / "python3.11" / "site-packages"
+    (packages / "bpy-5.1.0.dist-info").mkdir(parents=True)
+    assert missing_packages(tmp_path) == [package for package in PACKAGES if package.startswith("openexr")]
+    (packages / "openexr-3.5.3.dist-info").mkdir()
+    assert missing_packages(tmp_path) == []
+
+
+@pytest.mark.skipif(NO_BLENDER, reason="Blender's environment .venv-bake is not whole here")
 def test_blender_renders_a_shot_that_darkens_the_iris_behind_the_lid(
     kit: FaceKit, scene: FaceScene, tmp_path: Path
 ) -> None:
@@ -338,7 +350,7 @@ def test_blender_renders_a_shot_that_darkens_the_iris_behind_the_lid(
     assert shut[centre].mean() > 1.5 * opened[centre].mean()
 
 
-@pytest.mark.skipif(not BLENDER.exists(), reason="Blender's environment .venv-bake is not made here")
+@pytest.mark.skipif(NO_BLENDER, reason="Blender's environment .venv-bake is not whole here")
 def test_the_catchlight_is_no_matter_of_chance(scene: FaceScene, tmp_path: Path) -> None:
     bright = []
     for seed in (1, 2):

@@ -45,6 +45,12 @@ def test_the_tip_of_a_hair_that_ends_alone_stays() -> None:
     assert np.array_equal(without_specks(hair), hair)
 
 
+def test_a_lone_pixel_of_hair_has_nothing_to_be_held_against_and_stays() -> None:
+    hair = np.zeros((9, 9, 4), np.float32)
+    hair[4, 4] = (*(BROWN * 0.2), 0.2)
+    assert np.array_equal(without_specks(hair), hair)
+
+
 def test_neighbouring_broken_pixels_take_from_those_that_are_whole() -> None:
     hair = layer()
     hair[5, 5] = hair[5, 6] = (0, 0, 0, 1)
@@ -59,7 +65,7 @@ def skin_with_a_lash() -> np.ndarray:
     return picture.astype(np.float32)
 
 
-def test_a_dark_dot_on_skin_goes_and_a_lash_stays_to_its_ends() -> None:
+def test_a_dark_dot_on_skin_goes_and_a_lash_stays_but_for_its_last_pixels() -> None:
     picture = skin_with_a_lash()
     dotted = picture.copy()
     dotted[2, 15] = dotted[13, 2] = (0.01, 0.005, 0.003)

@@ -2,41 +2,31 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from stimuli_builder.characters.facekit.skin_light import (
-    MAXIMUM_RADIUS_PX,
     REACH_CM,
-    TAIL,
     diffusion_kernel,
     scattered,
 )
 
 
-@given(st.floats(0.05, 20))
-def test_a_kernel_gives_out_what_it_takes_in_and_no_more(reach_px: float) -> None:
+@pytest.mark.parametrize("reach_px", [0.33, 0.78, 3.6, 12.0])
+def test_a_kernel_has_the_light_that_rays_of_the_profile_bring(reach_px: float) -> None:
+    """Two hundred thousand rays from the middle: how many end in that pixel, and how far the others get."""
+    rng = np.random.default_rng(7)
+    # Eq. (1) over rings is an exponential of d, for one ray in four, and one of 3 d for the others.
+    far = rng.random(200_000) < 0.75
+    radius = rng.exponential(np.where(far, 3 * reach_px, reach_px))
+    angle = rng.uniform(0, 2 * np.pi, len(radius))
+    ends = np.round(radius * np.array([np.cos(angle), np.sin(angle)]))
     kernel = diffusion_kernel(reach_px)
-    assert kernel.sum() == pytest.approx(1)
-    assert kernel.min() >= 0
-    assert np.allclose(kernel, kernel.T, rtol=1e-12)
-    assert kernel.shape[0] // 2 == min(int(np.ceil(TAIL * reach_px)), MAXIMUM_RADIUS_PX)
-
-
-def test_light_falls_off_as_the_profile_says() -> None:
-    """Eq. (1) over a disk, by hand: 1 - exp(-r / d) / 4 - 3 exp(-r / 3 d) / 4 leave within r of the entry."""
-    reach = 4.0
-    kernel = diffusion_kernel(reach)
     middle = kernel.shape[0] // 2
-    rows, columns = np.indices(kernel.shape) - middle
-    distance = np.hypot(rows, columns)
-
-    def share(r: float) -> float:
-        return float(1 - np.exp(-r / reach) / 4 - 3 * np.exp(-r / (3 * reach)) / 4)
-
-    for radius in (4.5, 8.5, 16.5):
-        inside = kernel[distance < radius].sum()
-        assert inside == pytest.approx(share(radius) / share(TAIL * reach), abs=0.02)
+    kept = np.hypot(*ends[:, np.abs(ends).max(axis=0) <= middle])
+    distance = np.hypot(*(np.indices(kernel.shape) - middle))
+    assert kernel[middle, middle] == pytest.approx((kept == 0).mean(), abs=0.015)
+    for limit in (0.25 * middle, 0.5 * middle):
+        assert kernel[distance <= limit].sum() == pytest.approx((kept <= limit).mean(), abs=0.015)
+    assert kernel.sum() == pytest.approx(1)
 
 
 def test_even_light_stays_as_it_is_up_to_the_edges() -> None:
@@ -48,8 +38,8 @@ def test_a_shade_gets_a_red_rim_as_red_goes_farthest() -> None:
     light = np.ones((31, 61, 3), np.float32)
     light[:, 30:] = 0
     out = scattered(light, np.ones((31, 61), np.float32), tuple(reach * 75 for reach in REACH_CM))
-    red, green, blue = out[15, 33]
-    assert red > 2 * green > 2 * blue > 0
+    red, green, blue = out[15, 31]
+    assert red > 1.5 * green > 3 * blue > 0.001
     assert np.all(out[15, 10] > 0.97)
 
 
