@@ -50,7 +50,8 @@ class Layers:
         self._face.name = FACE
         self._face.layer_collection.children[HAIR].indirect_only = True
         self._hair.layer_collection.children[FACE].holdout = True
-        self._face.cycles.denoising_store_passes = True
+        # The hair's are not read; Cycles 5.0.1 ends at the second layer where the first alone has them.
+        self._face.cycles.denoising_store_passes = self._hair.cycles.denoising_store_passes = True
         self._face.use_pass_diffuse_direct = self._face.use_pass_diffuse_indirect = True
         self._face.use_pass_diffuse_color = True
         mask = self._face.aovs.add()
