@@ -43,14 +43,12 @@ class SamplesOrder:
 
     def settings(self, kit: FaceKit) -> dict[str, Any]:
         """What must be the same for a stopped run to go on; the count may grow."""
-        size = list(self.size_px)
-        recipe = RECIPES["eyes"]
         return {
             "seed": self.seed,
-            "size_px": size,
+            "size_px": list(self.size_px),
             "samples": self.samples,
             "kit": kit.fingerprint,
-            "recipe": recipe,
+            "recipe": RECIPES["eyes"],
         }
 
 
