@@ -139,7 +139,7 @@ def _check(job: TrackJob) -> None:
         check_figure_name(job.plot)
 
 
-def _model(job: TrackJob, info: VideoInfo) -> tuple[CoupledModel, Mapping[int, Points | None]]:
+def _model(job: TrackJob, info: VideoInfo) -> tuple[CoupledModel, Mapping[int, Points | str]]:
     """A model from labels, from a file, or from what the detector sees; then with its detections."""
     if job.labels is not None:
         lesson = learn(info, job.labels, job.options, one_eye=job.one_eye, folds=job.folds, refine=job.refine)
@@ -153,7 +153,7 @@ def _model(job: TrackJob, info: VideoInfo) -> tuple[CoupledModel, Mapping[int, P
     return model, {}
 
 
-def _label_free(job: TrackJob, info: VideoInfo) -> tuple[CoupledModel, Mapping[int, Points | None]]:
+def _label_free(job: TrackJob, info: VideoInfo) -> tuple[CoupledModel, Mapping[int, Points | str]]:
     by_hand = _by_hand(job.relabel, info)
     with frame_progress() as progress:
         task = progress.add_task("finding eyes", total=info.frame_count)
@@ -175,7 +175,7 @@ def _by_hand(path: Path | None, info: VideoInfo) -> Labels | None:
 
 
 def _relabel(
-    path: Path, info: VideoInfo, model: CoupledModel, out: Path, hints: Mapping[int, Points | None]
+    path: Path, info: VideoInfo, model: CoupledModel, out: Path, hints: Mapping[int, Points | str]
 ) -> None:
     before = _by_hand(path, info)
     worst = worst_frames(out, model.eyes, info.fps, hints)

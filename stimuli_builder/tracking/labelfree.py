@@ -1,7 +1,7 @@
 """A model without labels: a detector looks at frames across the video, the most varied ones train the AAM."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import count, islice
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import InputError
+from stimuli_builder.tracking.covers import covered_frames, textures_of
 from stimuli_builder.tracking.detector.detection import Detection
 from stimuli_builder.tracking.detector.mesh import open_detector
 from stimuli_builder.tracking.detector.one_face import one_face
@@ -24,6 +25,7 @@ from stimuli_builder.tracking.shapes import (
     similarity_between,
     widths,
 )
+from stimuli_builder.tracking.tracker import UNSEEN
 from stimuli_builder.tracking.training import TrainingOptions
 from stimuli_builder.video import Picture, VideoInfo, frames, rgb
 
@@ -64,17 +66,20 @@ class Survey:
         Frames among them with more than one face; the one larger over the recording was taken.
     unseen : frozenset of int
         Frames looked at in which the eyes of that face were not seen, or not wholly in the picture.
+    covered : dict of int to str
+        Frames looked at in which one of its eyes is covered, and that in words; they have no points.
     """
 
     points: dict[int, Points]
     looked_at: int
     several_faces: int
     unseen: frozenset[int] = frozenset()
+    covered: dict[int, str] = field(default_factory=dict)
 
     @property
-    def hints(self) -> dict[int, Points | None]:
-        """Every frame looked at and what was seen of the eyes there, None for nothing; see `track_video`."""
-        return {**self.points, **dict.fromkeys(self.unseen)}
+    def hints(self) -> dict[int, Points | str]:
+        """Every frame looked at and what was seen of the eyes there, or why nothing; see `track_video`."""
+        return {**self.points, **dict.fromkeys(self.unseen, UNSEEN), **self.covered}
 
 
 def survey(info: VideoInfo, *, one_eye: bool, advance: Callable[[int], None] | None = None) -> Survey:
@@ -87,6 +92,7 @@ def survey(info: VideoInfo, *, one_eye: bool, advance: Callable[[int], None] | N
     """
     step = max(1, -(-info.frame_count // LOOKED_AT))
     seen: dict[int, list[Detection]] = {}
+    textures: dict[Detection, Values] = {}
     first = _first(info, step) if one_eye else ()
     with open_detector(one_eye=one_eye, first=first) as detector:
         pictures = frames(info.path, read=_every(step))
@@ -94,10 +100,13 @@ def survey(info: VideoInfo, *, one_eye: bool, advance: Callable[[int], None] | N
             if not picture.size:
                 continue
             seen[number] = detector.detect(picture)
+            if not one_eye:
+                textures.update((face, textures_of(picture, face.points)) for face in seen[number])
             if advance is not None:
                 advance(number)
     several = sum(len(faces) > 1 for faces in seen.values())
-    eyes_seen = {n: face.points for n, face in one_face(seen).items() if _inside(face.points, info)}
+    face = {n: one for n, one in one_face(seen).items() if _inside(one.points, info)}
+    eyes_seen = {n: one.points for n, one in face.items()}
     labels = (
         eyes_seen
         if one_eye
@@ -105,7 +114,10 @@ def survey(info: VideoInfo, *, one_eye: bool, advance: Callable[[int], None] | N
     )
     _require_upright(info, eyes_seen, labels)
     _require_face(info, labels, len(seen), one_eye)
-    return Survey(labels, len(seen), several, frozenset(seen.keys() - labels.keys()))
+    unseen = frozenset(seen.keys() - labels.keys())
+    covers = {} if one_eye else covered_frames(info, {n: textures[face[n]] for n in labels}, FEWEST)
+    open_to_view = {n: points for n, points in labels.items() if n not in covers}
+    return Survey(open_to_view, len(seen), several, unseen, covers)
 
 
 def _first(info: VideoInfo, step: int) -> list[Picture]:

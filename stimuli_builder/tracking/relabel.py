@@ -15,7 +15,7 @@ APART_S = 0.1
 """Frames nearer to one another than this show the same; a fast camera's neighbours would fill the list."""
 
 
-def worst_frames(track: Path, eyes: int, fps: float, hints: Mapping[int, Points | None]) -> dict[int, Points]:
+def worst_frames(track: Path, eyes: int, fps: float, hints: Mapping[int, Points | str]) -> dict[int, Points]:
     """Return up to twelve frames that need a person most, with the points to begin from.
 
     Lost frames with a detection come first, then doubtful ones, then the largest stated errors.
@@ -26,7 +26,7 @@ def worst_frames(track: Path, eyes: int, fps: float, hints: Mapping[int, Points 
         points = numbers(row, point_columns(eyes), str(track)).reshape(-1, 2)
         if row["status"] == "lost":
             seen = hints.get(frame)
-            if seen is not None:
+            if seen is not None and not isinstance(seen, str):
                 ranked.append((2e6, frame, seen))
         else:
             error = float(row["error_px"] or 0.0)

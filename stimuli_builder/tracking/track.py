@@ -22,7 +22,7 @@ def track_video(
     info: VideoInfo,
     out: Path,
     advance: Callable[[TrackSummary], None] | None = None,
-    hints: Mapping[int, Points | None] = MappingProxyType({}),
+    hints: Mapping[int, Points | str] = MappingProxyType({}),
 ) -> TrackSummary:
     """Track every frame of a video into a CSV; memory does not grow with its length.
 
@@ -30,9 +30,9 @@ def track_video(
     ----------
     advance : callable, optional
         Called after each frame with the counts so far, for a progress bar.
-    hints : mapping of int to float64 array or None, optional
-        Frame looked at by a detector -> its points, or None where it saw no such eyes, or not wholly in the
-        picture; see `Tracker.step`.
+    hints : mapping of int to float64 array or str, optional
+        Frame looked at by a detector -> its points, or why there are none: it saw no such eyes, not wholly in
+        the picture, or covered ones; see `Tracker.step`.
 
     Raises
     ------
@@ -51,9 +51,10 @@ def track_video(
         pictures = frames(info.path, lambda full: reduced(full, model.reduction))
         for picture in islice(pictures, info.frame_count):
             before = time.thread_time()
-            if summary.frames in hints:
-                tracker.look(hints[summary.frames])
-            frame = tracker.step(picture, hints.get(summary.frames))
+            hint = hints.get(summary.frames)
+            if hint is not None:
+                tracker.look(hint)
+            frame = tracker.step(picture, None if isinstance(hint, str) else hint)
             summary.fit_s += time.thread_time() - before
             writer.write(summary.frames, float(info.times_s[summary.frames]), frame)
             summary.count(frame)

@@ -65,15 +65,20 @@ class Tracker:
         self._light = Light()
         self._before: Points | None = None
         self._loss = ""
-        self._unseen = False
+        self._unseen = ""
         self._to_parameters = _to_parameters(model)
 
-    def look(self, hint: Points | None) -> None:
+    def look(self, hint: Points | str) -> None:
         """Take in that a detector looks at the next frame: after one that sees nothing, fits are doubtful.
 
         A patch of cheek or wall may pass for eyes, and between two looks nobody else tells.
+
+        Parameters
+        ----------
+        hint : float64 array (9 * eyes, 2) or str
+            What it sees, or why nothing.
         """
-        self._unseen = hint is None
+        self._unseen = hint if isinstance(hint, str) else ""
 
     def step(self, picture: Picture, hint: Points | None = None) -> TrackedFrame:
         """Fit the next frame, searching for the eyes where they are not where they were.
@@ -209,7 +214,7 @@ class Tracker:
         difference = None if hint is None else lid_difference(points, hint)
         errors = stated_errors(self.model, fit, None if difference is None else difference * widths(points))
         why = doubt(self.model, fit, points, errors, difference, before)
-        why = why or self._faults.flat(fit) or (UNSEEN if self._unseen else "")
+        why = why or self._faults.flat(fit) or self._unseen
         self._before = points
         if not why:
             self._light = self._light.following(*fit.light)

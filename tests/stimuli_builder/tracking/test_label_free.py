@@ -259,11 +259,11 @@ def test_a_video_without_a_face_is_refused_in_one_line(detector, recording):
 
 
 def test_a_fit_where_the_detector_sees_nothing_is_doubtful_until_it_sees_the_eyes_again(lesson, recording):
-    tracker, seen = Tracker(lesson.model), {0: recording.points[0], 4: None, 8: recording.points[8]}
+    tracker, seen = Tracker(lesson.model), {0: recording.points[0], 8: recording.points[8]}
     outcomes = []
     for number in range(12):
-        if number in seen:
-            tracker.look(seen[number])
+        if number in (0, 4, 8):
+            tracker.look(seen.get(number, UNSEEN))
         frame = tracker.step(recording.pictures[number], seen.get(number))
         outcomes.append((frame.status, frame.reason))
     assert outcomes[:4] == [("tracked", "")] * 4
@@ -285,7 +285,7 @@ def test_frames_in_which_no_face_is_seen_are_told_from_frames_not_looked_at(
     info = scan_video(clip)
     seen = survey(info, one_eye=False)
     assert seen.hints.keys() == set(range(0, 72, 2))
-    assert seen.unseen == {n for n, points in seen.hints.items() if points is None} == set(range(40, 56, 2))
+    assert seen.unseen == {n for n, hint in seen.hints.items() if hint is UNSEEN} == set(range(40, 56, 2))
     lesson = label_free_lesson(info, seen, TrainingOptions(), one_eye=False, refine=False)
     track_video(lesson.model, info, out, None, seen.hints)
     with out.open() as stream:
