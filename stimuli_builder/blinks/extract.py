@@ -9,7 +9,8 @@ import numpy as np
 
 from experiments.counted import counted
 from experiments.errors import InputError
-from stimuli_builder.blinks.events.recognise import LidEvent, Recognised
+from stimuli_builder.blinks.events.lid_event import LidEvent
+from stimuli_builder.blinks.events.recognise import Recognised
 from stimuli_builder.blinks.label_options import LabelOptions
 from stimuli_builder.blinks.labelling import LabelledBlink, RefusedMinimum, find_blinks
 from stimuli_builder.blinks.measure import (

@@ -7,7 +7,8 @@ from itertools import pairwise
 import numpy as np
 
 from stimuli_builder.blinks.bottom import turning_frame
-from stimuli_builder.blinks.events.recognise import LidEvent, Recognised
+from stimuli_builder.blinks.events.lid_event import LidEvent
+from stimuli_builder.blinks.events.recognise import Recognised
 from stimuli_builder.blinks.label_options import LabelOptions
 from stimuli_builder.blinks.labelling import LabelledBlink, RefusedMinimum
 from stimuli_builder.blinks.measure import smoothed
@@ -40,10 +41,10 @@ def recognised_blinks(
 
 
 def _parted(events: Sequence[LidEvent], smooth: Array, fps: float) -> list[tuple[LidEvent, bool]]:
-    """Part blinks that overlap at the widest opening between them."""
+    """Part blinks that touch at the widest opening between them."""
     parted = [(event, False) for event in events]
     for index, (first, second) in enumerate(pairwise(list(events))):
-        if first.end_s <= second.onset_s:
+        if first.end_s < second.onset_s:
             continue
         between = smooth[first.frame : second.frame + 1]
         if between.size < 3 or not np.isfinite(between).any():

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from stimuli_builder.blinks.events.apart import apart
 from stimuli_builder.blinks.events.candidates import (
     RIPPLE,
     Candidate,
@@ -15,6 +16,7 @@ from stimuli_builder.blinks.events.candidates import (
 )
 from stimuli_builder.blinks.events.generated import CLOSED_EYE_S
 from stimuli_builder.blinks.events.levels import Depth, depth_of
+from stimuli_builder.blinks.events.lid_event import LidEvent
 from stimuli_builder.blinks.events.network import shipped_network
 from stimuli_builder.blinks.events.template import Timing, timing_of
 from stimuli_builder.blinks.profile import Array
@@ -32,37 +34,11 @@ ONE_BLINK_S = 0.2
 
 
 @dataclass(frozen=True)
-class LidEvent:
-    """One event of one eye.
-
-    Parameters
-    ----------
-    kind : str
-        "blink", "squint", "gaze_shift" or "closed_eye" (closed phase of 0.5 s or more).
-    probability : float
-        The classifier's, of this kind among the four and 'nothing'.
-    frame : int
-        Deepest frame of the series.
-    onset_s, closed_from_s, minimum_s, closed_to_s, end_s : float
-        From 5% of the amplitude over the closed phase (95% of it) to 95% recovery, from the first frame.
-    depth : float
-        Greatest depth as part of the opening.
-    """
-
-    kind: str
-    probability: float
-    frame: int
-    onset_s: float
-    closed_from_s: float
-    minimum_s: float
-    closed_to_s: float
-    end_s: float
-    depth: float
-
-
-@dataclass(frozen=True)
 class Recognised:
-    """Events of one eye in order of time, and the deepest frames of blinks whose start or end is missing."""
+    """Events of one eye in order of time, and the deepest frames of blinks whose start or end is missing.
+
+    An eye may blink or be shut while it is lowered (squint, gaze shift); else no two of its events overlap.
+    """
 
     events: tuple[LidEvent, ...]
     cut: tuple[int, ...]
@@ -86,8 +62,10 @@ def recognise(eyes: Sequence[BlinkSeries]) -> list[Recognised]:
         events: list[LidEvent] = []
         cut: list[int] = []
         for piece in pieces[number]:
-            _judge(piece, series.fps, other, events, cut)
-        results.append(Recognised(tuple(_single(events)), tuple(cut)))
+            told: list[LidEvent] = []
+            _judge(piece, series.fps, other, told, cut)
+            events += apart(_single(told), piece.depth.smooth, piece.start, series.fps)
+        results.append(Recognised(tuple(events), tuple(cut)))
     return results
 
 

@@ -1,5 +1,7 @@
 """Blinks, squints, gaze shifts and closed eyes told apart, at any rate, on series that trained nothing."""
 
+from itertools import pairwise
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -157,6 +159,40 @@ def test_lids_shut_for_half_a_second_while_looking_down_are_a_closed_eye(gaze, h
     motions = [Motion("gaze_shift", 8, 0.08, 3.0, 0.1, gaze), Motion("blink", 8.6, 0.1, hold, 0.24, 1.0)]
     (seen,) = recognise([eye(lids([*blinks_at(3, 5.5, 14, 17), *motions], 120.0), 120.0)])
     assert {event.kind for event in seen.events if 8 < event.minimum_s < 11} == {"closed_eye"}
+
+
+SHUT, LOWERED = {"blink", "closed_eye"}, {"squint", "gaze_shift"}
+
+
+def assert_apart(events):
+    """An eye shuts once at a time, and is lowered once at a time; each event holds its deepest moment."""
+    assert [event.minimum_s for event in events] == sorted(event.minimum_s for event in events)
+    for kinds in (SHUT, LOWERED):
+        alike = [event for event in events if event.kind in kinds]
+        for first, second in pairwise(alike):
+            assert first.end_s <= second.onset_s, (first, second)
+    for one in events:
+        times = [one.onset_s, one.closed_from_s, one.minimum_s, one.closed_to_s, one.end_s]
+        assert one.onset_s <= one.minimum_s <= one.end_s, one
+        assert min(times) == one.onset_s, one
+        assert max(times) == one.end_s, one
+
+
+@pytest.mark.parametrize("fps", [15.0, 30.0, 60.0, 120.0])
+def test_no_two_events_of_one_eye_overlap(fps):
+    for number in range(4):
+        series = generate(np.random.default_rng([HELD_OUT, 5, number]), 40, fps)
+        for seen in recognise([eye(distance, fps) for distance in series.distances]):
+            assert_apart(seen.events)
+
+
+@pytest.mark.parametrize("fps", [30.0, 120.0])
+def test_a_closed_eye_that_trembles_is_listed_once(fps):
+    times = np.arange(round(20 * fps)) / fps
+    shut = Motion("closed_eye", 9, 0.2, 3.0, 0.4, 0.9)
+    tremble = 4 * np.sin(2 * np.pi * times / 0.9) * ((times > 9.3) & (times < 12.2))
+    (seen,) = recognise([eye(np.maximum(lids([*blinks_at(2, 5, 15), shut], fps) + tremble, 0), fps)])
+    assert [event.kind for event in seen.events if 8.5 < event.minimum_s < 13] == ["closed_eye"]
 
 
 @pytest.mark.parametrize("fps", [30.0, 60.0, 120.0, 240.0, 600.0])
