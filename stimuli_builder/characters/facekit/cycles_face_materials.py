@@ -120,7 +120,7 @@ def skin(look: dict[str, Any]) -> Any:
     line = n.math("MULTIPLY", n.ramp(ridge, 0.0, 0.07, 1.0, 0.0), n.attribute("fine"))
     grain = n.noise(n.attribute("rest", True), 26.0, 2, 0.6)
     height = n.math("MULTIPLY", grain, 0.0055)
-    for part, depth in ((pit, 0.012), (furrow, 0.0045), (line, 0.0065)):
+    for part, depth in ((pit, 0.012), (furrow, 0.0045), (line, 0.011)):
         height = n.math("SUBTRACT", height, n.math("MULTIPLY", part, depth))
     dry = n.math("SUBTRACT", 1.0, wet)
     bump = n.add("Bump", Strength=1.0, Distance=1.0, Height=n.math("MULTIPLY", height, dry)).outputs[0]

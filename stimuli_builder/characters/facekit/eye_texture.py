@@ -10,7 +10,7 @@ from stimuli_builder.characters.facekit.kit import Array
 from stimuli_builder.characters.facekit.sphere import IRIS_CM, smooth
 
 GLOBE_CM = 1.5
-WHITE = (0.66, 0.60, 0.545)
+WHITE = (0.69, 0.64, 0.595)
 VEINS = 60
 
 
@@ -57,7 +57,7 @@ def eye_maps(
     white = _sclera_colour(plane, veins, redness)
     limbus = IRIS_CM + 0.01
     blend = smooth(limbus - 0.07, limbus + 0.055, plane.r + 0.008 * broad)[..., None]
-    ring = (1 - 0.40 * np.exp(-(((plane.r - limbus - 0.01) / 0.06) ** 2)))[..., None]
+    ring = (1 - 0.28 * np.exp(-(((plane.r - limbus - 0.01) / 0.06) ** 2)))[..., None]
     albedo = coloured * (1 - blend) + white * blend * ring
     stroma = (plane.r < limbus) & (plane.r > pupil)
     height = np.where(
@@ -77,17 +77,17 @@ def _iris_colour(plane: _Plane, iris: Iris, noises: tuple[Array, Array, Array], 
     core = np.clip(np.exp(-(((q - 0.08) / (0.24 + 0.02 * broad + 0.008 * bundles)) ** 2)) * 0.85, 0, 1)[
         ..., None
     ]
-    stroma = 0.66 + 0.13 * fibres * (0.4 + 0.6 * q) + 0.05 * bundles + 0.08 * broad
+    stroma = 0.66 + 0.21 * fibres * (0.5 + 0.5 * q) + 0.09 * bundles + 0.11 * broad
     out = (outer * (1 - zone) + middle * zone) * (1 - core) + inner * core
     out = out * np.clip(stroma, 0.15, 1.6)[..., None] * 1.3
     collarette = np.exp(-(((q - (0.30 + 0.03 * broad + 0.012 * bundles)) / 0.13) ** 2))
     out *= (1 + 0.16 * collarette * np.clip(fibres, -0.5, 1))[..., None]
-    for _ in range(14):
+    for _ in range(26):
         radius = pupil + (IRIS_CM - pupil) * plane.rng.uniform(0.3, 0.7)
         turn = np.angle(np.exp(1j * (plane.angle - plane.rng.uniform(-np.pi, np.pi))))
         crypt = np.exp(-(np.hypot((plane.r - radius) / 0.04, turn * radius / 0.018) ** 3))
-        out *= (1 - 0.3 * plane.rng.uniform(0.3, 1) * crypt)[..., None]
-    out *= (1 - 0.72 * smooth(0.78, 1.02, q + 0.02 * broad))[..., None]
+        out *= (1 - 0.5 * plane.rng.uniform(0.3, 1) * crypt)[..., None]
+    out *= (1 - 0.55 * smooth(0.74, 1.03, q + 0.045 * broad))[..., None]
     out *= (1 - 0.6 * np.exp(-(((plane.r - pupil) / 0.018) ** 2)))[..., None]
     return np.where((plane.r < pupil + 0.003 * fibres)[..., None], 0.002, out)
 

@@ -13,8 +13,8 @@ from stimuli_builder.characters.facekit.sphere import IRIS_CM, smooth, spherical
 
 TEXTURE_LIMIT = 1.25
 """Radians from the gaze axis at the edge of the eye's texture."""
-_SHADE_REACH_CM = (0.16, 0.07)
-_SHADE_DEPTH = (0.55, 0.22)
+_SHADE_REACH_CM = (0.26, 0.08)
+_SHADE_DEPTH = (0.52, 0.22)
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,12 +132,12 @@ def tube(line: Array, radius: Array, sectors: int = 10) -> Mesh:
 def caruncle(path: BlinkPath, posed: Array, side: int) -> Mesh:
     """The pink flesh of the nasal corner and the fold beside it."""
     tip = _nasal_tip(path, posed, side, EDGE_LOOP)
-    corner = _nasal_tip(path, posed, side, LASH_LOOP)
+    corner = _nasal_tip(path, posed, side, EDGE_LOOP + 1)
     tilt = -side * 0.5
     # Wide and sunk in, so that they stand out as one mound; rounder ones looked like beads.
-    main = _ellipsoid(tip + np.array([side * 0.13, -0.03, -0.070]), (0.25, 0.13, 0.105), tilt)
+    main = _ellipsoid(tip + np.array([side * 0.15, -0.03, -0.040]), (0.25, 0.13, 0.105), tilt)
     fold = _ellipsoid(tip + np.array([side * 0.30, -0.02, -0.075]), (0.17, 0.14, 0.08), tilt)
-    filling = _ellipsoid(corner + np.array([side * 0.09, -0.01, -0.055]), (0.15, 0.075, 0.055), tilt)
+    filling = _ellipsoid(corner + np.array([side * 0.09, -0.01, -0.075]), (0.15, 0.075, 0.055), tilt)
     meshes = [main, fold, filling]
     starts = np.cumsum([0, *[len(mesh.vertices) for mesh in meshes[:-1]]])
     quads = np.concatenate([mesh.quads + start for mesh, start in zip(meshes, starts, strict=True)])

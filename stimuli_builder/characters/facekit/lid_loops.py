@@ -1,4 +1,4 @@
-"""Loops of the kit's vertices round each eye: 0 hidden rim, 2 wet edge, 3 front edge, 8 about the fold."""
+"""Loops of the kit's vertices round each eye: 0 hidden rim, 2 wet edge, 4 lashes, 8 about the fold."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,8 @@ from stimuli_builder.characters.facekit.kit import EYEBALLS, Array, FaceKit, Ind
 SIDES = (1, -1)
 """1 is the person's left eye (+x), -1 the right one."""
 LOOPS = 14
-EDGE_LOOP, LASH_LOOP = 2, 3
+EDGE_LOOP, LASH_LOOP = 2, 4
+"""The lid's margin lies between both: about 1 mm as it is seen. Where lashes stood on loop 3, lids had no thickness."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -39,7 +39,7 @@ class Pigments:
         wet, fine, coordinates = self._lid_values()
         lid = self._upper_lid()
         melanin = self._melanin(lips) * (1 - 0.35 * wet) * (1 + LID_MELANIN * lid)
-        haemoglobin = self._haemoglobin(lips) + wet * 0.30 + LID_BLOOD * lid
+        haemoglobin = self._haemoglobin(lips) + wet * 0.14 + LID_BLOOD * lid
         melanin *= 1 + self.contrast * (0.10 * self._noise(1.3, 11) + 0.10 * self._noise(6.0, 12))
         haemoglobin *= 1 + 0.13 * self._noise(1.8, 13, 4) + 0.15 * self._noise(9.0, 14)
         # Fine speckle per vertex: as noise in the shader it doubled the time of a render.
@@ -145,10 +145,10 @@ class Pigments:
             turn = np.arctan2(self.rest[:, 1] - centre[1], (self.rest[:, 0] - centre[0]) * side)
             lid = np.where(loop < 13.5, loop * 1.5, 20) + at.upper * 30
             lines[here] = np.stack([turn * 2.2 + side * 40, lid, np.zeros(n)], -1)[here]
-            wet[here] = smooth(3.05, 2.5, loop)[here]
+            wet[here] = smooth(4.1, 3.3, loop)[here]
             corner = np.exp(-(((at.azimuth - 1.05) / 0.45) ** 2))
             reach = smooth(2.8, 5.5, loop) * smooth(13.6, 9.0, loop)
-            fine[here] = (reach * (0.35 + 0.25 * (1 - at.upper) + 0.4 * corner) * uneven)[here]
+            fine[here] = (reach * (0.6 + 0.4 * corner) * uneven)[here]
         return wet, fine, lines
 
     def _spots(self) -> Array:

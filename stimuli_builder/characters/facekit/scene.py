@@ -178,7 +178,8 @@ class FaceScene:
             points = []
             for a, b in zip(before, after, strict=True):
                 if a.material == "skin" or (a.material in ("lash", "brow") and a.name.endswith(name)):
-                    points.append(_moved_points(a, b, side, moves_cm))
+                    # However little the lower lashes move, a box's rim must not cut them.
+                    points.append(_moved_points(a, b, side, 0.0 if a.material == "lash" else moves_cm))
             out[name] = self.view.box_round(np.concatenate(points))
         return out
 
