@@ -8,7 +8,7 @@ import numpy as np
 from stimuli_builder.characters.facekit.blink_path import BlinkPath
 from stimuli_builder.characters.facekit.hair import edge_line
 from stimuli_builder.characters.facekit.kit import Array, Index
-from stimuli_builder.characters.facekit.lid_loops import EDGE_LOOP, LASH_LOOP, chains
+from stimuli_builder.characters.facekit.lid_loops import EDGE_LOOP, chains
 from stimuli_builder.characters.facekit.sphere import IRIS_CM, smooth, spherical, surface_radius
 
 TEXTURE_LIMIT = 1.25

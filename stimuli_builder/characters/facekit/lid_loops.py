@@ -10,7 +10,7 @@ SIDES = (1, -1)
 """1 is the person's left eye (+x), -1 the right one."""
 LOOPS = 14
 EDGE_LOOP, LASH_LOOP = 2, 4
-"""The lid's margin lies between both: about 1 mm as it is seen. Where lashes stood on loop 3, lids had no thickness."""
+"""The lid's margin lies between both, about 1 mm as it is seen; with lashes on loop 3 it had no thickness."""
 
 
 @dataclass(frozen=True, eq=False)
