@@ -37,8 +37,8 @@ def _names_a_folder(character: str) -> bool:
 
 
 def level_of_character(character: str) -> dict[str, Any]:
-    """The level that shows a character; of a folder's path its last part is the level's name."""
-    name = PurePath(character).name
+    """The level that shows a character, named after it: the last part of a path, without a version."""
+    name = PurePath(character).name.partition("@")[0]
     label = name.replace("_", " ").replace("-", " ")
     return {"name": name, "label": label[:1].upper() + label[1:], "render": {"character": character}}
 
@@ -61,8 +61,8 @@ class Factor(Declaration):
     """How many of a random factor's levels a participant sees, each level equally often over participants,
     give or take one; left out, all of them."""
     character: tuple[str, ...] = ()
-    """Characters (names, or paths of folders) that each make a level, named after it; written instead of
-    `levels`, and read as these: a declaration that was read has the levels and no list."""
+    """Characters (names, or paths of folders) that each make a level, named after it without its version;
+    written instead of `levels`, and read as these: a declaration that was read has the levels and no list."""
     levels: Annotated[tuple[Level, ...], Field(min_length=1)]
     """In the order of tables and contrasts. In the list of cells the last factor's change fastest."""
 

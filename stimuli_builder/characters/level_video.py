@@ -1,6 +1,7 @@
 """Levels of an atlas as frames of one video: alike as they are, they take a fraction of single pictures.
 
-H.264 in RGB planes: its decoding is exact by the standard, so every machine reads the same code values.
+H.264's decoding is exact by the standard, so every machine reads the same code values. Videos of earlier
+bakes hold planes of R, G and B and are read as they are.
 """
 
 from collections.abc import Iterator, Sequence
@@ -14,10 +15,11 @@ from numpy.typing import NDArray
 
 from experiments.errors import InputError
 from stimuli_builder.characters.declaration import REPAIR, Picture
+from stimuli_builder.characters.level_planes import FORMAT, frame_planes, picture_of, planes_of
 from stimuli_builder.characters.writing import write_bytes_declared
 
-QUANTISER = 7
-"""x264's constant quantiser: 54 dB or more against the pictures given (decision 0636)."""
+QUANTISER = 13
+"""x264's constant quantiser of ten-bit planes: 51.7 dB or more against the pictures given (decision 0950)."""
 STILL_CODES = 2
 """Code values that the encoder may change of a pixel which stands still: skin must not flicker."""
 
@@ -30,11 +32,11 @@ def write_level_video(folder: Path, file: str, pictures: Sequence[NDArray[np.uin
         # One thread and no date in the header: the same pictures give the same bytes.
         container.flags |= 0x400
         stream = container.add_stream(
-            "libx264rgb", rate=30, options={"qp": str(QUANTISER), "preset": "slow", "threads": "1"}
+            "libx264", rate=30, options={"qp": str(QUANTISER), "preset": "slow", "threads": "1"}
         )
-        stream.width, stream.height, stream.pix_fmt = width, height, "rgb24"
+        stream.width, stream.height, stream.pix_fmt = width, height, FORMAT
         for picture in pictures:
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
+            container.mux(stream.encode(_frame(picture)))
         container.mux(stream.encode())
     return write_bytes_declared(folder, file, buffer.getvalue())
 
@@ -98,12 +100,20 @@ def _count(content: bytes) -> int:
         return sum(packet.size > 0 for packet in container.demux(video=0))
 
 
+def _frame(picture: NDArray[np.uint8]) -> av.VideoFrame:
+    frame = av.VideoFrame(picture.shape[1], picture.shape[0], FORMAT)
+    for plane, content in zip(frame.planes, planes_of(picture), strict=True):
+        rows = np.zeros((plane.height, plane.line_size // content.itemsize), content.dtype)
+        rows[:, : content.shape[1]] = content
+        plane.update(rows.tobytes())
+    return frame
+
+
 def _rgb(frame: Any) -> NDArray[np.uint8]:
-    """Planes G, B, R of a decoded frame, without any conversion of colours."""
-    if frame.format.name != "gbrp":
-        raise ValueError(f"planes are {frame.format.name}, expected gbrp")
-    planes = [
-        np.frombuffer(plane, np.uint8).reshape(-1, plane.line_size)[: frame.height, : frame.width]
-        for plane in frame.planes
-    ]
+    """Code values of a decoded frame, by our own conversion of colours alone."""
+    if frame.format.name not in (FORMAT, "gbrp"):
+        raise ValueError(f"planes are {frame.format.name}, expected {FORMAT} or gbrp")
+    planes = frame_planes(frame)
+    if frame.format.name == FORMAT:
+        return picture_of(planes)
     return np.stack([planes[2], planes[0], planes[1]], -1)

@@ -1,5 +1,6 @@
 """`character = [...]`: the levels of a factor, or of one added last, in a list of names."""
 
+import json
 from collections.abc import Callable
 
 import pytest
@@ -10,7 +11,8 @@ from experiments.load import DefinitionError, parse_experiment
 from experiments.schema.canonical import definition_sha256
 from tests.helpers.faces import DEMO, HEAD, PROFILES, faces
 
-LIST = 'character = ["alder", "birch", "cedar", "hazel"]'
+SHOWN = {"alder": "alder@4", "birch": "birch", "cedar": "cedar", "hazel": "hazel"}
+LIST = f"character = {json.dumps(list(SHOWN.values()))}"
 
 
 def as_factor(line: str, keys: str = "random = true\nper_participant = 2") -> Experiment:
@@ -19,15 +21,15 @@ def as_factor(line: str, keys: str = "random = true\nper_participant = 2") -> Ex
 
 
 def in_render(value: str) -> Experiment:
-    text = f"{HEAD}[[factors]]{PROFILES}".replace('character = "alder"', f"character = {value}")
+    text = f"{HEAD}[[factors]]{PROFILES}".replace('character = "alder@4"', f"character = {value}")
     return parse_experiment(text.replace('own_per = ["face"]', 'own_per = ["character"]'))
 
 
 def test_a_list_reads_as_the_levels_it_is_short_for() -> None:
     levels = "".join(
         f'[[factors.levels]]\nname = "{name}"\nlabel = "{name.title()}"\n'
-        f'render = {{ character = "{name}" }}\n'
-        for name in ("alder", "birch", "cedar", "hazel")
+        f'render = {{ character = "{character}" }}\n'
+        for name, character in SHOWN.items()
     )
     short, long = as_factor(LIST), as_factor(levels)
     assert short == long
@@ -78,6 +80,7 @@ def test_folders_give_levels_their_own_name() -> None:
         ('[".", "birch"]', "expected a list such as"),
         ('["alder", "alder"]', "'alder' stands twice"),
         ('["a/b", "c/b"]', "'b' stands twice"),
+        ('["alder@3", "alder@4"]', "'alder' stands twice"),
     ],
 )
 @pytest.mark.parametrize("make", [lambda listed: as_factor(f"character = {listed}"), in_render])
@@ -107,11 +110,11 @@ def test_levels_and_a_list_are_refused_together() -> None:
 def test_a_factor_that_is_called_character_is_not_added_twice() -> None:
     text = DEMO.replace('name = "face"', 'name = "character"').replace('own_per = ["face"]', "")
     with pytest.raises(DefinitionError, match="'character'"):
-        parse_experiment(text.replace('character = "alder"', 'character = ["alder", "birch"]'))
+        parse_experiment(text.replace('character = "alder@4"', 'character = ["alder", "birch"]'))
 
 
 def test_a_fault_below_a_list_in_render_keeps_its_line() -> None:
-    text = DEMO.replace('character = "alder"', 'character = ["alder", "birch"]').replace(
+    text = DEMO.replace('character = "alder@4"', 'character = ["alder", "birch"]').replace(
         "duration_frames = 9 }", "duration_frames = 1 }", 1
     )
     with pytest.raises(DefinitionError) as raised:

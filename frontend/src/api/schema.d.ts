@@ -4508,8 +4508,8 @@ export interface components {
             per_participant: number | null;
             /**
              * Character
-             * @description Characters (names, or paths of folders) that each make a level, named after it; written instead of
-             *     `levels`, and read as these: a declaration that was read has the levels and no list.
+             * @description Characters (names, or paths of folders) that each make a level, named after it without its version;
+             *     written instead of `levels`, and read as these: a declaration that was read has the levels and no list.
              * @default []
              */
             character: string[];
@@ -6986,7 +6986,7 @@ export interface components {
         RenderSettings: {
             /**
              * Character
-             * @description A shipped character (`stimuli character list`: `alder@3`, `cartoon`), or the path of a folder of
+             * @description A shipped character (`stimuli character list`: `alder@4`, `cartoon`), or the path of a folder of
              *     your own; a list of them is short for a last factor `character` with a level each. Left out, it is the
              *     retired `photorealistic`, so that old declarations keep their meaning.
              * @default photorealistic
