@@ -15,19 +15,21 @@ from server.participants import completion, form_answers, links, returning, runs
 from server.participants.next_trials import follow
 from server.participants.older_pages import finished_for_page
 from server.participants.schemas import (
-    CalibrationResult,
     Completion,
-    Consent,
-    Events,
-    FormAnswers,
     Key,
-    LanguageChange,
     LinkState,
     Received,
     RunStart,
     RunStarted,
     RunState,
     Saved,
+)
+from server.participants.submissions import (
+    CalibrationResult,
+    Consent,
+    Events,
+    FormAnswers,
+    LanguageChange,
     ScreenOut,
     StageChange,
     Unsupported,

@@ -24,17 +24,8 @@ from server.participants.refusals import (
     ScreeningUndeclared,
 )
 from server.participants.returning import refusal_to_resume, resumable_until, shown_code
-from server.participants.schemas import (
-    BlockInfo,
-    CalibrationResult,
-    CalibrationState,
-    Event,
-    RunState,
-    Saved,
-    ScreenOut,
-    Stage,
-    Unsupported,
-)
+from server.participants.schemas import BlockInfo, CalibrationState, RunState, Saved, Stage
+from server.participants.submissions import CalibrationResult, Event, ScreenOut, Unsupported
 from server.participants.trial_list import trial_list
 from server.repository import insert_once
 from server.tokens import new_public_id
