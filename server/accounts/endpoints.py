@@ -6,7 +6,7 @@ from fastapi import APIRouter, BackgroundTasks, Cookie, Header, Request, Respons
 from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.orm import Session
 
-from server.accounts import invitations, notices, second_factor, service, tokens
+from server.accounts import invitations, notices, second_factor, service, signing_in, tokens
 from server.accounts.identity import (
     COOKIE,
     FreshMyself,
@@ -152,24 +152,24 @@ async def attempt(
     throttle = services.sign_ins
     key = throttle.key(body.name, address, device)
     await run_in_threadpool(throttle.enter, key, address, device)
-    stored = await run_in_threadpool(service.stored_password, services, body.name)
+    stored = await run_in_threadpool(signing_in.stored_password, services, body.name)
     checked = await services.passwords.run(lambda: checked_password(body.password, stored))
     fits = checked.stored is not None
     if fits and not device:
         await run_in_threadpool(throttle.codes.check, body.name.casefold())
     token, failure = await run_in_threadpool(
-        service.open_session, services, body.name, checked, body.code, user_agent
+        signing_in.open_session, services, body.name, checked, body.code, user_agent
     )
     if token is not None:
         await run_in_threadpool(throttle.names.succeeded, key)
         await run_in_threadpool(throttle.codes.succeeded, body.name.casefold())
         return token
-    if not isinstance(failure, service.SecondFactorRequired):
+    if not isinstance(failure, signing_in.SecondFactorRequired):
         await run_in_threadpool(throttle.names.failed, key)
         if fits and not device:
             # Whoever knows the password could else try codes from everywhere.
             await run_in_threadpool(throttle.codes.failed, body.name.casefold())
-    raise failure or service.WrongCredentials("Name or password are wrong.")
+    raise failure or signing_in.WrongCredentials("Name or password are wrong.")
 
 
 def address_of(request: Request) -> str:
@@ -179,7 +179,7 @@ def address_of(request: Request) -> str:
 
 def _just_signed_in(services: Services, token: str) -> Me:
     with services.database.read() as session:
-        signed_in = service.session_of(session, token)
+        signed_in = signing_in.session_of(session, token)
         if signed_in is None:
             return Me(account=None, accounts_exist=True)
         return _me(session, signed_in.account, second_factor=signed_in.second_factor)
@@ -267,7 +267,7 @@ async def must_fit(services: Services, me: Identity, password: str) -> None:
     stored = await run_in_threadpool(service.own_password, services, me)
     try:
         await services.passwords.run(lambda: service.must_fit(password, stored))
-    except service.WrongCredentials:
+    except signing_in.WrongCredentials:
         await run_in_threadpool(services.sign_ins.names.failed, key)
         raise
     await run_in_threadpool(services.sign_ins.names.succeeded, key)

@@ -7,7 +7,8 @@ from sqlalchemy.orm import Session
 from server.accounts import repository
 from server.accounts.audit import record
 from server.accounts.identity import Identity
-from server.accounts.service import add_account, begin_session, known_role
+from server.accounts.service import add_account, known_role
+from server.accounts.signing_in import begin_session
 from server.clock import now
 from server.context import Services
 from server.db import Database

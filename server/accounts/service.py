@@ -1,153 +1,27 @@
-"""Signing in, passwords, second factor, roles: the rules behind the account endpoints."""
-
-from datetime import timedelta
+"""Accounts, passwords, second factor, roles: the rules behind the account endpoints."""
 
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
 from experiments.errors import did_you_mean
 from server.accounts import repository, second_factor
-from server.accounts.audit import NOBODY, SECOND_FACTOR_SET_UP, record
+from server.accounts.audit import SECOND_FACTOR_SET_UP, record
 from server.accounts.identity import Identity, account_of
-from server.accounts.passwords import Checked, hash_password, password_fits
+from server.accounts.passwords import hash_password, password_fits
+from server.accounts.signing_in import WrongCredentials, WrongProof, identity_of, second_factor_failure
 from server.accounts.tokens import end_everything
 from server.clock import now
 from server.context import Services
 from server.db import Database
 from server.errors import ApiError, Conflict, NotFound
-from server.models import ROLES, Account, AdminSession, Role
-from server.tokens import hash_token, new_token
+from server.models import ROLES, Account, Role
 from server.workspaces.repository import default_workspace, set_member
 from server.workspaces.service import Membership
-
-
-class WrongCredentials(ApiError):
-    """Name, password or code do not fit."""
-
-    status = 401
-    code = "wrong_credentials"
-
-
-class WrongProof(WrongCredentials):
-    """The present password, or the code in its place, does not fit."""
-
-    audited = True
-
-
-class SecondFactorRequired(ApiError):
-    """The password fits; a code is needed too."""
-
-    status = 401
-    code = "second_factor_required"
-
-
-def identity_of(account: Account, session_id: int | None = None) -> Identity:
-    """The identity of an account that has just been recognised."""
-    return Identity(account.id, account.name, account.role, session_id=session_id)
 
 
 def accounts_exist(session: Session) -> bool:
     """False until the first account has been made."""
     return repository.any_accounts(session)
-
-
-def session_of(session: Session, token: str) -> AdminSession | None:
-    """The session of a cookie's value."""
-    return repository.session_by_token(session, hash_token(token))
-
-
-def stored_password(services: Services, name: str) -> str | None:
-    """The password's hash of the account called `name`; None where there is none."""
-    with services.database.read() as session:
-        account = repository.account_named(session, name)
-        return account.password_hash if account else None
-
-
-def open_session(
-    services: Services, name: str, checked: Checked, code: str | None, user_agent: str
-) -> tuple[str | None, ApiError | None]:
-    """After a right password: the token of a new session (the cookie's value), or why there is none.
-
-    Parameters
-    ----------
-    checked : Checked
-        The stored hash that the password fitted. The account is held meanwhile, so that a code works once
-        however many ask at once; failures are written down too.
-    """
-    with services.database.write() as session:
-        account = repository.account_named(session, name, lock=True)
-        if account is None or account.disabled_at is not None or account.password_hash != checked.stored:
-            failure: ApiError | None = WrongCredentials("Name or password are wrong.")
-        else:
-            failure = second_factor_failure(services, account, code)
-        if account is not None and failure is None:
-            account.password_hash = checked.renewed or account.password_hash
-            token = begin_session(services, session, account, user_agent)
-            record(session, identity_of(account), "signed in", "account", account.name)
-            return token, None
-        if not isinstance(failure, SecondFactorRequired):
-            record_failure(services, session, account)
-    return None, failure
-
-
-def record_failure(services: Services, session: Session, account: Account | None) -> None:
-    """Write a failed sign-in down, so many a minute; a name that is nobody's may be a password: not kept."""
-    unwritten = services.sign_ins.written()
-    if unwritten is None:
-        return
-    name = account.name if account else "(unknown)"
-    details = {"not_written_before": unwritten} if unwritten else {}
-    record(session, NOBODY, "sign-in failed", "account", name, **details)
-
-
-def second_factor_failure(services: Services, account: Account, code: str | None) -> ApiError | None:
-    """Why a code is not enough; None where it fits, or none is asked for."""
-    if account.totp_secret is None or account.totp_confirmed_at is None:
-        return None
-    if not code:
-        return SecondFactorRequired("Please enter the code of your authenticator app, or a recovery code.")
-    secret = second_factor.secret_of(services.settings.key, account.totp_secret)
-    step = second_factor.accepted_step(secret, code, account.totp_last_step)
-    if step is not None:
-        account.totp_last_step = step
-        return None
-    hashed = second_factor.hash_recovery_code(code)
-    if hashed in account.recovery_code_hashes:
-        account.recovery_code_hashes = [kept for kept in account.recovery_code_hashes if kept != hashed]
-        return None
-    return WrongCredentials("That code is wrong or was used before.")
-
-
-def begin_session(
-    services: Services,
-    session: Session,
-    account: Account,
-    user_agent: str,
-    *,
-    second_factor: bool | None = None,
-    provider: str | None = None,
-) -> str:
-    """Sign an account in that has just been recognised; return the session's token.
-
-    Parameters
-    ----------
-    second_factor : bool, optional
-        Whether one was given; where not said, what the account has was asked for.
-    provider : str, optional
-        Who recognised her; None for a password.
-    """
-    token = new_token()
-    session.add(
-        AdminSession(
-            account_id=account.id,
-            token_hash=hash_token(token),
-            second_factor=account.totp_confirmed_at is not None if second_factor is None else second_factor,
-            user_agent=user_agent[:300],
-            provider=provider,
-            expires_at=now() + timedelta(hours=services.settings.session_hours),
-        )
-    )
-    return token
 
 
 def create_account(session: Session, name: str, password: str, role: Role) -> Account:

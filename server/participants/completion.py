@@ -10,7 +10,7 @@ from server.clock import now
 from server.context import Services
 from server.evidence.service import judge_run
 from server.models import Study, StudyRun
-from server.participants import repository
+from server.participants import places_repository, repository
 from server.participants.links import recruiter_of
 from server.participants.lookup import find_run
 from server.participants.refusals import FormsMissing, RatingsMissing
@@ -90,5 +90,5 @@ def _close_when_full(session: Session, study: Study | None, run: StudyRun) -> No
     if study is None or study.quota is None or run.origin not in ("participant", "pilot"):
         return
     session.flush()
-    if repository.complete_runs(session, study, run.origin) >= study.quota:
+    if places_repository.complete_runs(session, study, run.origin) >= study.quota:
         study.status, study.closed_at = "closed", now()

@@ -8,7 +8,7 @@ from sqlalchemy.orm import Session
 
 from experiments.assignment.groups import names
 from experiments.definition import Experiment
-from server.participants import repository
+from server.participants import places_repository
 from server.participants.refusals import GroupRefused
 
 if TYPE_CHECKING:
@@ -51,5 +51,5 @@ def open_turns(
     if not quotas or origin not in COUNTED_ORIGINS:
         return turns
     lease = timedelta(minutes=experiment.session.lease_minutes)
-    taken = repository.places_by_group(session, version_id, origin, lease)
+    taken = places_repository.places_by_group(session, version_id, origin, lease)
     return [turn for turn in turns if every[turn] not in quotas or taken[every[turn]] < quotas[every[turn]]]

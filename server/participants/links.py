@@ -18,7 +18,7 @@ from server.evidence.repository import awaits_views_without_tickets, has_older_r
 from server.identities import repository as identities
 from server.identities.sealing import KnownAs
 from server.models import NO_SLOT, Link, Study, StudyRun
-from server.participants import grouping, repository, returning
+from server.participants import grouping, places_repository, repository, returning
 from server.participants.bounds import checked_device
 from server.participants.placing import assign_slot
 from server.participants.recruiter import Recruiter, stored_recruiter
@@ -162,7 +162,7 @@ def _status(session: Session, link: Link, study: Study, version_id: int, experim
         (study.quota, StudyRun.study_id, study.id),
     ):
         if quota is not None:
-            taken = repository.places_taken(session, column, ident, _origin(link, study), lease)
+            taken = places_repository.places_taken(session, column, ident, _origin(link, study), lease)
             if taken >= quota:
                 return "full"
     turns = grouping.open_turns(

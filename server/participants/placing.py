@@ -12,7 +12,7 @@ from experiments.assignment.trial import Trial
 from experiments.definition import Experiment
 from experiments.trials import KINDS
 from server.models import StudyRun
-from server.participants import repository
+from server.participants import places_repository, repository
 from server.participants.comparisons_repository import compared
 from server.trials.series import service as series
 from server.versions import LoadedVersion
@@ -27,9 +27,9 @@ def assign_slot(session: Session, run: StudyRun, loaded: LoadedVersion, turns: S
     lease = timedelta(minutes=experiment.session.lease_minutes)
     every = len(names(experiment))
     if len(turns) == every:
-        run.slot = repository.free_slot(session, run.version_id, run.origin, lease)
+        run.slot = places_repository.free_slot(session, run.version_id, run.origin, lease)
     else:
-        run.slot = repository.free_slot_of(session, run.version_id, run.origin, lease, every, turns)
+        run.slot = places_repository.free_slot_of(session, run.version_id, run.origin, lease, every, turns)
     run.group_name = name_of(seat_of(experiment, run.slot).levels)
     trials = _trials(session, run, experiment, lease)
     trials = with_checks(experiment, trials, run.seed, len(loaded.checks))

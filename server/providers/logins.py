@@ -6,7 +6,7 @@ from sqlalchemy.orm import Session
 from server.accounts import repository as accounts
 from server.accounts.audit import record
 from server.accounts.identity import Identity, account_of
-from server.accounts.service import identity_of
+from server.accounts.signing_in import identity_of
 from server.clock import now
 from server.context import Services
 from server.errors import Conflict, NotFound

@@ -9,8 +9,8 @@ from server.accounts.audit import NOBODY, record
 from server.accounts.invitations import check_invitation, find_invitation
 from server.accounts.notices import LOGIN_ADDED, RECOVERY_CODE_USED, Told
 from server.accounts.second_factor import is_recovery_code
-from server.accounts.service import begin_session, identity_of, record_failure
-from server.accounts.service import second_factor_failure as code_failure
+from server.accounts.signing_in import begin_session, identity_of, record_failure
+from server.accounts.signing_in import second_factor_failure as code_failure
 from server.clock import now
 from server.context import Services
 from server.errors import ApiError

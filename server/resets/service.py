@@ -9,7 +9,8 @@ from server import mail
 from server.accounts import repository as accounts
 from server.accounts.audit import NOBODY, record
 from server.accounts.identity import Identity, NotSignedIn, account_of
-from server.accounts.service import identity_of, renew
+from server.accounts.service import renew
+from server.accounts.signing_in import identity_of
 from server.accounts.throttle import known_device
 from server.clock import now
 from server.context import Services

@@ -11,7 +11,7 @@ import pyotp
 import pytest
 from fastapi.testclient import TestClient
 
-from server.accounts import invitations, passwords, service
+from server.accounts import invitations, passwords, signing_in
 from server.accounts.passwords import (
     Checked,
     PasswordsBusy,
@@ -61,13 +61,13 @@ def test_of_six_who_use_one_recovery_code_or_one_time_code_one_gets_in(
     setup = owner.send("POST", "/second-factor").json()
     totp = pyotp.TOTP(setup["secret"])
     codes = owner.send("PUT", "/second-factor", {"code": totp.now()}).json()["codes"]
-    stored = service.stored_password(services, owner.name)
+    stored = signing_in.stored_password(services, owner.name)
     with services.database.write() as session:
         session.query(Account).update({"totp_last_step": None})
     for code in (codes[0], totp.now()):
         got = together(
             SIX,
-            lambda _, code=code: service.open_session(services, owner.name, Checked(stored), code, ""),
+            lambda _, code=code: signing_in.open_session(services, owner.name, Checked(stored), code, ""),
         )
         assert sum(token is not None for token, _ in got) == 1, got
     with services.database.read() as session:

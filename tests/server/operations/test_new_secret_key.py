@@ -8,7 +8,7 @@ import pyotp
 import pytest
 from sqlalchemy import select, text
 
-from server.accounts import service
+from server.accounts import service, signing_in
 from server.accounts.identity import Identity
 from server.accounts.passwords import Checked
 from server.accounts.second_factor import secret_of
@@ -49,7 +49,7 @@ def with_phone(services: Services, name: str) -> Phone:
 def failure(services: Services, phone: Phone, code: str) -> ApiError | None:
     with services.database.read() as session:
         stored = session.scalars(select(Account).where(Account.name == phone.name)).one().password_hash
-    _, failed = service.open_session(services, phone.name, Checked(stored), code, "")
+    _, failed = signing_in.open_session(services, phone.name, Checked(stored), code, "")
     return failed
 
 

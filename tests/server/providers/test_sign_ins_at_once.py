@@ -10,6 +10,7 @@ from sqlalchemy import text
 
 from server.accounts import repository as accounts
 from server.accounts import service as account_service
+from server.accounts import signing_in
 from server.accounts.identity import OPERATOR, Identity
 from server.clock import now
 from server.context import Services
@@ -59,7 +60,7 @@ def identity(services: Services, name: str) -> Identity:
     with services.database.read() as session:
         account = accounts.account_named(session, name)
         assert account is not None
-        return account_service.identity_of(account)
+        return signing_in.identity_of(account)
 
 
 def with_second_factor(services: Services, name: str) -> tuple[str, list[str]]:
