@@ -67,7 +67,7 @@ def main() -> None:
     parser.add_argument("names", nargs="*", metavar="NAME", help="alder, birch, cedar and hazel")
     parser.add_argument("--facekit", type=Path, help="your copy of ICT-FaceKit")
     asked = parser.parse_args()
-    for name in asked.names or ("alder@4", "birch", "cedar", "hazel"):
+    for name in asked.names or ("alder@4", "birch@3", "cedar", "hazel"):
         atlas = load_atlas(SHIPPED / name)
         scene = scene_of(atlas, asked.facekit) if asked.facekit else None
         at, crop = poses(atlas), atlas.declaration.lower_lid.crop

@@ -11,7 +11,7 @@ from experiments.load import DefinitionError, parse_experiment
 from experiments.schema.canonical import definition_sha256
 from tests.helpers.faces import DEMO, HEAD, PROFILES, faces
 
-SHOWN = {"alder": "alder@4", "birch": "birch", "cedar": "cedar", "hazel": "hazel"}
+SHOWN = {"alder": "alder@4", "birch": "birch@3", "cedar": "cedar", "hazel": "hazel"}
 LIST = f"character = {json.dumps(list(SHOWN.values()))}"
 
 

@@ -13,7 +13,7 @@ from stimuli_builder.characters.retired import ROOT, Retired, load_retired, rest
 from stimuli_builder.clips.characters import find_character
 
 FOLDER = "pictures/old"
-OPENING_MM = {"photorealistic": 11.0, "alder@2": 10.07, "alder": 10.07, "alder@3": 10.07}
+OPENING_MM = {"photorealistic": 11.0, "alder@2": 10.07, "alder": 10.07, "alder@3": 10.07, "birch": 9.66}
 """Of the eyes of each character that has left, as its declaration has it."""
 
 
