@@ -1,5 +1,6 @@
 """The factorial set: factors, their levels, and how many clips a cell has."""
 
+import re
 from collections.abc import Mapping
 from pathlib import PurePath
 from typing import Annotated, Any, Self
@@ -23,11 +24,14 @@ class Level(Declaration):
     """What clips of this level change of [render]. Levels that change nothing give the same clips."""
 
 
+_VERSION = re.compile(r"(?<=.)@\d+$")
+
+
 def names_listed(value: Any) -> tuple[str, ...]:
     """The characters of a list; ValueError where it is none or one of them is no name."""
     names = tuple(value) if isinstance(value, list | tuple) else ()
     if not names or not all(isinstance(name, str) and _names_a_folder(name) for name in names):
-        raise ValueError(f'character: expected a list such as ["alder", "birch"], got {shown(value)}')
+        raise ValueError(f'character: expected a list such as ["alder@4", "cedar"], got {shown(value)}')
     return names
 
 
@@ -38,7 +42,7 @@ def _names_a_folder(character: str) -> bool:
 
 def level_of_character(character: str) -> dict[str, Any]:
     """The level that shows a character, named after it: the last part of a path, without a version."""
-    name = PurePath(character).name.partition("@")[0]
+    name = _VERSION.sub("", PurePath(character).name)
     label = name.replace("_", " ").replace("-", " ")
     return {"name": name, "label": label[:1].upper() + label[1:], "render": {"character": character}}
 

@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session, aliased
 from experiments.assignment.compared import Compared
 from server.clock import now
 from server.models import AssignedTrial, Rating, StudyRun, TrialClip, VersionClip
-from server.participants.places_repository import versions_of_series
+from server.participants.repository import versions_of_series
 
 Winner = Literal["left", "right", "tie"]
 

@@ -9,21 +9,14 @@ from sqlalchemy import Select, bindparam, func, literal, select, union_all
 from sqlalchemy.orm import Session
 
 from server.clock import now
-from server.models import NO_SLOT, Study, StudyRun, StudyVersion
+from server.models import NO_SLOT, Study, StudyRun
+from server.participants.repository import versions_of_series
 
 
 def places_taken(session: Session, column: Any, ident: int, origin: str, lease: timedelta) -> int:
     """Runs of this origin that are complete, or active and seen within the lease; `column` equals `ident`."""
     query = select(func.count()).select_from(StudyRun).where(column == ident, *_holding(now() - lease))
     return session.scalar(query.where(StudyRun.origin == origin)) or 0
-
-
-def versions_of_series(version_id: int) -> Select[int]:
-    """The versions whose answers may be pooled with those of this one, itself included."""
-    own = select(StudyVersion.study_id, StudyVersion.series).where(StudyVersion.id == version_id).subquery()
-    return select(StudyVersion.id).join(
-        own, (own.c.study_id == StudyVersion.study_id) & (own.c.series == StudyVersion.series)
-    )
 
 
 def places_by_group(session: Session, version_id: int, origin: str, lease: timedelta) -> Counter[str]:

@@ -103,6 +103,14 @@ def active_version_id(session: Session, study: Study) -> int:
     return session.scalars(query.where(StudyVersion.number == study.active_version)).one()
 
 
+def versions_of_series(version_id: int) -> Select[int]:
+    """The versions whose answers may be pooled with those of this one, itself included."""
+    own = select(StudyVersion.study_id, StudyVersion.series).where(StudyVersion.id == version_id).subquery()
+    return select(StudyVersion.id).join(
+        own, (own.c.study_id == StudyVersion.study_id) & (own.c.series == StudyVersion.series)
+    )
+
+
 def run_of_client(session: Session, link: Link, client_id: str) -> StudyRun | None:
     """The run this browser began through this link."""
     query = select(StudyRun).where(StudyRun.link_id == link.id, StudyRun.client_id == client_id)

@@ -18,6 +18,7 @@ from stimuli_builder.characters.facekit.identity import (
 from stimuli_builder.characters.facekit.kit import load_facekit
 from stimuli_builder.characters.facekit.plan import Samples, closures_of
 from stimuli_builder.characters.facekit.renderer import DEVICES, load_light
+from stimuli_builder.characters.retired import next_version
 
 
 def bake_face(
@@ -62,13 +63,14 @@ def bake_face(
         bool, typer.Option(help="--no-lower-lid leaves out the poses that Experiment 3 needs (17 pictures).")
     ] = True,
     version: Annotated[
-        int,
+        int | None,
         typer.Option(
             min=1,
             max=9999,
-            help="2 or more: other pictures of a face that was given to others, named NAME@VERSION.",
+            help="Of a face that was given to others other pictures are NAME@VERSION [the next that none of "
+            "this or an earlier release has].",
         ),
-    ] = 1,
+    ] = None,
     light: Annotated[str, typer.Option(help="Light preset: studio or window.")] = "studio",
     identities: Annotated[
         Path, typer.Option(help="Identities file, to bake a face of your own.")
@@ -103,6 +105,7 @@ def bake_face(
         raise InputError(f"device must be one of {', '.join(DEVICES)}; it is '{device}'")
     load_light(light)
     name, face = _face(identity, seed, identities)
+    version = version or next_version(character_name(name, framing))
     order = FaceOrder(
         name=name,
         seed=seed,

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 FORMAT = "yuv444p10le"
 """Name of the planes' layout in the video; their stream says nothing of the colours (2)."""
+_CODE = np.dtype("<u2")
 MIDDLE = 512
 """Code value of no difference between colours."""
 Planes = tuple[NDArray[np.uint16], NDArray[np.uint16], NDArray[np.uint16]]
@@ -27,7 +28,7 @@ def planes_of(picture: NDArray[np.uint8]) -> Planes:
     """Planes y, n, o of equation (1), each (h, w) in 0-1023, of an (h, w, 3) sRGB picture."""
     red, green, blue = (picture[..., k].astype(np.int16) for k in range(3))
     bright, greenish, orange = red + 2 * green + blue, 2 * green - red - blue, 2 * (red - blue)
-    return bright.astype(np.uint16), _shifted(greenish), _shifted(orange)
+    return bright.astype(_CODE), _shifted(greenish), _shifted(orange)
 
 
 def picture_of(planes: Sequence[NDArray[np.uint16]]) -> NDArray[np.uint8]:
@@ -44,10 +45,12 @@ def picture_of(planes: Sequence[NDArray[np.uint16]]) -> NDArray[np.uint8]:
 
 def frame_planes(frame: Any) -> list[NDArray[Any]]:
     """(h, w) views of a decoded frame's planes, without the padding of their rows."""
-    kind = np.uint16 if frame.format.name == FORMAT else np.uint8
-    planes = [np.frombuffer(plane, kind).reshape(plane.height, -1) for plane in frame.planes]
+    kind = _CODE if frame.format.name == FORMAT else np.dtype(np.uint8)
+    planes: list[NDArray[Any]] = [
+        np.frombuffer(plane, kind).reshape(plane.height, -1) for plane in frame.planes
+    ]
     return [plane[: frame.height, : frame.width] for plane in planes]
 
 
 def _shifted(difference: NDArray[np.int16]) -> NDArray[np.uint16]:
-    return np.asarray(difference + MIDDLE, np.uint16)
+    return np.asarray(difference + MIDDLE, _CODE)

@@ -11,7 +11,7 @@ from pathlib import Path
 from pydantic import BaseModel, ConfigDict, Field
 
 from experiments.errors import InputError, did_you_mean
-from stimuli_builder.characters.atlas import load_atlas
+from stimuli_builder.characters.atlas import SHIPPED, load_atlas
 from stimuli_builder.characters.declaration import DECLARATION_FILE
 
 RETIRED_FILE = Path(__file__).with_name("retired.toml")
@@ -33,6 +33,13 @@ def load_retired() -> dict[str, Retired]:
     """Every retired character by name."""
     content = tomllib.loads(RETIRED_FILE.read_text(encoding="utf-8"))
     return {name: Retired.model_validate(table) for name, table in content.items()}
+
+
+def next_version(name: str) -> int:
+    """The version that no character of that name has, here or in earlier releases; 1 for a new name."""
+    known = {folder.name for folder in SHIPPED.iterdir()} | set(load_retired())
+    numbers = [other.partition("@")[2] for other in known if other.partition("@")[0] == name]
+    return max((int(number) if number.isdecimal() else 1 for number in numbers), default=0) + 1
 
 
 def restore(name: str, source: Path | None, target: Path) -> Path:

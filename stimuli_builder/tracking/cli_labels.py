@@ -59,8 +59,9 @@ def label(
     """
     from experiments.files import check_targets
     from stimuli_builder.progress import frame_progress
-    from stimuli_builder.tracking.labelfree import proposed_labels, survey
+    from stimuli_builder.tracking.labelfree import proposed_labels
     from stimuli_builder.tracking.learn import open_video
+    from stimuli_builder.tracking.survey import survey
 
     check_targets([out], [video])
     info = open_video(video, accept_variable_rate)

@@ -11,7 +11,7 @@ from experiments.errors import InputError
 from experiments.files import check_targets, temporary_beside
 from stimuli_builder.blinks.plots import check_figure_name
 from stimuli_builder.progress import frame_progress
-from stimuli_builder.tracking.labelfree import label_free_lesson, survey
+from stimuli_builder.tracking.labelfree import label_free_lesson
 from stimuli_builder.tracking.labels import Labels, load_labels
 from stimuli_builder.tracking.learn import Lesson, learn, open_video
 from stimuli_builder.tracking.model import CoupledModel
@@ -21,6 +21,7 @@ from stimuli_builder.tracking.plot import plot_track
 from stimuli_builder.tracking.preview import write_preview
 from stimuli_builder.tracking.relabel import worst_frames, write_relabel
 from stimuli_builder.tracking.shapes import Points
+from stimuli_builder.tracking.survey import survey
 from stimuli_builder.tracking.track import track_video
 from stimuli_builder.tracking.training import TrainingOptions
 from stimuli_builder.video import VideoInfo, declared_frames

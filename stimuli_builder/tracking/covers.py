@@ -28,11 +28,12 @@ shut eyes."""
 USUAL = 0.85
 """Correlation above which an eye looks as usual, or two looks are alike. While one eye is covered the other
 has 0.94 or more, blinks aside."""
-COVERED = "{} eye covered: it looks like itself neither open nor shut, and the other eye looks as usual"
+COVERED = "{} covered: {} itself neither open nor shut"
 HALF = 0.5
 """Part of the looks at a changed eye that must resemble it shut, or it is covered."""
 BRIEF_S = 0.4
-"""An eye that changes alone for less than this may blink; what it looks like then is this eye shut."""
+"""An eye that changes alone for less than this, from first look to last, may blink; what it looks like then
+is this eye shut. Where looks lie farther apart, two looks are asked for."""
 
 
 @dataclass(frozen=True)
@@ -91,9 +92,10 @@ def covered_frames(info: VideoInfo, textures: Mapping[int, Values], fewest: int)
 
 def covered_looks(looks: Sequence[Look]) -> dict[int, str]:
     """Number of each look at which an eye is covered, and that in words; see `covered`."""
-    names = {(True, False): "left", (False, True): "right"}
-    flags = [(bool(left), bool(right)) for left, right in covered(looks)]
-    return {n: COVERED.format(names[one]) for n, one in enumerate(flags) if one in names}
+    words = ("left eye", "it looks like"), ("right eye", "it looks like"), ("both eyes", "neither looks like")
+    flags = covered(looks)
+    numbers = np.flatnonzero(flags.any(1)).tolist()
+    return {n: COVERED.format(*words[2 if flags[n].all() else int(flags[n, 1])]) for n in numbers}
 
 
 def covered(looks: Sequence[Look]) -> Flags:
@@ -102,8 +104,8 @@ def covered(looks: Sequence[Look]) -> Flags:
     An eye is odd while it is unlike its own commonest look and the other eye is as usual. Changed and odd for
     less than 0.4 s it may blink alone, and changed without being odd it blinks with the other one: looks like
     any of those are this eye shut. What lasts longer and is mostly unlike them is a cover, while the other
-    eye blinks too. Which look is the eye, where it is odd for most of the recording, is told by the other
-    eye's mirror image.
+    eye blinks or is covered too. Which look is the eye, where it is odd for most of the recording, is told
+    by the other eye's mirror image.
     """
     textures = np.array([look.textures for look in looks])
     times = np.array([look.time_s for look in looks])

@@ -17,9 +17,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from stimuli_builder.tracking.labelfree import label_free_lesson, survey
+from stimuli_builder.tracking.labelfree import label_free_lesson
 from stimuli_builder.tracking.labels import Labels, load_labels
 from stimuli_builder.tracking.shapes import EYE_POINTS, Points, inter_eyelid_distances, widths
+from stimuli_builder.tracking.survey import survey
 from stimuli_builder.tracking.table import numbers, point_columns, track_rows
 from stimuli_builder.tracking.track import track_video
 from stimuli_builder.tracking.training import TrainingOptions

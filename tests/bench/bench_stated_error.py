@@ -22,11 +22,12 @@ import numpy as np
 from stimuli_builder.actor.recording import Actor, ActorOptions, label_points, truth_points
 from stimuli_builder.environments import cache_folder
 from stimuli_builder.tracking.certainty import DOUBTFUL_SHARE, lid_offsets
-from stimuli_builder.tracking.labelfree import label_free_lesson, survey
+from stimuli_builder.tracking.labelfree import label_free_lesson
 from stimuli_builder.tracking.labels import Labels, load_labels
 from stimuli_builder.tracking.learn import lesson_from
 from stimuli_builder.tracking.model import CoupledModel
 from stimuli_builder.tracking.shapes import LOWER_LID, UPPER_LID, Points, default_markers, widths
+from stimuli_builder.tracking.survey import survey
 from stimuli_builder.tracking.table import error_columns, numbers, point_columns, track_rows
 from stimuli_builder.tracking.track import track_video
 from stimuli_builder.tracking.training import TrainingOptions

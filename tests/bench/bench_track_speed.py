@@ -19,7 +19,8 @@ from pathlib import Path
 
 import numpy as np
 
-from stimuli_builder.tracking.labelfree import label_free_lesson, survey
+from stimuli_builder.tracking.labelfree import label_free_lesson
+from stimuli_builder.tracking.survey import survey
 from stimuli_builder.tracking.table import numbers, point_columns, track_rows
 from stimuli_builder.tracking.track import track_video
 from stimuli_builder.video import scan_video

@@ -64,7 +64,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("names", nargs="*", metavar="NAME", help="alder, birch, cedar and hazel")
+    parser.add_argument("names", nargs="*", metavar="NAME", help="alder@4, birch@3, cedar and hazel")
     parser.add_argument("--facekit", type=Path, help="your copy of ICT-FaceKit")
     asked = parser.parse_args()
     for name in asked.names or ("alder@4", "birch@3", "cedar", "hazel"):

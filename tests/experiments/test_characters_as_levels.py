@@ -60,11 +60,15 @@ def test_a_list_in_render_is_a_last_factor_that_all_see() -> None:
     assert experiment.render.character == "alder"
 
 
-def test_folders_give_levels_their_own_name() -> None:
-    experiment = as_factor('character = ["faces/old-face", "birch"]', "random = true")
+def test_folders_give_levels_their_own_name_and_versions_are_dropped() -> None:
+    listed = '["faces/old-face", "birch@3", "faces/@mary", "ann@home", "ann@work"]'
+    experiment = as_factor(f"character = {listed}", "random = true")
     assert [(level.name, level.label) for level in experiment.factors[0].levels] == [
         ("old-face", "Old face"),
         ("birch", "Birch"),
+        ("@mary", "@mary"),
+        ("ann@home", "Ann@home"),
+        ("ann@work", "Ann@work"),
     ]
     assert experiment.factors[0].levels[0].render.character == "faces/old-face"
 
@@ -72,7 +76,7 @@ def test_folders_give_levels_their_own_name() -> None:
 @pytest.mark.parametrize(
     ("listed", "message"),
     [
-        ('["alder", 3]', 'expected a list such as ["alder", "birch"], got the list ["alder", 3]'),
+        ('["alder", 3]', 'expected a list such as ["alder@4", "cedar"], got the list ["alder", 3]'),
         ('["alder", ""]', "expected a list such as"),
         ("[]", "expected a list such as"),
         ('["..", "birch"]', "expected a list such as"),

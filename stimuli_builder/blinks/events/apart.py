@@ -20,7 +20,8 @@ def apart(events: Sequence[LidEvent], depth: Array, start: int, fps: float) -> l
 
     Of two events that are no blinks, where the deepest moment of one lies in the other, the longer stays: a
     lid that trembles while it is held is one event. Others that overlap, a blink beside a closed eye too,
-    part where the eye is open widest between them; what is left of a closed eye must last as one does.
+    part where the eye is open widest between them. A closed eye of whose closed phase less is left than one
+    lasts is no event, and leaves its neighbours as they were.
 
     Parameters
     ----------
@@ -63,11 +64,13 @@ def _parted(events: Sequence[LidEvent], depth: Array, start: int, fps: float) ->
         at = float(np.clip(widest, first.minimum_s, second.minimum_s))
         parted[number] = _within(parted[number], parted[number].onset_s, at)
         parted[number + 1] = _within(second, at, second.end_s)
-    return [
-        event
-        for event, whole in zip(parted, events, strict=True)
-        if event == whole or event.kind != "closed_eye" or _length(event) >= CLOSED_EYE_S
-    ]
+    whole = [event for event, part in zip(events, parted, strict=True) if event == part or _lasts(part)]
+    return parted if len(whole) == len(events) else _parted(whole, depth, start, fps)
+
+
+def _lasts(part: LidEvent) -> bool:
+    """Whether what is left of an event is still one of its kind."""
+    return part.kind != "closed_eye" or part.closed_to_s - part.closed_from_s >= CLOSED_EYE_S
 
 
 def _within(event: LidEvent, onset_s: float, end_s: float) -> LidEvent:

@@ -62,8 +62,8 @@ def recognise(eyes: Sequence[BlinkSeries]) -> list[Recognised]:
         events: list[LidEvent] = []
         cut: list[int] = []
         for piece in pieces[number]:
-            told: list[LidEvent] = []
-            _judge(piece, series.fps, other, told, cut)
+            told, without_end = _judged(piece, series.fps, other)
+            cut += without_end
             events += apart(_single(told), piece.depth.smooth, piece.start, series.fps)
         results.append(Recognised(tuple(events), tuple(cut)))
     return results
@@ -88,8 +88,10 @@ def _whole(pieces: list[_Piece], size: int) -> Array:
     return whole
 
 
-def _judge(piece: _Piece, fps: float, other: Array | None, events: list[LidEvent], cut: list[int]) -> None:
-    """Add the events of a piece to `events` and its incomplete blinks to `cut`."""
+def _judged(piece: _Piece, fps: float, other: Array | None) -> tuple[list[LidEvent], list[int]]:
+    """The events of a piece, and the deepest frames of its incomplete blinks."""
+    events: list[LidEvent] = []
+    cut: list[int] = []
     network = shipped_network()
     beside = None if other is None else other[piece.start : piece.start + piece.depth.smooth.size]
     rows = features_of(piece.candidates, piece.depth, beside)
@@ -107,6 +109,7 @@ def _judge(piece: _Piece, fps: float, other: Array | None, events: list[LidEvent
             timing = timing if above is None else _crossed(above, fps)
             kind = "closed_eye" if timing.closed_s >= CLOSED_EYE_S else "blink"
         events.append(_event(kind, float(shares.max()), candidate, timing, piece.start, fps))
+    return events, cut
 
 
 def _cut(candidate: Candidate, depth: Depth) -> bool:

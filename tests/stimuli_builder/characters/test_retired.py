@@ -8,8 +8,8 @@ import pytest
 
 from experiments.errors import InputError
 from stimuli_builder.characters import retired
-from stimuli_builder.characters.atlas import load_atlas
-from stimuli_builder.characters.retired import ROOT, Retired, load_retired, restore
+from stimuli_builder.characters.atlas import SHIPPED, load_atlas
+from stimuli_builder.characters.retired import ROOT, Retired, load_retired, next_version, restore
 from stimuli_builder.clips.characters import find_character
 
 FOLDER = "pictures/old"
@@ -64,6 +64,17 @@ def test_other_pictures_than_it_had_are_refused_and_nothing_stays(
     with pytest.raises(InputError, match="holds another 'old' than earlier releases had"):
         restore("old", tiny_character, tmp_path / "data" / "old")
     assert not list((tmp_path / "data").iterdir())
+
+
+def test_the_next_version_is_one_that_nobody_has() -> None:
+    """Other pictures than those that ship or have left are another character."""
+    taken = {*load_retired(), *(folder.name for folder in SHIPPED.iterdir())}
+    for name in ("alder", "birch", "hazel"):
+        version = next_version(name)
+        assert version > 1
+        assert f"{name}@{version}" not in taken
+        assert version == 2 or f"{name}@{version - 1}" in taken
+    assert next_version("nobody") == 1
 
 
 @pytest.mark.parametrize(

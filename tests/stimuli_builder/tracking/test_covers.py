@@ -1,14 +1,19 @@
 """A hand, a cup or a cloth over an eye is not called an eye, whatever its texture; a blink is no cover."""
 
 import csv
+from dataclasses import replace
 
 import cv2
 import numpy as np
 import pytest
 
+from experiments.errors import InputError
 from stimuli_builder.environments import cache_folder
-from stimuli_builder.tracking.covers import Look, covered_looks, textures_of
-from stimuli_builder.tracking.labelfree import label_free_lesson, survey
+from stimuli_builder.tracking.covers import Look, covered_frames, covered_looks, textures_of
+from stimuli_builder.tracking.faults import Faults
+from stimuli_builder.tracking.fit import Fitter
+from stimuli_builder.tracking.labelfree import label_free_lesson
+from stimuli_builder.tracking.survey import survey
 from stimuli_builder.tracking.track import track_video
 from stimuli_builder.tracking.training import TrainingOptions
 from stimuli_builder.video import frames, scan_video
@@ -130,6 +135,28 @@ def test_a_cover_stays_one_while_the_other_eye_blinks(seen, recording, blink):
     assert sorted(covered_looks(looks(textures))) == list(range(15, 33))
 
 
+def test_eyes_covered_one_after_the_other_are_both_covered_in_between(seen, recording):
+    textures = covered_by(open_and_shut(seen, ([], [])), recording, range(6, 26), 0, "fingers")
+    textures[:, 1] = covered_by(textures, recording, range(16, 36), 1, "wood")[:, 1]
+    told = covered_looks(looks(textures))
+    assert [told.get(n, "").partition(" covered")[0] for n in (5, 10, 20, 30, 36)] == [
+        "",
+        "left eye",
+        "both eyes",
+        "right eye",
+        "",
+    ]
+
+
+def test_a_video_that_shows_covers_alone_is_refused_with_their_number(seen, recording, tmp_path):
+    spoilt = covered_by(open_and_shut(seen, ([], [])), recording, range(4, 40), 1, "cloth")
+    info = scan_video(recording.video)
+    info = replace(info, times_s=np.arange(50) * 0.08)
+    with pytest.raises(InputError, match=r"one eye is covered on 36 of 50 frames that show a face, too few"):
+        covered_frames(info, dict(enumerate(spoilt)), fewest=20)
+    assert sorted(covered_frames(info, dict(enumerate(spoilt)), fewest=14)) == list(range(4, 40))
+
+
 BLINKS = [7, 8, 9, 22, 23, 37, 38]
 KEPT_SHUT = [7, 8, 9, *range(22, 45)]
 
@@ -154,7 +181,8 @@ def test_no_look_at_all_is_no_cover():
 
 
 @pytest.mark.parametrize("kind", ["skin", "cheek"])
-def test_a_textured_cover_on_the_actor_is_never_tracked(kind, lesson, recording, tmp_path):
+def test_a_model_from_labels_does_not_track_a_textured_cover(kind, lesson, recording, tmp_path):
+    """No detector looks here: the model has never seen the cover, and its residual tells it."""
     pictures = list(recording.pictures[:40])
     for n in range(15, 25):
         pictures[n] = cover(pictures[n], recording.points[n, 9:], kind)
@@ -176,7 +204,7 @@ def face(shared_data, monkeypatch):
         pytest.skip(
             "the face detector's environment is not made; 'stimuli track VIDEO' without labels makes it"
         )
-    monkeypatch.setattr("stimuli_builder.tracking.labelfree.LOOKED_AT", 24)
+    monkeypatch.setattr("stimuli_builder.tracking.survey.LOOKED_AT", 24)
     return list(frames(shared_data / "face_video" / "single_face.mp4"))
 
 
@@ -202,3 +230,16 @@ def test_a_textured_cover_on_a_real_face_is_never_tracked(face, tmp_path, kind, 
     assert {row["status"] for row in rows[first : first + 27]} <= {"lost", "doubtful"}
     assert all("left eye covered" in row["reason"] for row in rows[first : first + 27])
     assert {row["status"] for row in [*rows[: first - 1], *rows[first + 30 :]]} == {"tracked"}
+
+
+@pytest.mark.parametrize("eye", [0, 1])
+def test_an_eye_whose_picture_is_flat_is_no_eye(eye, lesson, recording):
+    """A model that has learnt a cover has no residual on it; that its picture is flat then tells it."""
+    fitter, faults = Fitter(lesson.model), Faults(lesson.model)
+    start, kept = lesson.model.poses[0], np.zeros(len(lesson.model.sd))
+    assert faults.flat(fitter.fit(recording.pictures[0], kept, start, max_iterations=1)) == ""
+    flat = recording.pictures[0].copy()
+    x, y = recording.points[0].reshape(2, 9, 2)[eye].mean(0).round().astype(int).tolist()
+    cv2.ellipse(flat, (x, y), (80, 50), 0, 0, 360, 105, -1)
+    seen = fitter.fit(flat, kept, start, max_iterations=1)
+    assert faults.flat(seen) == f"{('left', 'right')[eye]} eye covered: its picture is flat"

@@ -9,8 +9,9 @@ import pytest
 
 from stimuli_builder.actor.recording import Actor, ActorOptions, write_truth, write_video
 from stimuli_builder.environments import cache_folder
-from stimuli_builder.tracking.labelfree import label_free_lesson, survey
+from stimuli_builder.tracking.labelfree import label_free_lesson
 from stimuli_builder.tracking.shapes import widths
+from stimuli_builder.tracking.survey import survey
 from stimuli_builder.tracking.track import track_video
 from stimuli_builder.tracking.training import TrainingOptions
 from stimuli_builder.video import frames, scan_video
@@ -49,7 +50,7 @@ def detector(monkeypatch):
         pytest.skip(
             "the face detector's environment is not made; 'stimuli track VIDEO' without labels makes it"
         )
-    monkeypatch.setattr("stimuli_builder.tracking.labelfree.LOOKED_AT", 24)
+    monkeypatch.setattr("stimuli_builder.tracking.survey.LOOKED_AT", 24)
 
 
 def test_after_a_cut_to_a_close_up_of_another_person_no_frame_is_tracked(detector, shared_data, tmp_path):

@@ -20,15 +20,14 @@ from stimuli_builder.tracking.detector.mesh import FACES_ASKED, open_detector, s
 from stimuli_builder.tracking.detector.mesh_client import MeshClient
 from stimuli_builder.tracking.labelfree import (
     DETECTOR_SHARE,
-    Survey,
     label_free_lesson,
     plausible,
     proposed_labels,
-    survey,
 )
 from stimuli_builder.tracking.labels import load_labels
 from stimuli_builder.tracking.relabel import worst_frames, write_relabel
 from stimuli_builder.tracking.shapes import widths
+from stimuli_builder.tracking.survey import Survey, survey
 from stimuli_builder.tracking.track import track_video
 from stimuli_builder.tracking.tracker import FROZEN, UNSEEN, Tracker
 from stimuli_builder.tracking.training import TrainingOptions
@@ -236,7 +235,7 @@ def test_points_stay_where_they_are_when_a_picture_is_enlarged(detector, shared_
 def test_of_a_long_video_every_nth_frame_is_looked_at(detector, shared_data, monkeypatch):
     info = scan_video(shared_data / "face_video" / "single_face.mp4")
     every = survey(info, one_eye=False).points
-    monkeypatch.setattr("stimuli_builder.tracking.labelfree.LOOKED_AT", 12)
+    monkeypatch.setattr("stimuli_builder.tracking.survey.LOOKED_AT", 12)
     seen = survey(info, one_eye=False)
     assert seen.looked_at == 12
     assert sorted(seen.points) == list(range(0, 72, 6))
@@ -274,7 +273,7 @@ def test_a_fit_where_the_detector_sees_nothing_is_doubtful_until_it_sees_the_eye
 def test_frames_in_which_no_face_is_seen_are_told_from_frames_not_looked_at(
     detector, shared_data, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr("stimuli_builder.tracking.labelfree.LOOKED_AT", 36)
+    monkeypatch.setattr("stimuli_builder.tracking.survey.LOOKED_AT", 36)
     pictures = [picture.copy() for picture in frames(shared_data / "face_video" / "single_face.mp4")]
     for picture in pictures[40:56]:
         face, strip = np.full_like(picture, 128), slice(140, 190)
@@ -299,7 +298,7 @@ def test_frames_in_which_no_face_is_seen_are_told_from_frames_not_looked_at(
 def test_eyes_that_reach_out_of_the_picture_count_as_unseen_and_the_reason_says_so(
     detector, shared_data, tmp_path, monkeypatch, cut_px, unseen
 ):
-    monkeypatch.setattr("stimuli_builder.tracking.labelfree.LOOKED_AT", 12)
+    monkeypatch.setattr("stimuli_builder.tracking.survey.LOOKED_AT", 12)
     pictures = [picture.copy() for picture in frames(shared_data / "face_video" / "single_face.mp4")]
     for picture in pictures[36:]:
         picture[:, :-cut_px] = picture[:, cut_px:].copy()
@@ -310,7 +309,7 @@ def test_eyes_that_reach_out_of_the_picture_count_as_unseen_and_the_reason_says_
 
 
 def test_a_whole_face_is_refused_as_a_close_up_and_a_close_up_is_not(detector, shared_data, monkeypatch):
-    monkeypatch.setattr("stimuli_builder.tracking.labelfree.LOOKED_AT", 12)
+    monkeypatch.setattr("stimuli_builder.tracking.survey.LOOKED_AT", 12)
     folder = shared_data / "face_video"
     with pytest.raises(
         InputError, match=r"a whole face is seen on (\d) of \1 frames .* leave it out"

@@ -12,8 +12,8 @@ import pytest
 
 from experiments.errors import InputError
 from stimuli_builder.environments import cache_folder
-from stimuli_builder.tracking.labelfree import survey
 from stimuli_builder.tracking.model_file import save_model
+from stimuli_builder.tracking.survey import survey
 from stimuli_builder.tracking.track import track_video
 from stimuli_builder.video import declared_frames, frames, scan_before_damage, scan_video
 from tests.stimuli_builder.tracking.test_bad_input import write_frames
@@ -268,7 +268,7 @@ def face(shared_data, monkeypatch):
         pytest.skip(
             "the face detector's environment is not made; 'stimuli track VIDEO' without labels makes it"
         )
-    monkeypatch.setattr("stimuli_builder.tracking.labelfree.LOOKED_AT", 12)
+    monkeypatch.setattr("stimuli_builder.tracking.survey.LOOKED_AT", 12)
     return list(frames(shared_data / "face_video" / "single_face.mp4"))
 
 
