@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from datetime import datetime
 from typing import Any, Literal, NamedTuple, cast
 
-from sqlalchemy import ARRAY, Table, bindparam, delete, func, insert, select
+from sqlalchemy import ARRAY, Select, Table, bindparam, delete, func, insert, select
 from sqlalchemy.orm import Session
 
 from server.identities.repository import known_as
