@@ -30,7 +30,7 @@ from stimuli_builder.characters.facekit.renderer import Renderer, Setup, Shot, l
 from stimuli_builder.characters.facekit.scene import FaceScene
 
 # Raise when geometry, textures, materials, lights or that framing change: other recipes' work is not resumed.
-RECIPES = {"eyes": 13, "face": 14}
+RECIPES = {"eyes": 15, "face": 16}
 NOTICE = "Rendered from ICT-FaceKit geometry, (c) 2020 USC Institute for Creative Technologies, MIT licence"
 
 

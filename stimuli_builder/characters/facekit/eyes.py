@@ -130,13 +130,13 @@ def tube(line: Array, radius: Array, sectors: int = 10) -> Mesh:
 
 
 def caruncle(path: BlinkPath, posed: Array, side: int) -> Mesh:
-    """The pink flesh of the nasal corner and the fold beside it."""
+    """The pink flesh of the nasal corner and the fold beside it, in the corner of the posed vertices."""
     tip = _nasal_tip(path, posed, side, EDGE_LOOP)
     corner = _nasal_tip(path, posed, side, EDGE_LOOP + 1)
     tilt = -side * 0.5
-    # Wide and sunk in, so that they stand out as one mound; rounder ones looked like beads.
-    main = _ellipsoid(tip + np.array([side * 0.15, -0.03, -0.040]), (0.25, 0.13, 0.105), tilt)
-    fold = _ellipsoid(tip + np.array([side * 0.30, -0.02, -0.075]), (0.17, 0.14, 0.08), tilt)
+    # So wide that the lids' edges bound them, and sunk in: what ended within the corner looked like a bead.
+    main = _ellipsoid(tip + np.array([side * 0.10, -0.02, -0.085]), (0.34, 0.24, 0.125), tilt)
+    fold = _ellipsoid(tip + np.array([side * 0.30, -0.02, -0.105]), (0.17, 0.14, 0.08), tilt)
     filling = _ellipsoid(corner + np.array([side * 0.09, -0.01, -0.075]), (0.15, 0.075, 0.055), tilt)
     meshes = [main, fold, filling]
     starts = np.cumsum([0, *[len(mesh.vertices) for mesh in meshes[:-1]]])

@@ -104,7 +104,7 @@ class FaceScene:
                 Part(f"eye_{name}", "eye", eyeball(self.path, coarse, side, stroke)),
                 Part(f"film_{name}", "film", wet_film(self.path, side, stroke)),
                 Part(f"tear_{name}", "tear", tear_line(self.path, coarse, side, stroke)),
-                Part(f"flesh_{name}", "flesh", caruncle(self.path, coarse, side)),
+                Part(f"flesh_{name}", "flesh", caruncle(self.path, self._opened, side)),
                 Part(f"brow_{name}", "brow", self._brows[side].at(posed)),
             ]
         return parts + [Part(name, "lash", row.at(coarse)) for name, row in self._lashes]
@@ -119,6 +119,11 @@ class FaceScene:
 
     def _coarse(self, pose: LidPose) -> Array:
         return self.path.at(self.strokes_of(pose), self._lower_cm(pose))
+
+    @cached_property
+    def _opened(self) -> Array:
+        """Coarse vertices of the open eyes; the flesh of the corners stays where it is then."""
+        return self._coarse(OPEN)
 
     def _lower_cm(self, pose: LidPose) -> tuple[float, float]:
         return pose.vertical_mm / self.view.mm_per_cm, pose.horizontal_mm / self.view.mm_per_cm

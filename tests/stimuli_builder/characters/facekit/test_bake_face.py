@@ -146,6 +146,16 @@ def test_lids_boxes_hold_the_eyes_and_all_lashes(scene: FaceScene) -> None:
             assert ((at > low - 1) & (at < high + 1)).all()
 
 
+@pytest.mark.parametrize("closure", [0.25, 0.5, 1.0])
+def test_flesh_of_the_nasal_corners_stays_where_it_is(scene: FaceScene, closure: float) -> None:
+    """Moved with the lids it came 1 mm forward half shut, and stood before the eye like an egg."""
+    opened, pose = (
+        [part.shape.vertices for part in scene.shapes(LidPose(at)) if part.material == "flesh"]
+        for at in (0.0, closure)
+    )
+    np.testing.assert_array_equal(opened, pose)
+
+
 def test_skin_round_the_lids_keeps_the_still_frame(kit: FaceKit, scene: FaceScene, tmp_path: Path) -> None:
     bake = bake_of(kit, scene, replace(order(tmp_path, 3, 3), samples=Samples(1, 2, 4)))
     pretend_rendered(bake, 4)
