@@ -12,6 +12,8 @@ from experiments.definition.names import refuse_repeats
 from experiments.rendering import RenderOverrides
 from experiments.wrong_values import shown
 
+_VERSION = re.compile(r"(?<=.)@\d+$")
+
 
 class Level(Declaration):
     """One level of a factor: its name in the data, its label in tables, and what it changes in clips."""
@@ -22,9 +24,6 @@ class Level(Declaration):
     """What tables and figures call the level. Participants never see it."""
     render: RenderOverrides = RenderOverrides()
     """What clips of this level change of [render]. Levels that change nothing give the same clips."""
-
-
-_VERSION = re.compile(r"(?<=.)@\d+$")
 
 
 def names_listed(value: Any) -> tuple[str, ...]:

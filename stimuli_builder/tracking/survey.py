@@ -13,10 +13,7 @@ from stimuli_builder.tracking.covers import covered_frames, textures_of
 from stimuli_builder.tracking.detector.detection import Detection
 from stimuli_builder.tracking.detector.mesh import open_detector
 from stimuli_builder.tracking.detector.one_face import one_face
-from stimuli_builder.tracking.shapes import (
-    EYE_POINTS,
-    Points,
-)
+from stimuli_builder.tracking.shapes import EYE_POINTS, Points
 from stimuli_builder.tracking.tracker import UNSEEN
 from stimuli_builder.video import Picture, VideoInfo, frames, rgb
 
