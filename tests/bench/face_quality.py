@@ -24,9 +24,9 @@ from stimuli_builder.characters.colour import linear_to_srgb, srgb_to_linear
 from stimuli_builder.characters.facekit.assembly import STUDIO_EV
 from stimuli_builder.characters.facekit.bake import RECIPES
 from stimuli_builder.characters.facekit.development import (
-    develop,
     error_and_noise,
     error_db,
+    photographed,
     psnr_db,
     to_8_bit,
 )
@@ -68,7 +68,7 @@ def laid(character: Atlas, scene: FaceScene, shot: Shot) -> np.ndarray:
         x, y, width, height = box = shot.boxes[name]
         where = out[y - y0 : y - y0 + height, x - x0 : x - x0 + width]
         where += scene.view.feather(box) * (
-            develop(light.astype(np.float32), scene.identity.exposure_ev + STUDIO_EV) - where
+            photographed(light, scene.identity.exposure_ev + STUDIO_EV) - where
         )
     return to_8_bit(out)
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from stimuli_builder.characters.colour import linear_to_srgb, srgb_to_linear
 from stimuli_builder.characters.declaration import Declaration, Level, LowerLid, LowerLidPose
-from stimuli_builder.characters.facekit.development import develop, to_8_bit
+from stimuli_builder.characters.facekit.development import photographed, to_8_bit
 from stimuli_builder.characters.facekit.framing import INTER_OCULAR_MM, Box, bounding_box
 from stimuli_builder.characters.facekit.inbetween import flow_mix
 from stimuli_builder.characters.facekit.lid_pose import (
@@ -107,7 +107,7 @@ class Assembly:
         write_declaration(folder, declaration)
 
     def _developed(self, light: NDArray[np.float16]) -> NDArray[np.float32]:
-        return develop(light.astype(np.float32), self._scene.identity.exposure_ev + STUDIO_EV)
+        return photographed(light, self._scene.identity.exposure_ev + STUDIO_EV)
 
     def _laid(self, still: NDArray[np.float32], shot: Shot) -> NDArray[np.float32]:
         """The still frame with a shot's boxes laid over it, feathered to the still frame on their rims.

@@ -14,6 +14,7 @@ from typing import Any
 from experiments.errors import InputError
 from experiments.files import says_full
 from stimuli_builder.characters.facekit.assembly import Assembly
+from stimuli_builder.characters.facekit.development import LENS_PX
 from stimuli_builder.characters.facekit.environment import BPY_VERSION, ensure_blender
 from stimuli_builder.characters.facekit.identity import Identity
 from stimuli_builder.characters.facekit.kit import FaceKit
@@ -30,7 +31,7 @@ from stimuli_builder.characters.facekit.renderer import Renderer, Setup, Shot, l
 from stimuli_builder.characters.facekit.scene import FaceScene
 
 # Raise when geometry, textures, materials, lights or that framing change: other recipes' work is not resumed.
-RECIPES = {"eyes": 15, "face": 16}
+RECIPES = {"eyes": 17, "face": 18}
 NOTICE = "Rendered from ICT-FaceKit geometry, (c) 2020 USC Institute for Creative Technologies, MIT licence"
 
 
@@ -202,6 +203,7 @@ class FaceBake:
             "rendered_closures": rendered,
             "samples": order.samples.boxes,
             "frame_samples": order.samples.frame,
+            "lens_px": LENS_PX,
             "lid_samples": order.samples.lids or order.samples.boxes,
             "moved_mm_at_closure_1": {k: round(v, 3) for k, v in self.scene.movement_mm().items()},
             "versions": {"palpebra": version("palpebra"), "bpy": BPY_VERSION, "numpy": version("numpy")},

@@ -1,11 +1,24 @@
 """From the renderer's scene light to the picture's light: exposure, a soft shoulder, a slight S-curve."""
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from stimuli_builder.characters.colour import encode_srgb
 
 SHOULDER_STARTS, CONTRAST = 0.55, 0.2
+LENS_PX = 0.55
+"""Spread of a point of light over the picture, standard deviation of a Gaussian.
+
+As of a good lens before a sensor with colour filters: without it every edge is cut out, and hair is dots.
+"""
+
+
+def photographed(scene_light: NDArray[np.floating], exposure_ev: float) -> NDArray[np.float32]:
+    """`develop` of what a lens makes of (h, w, 3) scene-linear light."""
+    light = np.maximum(scene_light.astype(np.float32), 0)
+    spread = cv2.GaussianBlur(light, (0, 0), LENS_PX, borderType=cv2.BORDER_REPLICATE)
+    return develop(np.asarray(spread, np.float32), exposure_ev)
 
 
 def develop(scene_light: NDArray[np.floating], exposure_ev: float) -> NDArray[np.float32]:

@@ -12,6 +12,9 @@ from stimuli_builder.characters.facekit.sphere import IRIS_CM, smooth
 GLOBE_CM = 1.5
 WHITE = (0.69, 0.64, 0.595)
 VEINS = 60
+DRIFT, DRIFT_CM = 0.006, 0.07
+"""By which share of a turn fibres wander on their way outwards, and over which distance: straight spokes look
+drawn."""
 
 
 class _Plane:
@@ -23,6 +26,7 @@ class _Plane:
         at = ((np.arange(size) + 0.5) / size * 2 - 1) * TEXTURE_LIMIT * GLOBE_CM
         self.x, self.y = np.meshgrid(at, at)
         self.r, self.angle = np.hypot(self.x, self.y), np.arctan2(self.y, self.x)
+        self.drift = DRIFT * self.noise(DRIFT_CM)
 
     def noise(self, sigma_cm: float) -> Array:
         """Smooth noise of unit spread."""
@@ -37,9 +41,8 @@ class _Plane:
         turn, out = self.angle / (2 * np.pi) + 0.5, np.clip(self.r / (IRIS_CM * 1.1), 0, 1)
         for k in range(octaves):
             columns, rows = around * 2**k, int(outward * 2**k) + 2
-            warp = 0.15 * np.sin(self.angle * 7 + k) * across
             grid = self.rng.normal(size=(rows + 3, columns))
-            total += 0.62**k * _lookup(grid, out * rows, turn * columns + warp * columns / 40)
+            total += 0.62**k * _lookup(grid, out * rows, (turn + self.drift * across) * columns)
         return np.asarray(total / total[self.r < IRIS_CM].std())
 
 
@@ -77,7 +80,9 @@ def _iris_colour(plane: _Plane, iris: Iris, noises: tuple[Array, Array, Array], 
     core = np.clip(np.exp(-(((q - 0.08) / (0.24 + 0.02 * broad + 0.008 * bundles)) ** 2)) * 0.85, 0, 1)[
         ..., None
     ]
-    stroma = 0.66 + 0.21 * fibres * (0.5 + 0.5 * q) + 0.09 * bundles + 0.11 * broad
+    # Here fibres lie bare, there a haze covers them: of one strength all round they were a wheel's spokes.
+    bare = np.clip(0.75 + 0.45 * plane.noise(0.11), 0.15, 1.5)
+    stroma = 0.66 + 0.19 * fibres * bare * (0.5 + 0.5 * q) + 0.10 * bundles + 0.13 * broad
     out = (outer * (1 - zone) + middle * zone) * (1 - core) + inner * core
     out = out * np.clip(stroma, 0.15, 1.6)[..., None] * 1.3
     collarette = np.exp(-(((q - (0.30 + 0.03 * broad + 0.012 * bundles)) / 0.13) ** 2))

@@ -38,10 +38,12 @@ def eyeball(path: BlinkPath, posed: Array, side: int, stroke: float) -> Mesh:
         return np.where(angle < limbus, plane, radius - 0.035 * np.exp(-((angle - limbus) / 0.05)))
 
     mesh, angle = _dome(path, side, stroke, profile, 1.45, (150, 96))
+    # One texture, half a turn further on the other side: two irises whose fibres agreed looked copied.
+    uv = mesh.uv if side > 0 or mesh.uv is None else 1 - mesh.uv
     sclera = smooth(limbus - 0.01, limbus + 0.05, angle)
     # Between lids that meet, shadows that are rendered leave little: this one would make the slit black.
     shade = 1 - (1 - _lid_shade(path, posed, side, mesh.vertices)) * (1 - 0.5 * stroke)
-    return Mesh(mesh.vertices, mesh.quads, mesh.uv, {"sclera": sclera, "shade": shade})
+    return Mesh(mesh.vertices, mesh.quads, uv, {"sclera": sclera, "shade": shade})
 
 
 def wet_film(path: BlinkPath, side: int, stroke: float) -> Mesh:

@@ -15,6 +15,8 @@ LID_MELANIN, LID_BLOOD, LID_ROUGH, LID_DULL = 0.25, 0.07, 0.12, 0.6
 
 As oily as a brow, a shut lid shone as bright as the catchlight that it had covered.
 """
+RIM_BLOOD = 0.13
+"""Optical depth of blood that a lid's wet margin has beyond the skin's; about the pupil half of it."""
 NOSE, CHIN, BRIDGE, NOSTRILS, LIPS = 30, 8, 27, (31, 35), slice(48, 60)
 """Numbers of Multi-PIE landmarks."""
 
@@ -39,7 +41,7 @@ class Pigments:
         wet, fine, coordinates = self._lid_values()
         lid = self._upper_lid()
         melanin = self._melanin(lips) * (1 - 0.35 * wet) * (1 + LID_MELANIN * lid)
-        haemoglobin = self._haemoglobin(lips) + wet * 0.14 + LID_BLOOD * lid
+        haemoglobin = self._haemoglobin(lips) + wet * self._rim_blood() + LID_BLOOD * lid
         melanin *= 1 + self.contrast * (0.10 * self._noise(1.3, 11) + 0.10 * self._noise(6.0, 12))
         haemoglobin *= 1 + 0.13 * self._noise(1.8, 13, 4) + 0.15 * self._noise(9.0, 14)
         # Fine speckle per vertex: as noise in the shader it doubled the time of a render.
@@ -63,6 +65,11 @@ class Pigments:
             "wet": wet,
             "fine": fine * age_depth(self.look.age) ** 0.7,
         }
+
+    def _rim_blood(self) -> Array:
+        """(n,) blood of the lids' wet margins, more towards the corners: even, it is a drawn line."""
+        outer = np.abs(self.skin.coordinates.azimuth - 0.15)
+        return np.asarray(np.clip(RIM_BLOOD * (0.5 + 0.7 * outer + 0.45 * self._noise(4.0, 41, 2)), 0, None))
 
     def _noise(self, scale: float, offset: int, octaves: int = 3) -> Array:
         return value_noise(self.flat * scale, self.seed + offset, octaves) / 1.9

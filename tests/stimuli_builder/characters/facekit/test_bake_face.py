@@ -156,6 +156,15 @@ def test_flesh_of_the_nasal_corners_stays_where_it_is(scene: FaceScene, closure:
     np.testing.assert_array_equal(opened, pose)
 
 
+def test_no_iris_is_the_others_copy(scene: FaceScene) -> None:
+    eyes = {part.name: part.shape for part in scene.parts(LidPose(0.0)) if part.name.startswith("eye_")}
+    left, right = (eyes[f"eye_{side}"].uv for side in ("left", "right"))
+    assert left is not None
+    assert right is not None
+    # Each point of one eye shows what lies across the pupil on the other, never the same fibre.
+    np.testing.assert_allclose(left + right, 1.0, atol=1e-12)
+
+
 def test_skin_round_the_lids_keeps_the_still_frame(kit: FaceKit, scene: FaceScene, tmp_path: Path) -> None:
     bake = bake_of(kit, scene, replace(order(tmp_path, 3, 3), samples=Samples(1, 2, 4)))
     pretend_rendered(bake, 4)

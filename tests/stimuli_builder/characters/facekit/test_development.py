@@ -5,7 +5,13 @@ import numpy as np
 import pytest
 
 from stimuli_builder.characters.facekit.assembly import steadied
-from stimuli_builder.characters.facekit.development import develop, error_and_noise, psnr_db
+from stimuli_builder.characters.facekit.development import (
+    LENS_PX,
+    develop,
+    error_and_noise,
+    photographed,
+    psnr_db,
+)
 from stimuli_builder.characters.facekit.inbetween import flow_mix
 
 
@@ -15,6 +21,30 @@ def test_development_is_monotonic_and_stays_within_the_picture() -> None:
     assert (np.diff(code) >= 0).all()
     assert code[0] == 0
     assert code[-1] <= 1
+
+
+def test_a_lens_spreads_a_point_and_keeps_its_light() -> None:
+    point = np.zeros((21, 21, 3), np.float32)
+    point[10, 10] = 0.02  # so dark that development is close to a power function of it, turned round below
+    light = _undeveloped(photographed(point, 0.0)[..., 0])
+    across = np.arange(21) - 10
+    assert light.sum() == pytest.approx(0.02, rel=0.02)
+    spread = np.sqrt((light.sum(0) * across**2).sum() / light.sum())
+    # A Gaussian sampled at whole pixels is this much wider or narrower than the continuous one.
+    assert spread == pytest.approx(LENS_PX, rel=0.1)
+
+
+def test_a_lens_leaves_an_even_picture_and_takes_noise_away() -> None:
+    flat = np.full((40, 50, 3), 0.3, np.float32)
+    np.testing.assert_allclose(photographed(flat, 0.2), develop(flat, 0.2), atol=1e-6)
+    noisy = flat + np.random.default_rng(3).normal(0, 0.02, flat.shape).astype(np.float32)
+    assert photographed(noisy, 0.2).std() < 0.65 * develop(noisy, 0.2).std()
+
+
+def _undeveloped(code: np.ndarray) -> np.ndarray:
+    """Light of a code, read off development's own curve."""
+    light = np.linspace(0, 0.05, 5000, dtype=np.float32)
+    return np.interp(code, develop(light, 0.0), light)
 
 
 def test_psnr_of_known_pictures() -> None:
