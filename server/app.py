@@ -8,6 +8,7 @@ from fastapi import APIRouter, FastAPI
 from fastapi.routing import APIRoute
 
 from server import health, pages
+from server.accounts import credential_endpoints as credentials
 from server.accounts import endpoints as accounts
 from server.accounts import people
 from server.accounts.refusals import note_refusal
@@ -67,6 +68,7 @@ def _routers() -> tuple[APIRouter, ...]:
         operations.router,
         operations.admin_router,
         accounts.router,
+        credentials.router,
         providers.router,
         resets.router,
         people.router,

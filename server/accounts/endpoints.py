@@ -1,4 +1,4 @@
-"""Endpoints of one's own account: signing in and out, sessions, password, second factor, tokens."""
+"""Endpoints of signing in and out: sessions, and accounts made from invitations."""
 
 from typing import Annotated
 
@@ -9,7 +9,6 @@ from sqlalchemy.orm import Session
 from server.accounts import invitations, notices, second_factor, service, signing_in, tokens
 from server.accounts.identity import (
     COOKIE,
-    FreshMyself,
     Identity,
     Myself,
     NotSignedIn,
@@ -20,20 +19,12 @@ from server.accounts.identity import (
 from server.accounts.passwords import checked_password, hash_password
 from server.accounts.schemas import (
     AccountOut,
-    ChangePassword,
-    ConfirmCode,
-    ConfirmPassword,
     InvitationState,
     Me,
     MyWorkspace,
     NewAccount,
-    NewToken,
-    NewTokenOut,
-    RecoveryCodes,
-    SecondFactorSetup,
     SessionOut,
     SignIn,
-    TokenOut,
 )
 from server.accounts.throttle import DEVICE_COOKIE, known_device, new_device
 from server.clock import now
@@ -247,90 +238,3 @@ def list_sessions(services: ServicesDep, me: Myself) -> list[SessionOut]:
 def revoke_session(services: ServicesDep, me: Myself, session_id: Number) -> None:
     """Sign another of one's own browsers out."""
     tokens.revoke_session(services.database, me, session_id)
-
-
-@router.put("/password", status_code=204)
-async def change_password(
-    services: ServicesDep, me: Myself, body: ChangePassword, after: BackgroundTasks
-) -> None:
-    """Change the password; every other session and every API token ends."""
-    await must_fit(services, me, body.password)
-    fresh = await services.passwords.run(lambda: hash_password(body.new_password, me.name))
-    await run_in_threadpool(service.change_password, services, me, fresh)
-    after.add_task(notices.tell, services, me.account_id, notices.PASSWORD_CHANGED)
-
-
-async def must_fit(services: Services, me: Identity, password: str) -> None:
-    """Ask for the present password; a stolen session may not try many."""
-    key = f"session {me.session_id}"
-    await run_in_threadpool(services.sign_ins.names.check, key)
-    stored = await run_in_threadpool(service.own_password, services, me)
-    try:
-        await services.passwords.run(lambda: service.must_fit(password, stored))
-    except signing_in.WrongCredentials:
-        await run_in_threadpool(services.sign_ins.names.failed, key)
-        raise
-    await run_in_threadpool(services.sign_ins.names.succeeded, key)
-
-
-async def must_prove(services: Services, me: Identity, proof: str) -> None:
-    """Ask for the present password, and where the account has none for a code of its second factor."""
-    if await run_in_threadpool(service.own_password, services, me):
-        await must_fit(services, me, proof)
-        return
-    key = f"session {me.session_id}"
-    await run_in_threadpool(services.sign_ins.names.check, key)
-    failure = await run_in_threadpool(service.own_code_failure, services, me, proof)
-    if failure is not None:
-        await run_in_threadpool(services.sign_ins.names.failed, key)
-        raise failure
-    await run_in_threadpool(services.sign_ins.names.succeeded, key)
-
-
-@router.post("/second-factor")
-def start_second_factor(services: ServicesDep, me: FreshMyself) -> SecondFactorSetup:
-    """Begin the set-up of a second factor: a secret for an authenticator app."""
-    secret = service.start_second_factor(services, me)
-    uri = second_factor.provisioning_uri(secret, me.name)
-    return SecondFactorSetup(secret=secret, uri=uri, qr_svg=second_factor.qr_svg(uri))
-
-
-@router.put("/second-factor")
-def confirm_second_factor(
-    services: ServicesDep, me: FreshMyself, body: ConfirmCode, after: BackgroundTasks
-) -> RecoveryCodes:
-    """Turn the second factor on with the app's first code; gives the recovery codes, this once."""
-    codes = service.confirm_second_factor(services, me, body.code)
-    after.add_task(notices.tell, services, me.account_id, notices.SECOND_FACTOR_ADDED)
-    return RecoveryCodes(codes=codes)
-
-
-@router.delete("/second-factor", status_code=204)
-async def remove_second_factor(
-    services: ServicesDep, me: Myself, body: ConfirmPassword, after: BackgroundTasks
-) -> None:
-    """Turn the second factor off; asks for the password, and where the account has none for a code."""
-    await must_prove(services, me, body.password)
-    await run_in_threadpool(service.remove_second_factor, services, me)
-    after.add_task(notices.tell, services, me.account_id, notices.SECOND_FACTOR_REMOVED)
-
-
-@router.get("/tokens")
-def list_tokens(services: ServicesDep, me: Myself) -> list[TokenOut]:
-    """One's own API tokens."""
-    with services.database.read() as session:
-        return [TokenOut.model_validate(row) for row in tokens.open_tokens(session, me)]
-
-
-@router.post("/tokens", status_code=201)
-def create_token(services: ServicesDep, me: FreshMyself, body: NewToken) -> NewTokenOut:
-    """Make an API token; its secret is shown this once. It can do no more than the account."""
-    with services.database.write() as session:
-        row, secret = tokens.create_token(session, me, body.name, list(body.scopes), body.days_granted)
-        return NewTokenOut(**TokenOut.model_validate(row).model_dump(), token=secret)
-
-
-@router.delete("/tokens/{token_id}", status_code=204)
-def revoke_token(services: ServicesDep, me: Myself, token_id: Number) -> None:
-    """Revoke one's own API token."""
-    tokens.revoke_token(services.database, me, token_id)

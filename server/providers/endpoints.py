@@ -7,8 +7,9 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import RedirectResponse
 
 from server.accounts import notices
-from server.accounts.endpoints import address_of, must_prove, set_session_cookie
+from server.accounts.endpoints import address_of, set_session_cookie
 from server.accounts.identity import FreshMyself, Myself, check_origin
+from server.accounts.proof import must_prove
 from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES, ApiError
 from server.mail import can_send

@@ -6,9 +6,10 @@ from fastapi import APIRouter, BackgroundTasks, Cookie, Request
 from fastapi.concurrency import run_in_threadpool
 
 from server import mail
-from server.accounts.endpoints import address_of, must_fit, must_prove
+from server.accounts.endpoints import address_of
 from server.accounts.identity import Myself, account_of, check_origin
 from server.accounts.passwords import hash_password
+from server.accounts.proof import must_fit, must_prove
 from server.accounts.schemas import ConfirmPassword
 from server.accounts.throttle import DEVICE_COOKIE
 from server.context import Services, ServicesDep
