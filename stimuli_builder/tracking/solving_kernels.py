@@ -1,10 +1,86 @@
-"""Compiled loops of the normal equations of one step: the Hessian from its forms, and Cholesky; float64."""
+"""Compiled loops of the normal equations of one step: right side, the Hessian from its forms, and Cholesky.
+
+float32 over pixels, float64 over parameters.
+"""
 
 # mypy: disable-error-code="no-untyped-def, no-untyped-call"
 
 import numpy as np
 
 from stimuli_builder.compiled import compiled
+
+
+@compiled
+def accumulate(error, gx, gy, triangles, starts, forms, px, py, out):
+    """Add error x gradient into the mesh vertices: out[v] = sum_x b_v(x) error(x) gradient(x)."""
+    zero = np.float32(0)
+    out[:] = zero
+    for t in range(triangles.shape[0]):
+        sx = zero
+        sxx = zero
+        sxy = zero
+        sy = zero
+        syx = zero
+        syy = zero
+        xs = px[starts[t] : starts[t + 1]]
+        ys = py[starts[t] : starts[t + 1]]
+        errors = error[starts[t] : starts[t + 1]]
+        along_x = gx[starts[t] : starts[t + 1]]
+        along_y = gy[starts[t] : starts[t + 1]]
+        for i in range(xs.shape[0]):
+            ex = errors[i] * along_x[i]
+            ey = errors[i] * along_y[i]
+            sx += ex
+            sxx += ex * xs[i]
+            sxy += ex * ys[i]
+            sy += ey
+            syx += ey * xs[i]
+            syy += ey * ys[i]
+        for k in range(3):
+            v = triangles[t, k]
+            out[v, 0] += forms[t, k, 0] * sxx + forms[t, k, 1] * sxy + forms[t, k, 2] * sx
+            out[v, 1] += forms[t, k, 0] * syx + forms[t, k, 1] * syy + forms[t, k, 2] * sy
+
+
+@compiled
+def project(modes, error, first, last, out):
+    """Add the appearance part of SD^T E over pixels first <= x < last: out[i] += modes[i + 1] . error."""
+    count = modes.shape[0] - 1
+    part = error[first:last]
+    i = 0
+    while i + 4 <= count:
+        m0 = modes[i + 1, first:last]
+        m1 = modes[i + 2, first:last]
+        m2 = modes[i + 3, first:last]
+        m3 = modes[i + 4, first:last]
+        s0 = s1 = s2 = s3 = np.float32(0)
+        for x in range(part.shape[0]):
+            s0 += m0[x] * part[x]
+            s1 += m1[x] * part[x]
+            s2 += m2[x] * part[x]
+            s3 += m3[x] * part[x]
+        out[i] += s0
+        out[i + 1] += s1
+        out[i + 2] += s2
+        out[i + 3] += s3
+        i += 4
+    while i < count:
+        m0 = modes[i + 1, first:last]
+        s0 = np.float32(0)
+        for x in range(part.shape[0]):
+            s0 += m0[x] * part[x]
+        out[i] += s0
+        i += 1
+
+
+@compiled
+def subtract_warp(directions, vertex_sums, out):
+    """Subtract the warp part of SD^T E, over vertices, from out (K,)."""
+    for k in range(out.shape[0]):
+        total = 0.0
+        for v in range(vertex_sums.shape[0]):
+            total += directions[k, v, 0] * vertex_sums[v, 0] + directions[k, v, 1] * vertex_sums[v, 1]
+        out[k] -= total
 
 
 @compiled

@@ -91,10 +91,12 @@ def test_right_side_equals_the_direct_sum(model, recording):
     kernels.compose(model.appearance, c, 0, mesh.pixel_count, look)
     kernels.differentiate(look, *mesh.neighbours(), gx, gy)
     sums, fast = np.empty(mesh.vertices.shape, np.float32), np.empty(len(c) + 4)
-    kernels.accumulate(error, gx, gy, mesh.triangles, mesh.starts, mesh.barycentric, mesh.x, mesh.y, sums)
+    solving_kernels.accumulate(
+        error, gx, gy, mesh.triangles, mesh.starts, mesh.barycentric, mesh.x, mesh.y, sums
+    )
     fast[:] = 0
-    kernels.project(model.appearance, error, 0, mesh.pixel_count, fast)
-    kernels.subtract_warp(algebra.directions, sums, fast)
+    solving_kernels.project(model.appearance, error, 0, mesh.pixel_count, fast)
+    solving_kernels.subtract_warp(algebra.directions, sums, fast)
     direct = steepest_descent(model, c) @ error
     assert np.allclose(fast, direct, atol=2e-4 * np.abs(direct).max())
 
