@@ -1,6 +1,7 @@
 """Blinks told from squints, gaze shifts and closed eyes: classifier, prominent peaks, the paper's rule.
 
     python tests/bench/bench_lid_events.py [FOLDER]
+    python tests/bench/bench_lid_events.py --seed 8001 --series 24 --rates 30,120,240     # others, none else
 
 Prints precision, recall and F1 on generated series that trained nothing, at several rates, and how many
 squints and closed eyes were called blinks: those held for 0.25 s or more, and brief ones.
@@ -12,6 +13,7 @@ The peaks are in the style of JeFaPaTo: prominence 0.05 of an eye aspect ratio o
 distances of 50 frames at 240 frames a second.
 """
 
+import argparse
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -28,6 +30,7 @@ from stimuli_builder.blinks.series import BlinkSeries, bridge_gaps, runs
 
 SEED = 909
 SERIES = 20
+RATES = (15.0, 30.0, 60.0, 120.0, 500.0)
 SLACK_S = 0.1
 HELD_S = 0.25
 """A squint that stays for less is a partial blink in its course; it is counted apart."""
@@ -84,9 +87,9 @@ def tell(name: str, total: Array, more: str = "") -> None:
     sys.stdout.write(f"{line}  ({hits:.0f} hits, {alarms:.0f} false, {misses:.0f} missed){more}\n")
 
 
-def generated(fps: float) -> None:
+def generated(fps: float, seed: int, count: int) -> None:
     sys.stdout.write(f"generated series, {fps:g} frames/s\n")
-    series = [generate(np.random.default_rng([SEED, n, int(fps)]), 40, fps) for n in range(SERIES)]
+    series = [generate(np.random.default_rng([seed, n, int(fps)]), 40, fps) for n in range(count)]
     for name, method in METHODS.items():
         totals, called, shut = [], np.zeros(2, int), np.zeros(2, int)
         for one in series:
@@ -174,18 +177,36 @@ def f1(total: Array) -> float:
     return float(2 * hits / max(2 * hits + alarms + misses, 1))
 
 
+def rates(text: str) -> tuple[float, ...]:
+    return tuple(float(part) for part in text.split(","))
+
+
+def arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("folder", nargs="?", type=Path, metavar="FOLDER", help="hand-labelled series")
+    parser.add_argument("--seed", type=int, help=f"of the generated series ({SEED}); leaves recordings out")
+    parser.add_argument("--series", type=int, default=SERIES, help=f"generated series a rate ({SERIES})")
+    parser.add_argument("--rates", type=rates, default=RATES, help="frames/s, separated by commas")
+    return parser.parse_args()
+
+
 def main() -> None:
-    for fps in (15.0, 30.0, 60.0, 120.0, 500.0):
-        generated(fps)
+    asked = arguments()
+    for fps in asked.rates:
+        generated(fps, SEED if asked.seed is None else asked.seed, asked.series)
     sys.stdout.write("called blinks, all rates: (held, brief) of (held, brief)\n")
     for name, (held, brief, all_held, all_brief) in TOTALS.items():
         sys.stdout.write(f"  {name:16} {held} of {all_held} held, {brief} of {all_brief} brief\n")
-    sys.stdout.write(f"all generated series of {FAST:g} frames/s and more\n")
+    if OF_FAST:
+        sys.stdout.write(f"all generated series of {FAST:g} frames/s and more\n")
     for name, totals in OF_FAST.items():
         tell(name, np.sum(totals, axis=0), f", standard error over series {jackknife(totals):.3f}")
-    measured_by_others()
-    if len(sys.argv) > 1:
-        recorded(Path(sys.argv[1]))
+    if asked.seed is None:
+        measured_by_others()
+    if asked.folder is not None:
+        recorded(asked.folder)
 
 
 if __name__ == "__main__":
