@@ -4,10 +4,12 @@ SHELL := /bin/bash
 PYTHON ?= python3
 BIN := .venv/bin
 export PATH := $(CURDIR)/$(BIN):$(PATH)
+# Tests wait for browsers and servers a third of the time: one process more than there are cores, at most four.
+PROCESSES = $(shell $(PYTHON) -c 'import os; print(min(4, (os.cpu_count() or 1) + 1))')
 # Where this is set, every start compiles every module anew: seconds for each process that a test starts.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: addon playground help run test check setup setup-test lock format types bench sbom scope load evidence audit screenshots docs api clean
+.PHONY: addon playground help run test check check-style check-types check-imports check-pages check-supply setup setup-test lock format types bench sbom scope load evidence audit screenshots docs api clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-12s %s\n", $$1, $$2}' Makefile
@@ -17,18 +19,30 @@ run: setup ## set everything up and start Exp 1-3 in the browser (PORT=8000)
 
 test: setup-test ## set everything up and run all tests: Python, TypeScript, browser, PostgreSQL
 	@cd frontend && npm run --silent test
-	@OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n logical --maxprocesses 4 --dist loadscope --no-loadscope-reorder --rerun-show-tracebacks $(TESTS)
+	@OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(PROCESSES) --dist loadscope --no-loadscope-reorder --rerun-show-tracebacks $(TESTS)
 
 check: setup-test ## lint and type-check everything, import rules, lock files, known weaknesses
+	@$(MAKE) --no-print-directory --jobs=4 check-style check-types check-imports check-pages check-supply
+
+# The parts of `check`, which run beside one another: apart from the environment they need nothing of each other.
+check-style:
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check -q .
 	@$(BIN)/python tools/check_names.py
 	@$(BIN)/python tools/check_unused.py
 	@$(BIN)/python -m tools.check_docstrings
+
+check-types:
 	@$(BIN)/mypy
 	@$(BIN)/mypy --explicit-package-bases --follow-imports=silent tools
+
+check-imports:
 	@$(BIN)/lint-imports
+
+check-pages:
 	@cd frontend && npm run --silent typecheck && npm run --silent lint && npm run --silent api -- --check && npm run --silent size
+
+check-supply:
 	@$(BIN)/python tools/check_lock_files.py
 	@$(BIN)/python tools/sbom.py --check
 	@$(BIN)/python tools/audit.py
