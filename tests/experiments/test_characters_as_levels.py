@@ -11,7 +11,7 @@ from experiments.load import DefinitionError, parse_experiment
 from experiments.schema.canonical import definition_sha256
 from tests.helpers.faces import DEMO, HEAD, PROFILES, faces
 
-SHOWN = {"alder": "alder@4", "birch": "birch@3", "cedar": "cedar", "hazel": "hazel"}
+SHOWN = {"alder": "alder@4", "birch": "birch@3", "cedar": "cedar@3", "hazel": "hazel"}
 LIST = f"character = {json.dumps(list(SHOWN.values()))}"
 
 
@@ -76,7 +76,7 @@ def test_folders_give_levels_their_own_name_and_versions_are_dropped() -> None:
 @pytest.mark.parametrize(
     ("listed", "message"),
     [
-        ('["alder", 3]', 'expected a list such as ["alder@4", "cedar"], got the list ["alder", 3]'),
+        ('["alder", 3]', 'expected a list such as ["alder@4", "birch@3"], got the list ["alder", 3]'),
         ('["alder", ""]', "expected a list such as"),
         ("[]", "expected a list such as"),
         ('["..", "birch"]', "expected a list such as"),

@@ -13,7 +13,14 @@ from stimuli_builder.characters.retired import ROOT, Retired, load_retired, next
 from stimuli_builder.clips.characters import find_character
 
 FOLDER = "pictures/old"
-OPENING_MM = {"photorealistic": 11.0, "alder@2": 10.07, "alder": 10.07, "alder@3": 10.07, "birch": 9.66}
+OPENING_MM = {
+    "photorealistic": 11.0,
+    "alder@2": 10.07,
+    "alder": 10.07,
+    "alder@3": 10.07,
+    "birch": 9.66,
+    "cedar": 9.85,
+}
 """Of the eyes of each character that has left, as its declaration has it."""
 
 
