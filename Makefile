@@ -4,7 +4,8 @@ SHELL := /bin/bash
 PYTHON ?= python3
 BIN := .venv/bin
 export PATH := $(CURDIR)/$(BIN):$(PATH)
-# Tests wait for browsers and servers a third of the time: one process more than there are cores, at most four.
+# Tests wait for browsers and servers a third of the time (two cores, 2026-11-26): one process more than there
+# are cores, at most four. Another number: `make test PROCESSES=1`.
 PROCESSES = $(shell $(PYTHON) -c 'import os; print(min(4, (os.cpu_count() or 1) + 1))')
 # Where this is set, every start compiles every module anew: seconds for each process that a test starts.
 unexport PYTHONDONTWRITEBYTECODE
@@ -17,14 +18,15 @@ help: ## list the targets
 run: setup ## set everything up and start Exp 1-3 in the browser (PORT=8000)
 	@$(BIN)/python tools/first_run.py
 
-test: setup-test ## set everything up and run all tests: Python, TypeScript, browser, PostgreSQL
+test: setup-test ## set everything up and run all tests: Python, TypeScript, browser, PostgreSQL (PROCESSES=N)
 	@cd frontend && npm run --silent test
 	@OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(PROCESSES) --dist loadscope --no-loadscope-reorder --rerun-show-tracebacks $(TESTS)
 
 check: setup-test ## lint and type-check everything, import rules, lock files, known weaknesses
-	@$(MAKE) --no-print-directory --jobs=4 check-style check-types check-imports check-pages check-supply
+	@$(MAKE) --no-print-directory --jobs=5 --keep-going check-style check-types check-imports check-pages check-supply
 
-# The parts of `check`, which run beside one another: apart from the environment they need nothing of each other.
+# The parts of `check`, side by side once `make setup-test` is through; one that fails fails the whole, and make
+# names it after the others have ended.
 check-style:
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check -q .
@@ -81,7 +83,7 @@ bench: setup-test ## speed, memory and accuracy, as figures and ratios (long)
 	@PYTHONPATH=. $(BIN)/python tests/bench/bench_label_free.py
 	@PYTHONPATH=. $(BIN)/python tests/bench/bench_track_speed.py
 	@PYTHONPATH=. $(BIN)/python tests/bench/bench_reflections.py
-	@test -z "$(FACEKIT)" || PYTHONPATH=. $(BIN)/python tests/bench/face_quality.py alder@4 $(FACEKIT)
+	@test -z "$(FACEKIT)" || PYTHONPATH=. $(BIN)/python tests/bench/face_quality.py cedar@3 $(FACEKIT)
 
 screenshots: setup-test ## make the pictures of README and docs anew (needs the clips of `make run`)
 	@$(BIN)/python tools/screenshots.py

@@ -1,7 +1,7 @@
 """Blinks told from squints, gaze shifts and closed eyes: classifier, prominent peaks, the paper's rule.
 
     python tests/bench/bench_lid_events.py [FOLDER]
-    python tests/bench/bench_lid_events.py --seed 8001 --series 24 --rates 30,120,240     # others, none else
+    python tests/bench/bench_lid_events.py --seed 8001 --series 24 --rates 30,120,240    # no recordings
 
 Prints precision, recall and F1 on generated series that trained nothing, at several rates, and how many
 squints and closed eyes were called blinks: those held for 0.25 s or more, and brief ones.
@@ -194,6 +194,8 @@ def arguments() -> argparse.Namespace:
 
 def main() -> None:
     asked = arguments()
+    if asked.folder is not None and asked.seed is not None:
+        raise SystemExit("FOLDER or --seed: a seed draws generated series alone")
     for fps in asked.rates:
         generated(fps, SEED if asked.seed is None else asked.seed, asked.series)
     sys.stdout.write("called blinks, all rates: (held, brief) of (held, brief)\n")

@@ -63,12 +63,13 @@ def picture(character: Atlas, closure: float) -> np.ndarray:
 def laid(character: Atlas, scene: FaceScene, shot: Shot) -> np.ndarray:
     """(h, w, 3) code values of the crop with a shot's boxes over the open level, as an atlas is made."""
     x0, y0 = character.declaration.crop[:2]
+    lens_px = character.declaration.provenance.get("lens_px", 0.0)
     out = character.level_srgb(0).astype(np.float32) / 255
     for name, light in shot.read().items():
         x, y, width, height = box = shot.boxes[name]
         where = out[y - y0 : y - y0 + height, x - x0 : x - x0 + width]
         where += scene.view.feather(box) * (
-            photographed(light, scene.identity.exposure_ev + STUDIO_EV) - where
+            photographed(light, scene.identity.exposure_ev + STUDIO_EV, lens_px) - where
         )
     return to_8_bit(out)
 
@@ -111,7 +112,7 @@ def scene_of(character: Atlas, facekit: Path) -> FaceScene:
     if made["recipe"] != RECIPES[framing]:
         say(
             f"{character.name} is of recipe {made['recipe']}, the references of {RECIPES[framing]}: "
-            "they differ in what the recipes of docs/characters.md say"
+            "they differ in what the recipes of docs/face-quality.md say"
         )
     identity = Identity.model_validate(made["face"])
     return FaceScene(load_facekit(facekit), identity, framing, character.size_px)

@@ -30,7 +30,7 @@ from stimuli_builder.characters.facekit.plan import (
 from stimuli_builder.characters.facekit.renderer import Renderer, Setup, Shot, load_light
 from stimuli_builder.characters.facekit.scene import FaceScene
 
-# Raise when geometry, textures, materials, lights or that framing change: other recipes' work is not resumed.
+# Raise when geometry, textures, materials, lights, lens or that framing change: work of others is not resumed.
 RECIPES = {"eyes": 17, "face": 18}
 NOTICE = "Rendered from ICT-FaceKit geometry, (c) 2020 USC Institute for Creative Technologies, MIT licence"
 
@@ -203,8 +203,8 @@ class FaceBake:
             "rendered_closures": rendered,
             "samples": order.samples.boxes,
             "frame_samples": order.samples.frame,
-            "lens_px": LENS_PX,
             "lid_samples": order.samples.lids or order.samples.boxes,
+            "lens_px": LENS_PX,
             "moved_mm_at_closure_1": {k: round(v, 3) for k, v in self.scene.movement_mm().items()},
             "versions": {"palpebra": version("palpebra"), "bpy": BPY_VERSION, "numpy": version("numpy")},
             "platform": f"{sys.platform} {platform.machine()}",

@@ -1,4 +1,4 @@
-"""From the renderer's scene light to the picture's light: exposure, a soft shoulder, a slight S-curve."""
+"""From the renderer's scene light to the picture's: a lens, exposure, a soft shoulder, a slight S-curve."""
 
 import cv2
 import numpy as np
@@ -14,10 +14,24 @@ As of a good lens before a sensor with colour filters: without it every edge is 
 """
 
 
-def photographed(scene_light: NDArray[np.floating], exposure_ev: float) -> NDArray[np.float32]:
-    """`develop` of what a lens makes of (h, w, 3) scene-linear light."""
+def photographed(
+    scene_light: NDArray[np.floating], exposure_ev: float, lens_px: float = LENS_PX
+) -> NDArray[np.float32]:
+    """Gamma-encoded sRGB in 0-1 of what a lens makes of scene-linear light.
+
+    Parameters
+    ----------
+    scene_light : float array (h, w, 3)
+        Light as rendered.
+    exposure_ev : float
+        Exposure in stops.
+    lens_px : float, optional
+        Spread of a point in pixels, standard deviation; 0 for none, as of faces of recipes before 17.
+    """
+    if lens_px == 0:
+        return develop(scene_light, exposure_ev)
     light = np.maximum(scene_light.astype(np.float32), 0)
-    spread = cv2.GaussianBlur(light, (0, 0), LENS_PX, borderType=cv2.BORDER_REPLICATE)
+    spread = cv2.GaussianBlur(light, (0, 0), lens_px, borderType=cv2.BORDER_REPLICATE)
     return develop(np.asarray(spread, np.float32), exposure_ev)
 
 

@@ -13,8 +13,10 @@ GLOBE_CM = 1.5
 WHITE = (0.69, 0.64, 0.595)
 VEINS = 60
 DRIFT, DRIFT_CM = 0.006, 0.07
-"""By which share of a turn fibres wander on their way outwards, and over which distance: straight spokes look
-drawn."""
+"""How far fibres wander on their way outwards: standard deviation at the rim, turns, and its scale, cm.
+
+Straight spokes look drawn.
+"""
 
 
 class _Plane:

@@ -15,6 +15,8 @@ from stimuli_builder.characters.facekit.sphere import smooth, spherical
 from stimuli_builder.characters.facekit.subdivision import Subdivision, subdivide
 
 LEAST_CLEARANCE_CM = 0.02
+LID_MIDDLE = 0.15
+"""Azimuth half way along the lids, radians."""
 STROKES = 17
 LEVELS = 3
 
@@ -134,8 +136,8 @@ class FaceSkin:
         height = lids.crease + wander * 0.6
         height = height - 0.9 * smooth(0.1, -0.8, at.azimuth) - 0.5 * smooth(0.5, 1.2, at.azimuth)
         above, opened = at.loop - height, 1 - stroke
-        # Of one depth from end to end it was a line drawn round the eye.
-        uneven = np.clip(0.85 + 0.9 * wander - 0.35 * np.abs(at.azimuth - 0.15), 0.35, 1.1)
+        # Of one depth from end to end it was a line drawn round the eye: it runs out, and is nowhere gone.
+        uneven = np.clip(0.85 + 0.9 * wander - 0.35 * np.abs(at.azimuth - LID_MIDDLE), 0.35, 1.1)
         fold = -lids.depth * uneven * (0.022 + 0.030 * opened) * np.exp(-((above / 0.48) ** 2))
         fold += lids.depth * 0.030 * opened * np.exp(-(((above - 1.15) / 0.8) ** 2))
         second = np.exp(-(((above - 1.5) / 0.22) ** 2)) * (0.4 + 0.6 * stroke)

@@ -6,7 +6,7 @@ from scipy.spatial import cKDTree
 from stimuli_builder.characters.facekit.field_noise import value_noise
 from stimuli_builder.characters.facekit.kit import Array
 from stimuli_builder.characters.facekit.lid_loops import SIDES
-from stimuli_builder.characters.facekit.lid_skin import FaceSkin, age_depth
+from stimuli_builder.characters.facekit.lid_skin import LID_MIDDLE, FaceSkin, age_depth
 from stimuli_builder.characters.facekit.sphere import smooth
 
 SPOTS = 220
@@ -68,7 +68,7 @@ class Pigments:
 
     def _rim_blood(self) -> Array:
         """(n,) blood of the lids' wet margins, more towards the corners: even, it is a drawn line."""
-        outer = np.abs(self.skin.coordinates.azimuth - 0.15)
+        outer = np.abs(self.skin.coordinates.azimuth - LID_MIDDLE)
         return np.asarray(np.clip(RIM_BLOOD * (0.5 + 0.7 * outer + 0.45 * self._noise(4.0, 41, 2)), 0, None))
 
     def _noise(self, scale: float, offset: int, octaves: int = 3) -> Array:

@@ -30,7 +30,7 @@ def test_a_lens_spreads_a_point_and_keeps_its_light() -> None:
     across = np.arange(21) - 10
     assert light.sum() == pytest.approx(0.02, rel=0.02)
     spread = np.sqrt((light.sum(0) * across**2).sum() / light.sum())
-    # A Gaussian sampled at whole pixels is this much wider or narrower than the continuous one.
+    # The kernel is cut off and sampled at whole pixels, each as wide as the Gaussian itself.
     assert spread == pytest.approx(LENS_PX, rel=0.1)
 
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from stimuli_builder.characters.facekit.blink_path import BlinkPath
 from stimuli_builder.characters.facekit.identity import identity_of_seed
 from stimuli_builder.characters.facekit.kit import FaceKit
-from stimuli_builder.characters.facekit.lid_skin import FaceSkin, lid_skin
+from stimuli_builder.characters.facekit.lid_skin import LID_MIDDLE, FaceSkin, lid_skin
 from stimuli_builder.characters.facekit.pigments import Pigments
 
 Array = NDArray[np.float64]
@@ -54,3 +54,22 @@ def test_the_upper_lid_is_duller_and_darker_than_the_skin_beyond(
     assert values["shine"][beyond].min() == 1.0
     assert values["rough"][lid].mean() - values["rough"][beyond].mean() > 0.04
     assert values["mel"][lid].mean() > 1.15 * values["mel"][beyond & (skin.coordinates.upper < 0.5)].mean()
+
+
+def test_the_wet_margins_blood_gathers_towards_the_corners(skin: FaceSkin) -> None:
+    outer, blood = np.abs(skin.coordinates.azimuth - LID_MIDDLE), Pigments(skin)._rim_blood()
+    rim = skin.coordinates.loop < 3.3
+    middle, corners = (blood[rim & part].mean() for part in (outer < 0.3, outer > 0.7))
+    assert corners > 1.5 * middle > 0
+
+
+def test_the_fold_runs_out_towards_the_corners(skin: FaceSkin) -> None:
+    """Its depth is read off as what the open lid's relief takes from the mesh without it."""
+    at = skin.coordinates
+    depth = -skin._relief(np.zeros(len(skin.rest)))
+    fold = (at.upper > 0.95) & (at.loop < 12)
+    middle, outer = (
+        np.percentile(depth[fold & part], 99)
+        for part in (np.abs(at.azimuth - LID_MIDDLE) < 0.2, (at.azimuth > 0.65) & (at.azimuth < 0.75))
+    )
+    assert 0 < outer < 0.85 * middle
