@@ -30,7 +30,7 @@ from stimuli_builder.characters.facekit.plan import (
 from stimuli_builder.characters.facekit.renderer import Renderer, Setup, Shot, load_light
 from stimuli_builder.characters.facekit.scene import FaceScene
 
-# Raise when geometry, textures, materials, lights, lens or that framing change: work of others is not resumed.
+# Raise when geometry, textures, materials, lights, lens or a framing change: work of others is not resumed.
 RECIPES = {"eyes": 17, "face": 18}
 NOTICE = "Rendered from ICT-FaceKit geometry, (c) 2020 USC Institute for Creative Technologies, MIT licence"
 
