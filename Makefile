@@ -4,9 +4,6 @@ SHELL := /bin/bash
 PYTHON ?= python3
 BIN := .venv/bin
 export PATH := $(CURDIR)/$(BIN):$(PATH)
-# Tests wait for browsers and servers a third of the time (two cores, 2026-11-26): one process more than there
-# are cores, at most four. Another number: `make test PROCESSES=1`.
-PROCESSES = $(shell $(PYTHON) -c 'import os; print(min(4, (os.cpu_count() or 1) + 1))')
 # Where this is set, every start compiles every module anew: seconds for each process that a test starts.
 unexport PYTHONDONTWRITEBYTECODE
 
@@ -18,9 +15,9 @@ help: ## list the targets
 run: setup ## set everything up and start Exp 1-3 in the browser (PORT=8000)
 	@$(BIN)/python tools/first_run.py
 
-test: setup-test ## set everything up and run all tests: Python, TypeScript, browser, PostgreSQL (PROCESSES=N)
+test: setup-test ## set everything up and run all tests: Python, TypeScript, browser, PostgreSQL
 	@cd frontend && npm run --silent test
-	@OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(PROCESSES) --dist loadscope --no-loadscope-reorder --rerun-show-tracebacks $(TESTS)
+	@OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n logical --maxprocesses 4 --dist loadscope --no-loadscope-reorder --rerun-show-tracebacks $(TESTS)
 
 check: setup-test ## lint and type-check everything, import rules, lock files, known weaknesses
 	@$(MAKE) --no-print-directory --jobs=5 --keep-going check-style check-types check-imports check-pages check-supply

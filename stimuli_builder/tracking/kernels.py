@@ -64,7 +64,7 @@ def differentiate(values, left, right, above, below, gx, gy):
         gy[x] = half * (values[below[x]] - values[above[x]])
 
 
-@compiled_over(sampling_kernels)
+@compiled_over(sampling_kernels, solving_kernels)
 def compare(appearance, weights, c, sampled, look, error, out):
     """Look of parameters c, its weighted error, and the error's appearance part of SD^T E into out (K,).
 
