@@ -9,7 +9,7 @@ from typing import Any
 from zipfile import BadZipFile
 
 from analysis.read.files.cells import Cells, cells_of
-from analysis.read.files.workbook_size import refuse_too_far, refuse_too_large
+from analysis.read.files.workbook_size import LAST_ROW, refuse_too_far, refuse_too_large
 from experiments.errors import InputError, did_you_mean
 
 Rows = list[list[Any]]
@@ -17,16 +17,17 @@ Rows = list[list[Any]]
 
 @dataclass(frozen=True)
 class Page:
-    """A sheet from its first row that holds anything, which is row `first`, and its merged cells.
+    """A sheet from its first row that holds anything, row `first`, to the last, and its merged cells.
 
     `merged` has a text like `A2:A4` and the rows and columns from and to, counted from 1; `hidden` counts
-    rows with values that a filter or a person hid.
+    rows with values that a filter or a person hid; `more` says that cells without a value stand below.
     """
 
     rows: Rows
     first: int
     merged: tuple[tuple[str, int, int, int, int], ...]
     hidden: int
+    more: bool
 
 
 _UNREADABLE = (
@@ -133,8 +134,10 @@ def _pages(path: Path, _changed: int, formulas: bool) -> dict[str, Page]:
 
     refuse_too_large(path)
     try:
-        book = load_workbook(path, data_only=not formulas)
-        return {sheet.title: _page_of(path, sheet) for sheet in book.worksheets}
+        # opened here: openpyxl leaves a damaged file open that it opened itself
+        with path.open("rb") as file:
+            book = load_workbook(file, data_only=not formulas)
+            return {sheet.title: _page_of(path, sheet) for sheet in book.worksheets}
     except InputError:
         raise
     except (*_UNREADABLE, InvalidFileException) as error:
@@ -146,7 +149,11 @@ def _pages(path: Path, _changed: int, formulas: bool) -> dict[str, Page]:
 
 def _page_of(path: Path, sheet: Any) -> Page:
     refuse_too_far(path, sheet)
-    rows = [list(row) for row in sheet.iter_rows(values_only=True)]
+    furthest = sheet.max_row
+    if furthest > LAST_ROW:
+        raise ValueError(f"expected at most {LAST_ROW:,} rows, and there is a row {furthest:,}")
+    last = _last_filled_row(sheet) or furthest
+    rows = [list(row) for row in sheet.iter_rows(max_row=last, values_only=True)]
     first = next((i for i, row in enumerate(rows) if any(value is not None for value in row)), len(rows))
     merged = tuple(
         (str(area), area.min_row, area.min_col, area.max_row, area.max_col)
@@ -157,18 +164,28 @@ def _page_of(path: Path, sheet: Any) -> Page:
         for number, row in sheet.row_dimensions.items()
         if row.hidden and number > first + 1
     )
-    return Page(rows[first:], first + 1, merged, hidden)
+    return Page(rows[first:], first + 1, merged, hidden, furthest > last)
+
+
+def _last_filled_row(sheet: Any) -> int:
+    """The last row with a value, 0 where none has one.
+
+    openpyxl's own iteration makes every cell up to the last that is formatted: a million rows of nothing.
+    """
+    return max((row for (row, _), cell in sheet._cells.items() if cell.value is not None), default=0)
 
 
 def _refuse_uncalculated(path: Path, title: str, columns: list[str], body: Rows, names: list[str]) -> None:
     positions = [columns.index(name) for name in names]
     empty = [(i, p) for i, row in enumerate(body) for p in positions if row[p] is None]
-    if not empty:
+    if not empty and not _page(path, title)[1].more:
         return
     page = _page(path, title, formulas=True)[1]
     formulas = page.rows[1:]
+    # rows without any value end the body; formulas that were never calculated may stand in them
+    empty += [(i, p) for i in range(len(body), len(formulas)) for p in positions]
     for i, p in empty:
-        held = formulas[i][p] if p < len(formulas[i]) else None
+        held = formulas[i][p] if i < len(formulas) and p < len(formulas[i]) else None
         if isinstance(held, str) and held.startswith("="):
             raise InputError(
                 f"{path.name}: row {page.first + 1 + i} of '{columns[p]}' holds the formula {held} "

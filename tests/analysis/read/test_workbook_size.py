@@ -6,6 +6,7 @@ import openpyxl
 import pytest
 
 from analysis.read.files import workbook_size
+from analysis.read.files.workbook import _pages
 from analysis.read.long_csv import read_long_table
 from experiments.errors import InputError
 
@@ -123,6 +124,17 @@ def test_a_document_type_is_refused(tmp_path) -> None:
 
 def test_a_column_formatted_to_the_last_row_is_nothing(tmp_path) -> None:
     assert read(workbook(tmp_path / "a.xlsx", END, '<row r="1048576"><c r="C1048576"/></row>' + END)) == 2
+
+
+def test_rows_behind_the_last_value_are_not_held(tmp_path) -> None:
+    path = workbook(tmp_path / "a.xlsx", END, '<row r="90000"><c r="C90000"/></row>' + END)
+    assert len(_pages(path, path.stat().st_mtime_ns, formulas=False)["Sheet"].rows) == 3
+
+
+def test_a_formula_never_calculated_in_a_row_without_values_is_refused(tmp_path) -> None:
+    row = '<row r="7"><c r="A7"/><c r="C7"><f>1+1</f></c></row>'
+    with pytest.raises(InputError, match=r"row 7 of 'score' holds the formula =1\+1"):
+        read(workbook(tmp_path / "a.xlsx", END, row + END))
 
 
 def test_a_sheet_cut_off_ends_in_one_line(tmp_path) -> None:
