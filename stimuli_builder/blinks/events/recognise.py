@@ -24,6 +24,9 @@ from stimuli_builder.blinks.series import BlinkSeries, runs
 
 SHORTEST_PIECE_S = 0.8
 LEAST_PROBABILITY = 0.5
+BLINK_TO_SQUINT = 10.0
+"""What would be a blink is a squint where it is not this much likelier a blink. Brief squints are partial
+blinks but for slower lids, and rarer: by the likelier of both one in eight of them was called a blink."""
 STILL_CLOSED = 0.8
 """Part of its depth at which a lid that stays closed for half a second is for most of that time. A blink on a
 gaze shift down comes back to where the gaze leaves it, and the template takes that for its closed phase."""
@@ -53,6 +56,18 @@ class _Piece:
     candidates: list[Candidate]
 
 
+@dataclass(frozen=True, eq=False)
+class _Told:
+    """Events of a piece, what a blink is instead where a squint may well explain it, and cut blinks.
+
+    `squints` and `cut` are by the deepest frame of the series.
+    """
+
+    events: list[LidEvent]
+    squints: dict[int, LidEvent]
+    cut: list[int]
+
+
 def recognise(eyes: Sequence[BlinkSeries]) -> list[Recognised]:
     """Return the events of each series; two series are taken as the two eyes of one face."""
     pieces = [_pieces(series) for series in eyes]
@@ -62,9 +77,10 @@ def recognise(eyes: Sequence[BlinkSeries]) -> list[Recognised]:
         events: list[LidEvent] = []
         cut: list[int] = []
         for piece in pieces[number]:
-            told, without_end = _judged(piece, series.fps, other)
-            cut += without_end
-            events += apart(_single(told), piece.depth.smooth, piece.start, series.fps)
+            told = _judged(piece, series.fps, other)
+            cut += told.cut
+            listed = [told.squints.get(event.frame, event) for event in _single(told.events)]
+            events += apart(listed, piece.depth.smooth, piece.start, series.fps)
         results.append(Recognised(tuple(events), tuple(cut)))
     return results
 
@@ -88,28 +104,41 @@ def _whole(pieces: list[_Piece], size: int) -> Array:
     return whole
 
 
-def _judged(piece: _Piece, fps: float, other: Array | None) -> tuple[list[LidEvent], list[int]]:
-    """The events of a piece, and the deepest frames of its incomplete blinks."""
-    events: list[LidEvent] = []
-    cut: list[int] = []
+def _judged(piece: _Piece, fps: float, other: Array | None) -> _Told:
+    """What each dip of a piece is."""
+    told = _Told([], {}, [])
     network = shipped_network()
     beside = None if other is None else other[piece.start : piece.start + piece.depth.smooth.size]
     rows = features_of(piece.candidates, piece.depth, beside)
-    for candidate, shares in zip(piece.candidates, network.probabilities(rows), strict=True):
-        sure = shares[network.kinds.index("blink")] >= LEAST_PROBABILITY
-        kind = "blink" if sure else network.kinds[int(shares.argmax())]
-        if kind == "nothing":
+    for candidate, row in zip(piece.candidates, network.probabilities(rows), strict=True):
+        shares = dict(zip(network.kinds, row.tolist(), strict=True))
+        sure = shares["blink"] >= LEAST_PROBABILITY
+        likeliest = "blink" if sure else max(shares, key=shares.__getitem__)
+        if likeliest == "nothing":
             continue
         if _cut(candidate, piece.depth):
-            cut += [piece.start + candidate.peak] if kind == "blink" else []
+            told.cut.extend([piece.start + candidate.peak] if likeliest == "blink" else [])
             continue
-        timing = _timed(candidate, piece.depth) if kind == "blink" else _crossed(candidate, fps)
-        if kind == "blink" and timing.closed_s >= CLOSED_EYE_S:
-            above = _above_its_shoulders(timing, candidate, piece.depth) if sure else None
-            timing = timing if above is None else _crossed(above, fps)
-            kind = "closed_eye" if timing.closed_s >= CLOSED_EYE_S else "blink"
-        events.append(_event(kind, float(shares.max()), candidate, timing, piece.start, fps))
-    return events, cut
+        kind, timing = _phases(likeliest, sure, candidate, piece.depth)
+        event = _event(kind, shares[likeliest], candidate, timing, piece.start, fps)
+        told.events.append(event)
+        if kind == "blink" and shares["blink"] < BLINK_TO_SQUINT * shares["squint"]:
+            timing = _crossed(candidate, fps)
+            squint = _event("squint", shares["squint"], candidate, timing, piece.start, fps)
+            told.squints[event.frame] = squint
+    return told
+
+
+def _phases(kind: str, sure: bool, candidate: Candidate, depth: Depth) -> tuple[str, Timing]:
+    """Phases of a dip; a blink is a closed eye where they say so."""
+    if kind != "blink":
+        return kind, _crossed(candidate, depth.fps)
+    timing = _timed(candidate, depth)
+    if timing.closed_s < CLOSED_EYE_S:
+        return kind, timing
+    above = _above_its_shoulders(timing, candidate, depth) if sure else None
+    timing = timing if above is None else _crossed(above, depth.fps)
+    return "closed_eye" if timing.closed_s >= CLOSED_EYE_S else "blink", timing
 
 
 def _cut(candidate: Candidate, depth: Depth) -> bool:

@@ -1,6 +1,6 @@
 """Train the classifier of lid events on generated series and write its weights.
 
-    python -m stimuli_builder.blinks.events.train [series, default 6000]
+    python -m stimuli_builder.blinks.events.train [series, default 12000]
 
 Needs scikit-learn, which comes with pingouin. The same seed gives the same weights.
 """
@@ -28,8 +28,8 @@ from stimuli_builder.blinks.events.network import WEIGHTS
 from stimuli_builder.blinks.profile import Array
 
 SEED = 20261121
-SERIES = 6000
-UNITS = (64, 32)
+SERIES = 12000
+UNITS = (256, 128)
 STAGES = ((2e-3, 6), (5e-4, 4), (1e-4, 3))
 """Rate of learning and passes over the dips of each stage; the last ones settle what the first one found."""
 NEAR_HOLD_S = 0.1
@@ -86,17 +86,17 @@ def _event_at(time: float, motions: tuple[Motion, ...], slack: float) -> str:
     return min(near)[1] if near else "nothing"
 
 
-def training_data(count: int, seed: int) -> tuple[Array, list[str]]:
+def training_data(count: int, seed: int) -> tuple[NDArray[np.float32], list[str]]:
     """Features and kinds of `count` generated series."""
     rows, kinds = [], []
     for number in range(count):
         features, names = labelled_features(generate(np.random.default_rng([seed, number])))
-        rows.append(features)
+        rows.append(features.astype(np.float32))  # a million rows
         kinds += names
     return np.concatenate(rows), kinds
 
 
-def trained(features: Array, classes: NDArray[np.int64]) -> MLPClassifier:
+def trained(features: NDArray[np.float32], classes: NDArray[np.int64]) -> MLPClassifier:
     """Train the network on standardised features (n, features), stage by stage."""
     network = MLPClassifier(
         UNITS, activation="tanh", alpha=1e-4, batch_size=512, random_state=SEED, warm_start=True
@@ -113,7 +113,8 @@ def main() -> None:
     """Train and write."""
     count = int(sys.argv[1]) if len(sys.argv) > 1 else SERIES
     features, kinds = training_data(count, SEED)
-    mean, spread = features.mean(0), features.std(0) + 1e-6
+    mean = features.mean(0, dtype=np.float64)
+    spread = features.std(0, dtype=np.float64) + 1e-6
     standard = np.clip((features - mean) / spread, -6, 6).astype(np.float32)
     network = trained(standard, np.array([CLASSES.index(k) for k in kinds]))
     layers = [

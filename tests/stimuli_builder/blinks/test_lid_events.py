@@ -161,6 +161,27 @@ def test_lids_shut_for_half_a_second_while_looking_down_are_a_closed_eye(gaze, h
     assert {event.kind for event in seen.events if 8 < event.minimum_s < 11} == {"closed_eye"}
 
 
+@pytest.mark.parametrize("fps", [30.0, 120.0])
+@pytest.mark.parametrize(
+    ("depth", "down", "hold", "up"),
+    [(0.4, 0.14, 0.1, 0.4), (0.4, 0.18, 0.03, 0.35), (0.55, 0.22, 0.03, 0.35)],
+)
+def test_a_brief_slow_squint_is_no_blink(fps, depth, down, hold, up):
+    squint = Motion("squint", 9, down, hold, up, depth)
+    (seen,) = recognise([eye(lids([*blinks_at(3, 6, 14, 17), squint], fps), fps)])
+    assert [event.kind for event in seen.events] == ["blink", "blink", "squint", "blink", "blink"]
+    (told,) = [event for event in seen.events if event.kind == "squint"]
+    assert told.probability < 0.5
+    assert 9 <= told.onset_s < told.minimum_s < told.end_s <= squint.end_s
+
+
+@pytest.mark.parametrize("fps", [30.0, 120.0])
+@pytest.mark.parametrize("depth", [0.5, 0.7, 0.9])
+def test_a_brisk_partial_blink_stays_a_blink(fps, depth):
+    partial = Motion("blink", 9, 0.09, 0.02, 0.22, depth)
+    assert kinds_of(lids([*blinks_at(3, 6, 14, 17), partial], fps), fps) == ["blink"] * 5
+
+
 SHUT, LOWERED = {"blink", "closed_eye"}, {"squint", "gaze_shift"}
 
 
