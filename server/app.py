@@ -3,9 +3,11 @@
 import gc
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from functools import lru_cache
 
 from fastapi import APIRouter, FastAPI
 from fastapi.routing import APIRoute
+from starlette.routing import BaseRoute
 
 from server import health, pages
 from server.accounts import credential_endpoints as credentials
@@ -100,6 +102,21 @@ def _operation_id(route: APIRoute) -> str:
     return route.name
 
 
+@lru_cache(maxsize=1)
+def every_route() -> tuple[BaseRoute, ...]:
+    """What every application of this process answers to, ready for its first request.
+
+    FastAPI leaves half a second of work to the first request that goes through them all, as one for a page
+    does: somebody would wait for it after each start, and everybody else with them.
+    """
+    whole = APIRouter(generate_unique_id_function=_operation_id)
+    for router in _routers():
+        whole.include_router(router)
+    for route in whole.routes:
+        route.matches({"type": "http", "method": "GET", "path": "/", "root_path": "", "headers": []})
+    return tuple(whole.routes)
+
+
 def create_app(settings: Settings | None = None, *, rehearses: bool = False) -> FastAPI:
     """The server with these settings (from the environment where None); the database must be migrated.
 
@@ -139,8 +156,7 @@ def create_app(settings: Settings | None = None, *, rehearses: bool = False) -> 
         lifespan=lifespan,
     )
     app.state.services = services
-    for router in _routers():
-        app.include_router(router)
+    app.router.routes.extend(every_route())
     install_error_handlers(app, note_refusal)
     app.add_middleware(ChangesTold, changes=services.changes)
     app.add_middleware(ExperimentersLane)  # inside the door: a body that comes slowly holds no place

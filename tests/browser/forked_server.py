@@ -10,7 +10,7 @@ from pathlib import Path
 from tests.browser.server_process import ServerProcess
 
 _FORKS = multiprocessing.get_context("forkserver")
-_FORKS.set_forkserver_preload(["server.cli_run", "server.app"])
+_FORKS.set_forkserver_preload(["server.cli_run", "server.app", "tests.browser.preloaded"])
 
 
 class ForkedServer(ServerProcess):

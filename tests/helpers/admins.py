@@ -34,8 +34,14 @@ class Admin:
 
 
 def fresh_browser(client: TestClient, settings: Settings) -> TestClient:
-    """Another browser of the same application: no cookies."""
-    return TestClient(client.app, base_url=settings.public_url, raise_server_exceptions=False)
+    """Another browser of the same application: no cookies.
+
+    It asks in the same event loop, as all browsers of a server do; with none given, a client begins a thread
+    and a loop for each request.
+    """
+    fresh = TestClient(client.app, base_url=settings.public_url, raise_server_exceptions=False)
+    fresh.portal = client.portal
+    return fresh
 
 
 def signed_in(client: TestClient, services: Services, role: Role, name: str = "") -> Admin:
