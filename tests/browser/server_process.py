@@ -1,12 +1,15 @@
 """A real `server run` in a process of its own, that can be killed and started again on the same data."""
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import time
 import urllib.error
 import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
@@ -16,9 +19,11 @@ from sqlalchemy import text
 from experiments.load import parse_experiment
 from experiments.manifest import read_manifest
 from server.cli_common import migrated_services
+from server.context import Services, open_services
 from server.settings import Settings
 from server.studies.importing import add_version, create_study, store_clips
 from server.studies.links import LinkKind, create_link
+from tests.helpers.databases import migrated_sqlite
 from tests.helpers.ports import free_port
 from tests.helpers.studies import StudyInDatabase, add_study, link_token
 
@@ -47,6 +52,24 @@ class ServerProcess:
         self.port = free_port()
         self.log = data_folder.with_suffix(".log")
         self.process: Launched | None = None
+        self._migrated = False
+
+    @contextmanager
+    def services(self) -> Iterator[Services]:
+        """Database and clips of the server: a new database is a copy of one that was migrated."""
+        path = self.settings.data_folder / "palpebra.sqlite"
+        if not self._migrated and not self.settings.database_url and not path.exists():
+            path.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(migrated_sqlite(), path)
+            self._migrated = True
+        if not self._migrated:
+            with migrated_services(self.settings):
+                self._migrated = True
+        opened = open_services(self.settings)
+        try:
+            yield opened
+        finally:
+            opened.database.close()
 
     @property
     def address(self) -> str:
@@ -54,13 +77,13 @@ class ServerProcess:
 
     def add_study(self, folder: Path, declaration: str, frames: int = 8) -> StudyInDatabase:
         """Take in a declaration with tiny clips, live; its `link_token` leads to /run/."""
-        with migrated_services(self.settings) as services:
+        with self.services() as services:
             return add_study(services, folder, declaration, frames=frames)
 
     def add_built_study(self, folder: Path, declaration: str) -> StudyInDatabase:
         """Take in a declaration with the clips that `stimuli build` made for it, live."""
         experiment, manifest = parse_experiment(declaration), read_manifest(folder)
-        with migrated_services(self.settings) as services:
+        with self.services() as services:
             store_clips(services.clips, manifest, folder)
             with services.database.write() as session:
                 study = create_study(session, experiment.name, experiment, None)
@@ -71,17 +94,17 @@ class ServerProcess:
 
     def link(self, study: StudyInDatabase, kind: LinkKind, **options: Any) -> str:
         """The token of a new link, made while the server runs."""
-        with migrated_services(self.settings) as services:
+        with self.services() as services:
             return replace(study, services=services).link(kind, **options)
 
     def change(self, statement: str) -> None:
         """Change the server's database behind its back."""
-        with migrated_services(self.settings) as services, services.database.write() as session:
+        with self.services() as services, services.database.write() as session:
             session.execute(text(statement))
 
     def rows(self, statement: str) -> list[dict[str, Any]]:
         """What an SQL query gives on the server's database."""
-        with migrated_services(self.settings) as services, services.database.read() as session:
+        with self.services() as services, services.database.read() as session:
             return [dict(row) for row in session.execute(text(statement)).mappings()]
 
     def rows_soon(self, statement: str, count: int, limit_s: float = 30.0) -> list[dict[str, Any]]:

@@ -34,9 +34,17 @@ BACKENDS = ("sqlite", pytest.param("postgres", marks=pytest.mark.postgres))
 
 
 @pytest.fixture(scope="session")
-def sqlite_template(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def sqlite_template() -> Path:
     """A migrated, empty SQLite file, copied for each test."""
-    path = tmp_path_factory.mktemp("sqlite") / "template.sqlite"
+    return migrated_sqlite()
+
+
+@lru_cache(maxsize=1)
+def migrated_sqlite() -> Path:
+    """The same outside fixtures: migrated once, though several folders ask; it ends with the process."""
+    folder = tempfile.mkdtemp(prefix="palpebra-sqlite-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    path = Path(folder) / "template.sqlite"
     database = Database(f"sqlite:///{path}")
     upgrade(database)
     database.close()
