@@ -69,7 +69,7 @@ class Layers:
         hair = self._rendered(self._hair, draft, samples * HAIR_SAMPLES, least=max(4, samples * 2 // 3))
         behind = self._lit(face) + (1 - face["Combined"][..., 3:]) * self._ground
         before = without_specks(hair["Combined"])
-        return without_dots(behind * (1 - before[..., 3:]) + before[..., :3])
+        return without_dots(behind * (1 - before[..., 3:]) + before[..., :3], before[..., 3])
 
     def _lit(self, face: dict[str, Any]) -> Any:
         """Skin and eyes, light below the skin included.

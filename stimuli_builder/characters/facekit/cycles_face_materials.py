@@ -12,6 +12,8 @@ from cycles_face_wet import film, tear
 BASE = (0.86, 0.73, 0.595)
 SKIN_SHARE = "skin"
 """Pass that says which share of a pixel is skin."""
+SHADE = (0.75, 1.15, 1.4)
+"""Exponents of the light that lids leave near their edges: what comes there went through and off skin."""
 DARK_MELANIN = 0.9
 """Optical depth of melanin above which skin scatters and shines as dark skin does."""
 MELANIN, BLOOD = (1.0, 1.33, 1.64), (0.06, 0.84, 0.86)
@@ -28,7 +30,7 @@ def materials(settings: dict[str, Any]) -> dict[str, Any]:
         "tear": tear(settings["lights"]),
         "flesh": flesh(look),
         "spectacles": spectacles(),
-        "lash": hair("lash", [min(0.008, c * 0.25) for c in look["hair"]], 0.25),
+        "lash": hair("lash", [min(0.004, c * 0.12) for c in look["hair"]], 0.25),
         "brow": hair("brow", look["hair"], 0.33),
     }
 
@@ -88,9 +90,10 @@ def eye(colour: Any, height: Any) -> Any:
     n = Nodes("eye")
     albedo = n.add("TexImage", image=colour, interpolation="Cubic", extension="EXTEND").outputs[0]
     relief = n.add("TexImage", image=height, interpolation="Cubic", extension="EXTEND").outputs[0]
-    shaded = n.add("VectorMath", operation="SCALE")
+    shade = [n.math("POWER", n.attribute("shade"), exponent) for exponent in SHADE]
+    shaded = n.add("VectorMath", operation="MULTIPLY")
     n.put(albedo, shaded.inputs[0])
-    n.put(n.attribute("shade"), shaded.inputs["Scale"])
+    n.put(n.add("CombineXYZ", X=shade[0], Y=shade[1], Z=shade[2]).outputs[0], shaded.inputs[1])
     shader = n.add("BsdfPrincipled", Roughness=0.5, Specular_IOR_Level=0.0)
     n.put(shaded.outputs[0], shader.inputs["Base Color"])
     n.put(n.add("Bump", Strength=0.6, Distance=0.04, Height=relief).outputs[0], shader.inputs["Normal"])

@@ -9,7 +9,7 @@ from mathutils import Vector
 FILM_IOR = 1.376
 ROOM_MIRRORED = 0.5
 """Share of the room's light that the eyes mirror: half of what lies about them is the face itself."""
-ROUNDED = 3.0
+ROUNDED = 2.0
 """Exponent of a lamp's outline as the eyes mirror it: 2 is an ellipse, and beyond 8 a square."""
 HOT = 1.8
 """Light of a mirrored lamp's middle over that of its rim: the bulb behind a soft box's cloth."""
@@ -79,7 +79,7 @@ def tear(lights: dict[str, Any]) -> Any:
     """Thin water: it passes what lies behind and shines with the lamps; the lids are all else it mirrors."""
     n = Nodes("tear")
     # The rim of so thin a line would mirror all there is, as white dots that come and go with the samples.
-    mirrored, ray = n.math("MINIMUM", n.add("Fresnel", IOR=1.34).outputs[0], 0.05), n.add("LightPath")
+    mirrored, ray = n.math("MINIMUM", n.add("Fresnel", IOR=1.34).outputs[0], 0.03), n.add("LightPath")
     shine = n.add("Emission", Color=reflected(n, n.add("NewGeometry").outputs["Normal"], lights, room=0.0))
     n.put(n.math("MULTIPLY", mirrored, ray.outputs["Is Camera Ray"]), shine.inputs["Strength"])
     both = n.add("AddShader")

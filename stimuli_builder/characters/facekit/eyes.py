@@ -14,7 +14,7 @@ from stimuli_builder.characters.facekit.sphere import IRIS_CM, smooth, spherical
 TEXTURE_LIMIT = 1.25
 """Radians from the gaze axis at the edge of the eye's texture."""
 _SHADE_REACH_CM = (0.26, 0.08)
-_SHADE_DEPTH = (0.52, 0.22)
+_SHADE_DEPTH = (0.52, 0.30)
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +42,7 @@ def eyeball(path: BlinkPath, posed: Array, side: int, stroke: float) -> Mesh:
     uv = mesh.uv if side > 0 or mesh.uv is None else 1 - mesh.uv
     sclera = smooth(limbus - 0.01, limbus + 0.05, angle)
     # Between lids that meet, shadows that are rendered leave little: this one would make the slit black.
-    shade = 1 - (1 - _lid_shade(path, posed, side, mesh.vertices)) * (1 - 0.5 * stroke)
+    shade = 1 - (1 - _lid_shade(path, posed, side, mesh.vertices)) * (1 - 0.35 * stroke)
     return Mesh(mesh.vertices, mesh.quads, uv, {"sclera": sclera, "shade": shade})
 
 

@@ -120,9 +120,9 @@ def _draw_row(hair: Hair, upper: bool, rng: np.random.Generator) -> _LashRow:
             + rng.normal(0, 0.05, count)
             + gather * 3.0
         )
-        start = np.full(count, 36.0)
-        end = 36.0 - 88.0 * curled[clump] * rng.normal(1, 0.07, count)
-        radius = 0.0052 * rng.normal(1, 0.18, count)
+        start = np.full(count, 30.0)
+        end = 30.0 - 64.0 * curled[clump] * rng.normal(1, 0.07, count)
+        radius = 0.0060 * rng.normal(1, 0.18, count)
     else:
         size = 0.24 + 0.12 * np.exp(-(((along_lid - 0.62) / 0.3) ** 2))
         size = size * longer[clump] * rng.normal(0.95, 0.18, count)

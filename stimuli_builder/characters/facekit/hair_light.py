@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-DOT = 0.5
-"""A pixel this many times as bright as all about it but one is no hair, which goes on to both sides."""
+DOT, SPARSE = 0.5, 0.25
+"""A pixel covered so far, with all but one about it below SPARSE, is no hair: hair goes on to both sides."""
 GLINT = 3.0
 """A pixel this many times as bright as the hair about it is one ray that met a lamp by chance."""
 ALONE = 1e-3
@@ -40,29 +40,30 @@ def without_specks(hair: Light) -> Light:
     return np.asarray(out, np.float32)
 
 
-def without_dots(picture: Light) -> Light:
+def without_dots(picture: Light, cover: Light) -> Light:
     """A picture of hair before skin without single dark pixels.
 
     Now and then Cycles calls a pixel wholly covered of which a hair covers a tenth: a dot of ink again, with
-    some of the hair's light, that comes and goes from one closure to the next.
+    some of the hair's light, that comes and goes from one closure to the next. Coverage tells it from hair:
+    judged by its light, every other pixel of a thin lash was a dot, and lashes were rows of specks.
 
     Parameters
     ----------
     picture : float32 array (h, w, 3)
         Scene-linear light.
+    cover : float32 array (h, w)
+        Share of each pixel that hair covers, 0 to 1.
 
     Returns
     -------
     float32 array (h, w, 3)
-        A dot has the median light of the eight pixels about it; all others stay. The end of a hair
-        that is dark to its last pixel, which has one such neighbour too, loses that pixel.
+        A dot has the median light of the eight pixels about it; all others stay.
     """
-    padded = np.pad(picture, ((1, 1), (1, 1), (0, 0)), mode="reflect")
-    about = np.stack(_shifted(padded, picture.shape))
-    second = np.partition(about.sum(axis=-1), 1, axis=0)[1]
-    dark = picture.sum(axis=-1) < DOT * second
+    about = np.stack(_shifted(np.pad(cover, 1, mode="reflect"), cover.shape))
+    dots = (cover > DOT) & (np.partition(about, -2, axis=0)[-2] < SPARSE)
+    light = np.stack(_shifted(np.pad(picture, ((1, 1), (1, 1), (0, 0)), mode="reflect"), picture.shape))
     out = picture.copy()
-    out[dark] = np.median(about[:, dark], axis=0)
+    out[dots] = np.median(light[:, dots], axis=0)
     return out
 
 

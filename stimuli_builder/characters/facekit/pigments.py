@@ -40,7 +40,8 @@ class Pigments:
         lips = self._lips()
         wet, fine, coordinates = self._lid_values()
         lid = self._upper_lid()
-        melanin = self._melanin(lips) * (1 - 0.35 * wet) * (1 + LID_MELANIN * lid)
+        margin = wet * self.skin.coordinates.upper
+        melanin = self._melanin(lips) * (1 - 0.35 * wet) * (1 + LID_MELANIN * lid) + 0.7 * margin
         haemoglobin = self._haemoglobin(lips) + wet * self._rim_blood() + LID_BLOOD * lid
         melanin *= 1 + self.contrast * (0.10 * self._noise(1.3, 11) + 0.10 * self._noise(6.0, 12))
         haemoglobin *= 1 + 0.13 * self._noise(1.8, 13, 4) + 0.15 * self._noise(9.0, 14)
@@ -69,7 +70,10 @@ class Pigments:
     def _rim_blood(self) -> Array:
         """(n,) blood of the lids' wet margins, more towards the corners: even, it is a drawn line."""
         outer = np.abs(self.skin.coordinates.azimuth - LID_MIDDLE)
-        return np.asarray(np.clip(RIM_BLOOD * (0.5 + 0.7 * outer + 0.45 * self._noise(4.0, 41, 2)), 0, None))
+        shaded = 1 - 0.6 * self.skin.coordinates.upper
+        return np.asarray(
+            shaded * np.clip(RIM_BLOOD * (0.5 + 0.7 * outer + 0.45 * self._noise(4.0, 41, 2)), 0, None)
+        )
 
     def _noise(self, scale: float, offset: int, octaves: int = 3) -> Array:
         return value_noise(self.flat * scale, self.seed + offset, octaves) / 1.9
@@ -152,7 +156,7 @@ class Pigments:
             turn = np.arctan2(self.rest[:, 1] - centre[1], (self.rest[:, 0] - centre[0]) * side)
             lid = np.where(loop < 13.5, loop * 1.5, 20) + at.upper * 30
             lines[here] = np.stack([turn * 2.2 + side * 40, lid, np.zeros(n)], -1)[here]
-            wet[here] = smooth(4.1, 3.3, loop)[here]
+            wet[here] = (smooth(4.1, 3.3, loop) * (0.25 + 0.75 * smooth(-0.75, -0.45, at.azimuth)))[here]
             corner = np.exp(-(((at.azimuth - 1.05) / 0.45) ** 2))
             reach = smooth(2.8, 5.5, loop) * smooth(13.6, 9.0, loop)
             fine[here] = (reach * (0.6 + 0.4 * corner) * uneven)[here]

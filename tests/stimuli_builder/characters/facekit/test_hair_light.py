@@ -57,33 +57,46 @@ def test_neighbouring_broken_pixels_take_from_those_that_are_whole() -> None:
     assert without_specks(hair)[5, 5:7, 3] == pytest.approx([0.6, 0.6])
 
 
-def skin_with_a_lash() -> np.ndarray:
-    """Light skin, a little uneven, with one dark hair of a pixel's width across it."""
+def skin_with_a_lash() -> tuple[np.ndarray, np.ndarray]:
+    """Light skin, a little uneven, with one dark hair of a pixel's width across it, and its coverage."""
     shade = np.random.default_rng(3).uniform(0.9, 1.1, (15, 20, 1))
-    picture = np.array([0.3, 0.18, 0.12]) * shade
-    picture[range(3, 12), range(4, 13)] *= 0.15
-    return picture.astype(np.float32)
+    cover = np.zeros((15, 20), np.float32)
+    cover[range(3, 12), range(4, 13)] = 0.85
+    picture = np.array([0.3, 0.18, 0.12]) * shade * (1 - cover[..., None])
+    return picture.astype(np.float32), cover
 
 
-def test_a_dark_dot_on_skin_goes_and_a_lash_stays_but_for_its_last_pixels() -> None:
-    picture = skin_with_a_lash()
-    dotted = picture.copy()
-    dotted[2, 15] = dotted[13, 2] = (0.01, 0.005, 0.003)
-    mended = without_dots(dotted)
-    assert mended[2, 15] == pytest.approx(picture[2, 15], rel=0.15)
-    assert mended[13, 2] == pytest.approx(picture[13, 2], rel=0.15)
+def test_a_dark_dot_on_skin_goes_and_all_of_a_lash_stays() -> None:
+    picture, cover = skin_with_a_lash()
+    dotted, covered = picture.copy(), cover.copy()
+    for dot in ((2, 15), (13, 2)):
+        dotted[dot], covered[dot] = (0.01, 0.005, 0.003), 1.0
+    mended = without_dots(dotted, covered)
+    for dot in ((2, 15), (13, 2)):
+        assert mended[dot] == pytest.approx(picture[dot], rel=0.15)
+        mended[dot] = picture[dot]
     inner = (slice(4, 11), slice(5, 12))
     assert np.array_equal(mended[inner], picture[inner])
 
 
+def test_a_thin_lash_of_uneven_coverage_is_not_broken_into_specks() -> None:
+    """As sampled: every other pixel of it is half as dark as the next, and none of them is a dot."""
+    picture, cover = skin_with_a_lash()
+    along = np.arange(9)
+    cover[along + 3, along + 4] = np.where(along % 2, 0.9, 0.45)
+    picture[along + 3, along + 4] *= ((1 - cover) / 0.15)[along + 3, along + 4, None]
+    inner = (slice(4, 11), slice(5, 12))
+    assert np.array_equal(without_dots(picture, cover)[inner], picture[inner])
+
+
 def test_a_dot_in_the_corner_goes_too() -> None:
-    picture = skin_with_a_lash()
-    picture[0, 19] = 0
-    assert without_dots(picture)[0, 19].min() > 0.1
+    picture, cover = skin_with_a_lash()
+    picture[0, 19], cover[0, 19] = 0, 1
+    assert without_dots(picture, cover)[0, 19].min() > 0.1
 
 
-def test_a_bright_catchlight_and_a_dark_pupil_stay() -> None:
+def test_what_hair_does_not_cover_stays_however_dark() -> None:
     picture = np.full((20, 20, 3), 0.1, np.float32)
     picture[5:9, 5:9] = 5.0
-    picture[12:18, 3:9] = 0.001
-    assert np.array_equal(without_dots(picture), picture)
+    picture[12:18, 3:9] = picture[2, 15] = 0.001
+    assert np.array_equal(without_dots(picture, np.zeros((20, 20), np.float32)), picture)

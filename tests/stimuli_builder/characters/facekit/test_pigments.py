@@ -73,3 +73,22 @@ def test_the_fold_runs_out_towards_the_corners(skin: FaceSkin) -> None:
         for part in (np.abs(at.azimuth - LID_MIDDLE) < 0.2, (at.azimuth > 0.65) & (at.azimuth < 0.75))
     )
     assert 0 < outer < 0.85 * middle
+
+
+def test_the_upper_margin_is_the_darker_and_the_paler_in_blood(
+    skin: FaceSkin, values: dict[str, Array]
+) -> None:
+    at = skin.coordinates
+    rim = (at.loop < 3.3) & (np.abs(at.azimuth - LID_MIDDLE) < 0.6)
+    upper, lower = rim & (at.upper > 0.95), rim & (at.upper < 0.05)
+    assert values["mel"][upper].mean() > values["mel"][lower].mean() + 0.4
+    blood = Pigments(skin)._rim_blood()
+    assert 0 < blood[upper].mean() < 0.7 * blood[lower].mean()
+
+
+def test_the_nasal_corner_is_less_wet_than_the_margins(skin: FaceSkin, values: dict[str, Array]) -> None:
+    """Its wet skin mirrored the key light as one white dot, which stayed alone as the lid came down."""
+    at = skin.coordinates
+    rim = (at.loop < 3.2) & (skin.rest[:, 2] > 4)
+    assert values["wet"][rim & (at.azimuth < -0.8)].max() < 0.3
+    assert values["wet"][rim & (np.abs(at.azimuth) < 0.3)].min() > 0.9

@@ -1,0 +1,30 @@
+"""Lashes as the camera sees them: on a shut lid they hang as long as they stand on an open one."""
+
+import numpy as np
+import pytest
+
+from stimuli_builder.characters.facekit.blink_path import BlinkPath
+from stimuli_builder.characters.facekit.hair import Lashes
+from stimuli_builder.characters.facekit.identity import identity_of_seed
+from stimuli_builder.characters.facekit.kit import FaceKit
+
+
+@pytest.fixture(scope="module")
+def path(kit: FaceKit) -> BlinkPath:
+    identity = identity_of_seed(4)
+    return BlinkPath(kit, identity.rest(kit), identity.movement)
+
+
+def seen(path: BlinkPath, stroke: float) -> np.ndarray:
+    """(n, 2) way in the picture from root to tip of one eye's upper lashes, cm; y points upwards."""
+    lashes = Lashes(path, identity_of_seed(4).hair, 1, True, 4)
+    points = lashes.at(path.at({1: stroke, -1: stroke})).points
+    return np.asarray(points[:, -1, :2] - points[:, 0, :2])
+
+
+def test_a_shut_lids_lashes_hang_down_as_long_as_they_stood(path: BlinkPath) -> None:
+    opened, shut = seen(path, 0.0), seen(path, 1.0)
+    assert np.mean(opened[:, 1] > 0) > 0.9
+    assert np.mean(shut[:, 1] < 0) > 0.9
+    # Seen end on, they were a third as long.
+    assert np.median(np.linalg.norm(shut, axis=1)) > 0.7 * np.median(np.linalg.norm(opened, axis=1))
