@@ -3,7 +3,7 @@
 Examples:
   python tools/screenshots_clips.py                            all characters, into docs/images
 
-  python tools/screenshots_clips.py /tmp/sheets alder@4 hazel    two characters, elsewhere
+  python tools/screenshots_clips.py /tmp/sheets alder@5 hazel    two characters, elsewhere
 """
 
 import argparse

@@ -18,6 +18,7 @@ OPENING_MM = {
     "alder@2": 10.07,
     "alder": 10.07,
     "alder@3": 10.07,
+    "alder@4": 10.07,
     "birch": 9.66,
     "cedar": 9.85,
 }

@@ -26,5 +26,5 @@ def test_a_shut_lids_lashes_hang_down_as_long_as_they_stood(path: BlinkPath) -> 
     opened, shut = seen(path, 0.0), seen(path, 1.0)
     assert np.mean(opened[:, 1] > 0) > 0.9
     assert np.mean(shut[:, 1] < 0) > 0.9
-    # Seen end on, they were a third as long.
-    assert np.median(np.linalg.norm(shut, axis=1)) > 0.7 * np.median(np.linalg.norm(opened, axis=1))
+    # Curled by 88 degrees they were 0.83 times as long, and a seventh of them pointed up.
+    assert np.median(np.linalg.norm(shut, axis=1)) > 0.95 * np.median(np.linalg.norm(opened, axis=1))
