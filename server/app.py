@@ -107,11 +107,13 @@ def every_route() -> tuple[BaseRoute, ...]:
     """What every application of this process answers to, ready for its first request.
 
     FastAPI leaves half a second of work to the first request that goes through them all, as one for a page
-    does: somebody would wait for it after each start, and everybody else with them.
+    does: somebody would wait for it after each start, and everybody else with them. Routes that several
+    applications share know none of them: `dependency_overrides` and lifespans of routers are not for them.
     """
     whole = APIRouter(generate_unique_id_function=_operation_id)
     for router in _routers():
         whole.include_router(router)
+    # matching builds what FastAPI leaves to the first request
     for route in whole.routes:
         route.matches({"type": "http", "method": "GET", "path": "/", "root_path": "", "headers": []})
     return tuple(whole.routes)

@@ -14,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
 
-from sqlalchemy import text
+from sqlalchemy import make_url, text
 
 from experiments.load import parse_experiment
 from experiments.manifest import read_manifest
@@ -57,7 +57,7 @@ class ServerProcess:
     @contextmanager
     def services(self) -> Iterator[Services]:
         """Database and clips of the server: a new database is a copy of one that was migrated."""
-        path = self.settings.data_folder / "palpebra.sqlite"
+        path = Path(make_url(self.settings.resolved_database_url).database or "")
         if not self._migrated and not self.settings.database_url and not path.exists():
             path.parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(migrated_sqlite(), path)

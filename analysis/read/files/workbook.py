@@ -130,7 +130,6 @@ def _page(path: Path, sheet: str | None, formulas: bool = False) -> tuple[str, P
 def _pages(path: Path, _changed: int, formulas: bool) -> dict[str, Page]:
     """Every sheet; read once for the header and for the cells."""
     from openpyxl import load_workbook
-    from openpyxl.utils.exceptions import InvalidFileException
 
     refuse_too_large(path)
     try:
@@ -140,7 +139,7 @@ def _pages(path: Path, _changed: int, formulas: bool) -> dict[str, Page]:
             return {sheet.title: _page_of(path, sheet) for sheet in book.worksheets}
     except InputError:
         raise
-    except (*_UNREADABLE, InvalidFileException) as error:
+    except _UNREADABLE as error:
         said = " ".join(str(error).split())
         raise InputError(
             f"{path.name} is not an Excel workbook that can be read ({said}); save it as .xlsx anew or as CSV"
@@ -152,9 +151,10 @@ def _page_of(path: Path, sheet: Any) -> Page:
     furthest = sheet.max_row
     if furthest > LAST_ROW:
         raise ValueError(f"expected at most {LAST_ROW:,} rows, and there is a row {furthest:,}")
-    last = _last_filled_row(sheet) or furthest
-    rows = [list(row) for row in sheet.iter_rows(max_row=last, values_only=True)]
-    first = next((i for i, row in enumerate(rows) if any(value is not None for value in row)), len(rows))
+    last = _last_filled_row(sheet)
+    # openpyxl takes a last row of 0 for all rows
+    rows = [list(row) for row in sheet.iter_rows(max_row=last, values_only=True)] if last else []
+    first = next((i for i, row in enumerate(rows) if any(value is not None for value in row)), furthest)
     merged = tuple(
         (str(area), area.min_row, area.min_col, area.max_row, area.max_col)
         for area in sheet.merged_cells.ranges

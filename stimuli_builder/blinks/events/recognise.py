@@ -1,6 +1,6 @@
 """From lid series to events: what each dip is, how sure that is, and when it happened."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,8 +79,7 @@ def recognise(eyes: Sequence[BlinkSeries]) -> list[Recognised]:
         for piece in pieces[number]:
             told = _judged(piece, series.fps, other)
             cut += told.cut
-            listed = [told.squints.get(event.frame, event) for event in _single(told.events)]
-            events += apart(listed, piece.depth.smooth, piece.start, series.fps)
+            events += apart(_listed(told), piece.depth.smooth, piece.start, series.fps)
         results.append(Recognised(tuple(events), tuple(cut)))
     return results
 
@@ -116,17 +115,29 @@ def _judged(piece: _Piece, fps: float, other: Array | None) -> _Told:
         likeliest = "blink" if sure else max(shares, key=shares.__getitem__)
         if likeliest == "nothing":
             continue
+        explained = shares["blink"] < BLINK_TO_SQUINT * shares["squint"]
         if _cut(candidate, piece.depth):
-            told.cut.extend([piece.start + candidate.peak] if likeliest == "blink" else [])
+            told.cut.extend([piece.start + candidate.peak] if likeliest == "blink" and not explained else [])
             continue
         kind, timing = _phases(likeliest, sure, candidate, piece.depth)
         event = _event(kind, shares[likeliest], candidate, timing, piece.start, fps)
         told.events.append(event)
-        if kind == "blink" and shares["blink"] < BLINK_TO_SQUINT * shares["squint"]:
+        if kind == "blink" and explained:
             timing = _crossed(candidate, fps)
             squint = _event("squint", shares["squint"], candidate, timing, piece.start, fps)
             told.squints[event.frame] = squint
     return told
+
+
+def _listed(told: _Told) -> list[LidEvent]:
+    """The events, squints in place of blinks that they explain; a ripple of a closed eye stays a blink."""
+    closed = [event for event in told.events if event.kind == "closed_eye"]
+    listed = []
+    for event in _single(told.events, told.squints):
+        squint = told.squints.get(event.frame)
+        shut = any(eye.onset_s <= event.minimum_s <= eye.end_s for eye in closed)
+        listed.append(event if squint is None or event.kind != "blink" or shut else squint)
+    return listed
 
 
 def _phases(kind: str, sure: bool, candidate: Candidate, depth: Depth) -> tuple[str, Timing]:
@@ -201,14 +212,14 @@ def _event(
     )
 
 
-def _single(events: list[LidEvent]) -> list[LidEvent]:
-    """Keep the likelier of two blinks too close to be two."""
+def _single(events: list[LidEvent], squints: Collection[int]) -> list[LidEvent]:
+    """Keep the likelier of two blinks too close to be two, of which one that is no squint comes first."""
     kept: list[LidEvent] = []
     for event in sorted(events, key=lambda event: event.minimum_s):
         last = kept[-1] if kept else None
         both = last is not None and event.kind == last.kind == "blink"
         if last is not None and both and event.minimum_s - last.minimum_s < ONE_BLINK_S:
-            kept[-1] = max(last, event, key=lambda one: one.probability)
+            kept[-1] = max(last, event, key=lambda one: (one.frame not in squints, one.probability))
         else:
             kept.append(event)
     return kept

@@ -13,7 +13,7 @@ BASE = (0.86, 0.73, 0.595)
 SKIN_SHARE = "skin"
 """Pass that says which share of a pixel is skin."""
 SHADE = (0.75, 1.15, 1.4)
-"""Exponents of the light that lids leave near their edges: what comes there went through and off skin."""
+"""Exponents (red, green, blue) of the light that lids leave near their edges: it came by way of skin."""
 DARK_MELANIN = 0.9
 """Optical depth of melanin above which skin scatters and shines as dark skin does."""
 MELANIN, BLOOD = (1.0, 1.33, 1.64), (0.06, 0.84, 0.86)

@@ -57,7 +57,8 @@ def without_dots(picture: Light, cover: Light) -> Light:
     Returns
     -------
     float32 array (h, w, 3)
-        A dot has the median light of the eight pixels about it; all others stay.
+        A dot has the median light of the eight pixels about it; all others stay. The end of a hair that is
+        covered to its last pixel, which has one covered neighbour too, loses that pixel.
     """
     about = np.stack(_shifted(np.pad(cover, 1, mode="reflect"), cover.shape))
     dots = (cover > DOT) & (np.partition(about, -2, axis=0)[-2] < SPARSE)

@@ -131,6 +131,15 @@ def test_rows_behind_the_last_value_are_not_held(tmp_path) -> None:
     assert len(_pages(path, path.stat().st_mtime_ns, formulas=False)["Sheet"].rows) == 3
 
 
+def test_an_empty_sheet_with_a_formatted_row_far_below_holds_no_rows(tmp_path) -> None:
+    book = openpyxl.load_workbook(workbook(tmp_path / "a.xlsx", END, END))
+    book.create_sheet("Empty")["C90000"].number_format = "0.00"
+    book.save(tmp_path / "b.xlsx")
+    pages = _pages(tmp_path / "b.xlsx", 0, formulas=False)
+    assert pages["Empty"].rows == []
+    assert read(tmp_path / "b.xlsx") == 2
+
+
 def test_a_formula_never_calculated_in_a_row_without_values_is_refused(tmp_path) -> None:
     row = '<row r="7"><c r="A7"/><c r="C7"><f>1+1</f></c></row>'
     with pytest.raises(InputError, match=r"row 7 of 'score' holds the formula =1\+1"):

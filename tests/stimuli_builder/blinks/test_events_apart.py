@@ -1,10 +1,13 @@
 """Events of one eye that overlap, made by hand: which stays, and where they part."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from stimuli_builder.blinks.events.apart import apart
 from stimuli_builder.blinks.events.lid_event import LidEvent
+from stimuli_builder.blinks.events.recognise import _listed, _Told
 
 FPS = 100.0
 
@@ -84,3 +87,23 @@ def test_a_closed_eye_of_whose_closed_phase_little_is_left_is_none_and_cuts_nobo
 def test_events_that_only_touch_stay_as_they_are():
     events = [event("blink", 1.0, 1.5), event("blink", 1.5, 2.0)]
     assert apart(events, depth_open_at(), 0, FPS) == events
+
+
+def listed(*events, squints=()):
+    told = _Told(list(events), {one.frame: replace(one, kind="squint") for one in squints}, [])
+    return [one.kind for one in _listed(told)]
+
+
+def test_a_blink_that_a_squint_explains_is_listed_as_that():
+    doubtful = event("blink", 2.9, 3.1)
+    assert listed(event("blink", 0.9, 1.1), doubtful, squints=(doubtful,)) == ["blink", "squint"]
+
+
+def test_a_ripple_of_a_closed_eye_is_no_squint():
+    ripple = event("blink", 2.9, 3.1)
+    assert "squint" not in listed(event("closed_eye", 2.3, 3.9), ripple, squints=(ripple,))
+
+
+def test_of_two_blinks_too_close_the_one_that_is_no_squint_stays():
+    doubtful, sure = replace(event("blink", 2.9, 3.1), probability=0.95), event("blink", 3.0, 3.2)
+    assert listed(doubtful, sure, squints=(doubtful,)) == ["blink"]
