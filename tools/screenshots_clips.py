@@ -3,7 +3,7 @@
 Examples:
   python tools/screenshots_clips.py                            all characters, into docs/images
 
-  python tools/screenshots_clips.py /tmp/sheets alder@5 hazel    two characters, elsewhere
+  python tools/screenshots_clips.py /tmp/sheets alder@5 hazel@3   two characters, elsewhere
 """
 
 import argparse
@@ -37,7 +37,7 @@ from stimuli_builder.clips.motion_blur import frame_weights  # noqa: E402
 
 SIZE = (960, 360)
 CLOSURES = (0.0, 0.25, 0.5, 0.75, 1.0)
-MOVED = "hazel"
+MOVED = "hazel@3"
 """Whose brow, cheek, squint and gaze are shown moved."""
 FACES_IN_A_ROW = 6
 LIMIT_BYTES = 400_000

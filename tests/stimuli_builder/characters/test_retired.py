@@ -21,6 +21,7 @@ OPENING_MM = {
     "alder@4": 10.07,
     "birch": 9.66,
     "cedar": 9.85,
+    "hazel": 10.91,
 }
 """Of the eyes of each character that has left, as its declaration has it."""
 
