@@ -10,9 +10,8 @@ from server.context import open_services
 from server.migrate import newest_revision, upgrade
 from server.operations.backup import back_up
 from server.settings import Settings
+from tests.helpers.golden_backups import GOLDEN, keep_backup
 from tests.helpers.studies import Participant, add_study
-
-HERE = Path(__file__).resolve().parent
 
 
 def main() -> None:
@@ -36,8 +35,10 @@ def main() -> None:
             second.rate(second.state()["trials"][0], comment="an open visit")
             known = Participant(client, study.link(recruiter={"kind": "sona"}))
             known.start(query={"survey_code": "40177"})
-        name = f"{newest_revision()}.tar"
-        back_up(services, HERE / name, with_clips=False, keys=HERE / f"{newest_revision()}.keys.json")
+        revision = newest_revision()
+        backup = folder / f"{revision}.tar"
+        back_up(services, backup, with_clips=False, keys=GOLDEN / f"{revision}.keys.json")
+        keep_backup(backup)
         services.database.close()
 
 

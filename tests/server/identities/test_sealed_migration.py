@@ -12,9 +12,9 @@ from server.migrate import current_revision, downgrade, newest_revision, upgrade
 from server.models import StudyRun
 from server.operations.restore import restore
 from server.settings import Settings
-from tests.conftest import REPOSITORY
+from tests.helpers.golden_backups import golden_backup, golden_keys
 
-BEFORE, GOLDEN = "0024", REPOSITORY / "tests" / "golden" / "backups" / "0025.tar"
+BEFORE, SEALED = "0024", "0025"
 
 
 @pytest.fixture
@@ -22,7 +22,7 @@ def golden(tmp_path: Path) -> Services:
     """A database with recruiters' ids."""
     url = f"sqlite:///{tmp_path / 'x.sqlite'}"
     services = open_services(Settings(database_url=url, data_folder=tmp_path / "data"))
-    restore(services, GOLDEN, keys=GOLDEN.with_suffix(".keys.json"))
+    restore(services, golden_backup(SEALED, tmp_path), keys=golden_keys(SEALED))
     return services
 
 

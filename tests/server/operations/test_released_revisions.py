@@ -12,26 +12,24 @@ from server.operations.rows import Content
 from server.operations.rows_repository import content_of, snapshot, tables_of
 from server.settings import Settings
 from server.tallies.recount import Recount
-from tests.conftest import REPOSITORY
 from tests.helpers.databases import BACKENDS
-
-BACKUPS = sorted((REPOSITORY / "tests" / "golden" / "backups").glob("*.tar"))
+from tests.helpers.golden_backups import REVISIONS, golden_backup, golden_keys
 
 
 def test_the_newest_revision_has_its_backup() -> None:
-    assert newest_revision() in {path.stem for path in BACKUPS}
+    assert newest_revision() in REVISIONS
 
 
 @pytest.mark.parametrize("empty_database_url", BACKENDS, indirect=True)
-@pytest.mark.parametrize("backup", BACKUPS, ids=lambda path: path.stem)
+@pytest.mark.parametrize("revision", REVISIONS)
 def test_a_released_revision_is_migrated_with_its_rows(
-    backup: Path, empty_database_url: str, tmp_path: Path
+    revision: str, empty_database_url: str, tmp_path: Path
 ) -> None:
     settings = Settings(database_url=empty_database_url, data_folder=tmp_path / "data")
     services = open_services(settings)
-    keys = backup.with_suffix(".keys.json")
-    described = restore(services, backup, keys=keys if keys.exists() else None)
-    assert described.revision == backup.stem
+    keys = golden_keys(revision)
+    described = restore(services, golden_backup(revision, tmp_path), keys=keys)
+    assert described.revision == revision
     assert current_revision(services.database) == newest_revision()
 
     def contents() -> dict[str, Content]:
@@ -39,12 +37,12 @@ def test_a_released_revision_is_migrated_with_its_rows(
             return {table.name: content_of(connection, table) for table in tables_of(connection)}
 
     migrated = contents()
-    if keys.exists():
+    if keys:
         assert migrated["identity_keys"].rows == migrated["recruiter_identities"].rows == 1
     assert migrated["trial_ratings"].rows == described.tables["trial_ratings"].rows == 13
     downgrade(services.database)
     upgrade(services.database)
-    if len(BACKUPS) > 1:  # below the first revision there are no tables to keep rows in
+    if len(REVISIONS) > 1:  # below the first revision there are no tables to keep rows in
         assert {name: found.rows for name, found in contents().items()} == {
             name: found.rows for name, found in migrated.items()
         }
