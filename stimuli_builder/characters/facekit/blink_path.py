@@ -243,3 +243,9 @@ def corner_line(path: BlinkPath, side: int) -> tuple[float, float, float, float]
     a, b = int(np.argmin(turned)), int(np.argmax(turned))
     slope = (elevation[b] - elevation[a]) / (turned[b] - turned[a])
     return float(turned[a]), float(elevation[a]), float(slope), float(turned[b] - turned[a])
+
+
+def nasal_tip(path: BlinkPath, posed: Array, side: int, loop: int) -> Array:
+    """(3,) vertex of a loop that lies nearest to the nose."""
+    upper, _ = chains(path.kit, path.loops[side][loop], side)
+    return np.asarray(posed[upper[0]])

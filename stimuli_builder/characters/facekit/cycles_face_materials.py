@@ -14,6 +14,8 @@ SKIN_SHARE = "skin"
 """Pass that says which share of a pixel is skin."""
 SHADE = (0.75, 1.15, 1.4)
 """Exponents (red, green, blue) of the light that lids leave near their edges: it came by way of skin."""
+FLUSH = (0.97, 0.77, 0.72)
+"""Share of light (red, green, blue) that the eye's white keeps at its nasal end, which turns to flesh."""
 DARK_MELANIN = 0.9
 """Optical depth of melanin above which skin scatters and shines as dark skin does."""
 MELANIN, BLOOD = (1.0, 1.33, 1.64), (0.06, 0.84, 0.86)
@@ -86,16 +88,16 @@ def _skin_colour(n: Nodes, grain: Any, pit: Any, furrow: Any, line: Any) -> Any:
 
 
 def eye(colour: Any, height: Any) -> Any:
-    """Iris and sclera under the film; `shade` darkens what lies near a lid."""
+    """Iris and sclera under the film; `shade` darkens what lies near a lid, `flush` reddens the nasal end."""
     n = Nodes("eye")
     albedo = n.add("TexImage", image=colour, interpolation="Cubic", extension="EXTEND").outputs[0]
     relief = n.add("TexImage", image=height, interpolation="Cubic", extension="EXTEND").outputs[0]
     shade = [n.math("POWER", n.attribute("shade"), exponent) for exponent in SHADE]
-    shaded = n.add("VectorMath", operation="MULTIPLY")
-    n.put(albedo, shaded.inputs[0])
-    n.put(n.add("CombineXYZ", X=shade[0], Y=shade[1], Z=shade[2]).outputs[0], shaded.inputs[1])
+    pink = [n.math("MULTIPLY_ADD", n.attribute("flush"), share - 1, 1.0) for share in FLUSH]
+    left = [n.math("MULTIPLY", *both) for both in zip(shade, pink, strict=True)]
+    shaded = n.vector("MULTIPLY", albedo, n.add("CombineXYZ", X=left[0], Y=left[1], Z=left[2]).outputs[0])
     shader = n.add("BsdfPrincipled", Roughness=0.5, Specular_IOR_Level=0.0)
-    n.put(shaded.outputs[0], shader.inputs["Base Color"])
+    n.put(shaded, shader.inputs["Base Color"])
     n.put(n.add("Bump", Strength=0.6, Distance=0.04, Height=relief).outputs[0], shader.inputs["Normal"])
     shader.subsurface_method = "RANDOM_WALK"
     n.put(n.math("MULTIPLY", n.attribute("sclera"), 0.35), shader.inputs["Subsurface Weight"])
@@ -108,8 +110,8 @@ def flesh(look: dict[str, Any]) -> Any:
     """The nasal corner's moist flesh."""
     n = Nodes("flesh")
     dark = math.exp(-0.25 * look["melanin"])
-    shader = n.add("BsdfPrincipled", Roughness=0.45, Coat_Weight=0.2, Coat_Roughness=0.2)
-    shader.inputs["Base Color"].default_value = (0.64 * dark, 0.37 * dark, 0.31 * dark, 1)
+    shader = n.add("BsdfPrincipled", Roughness=0.5, Coat_Weight=0.25, Coat_Roughness=0.25)
+    shader.inputs["Base Color"].default_value = (0.56 * dark, 0.25 * dark, 0.21 * dark, 1)
     shader.inputs["Subsurface Weight"].default_value = 0.8
     shader.inputs["Subsurface Radius"].default_value = (1.0, 0.35, 0.25)
     shader.inputs["Subsurface Scale"].default_value = 0.08

@@ -14,6 +14,10 @@ ROUNDED = 2.0
 HOT = 1.8
 """Light of a mirrored lamp's middle over that of its rim: the bulb behind a soft box's cloth."""
 
+TEAR_RIPPLES, TEAR_SLOPE = 6.0, 1.6
+"""Ripples of the line of tears per cm, and the greatest slope that they give it along the lid: a smooth
+tube met the lamps at one place at most, and a lid's margin without glints looks dry."""
+
 
 def film(lights: dict[str, Any]) -> Any:
     """Clear wet layer: refracts to the camera and shines with what it mirrors, is open to light on its way.
@@ -80,7 +84,11 @@ def tear(lights: dict[str, Any]) -> Any:
     n = Nodes("tear")
     # The rim of so thin a line would mirror all there is, as white dots that come and go with the samples.
     mirrored, ray = n.math("MINIMUM", n.add("Fresnel", IOR=1.34).outputs[0], 0.03), n.add("LightPath")
-    shine = n.add("Emission", Color=reflected(n, n.add("NewGeometry").outputs["Normal"], lights, room=0.0))
+    at = n.add("TexCoord").outputs["Object"]
+    slope = n.math("MULTIPLY_ADD", n.noise(at, TEAR_RIPPLES, 1), 2 * TEAR_SLOPE, -TEAR_SLOPE)
+    along = n.add("CombineXYZ", X=slope, Y=0.0, Z=0.0).outputs[0]
+    normal = n.vector("NORMALIZE", n.vector("ADD", n.add("NewGeometry").outputs["Normal"], along))
+    shine = n.add("Emission", Color=reflected(n, normal, lights, room=0.0))
     n.put(n.math("MULTIPLY", mirrored, ray.outputs["Is Camera Ray"]), shine.inputs["Strength"])
     both = n.add("AddShader")
     n.put(n.add("BsdfTransparent").outputs[0], both.inputs[0])

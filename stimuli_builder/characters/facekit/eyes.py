@@ -5,16 +5,18 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from stimuli_builder.characters.facekit.blink_path import BlinkPath
+from stimuli_builder.characters.facekit.blink_path import BlinkPath, nasal_tip
 from stimuli_builder.characters.facekit.hair import edge_line
 from stimuli_builder.characters.facekit.kit import Array, Index
-from stimuli_builder.characters.facekit.lid_loops import EDGE_LOOP, chains
+from stimuli_builder.characters.facekit.lid_loops import EDGE_LOOP
 from stimuli_builder.characters.facekit.sphere import IRIS_CM, smooth, spherical, surface_radius
 
 TEXTURE_LIMIT = 1.25
 """Radians from the gaze axis at the edge of the eye's texture."""
-_SHADE_REACH_CM = (0.26, 0.08)
-_SHADE_DEPTH = (0.52, 0.30)
+_SHADE_REACH_CM = (0.26, 0.07)
+_SHADE_DEPTH = (0.52, 0.42)
+_FLUSHED_CM = (0.18, 0.40)
+"""Distances from the nasal corner between which the eye's white turns from the corner's pink to its own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +45,9 @@ def eyeball(path: BlinkPath, posed: Array, side: int, stroke: float) -> Mesh:
     sclera = smooth(limbus - 0.01, limbus + 0.05, angle)
     # Between lids that meet, shadows that are rendered leave little: this one would make the slit black.
     shade = 1 - (1 - _lid_shade(path, posed, side, mesh.vertices)) * (1 - 0.35 * stroke)
-    return Mesh(mesh.vertices, mesh.quads, uv, {"sclera": sclera, "shade": shade})
+    from_corner = np.linalg.norm(mesh.vertices - nasal_tip(path, path.rest, side, EDGE_LOOP), axis=1)
+    flush = smooth(_FLUSHED_CM[1], _FLUSHED_CM[0], from_corner) * sclera
+    return Mesh(mesh.vertices, mesh.quads, uv, {"sclera": sclera, "shade": shade, "flush": flush})
 
 
 def wet_film(path: BlinkPath, side: int, stroke: float) -> Mesh:
@@ -133,22 +137,17 @@ def tube(line: Array, radius: Array, sectors: int = 10) -> Mesh:
 
 def caruncle(path: BlinkPath, posed: Array, side: int) -> Mesh:
     """The pink flesh of the nasal corner and the fold beside it, in the corner of the posed vertices."""
-    tip = _nasal_tip(path, posed, side, EDGE_LOOP)
-    corner = _nasal_tip(path, posed, side, EDGE_LOOP + 1)
+    tip = nasal_tip(path, posed, side, EDGE_LOOP)
+    corner = nasal_tip(path, posed, side, EDGE_LOOP + 1)
     tilt = -side * 0.5
     # So wide that the lids' edges bound them, and sunk in: what ended within the corner looked like a bead.
-    main = _ellipsoid(tip + np.array([side * 0.10, -0.02, -0.085]), (0.34, 0.24, 0.125), tilt)
+    main = _ellipsoid(tip + np.array([side * 0.13, -0.02, -0.082]), (0.42, 0.25, 0.115), tilt)
     fold = _ellipsoid(tip + np.array([side * 0.30, -0.02, -0.105]), (0.17, 0.14, 0.08), tilt)
     filling = _ellipsoid(corner + np.array([side * 0.09, -0.01, -0.075]), (0.15, 0.075, 0.055), tilt)
     meshes = [main, fold, filling]
     starts = np.cumsum([0, *[len(mesh.vertices) for mesh in meshes[:-1]]])
     quads = np.concatenate([mesh.quads + start for mesh, start in zip(meshes, starts, strict=True)])
     return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), quads)
-
-
-def _nasal_tip(path: BlinkPath, posed: Array, side: int, loop: int) -> Array:
-    upper, _ = chains(path.kit, path.loops[side][loop], side)
-    return np.asarray(posed[upper[0]])
 
 
 def _ellipsoid(centre: Array, size: tuple[float, float, float], tilt: float) -> Mesh:

@@ -3,9 +3,10 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
+from stimuli_builder.characters.facekit.blink_path import nasal_tip
 from stimuli_builder.characters.facekit.field_noise import value_noise
 from stimuli_builder.characters.facekit.kit import Array
-from stimuli_builder.characters.facekit.lid_loops import SIDES
+from stimuli_builder.characters.facekit.lid_loops import EDGE_LOOP, SIDES
 from stimuli_builder.characters.facekit.lid_skin import LID_MIDDLE, FaceSkin, age_depth
 from stimuli_builder.characters.facekit.sphere import smooth
 
@@ -17,6 +18,10 @@ As oily as a brow, a shut lid shone as bright as the catchlight that it had cove
 """
 RIM_BLOOD = 0.13
 """Optical depth of blood that a lid's wet margin has beyond the skin's; about the pupil half of it."""
+MARGIN_MELANIN = 1.3
+"""Optical depth of melanin that an upper lid's margin has beyond the skin's: lashes' roots are dark."""
+CORNER_CM, CORNER_BLOOD = 0.30, 0.28
+"""Reach and added blood of a nasal corner's duller skin: lit and smooth, its fold shone as a white dot."""
 NOSE, CHIN, BRIDGE, NOSTRILS, LIPS = 30, 8, 27, (31, 35), slice(48, 60)
 """Numbers of Multi-PIE landmarks."""
 
@@ -39,10 +44,13 @@ class Pigments:
         """Values by attribute name: (n,) or, of coordinates, (n, 3)."""
         lips = self._lips()
         wet, fine, coordinates = self._lid_values()
-        lid = self._upper_lid()
+        lid, corner = self._upper_lid(), self._nasal_corner()
         margin = wet * self.skin.coordinates.upper
-        melanin = self._melanin(lips) * (1 - 0.35 * wet) * (1 + LID_MELANIN * lid) + 0.7 * margin
-        haemoglobin = self._haemoglobin(lips) + wet * self._rim_blood() + LID_BLOOD * lid
+        melanin = self._melanin(lips) * (1 - 0.35 * wet) * (1 + LID_MELANIN * lid)
+        melanin += MARGIN_MELANIN * margin * np.clip(1 + 0.5 * self._noise(7.0, 42, 2), 0.4, 1.5)
+        haemoglobin = (
+            self._haemoglobin(lips) + wet * self._rim_blood() + LID_BLOOD * lid + CORNER_BLOOD * corner
+        )
         melanin *= 1 + self.contrast * (0.10 * self._noise(1.3, 11) + 0.10 * self._noise(6.0, 12))
         haemoglobin *= 1 + 0.13 * self._noise(1.8, 13, 4) + 0.15 * self._noise(9.0, 14)
         # Fine speckle per vertex: as noise in the shader it doubled the time of a render.
@@ -61,8 +69,8 @@ class Pigments:
             "pore": np.clip(self._pores(lips), 0, 1.5)
             * np.clip(0.7 + 0.4 * self._noise(5.0, 16, 1), 0.15, 1.2),
             "net": np.clip(0.75 + 0.35 * self._noise(2.6, 17, 2), 0.2, 1.3) * age_depth(self.look.age) ** 0.5,
-            "rough": np.clip(self._roughness(lips) + LID_ROUGH * lid, 0.2, 0.6),
-            "shine": 1 - LID_DULL * lid,
+            "rough": np.clip(self._roughness(lips) + LID_ROUGH * np.maximum(lid, corner), 0.2, 0.6),
+            "shine": (1 - LID_DULL * lid) * (1 - 0.85 * corner),
             "wet": wet,
             "fine": fine * age_depth(self.look.age) ** 0.7,
         }
@@ -136,6 +144,14 @@ class Pigments:
         at = self.skin.coordinates
         return np.asarray(smooth(2.8, 4.5, at.loop) * smooth(12.5, 8.5, at.loop) * at.upper)
 
+    def _nasal_corner(self) -> Array:
+        """(n,) 1 at the nasal corners of the open eyes, 0 from twice `CORNER_CM` on."""
+        tips = np.stack(
+            [nasal_tip(self.skin.path, self.skin.path.rest, side, EDGE_LOOP + 1) for side in SIDES]
+        )
+        away, _ = cKDTree(tips).query(self.rest)
+        return smooth(2 * CORNER_CM, 0.5 * CORNER_CM, away)
+
     def _pores(self, lips: Array) -> Array:
         depth = 0.8 + 0.2 * age_depth(self.look.age)
         out = 0.50 * depth + 0.55 * self._spot(self.landmarks[NOSE], 1.3, 1.2)
@@ -159,7 +175,10 @@ class Pigments:
             wet[here] = (smooth(4.1, 3.3, loop) * (0.25 + 0.75 * smooth(-0.75, -0.45, at.azimuth)))[here]
             corner = np.exp(-(((at.azimuth - 1.05) / 0.45) ** 2))
             reach = smooth(2.8, 5.5, loop) * smooth(13.6, 9.0, loop)
-            fine[here] = (reach * (0.6 + 0.4 * corner) * uneven)[here]
+            # Across the line of the corners the coordinate goes from lower to upper lid at once: its lines
+            # ran together there into a brown streak beyond either corner.
+            apart = np.clip(1 - 8 * at.upper * (1 - at.upper), 0, 1)
+            fine[here] = (reach * (0.6 + 0.4 * corner) * uneven * apart)[here]
         return wet, fine, lines
 
     def _spots(self) -> Array:

@@ -92,3 +92,23 @@ def test_the_nasal_corner_is_less_wet_than_the_margins(skin: FaceSkin, values: d
     rim = (at.loop < 3.2) & (skin.rest[:, 2] > 4)
     assert values["wet"][rim & (at.azimuth < -0.8)].max() < 0.3
     assert values["wet"][rim & (np.abs(at.azimuth) < 0.3)].min() > 0.9
+
+
+def test_no_lines_run_together_on_the_line_of_the_corners(skin: FaceSkin, values: dict[str, Array]) -> None:
+    """There the coordinate along which lines are drawn jumps from the lower lid's to the upper one's."""
+    at = skin.coordinates
+    jumps = (at.upper > 0.2) & (at.upper < 0.8)
+    # Where the step is narrow enough to be seen as a streak: more than a line's width a millimetre.
+    assert values["fine"][jumps].max() == 0
+    apart = (at.upper < 0.01) & (at.loop > 6) & (at.loop < 9) & (skin.rest[:, 2] > 4)
+    assert values["fine"][apart].min() > 0
+
+
+def test_the_nasal_corner_is_redder_and_duller_than_the_skin_beyond(
+    skin: FaceSkin, values: dict[str, Array]
+) -> None:
+    corner = Pigments(skin)._nasal_corner()
+    near, beyond = corner > 0.9, (corner == 0) & (skin.rest[:, 2] > 4)
+    assert near.sum() > 50
+    assert values["shine"][near].max() < 0.25
+    assert np.median(values["hem"][near]) > np.median(values["hem"][beyond]) + 0.15

@@ -1,0 +1,44 @@
+"""What is told to the eye's shader: where it is shaded, and where its white turns into flesh."""
+
+import numpy as np
+import pytest
+
+from stimuli_builder.characters.facekit.blink_path import BlinkPath, nasal_tip
+from stimuli_builder.characters.facekit.eyes import Mesh, eyeball
+from stimuli_builder.characters.facekit.identity import identity_of_seed
+from stimuli_builder.characters.facekit.kit import FaceKit
+from stimuli_builder.characters.facekit.lid_loops import EDGE_LOOP, SIDES
+from stimuli_builder.characters.facekit.sphere import IRIS_CM
+
+
+@pytest.fixture(scope="module")
+def path(kit: FaceKit) -> BlinkPath:
+    identity = identity_of_seed(4)
+    return BlinkPath(kit, identity.rest(kit), identity.movement)
+
+
+def eye(path: BlinkPath, side: int) -> Mesh:
+    return eyeball(path, path.at({1: 0.0, -1: 0.0}), side, 0.0)
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_the_white_turns_into_flesh_at_its_nasal_end_alone(path: BlinkPath, side: int) -> None:
+    mesh = eye(path, side)
+    flush, centre = mesh.values["flush"], path.globes[side].centre
+    seen = mesh.vertices[:, 2] > centre[2]
+    temporal = seen & ((mesh.vertices[:, 0] - centre[0]) * side > 0)
+    iris = np.linalg.norm((mesh.vertices - centre)[:, :2], axis=1) < IRIS_CM
+    corner = np.linalg.norm(mesh.vertices - nasal_tip(path, path.rest, side, EDGE_LOOP), axis=1) < 0.15
+    assert flush[seen & corner].min() > 0.9
+    assert flush[temporal].max() == 0
+    assert flush[seen & iris].max() == 0
+
+
+def test_the_white_is_darkest_at_the_lids(path: BlinkPath) -> None:
+    mesh, centre = eye(path, 1), path.globes[1].centre
+    middle = (np.abs(mesh.vertices[:, 0] - centre[0]) < 0.1) & (mesh.vertices[:, 2] > centre[2])
+    height, shade = (mesh.vertices - centre)[middle, 1], mesh.values["shade"][middle]
+    order = np.argsort(height)
+    lowest, highest = shade[order][[0, -1]]
+    assert shade.max() > 0.9
+    assert max(lowest, highest) < 0.7
