@@ -37,10 +37,10 @@ from stimuli_builder.clips.motion_blur import frame_weights  # noqa: E402
 
 SIZE = (960, 360)
 CLOSURES = (0.0, 0.25, 0.5, 0.75, 1.0)
-MOVED = "hazel@3"
-"""Whose brow, cheek, squint and gaze are shown moved."""
+MOVED, LOWERED = "hazel@3", "alder@5"
+"""Whose brow, cheek, squint and gaze are shown moved, and whose lower lid: of one face each, for a small clone."""
 FACES_IN_A_ROW = 6
-LIMIT_BYTES = 400_000
+LIMIT_BYTES = 300_000
 Rgb = NDArray[np.uint8]
 
 
@@ -54,7 +54,7 @@ def main() -> None:
         character = find_character(name).levels(whole if tall else SIZE)
         save(closures_sheet(character, tall), folder / f"{name}-closures.jpg")
         save(blink_sheet(character, tall), folder / f"{name}-blink.jpg")
-        if character.read_lower is not None:
+        if name == LOWERED:
             save(lower_lid_sheet(character), folder / f"{name}-lower-lid.jpg")
         if name == MOVED:
             save(movement_sheet(character, name), folder / "face-movement.jpg")
