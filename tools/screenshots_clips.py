@@ -38,7 +38,7 @@ from stimuli_builder.clips.motion_blur import frame_weights  # noqa: E402
 SIZE = (960, 360)
 CLOSURES = (0.0, 0.25, 0.5, 0.75, 1.0)
 MOVED, LOWERED = "hazel@3", "alder@5"
-"""Whose brow, cheek, squint and gaze are shown moved, and whose lower lid: of one face each, for a small clone."""
+"""Whose brow, cheek, squint and gaze are shown moved, and whose lower lid: one face each, for its size."""
 FACES_IN_A_ROW = 6
 LIMIT_BYTES = 300_000
 Rgb = NDArray[np.uint8]
