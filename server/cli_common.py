@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TypeVar
 
 from rich.console import Console
@@ -9,6 +10,7 @@ from sqlalchemy.exc import OperationalError
 
 from experiments.errors import InputError, did_you_mean
 from server.context import Services, open_services
+from server.db import checked_url
 from server.migrate import current_revision, known_revision, upgrade
 from server.settings import KEY_LENGTH_MIN, Settings
 
@@ -37,6 +39,27 @@ def migrated_services(settings: Settings | None = None) -> Iterator[Services]:
         yield services
     finally:
         services.database.close()
+
+
+@contextmanager
+def stored_services() -> Iterator[Services]:
+    """Database and clip store of the settings, for commands on what is already there.
+
+    Raises
+    ------
+    InputError
+        There is no SQLite file: in a folder beside the server's, an empty database made on the spot would
+        look as if all studies were lost.
+    """
+    settings = Settings()
+    url = checked_url(settings.resolved_database_url)
+    if url.get_backend_name() == "sqlite" and url.database and not Path(url.database).exists():
+        raise InputError(
+            f"there is no database at {url.database}; run this in the folder where the server runs, or name "
+            "its data by PALPEBRA_DATA_FOLDER or DATABASE_URL"
+        )
+    with migrated_services(settings) as services:
+        yield services
 
 
 def _stored_revision(services: Services) -> str | None:

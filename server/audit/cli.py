@@ -14,7 +14,7 @@ from experiments.files import whole_file
 from server.audit import repository
 from server.audit.sealing import written
 from server.audit.verify import verify
-from server.cli_common import migrated_services, out
+from server.cli_common import out, stored_services
 from server.context import Services
 
 app = command_group("The audit log: verify its chain of hashes, export it.")
@@ -42,7 +42,7 @@ def verify_chain(
       server audit verify --head 412:9f2c...
     """
     kept = _head(head) if head else None
-    with migrated_services() as services, services.database.snapshot() as session:
+    with stored_services() as services, services.database.snapshot() as session:
         chain = verify(session, services.settings.key, kept)
     if chain.broken is not None:
         raise InputError(f"the audit log is broken: {chain.broken}")
@@ -70,7 +70,7 @@ def export(
 
     Example: server audit export --out audit.ndjson
     """
-    with migrated_services() as services:
+    with stored_services() as services:
         if str(out_file) == "-":
             sys.stdout.writelines(_lines(services, after))
             return

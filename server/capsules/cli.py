@@ -10,7 +10,7 @@ from experiments.errors import InputError
 from server.accounts.audit import record
 from server.accounts.identity import OPERATOR
 from server.capsules.build import CapsuleContents, CapsuleOrigin, build_capsule
-from server.cli_common import migrated_services, out
+from server.cli_common import out, stored_services
 from server.export.extract import Extract
 from server.studies.lookup import find_study
 
@@ -55,7 +55,7 @@ def capsule(
     """
     if not out_file.parent.is_dir():
         raise InputError(f"{out_file}: the folder {out_file.parent} does not exist; make it first")
-    with migrated_services() as services, Console(stderr=True).status("capsule") as status:
+    with stored_services() as services, Console(stderr=True).status("capsule") as status:
         with services.database.write() as session:
             known = find_study(session, study, OPERATOR, "view")
             about = Extract(origin, series).definition(session, known).dataset

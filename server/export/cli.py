@@ -10,10 +10,10 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from experiments.definition import Experiment
 from experiments.errors import InputError
-from experiments.files import whole_file
+from experiments.files import check_targets, whole_file
 from server.accounts.audit import record
 from server.accounts.identity import OPERATOR
-from server.cli_common import migrated_services, out
+from server.cli_common import out, stored_services
 from server.export.extract import ExportOrigin, Extract
 from server.export.formats import CSV_FORMATS, FORMATS, Format, proofed, row_count
 from server.export.repository import runs_by_origin
@@ -83,7 +83,9 @@ def export(
     beside = ""
     if (bom or guard) and form not in CSV_FORMATS:
         raise InputError(f"--bom and --guard are for CSV ({', '.join(CSV_FORMATS)}), not {form}")
-    with migrated_services() as services, services.database.snapshot() as session:
+    if str(out_file) != "-":
+        check_targets([out_file])
+    with stored_services() as services, services.database.snapshot() as session:
         known = find_study(session, study, OPERATOR, "view")
         extract = Extract(origin, series)
         extract.definition(session, known)
@@ -122,6 +124,5 @@ def _write(out_file: Path, pieces: Iterable[bytes]) -> int:
     """Write the pieces, to a file that gets its name at the end; return their bytes."""
     if str(out_file) == "-":
         return sum(sys.stdout.buffer.write(piece) for piece in pieces)
-    out_file.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(out_file) as unfinished, unfinished.open("wb") as stream:
         return sum(stream.write(piece) for piece in pieces)

@@ -42,13 +42,16 @@ def script(
         }
         for factor in experiment.factors
     ]
+    rules = [rule.rule.replace("_", " ") for rule in experiment.exclusions]
     values: dict[str, Any] = {
         "title": " ".join(experiment.title.split()),
         "data": data,
         "factors": factors,
         "analysed": [f for f in factors if len(f["levels"]) > 1 and _in_plan(experiment, f, column)],
         "scales": scales_of(experiment),
-        "rules": [rule.rule.replace("_", " ") for rule in experiment.exclusions],
+        "rules": rules,
+        "unapplied": f"note: nobody is left out by the declared exclusions ({'; '.join(rules)}): "
+        "list the runs that `analysis run` names, in this script",
         "view": KINDS[experiment.trial.kind].view.name,
     }
     templates = [f"{values['view']}.{language}.j2", f"answers.{language}.j2"]

@@ -8,7 +8,7 @@ import typer
 
 from experiments.errors import InputError
 from server.accounts.identity import OPERATOR
-from server.cli_common import migrated_services
+from server.cli_common import stored_services
 from server.methods import service
 from server.studies.lookup import find_study
 
@@ -57,7 +57,7 @@ def methods(
         raise InputError(
             f"expected {service.RESULTS} in {report}, found none; run `analysis run --out` first"
         )
-    with migrated_services() as services, services.database.read() as session:
+    with stored_services() as services, services.database.read() as session:
         methods = service.methods_of(
             session, find_study(session, study, OPERATOR, "view"), origin.value, series, results
         )

@@ -12,7 +12,7 @@ import typer
 from pyrage import x25519
 
 from experiments.errors import InputError
-from server.cli_common import migrated_services, out
+from server.cli_common import migrated_services, out, stored_services
 from server.clock import now
 from server.context import open_services
 from server.operations import backup as backups
@@ -98,7 +98,7 @@ def backup(
     path = file or Path(name)
     if path.exists() and not replace:
         raise InputError(f"{path} is there already; name another file, or add --replace to write over it")
-    with migrated_services() as services:
+    with stored_services() as services:
         described = backups.back_up(
             services, path, with_clips=not without_clips, keys=keys or services.settings.backup_keys
         )

@@ -9,7 +9,7 @@ from experiments.command_groups import command_group
 from experiments.errors import InputError
 from experiments.files import check_targets, whole_private_file
 from server.accounts.identity import OPERATOR
-from server.cli_common import migrated_services, out
+from server.cli_common import out, stored_services
 from server.persons.service import subject_access, visits_of
 from server.runs.erasure import erase
 from server.studies.lookup import find_study
@@ -44,7 +44,7 @@ def export(
     """
     _one_of_both(run, identifier)
     check_targets([file])
-    with migrated_services() as services, services.database.write() as session:
+    with stored_services() as services, services.database.write() as session:
         known = find_study(session, study, OPERATOR, "own")
         visits = visits_of(session, known, run, identifier)
         told = subject_access(session, known, visits, OPERATOR)
@@ -69,7 +69,7 @@ def erase_person(
       server person erase exp3 --run 0123456789abcdef --yes
     """
     _one_of_both(run, identifier)
-    with migrated_services() as services:
+    with stored_services() as services:
         with services.database.read() as session:
             known = find_study(session, study, OPERATOR, "edit")
             visits = [visit.public_id for visit in visits_of(session, known, run, identifier)]

@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from server.accounts.identity import OPERATOR
-from server.cli_common import migrated_services, out
+from server.cli_common import out, stored_services
 from server.clock import now
 from server.context import Services
 from server.retention import service
@@ -36,7 +36,7 @@ def retention(
 
       server retention exp3
     """
-    with migrated_services() as services:
+    with stored_services() as services:
         shown = _previews(services, study)
         if not shown:
             out.print("no study declares a period; see \\[retention] of the declaration")

@@ -9,7 +9,7 @@ import typer
 from experiments.errors import InputError
 from experiments.files import whole_text
 from server.accounts.identity import OPERATOR
-from server.cli_common import migrated_services, out
+from server.cli_common import out, stored_services
 from server.seals.page import page
 from server.seals.service import seal_of, seal_plan
 from server.studies.lookup import find_study
@@ -38,7 +38,7 @@ def seal(
       analysis run exp3.toml --csv exp3.csv --seal exp3-seal.json
     """
     planned = _power(power)
-    with migrated_services() as services, services.database.write() as session:
+    with stored_services() as services, services.database.write() as session:
         known = find_study(session, study, OPERATOR, "view")
         sealed = seal_of(session, known) or seal_plan(session, known, None, planned)
     if planned is not None and sealed.power != planned:

@@ -15,7 +15,7 @@ from experiments.manifest import Manifest, read_manifest
 from experiments.schema.canonical import definition_sha256
 from server.accounts.audit import record
 from server.accounts.identity import OPERATOR
-from server.cli_common import migrated_services, out
+from server.cli_common import migrated_services, out, stored_services
 from server.clock import now
 from server.context import Services
 from server.models import Link, Study, StudyVersion
@@ -133,7 +133,7 @@ def set_status(
     """
     if status not in STATUSES:
         raise InputError(f"no status '{status}'{did_you_mean(status, STATUSES)}")
-    with migrated_services() as services, services.database.write() as session:
+    with stored_services() as services, services.database.write() as session:
         known = find_study(session, study, OPERATOR, "view")
         _set_status(session, known, status)
         out.print(f"study {known.name}: {known.status}")
@@ -145,7 +145,7 @@ def list_studies() -> None:
 
     Example: server study list
     """
-    with migrated_services() as services, services.database.read() as session:
+    with stored_services() as services, services.database.read() as session:
         table = Table("study", "status", "version", "runs", "complete", "title")
         counts = repository.runs_by_status(session)
         for study in repository.all_studies(session):
@@ -181,7 +181,7 @@ def create(
         )
     expires = now() + timedelta(hours=expires_hours) if expires_hours is not None else None
     options = LinkOptions(KINDS[kind], group_name=group, quota=quota, expires_at=expires)
-    with migrated_services() as services:
+    with stored_services() as services:
         settings = services.settings
         rows = prepared_links(settings.key, options, numbered_labels(label, count) if count > 1 else [label])
         with services.database.write() as session:
@@ -199,7 +199,7 @@ def list_links(study: Annotated[str, typer.Argument(help="Name of the study.")])
 
     Example: server link list exp3
     """
-    with migrated_services() as services, services.database.read() as session:
+    with stored_services() as services, services.database.read() as session:
         key, public_url = services.settings.key, services.settings.public_url
         for link in links_of(session, find_study(session, study, OPERATOR, "view")):
             out.print(f"{link.kind},{link.label},{link_url(public_url, key, link.public_id)}")
@@ -228,7 +228,7 @@ def show_secret(
 
     Example: server link secret exp3 --link "summer school"
     """
-    with migrated_services() as services, services.database.write() as session:
+    with stored_services() as services, services.database.write() as session:
         known = find_study(session, study, OPERATOR, "own")
         of_link = None if link is None else _labelled(links_of(session, known), link)
         told = signing(session, services.settings.key, known, name, None, of_link)

@@ -9,7 +9,7 @@ from rich.table import Table
 from experiments.command_groups import command_group
 from experiments.errors import InputError
 from server.accounts.identity import OPERATOR
-from server.cli_common import migrated_services, one_of, out
+from server.cli_common import migrated_services, one_of, out, stored_services
 from server.models import RIGHTS, ROLES
 from server.studies.lookup import find_study
 from server.workspaces import repository, service
@@ -32,7 +32,7 @@ def list_workspaces() -> None:
 
     Example: server workspace list
     """
-    with migrated_services() as services, services.database.read() as session:
+    with stored_services() as services, services.database.read() as session:
         table = Table("workspace", "title", "studies", "second factor", "members")
         counts = repository.counts(session)
         for one in repository.every(session):

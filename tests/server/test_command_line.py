@@ -189,6 +189,40 @@ def test_other_bad_input_is_one_line_too(
     assert expected in refused.stderr
 
 
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("study", "list"),
+        ("export", "short", "--out", "x.csv"),
+        ("backup", "x.tar"),
+        ("workspace", "list"),
+        ("audit", "verify"),
+    ],
+    ids=" ".join,
+)
+@pytest.mark.parametrize("empty_database_url", ["sqlite"], indirect=True)
+def test_a_folder_without_a_database_gets_none(
+    tmp_path: Path, empty_database_url: str, command: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An empty one made on the spot looked as if all studies were lost."""
+    monkeypatch.chdir(tmp_path)
+    file = Path(empty_database_url.removeprefix("sqlite:///"))
+    settings = Settings(data_folder=tmp_path / "data", database_url=empty_database_url)
+    refused = run_server_command(settings, *command)
+    assert refused.returncode == 2
+    assert refused.stderr.startswith(f"error: there is no database at {file}; ")
+    assert refused.stderr.count("\n") == 1
+    assert not file.exists()
+
+
+def test_an_export_makes_no_folders(settings: Settings, study, tmp_path: Path) -> None:
+    out = tmp_path / "mistyped" / "x.csv"
+    refused = run_server_command(settings, "export", "short", "--out", str(out))
+    assert refused.returncode == 2
+    assert "does not exist; make it first" in refused.stderr
+    assert not out.parent.exists()
+
+
 def test_personal_links_come_as_a_table(settings: Settings, study) -> None:
     arguments = ("link", "create", "short", "--kind", "personal", "--label", "P", "--count", "3")
     lines = run_server_command(settings, *arguments).stdout.splitlines()

@@ -79,6 +79,8 @@ def test_the_python_script_gives_our_own_tables(studied) -> None:
         [sys.executable, "-W", "error", str(target)], capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
+    # `analysis run` applies the declared exclusions, the script those that it is told.
+    assert ("note: nobody is left out by the declared exclusions" in done.stderr) == bool(study.exclusions)
     for effect in numbers["effects"]:
         ours = effect["univariate"]
         found = re.search(rf"^\d+ +{effect['effect']} +(.*)$", done.stdout, re.MULTILINE)
