@@ -8,8 +8,8 @@ import pandas as pd
 
 from experiments.errors import InputError
 from experiments.files import whole_file
+from stimuli_builder.blinks.csv_table import read_table
 from stimuli_builder.blinks.profile import PROFILE_FPS, Array, BlinkProfile, Eye
-from stimuli_builder.blinks.series import read_table
 
 EYES: dict[str, Eye | None] = {"left": "left", "right": "right", "both": "both", "": None}
 TABLE_COLUMNS = {
