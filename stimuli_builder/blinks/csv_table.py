@@ -1,6 +1,7 @@
 """A CSV with a header line as a table, however a spreadsheet wrote it: commas, semicolons or tabs."""
 
 import re
+from collections.abc import Sequence
 from io import StringIO
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from experiments.errors import InputError
 
 NOTE = "note"
 """Key of `DataFrame.attrs` under which a table says how it was read; absent where that is plain."""
+MAX_NAMED = 6
 _SEPARATORS = {";": "semicolons", "\t": "tabs"}
 _COMMA_OR_WHOLE = re.compile(r"[+-]?[0-9]+(,[0-9]+)?")
 
@@ -49,6 +51,12 @@ def read_table(path: Path) -> pd.DataFrame:
     if said:
         table.attrs[NOTE] = f"{path.name}: {', '.join(said)}"
     return table
+
+
+def few(names: Sequence[str]) -> str:
+    """The first names of columns; a table of face tracking has sixty, too many for a line."""
+    rest = len(names) - MAX_NAMED
+    return ", ".join(names[:MAX_NAMED]) + (f" and {rest} more" if rest > 0 else "")
 
 
 def _text(path: Path) -> str:

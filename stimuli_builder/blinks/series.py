@@ -9,14 +9,13 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from experiments.errors import InputError, nearest
-from stimuli_builder.blinks.csv_table import NOTE, read_table
+from stimuli_builder.blinks.csv_table import NOTE, few, read_table
 from stimuli_builder.blinks.profile import Array
 from stimuli_builder.blinks.tracked_lid import tracked_lower_lid
 
 PAPER_FPS = 300
 DISTANCE_COLUMNS = ("left_distance_px", "right_distance_px", "distance_px")
 INDEX_COLUMNS = ("frame", "time_s", "valid")
-MAX_NAMED = 6
 MAX_BRIDGED_MS = 1000 / 30
 """Longest gap that is filled by a straight line: ten frames of the paper's, the filter's width."""
 
@@ -91,7 +90,7 @@ def choose_columns(table: pd.DataFrame, named: Sequence[str], path: Path) -> lis
         return tracked
     if len(candidates) == 1:
         return candidates
-    there = _few(candidates) or "no column of decimal numbers but the times"
+    there = few(candidates) or "no column of decimal numbers but the times"
     raise InputError(f"{path.name}: say with --column which series to label; it has {there}")
 
 
@@ -99,14 +98,8 @@ def _near_or_plausible(name: str, candidates: Sequence[str]) -> str:
     near = nearest(name, candidates)
     if near is not None:
         return f"; did you mean '{near}'?"
-    plausible = _few([one for one in candidates if one in DISTANCE_COLUMNS] or candidates)
+    plausible = few([one for one in candidates if one in DISTANCE_COLUMNS] or candidates)
     return f"; expected one of: {plausible}" if plausible else ""
-
-
-def _few(names: Sequence[str]) -> str:
-    """The first names; a table of face tracking has sixty, which no line of an error should hold."""
-    rest = len(names) - MAX_NAMED
-    return ", ".join(names[:MAX_NAMED]) + (f" and {rest} more" if rest > 0 else "")
 
 
 def series_fps(table: pd.DataFrame, fps: float | None, path: Path, *, uneven: bool = False) -> float:
@@ -117,7 +110,7 @@ def series_fps(table: pd.DataFrame, fps: float | None, path: Path, *, uneven: bo
     measured = _measured_fps(table, path, uneven=uneven) if "time_s" in table.columns else None
     if fps is None and measured is None:
         raise InputError(
-            f"{path.name} has no column time_s (it has {_few(list(table.columns))}); expected a "
+            f"{path.name} has no column time_s (it has {few(list(table.columns))}); expected a "
             "track, or lid distances: give the recording's rate with --fps"
         )
     if fps is not None and not (np.isfinite(fps) and 10 <= fps <= 10_000):
