@@ -11,7 +11,7 @@ from pydantic import BaseModel, ValidationError
 
 from experiments.definition import Experiment
 from experiments.definition.experiment import STORED
-from experiments.errors import InputError, did_you_mean
+from experiments.errors import InputError, did_you_mean, nearest
 from experiments.schema.keys import Key, is_tag
 from experiments.schema.upgrades import upgraded
 from experiments.toml_keys import MAX_DEPTH, has_endless_key
@@ -79,9 +79,12 @@ def locate(name_or_path: str) -> Path:
         raise InputError(
             f"no file {name_or_path}; expected a TOML file or one of {', '.join((*SHIPPED, *DEMOS))}"
         )
-    near = did_you_mean(stem, (*SHIPPED, *DEMOS))
-    path_too = "" if near.startswith("; did you mean") else ", or the path of a TOML file"
-    raise InputError(f"no experiment '{name_or_path}'{near}{path_too}")
+    names = (*SHIPPED, *DEMOS)
+    near = nearest(stem, names)
+    hint = f"; did you mean '{near}'? Expected" if near else "; expected"
+    raise InputError(
+        f"no experiment '{name_or_path}'{hint} one of: {', '.join(names)}, or the path of a TOML file"
+    )
 
 
 MAX_PROBLEMS = 100

@@ -26,7 +26,12 @@ def register(app: typer.Typer) -> None:
 
 
 def anova(
-    file: Annotated[Path, typer.Argument(help="CSV file, one row a trial (or one a cell).")],
+    file: Annotated[
+        Path,
+        typer.Argument(
+            help="CSV file, one row a trial (or one a cell); of a folder all files .csv, as one table."
+        ),
+    ],
     participant: Annotated[str, typer.Option(help="Column that names the participant.")],
     rating: Annotated[str, typer.Option(help="Column with the number measured.")],
     within: Annotated[

@@ -1,12 +1,15 @@
 """A CSV with the declaration of its columns beside, as a table of numbers, times and named levels."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 from pydantic import TypeAdapter, ValidationError
 
 from experiments.columns import Column
 from experiments.errors import InputError
+from experiments.wrong_values import expectation, shown, wrong_value
 
 Columns = tuple[Column, ...]
 _COLUMNS = TypeAdapter(Columns)
@@ -16,9 +19,23 @@ def read_columns(path: Path) -> Columns:
     """The declarations (JSON, as the server writes it); InputError where they cannot be used."""
     try:
         return _COLUMNS.validate_json(path.read_bytes())
-    except (OSError, ValidationError) as error:
-        reason = str(error).splitlines()[0]
-        raise InputError(f"{path.name}: expected the columns of a table as JSON ({reason})") from error
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error}); check the path") from error
+    except ValidationError as error:
+        raise InputError(
+            f"{path.name}: expected the columns of a table as JSON, as `server export --format columns` "
+            f"writes them ({_reason(error.errors()[0])})"
+        ) from error
+
+
+def _reason(detail: Mapping[str, Any]) -> str:
+    """What is wrong with the first value refused, without the names of Python's types."""
+    if detail["type"] == "json_invalid":
+        return "this is no JSON"
+    parts = [f"column {part + 1}" if isinstance(part, int) else str(part) for part in detail["loc"][:2]]
+    said = expectation(detail) is not None or detail["type"] == "missing"
+    problem = wrong_value(detail) if said else f"got {shown(detail['input'])}"
+    return ": ".join([*parts, problem])
 
 
 def read_typed(path: Path, columns: Columns) -> pd.DataFrame:

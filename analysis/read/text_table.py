@@ -65,7 +65,7 @@ def read_text_table(path: Path, needed: Sequence[str] | None, optional: Sequence
     """
     reader = reader_of(path)
     header = reader.header()
-    names = _names_to_read(path.name, header, header if needed is None else needed, optional)
+    names = _names_to_read(_source(path), header, header if needed is None else needed, optional)
     cells = trials_only(reader.cells(names), list(needed or ()), _sorts(reader, header))
     if cells.rows.empty:
         raise InputError(f"{path.name} has a header but no rows{' that are trials' * bool(cells.decisions)}")
@@ -84,6 +84,12 @@ def read_text_table(path: Path, needed: Sequence[str] | None, optional: Sequence
         table.columns[name] = _stripped(table.columns[name])
     _leave_out_empty_rows(table, names)
     return table
+
+
+def _source(path: Path) -> str:
+    """How an error names what was read: of a folder's columns only those count that all its files have."""
+    name = path.resolve().name
+    return f"the folder {name} (all its .csv files as one table)" if path.is_dir() else path.name
 
 
 def _leave_out_empty_rows(table: TextTable, names: Sequence[str]) -> None:

@@ -184,7 +184,7 @@ def restore(
 
       DATABASE_URL=postgresql://me@host/new server restore backups/monday.tar
 
-      server restore s3://lab-backups/palpebra/palpebra-2026-01-31T030000.tar.age --identity backups.key
+      server restore s3://lab/palpebra/palpebra-2026-01-31T030000.tar.age --identity backups.key
     """
     settings = Settings()
     services = open_services(settings)

@@ -74,8 +74,7 @@ def restore(
             for sha256 in described.clips:
                 _restore_clip(services, tar, sha256)
     except (tarfile.TarError, EOFError, gzip.BadGzipFile) as error:
-        (reason, *_) = str(error).splitlines() or [type(error).__name__]
-        raise InputError(f"{path} is damaged or no backup of `server backup`: {reason}") from error
+        raise InputError(f"{path} is damaged or no backup of `server backup`{_reason(error)}") from error
     except OSError as error:
         if error.errno == errno.ENOSPC:
             raise InputError(f"no room left for what {path} holds; make room and restore again") from error
@@ -85,6 +84,12 @@ def restore(
     _erase_again(services, told)
     told(f"{len(described.clips)} clips, secret key")
     return described
+
+
+def _reason(error: Exception) -> str:
+    """What the library says; where that is only that no format fits, and a list of them, what to do."""
+    (reason, *_) = str(error).splitlines() or [type(error).__name__]
+    return "; name a file that it wrote" if reason.endswith(":") else f": {reason}"
 
 
 def _take_over_ledger(settings: Settings, path: Path) -> None:

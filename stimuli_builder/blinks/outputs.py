@@ -1,5 +1,6 @@
 """What else `stimuli blinks` writes of a recording: the report, every frame in units, an animation curve."""
 
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -9,11 +10,11 @@ import pandas as pd
 
 from experiments.errors import InputError
 from experiments.files import whole_text
+from stimuli_builder.blinks.csv_table import read_table
 from stimuli_builder.blinks.export.formats import CurveTarget, check_format, write_curve
 from stimuli_builder.blinks.extract import EyeBlinks, rate_doubt
 from stimuli_builder.blinks.recorded_curve import recorded_curve
-from stimuli_builder.blinks.series import read_table
-from stimuli_builder.blinks.units import scale_of, write_lids
+from stimuli_builder.blinks.units import check_scale, scale_of, write_lids
 
 
 @dataclass(frozen=True)
@@ -32,8 +33,14 @@ class MoreOutputs:
         return self.report, self.lids, self.curve
 
     def check(self) -> None:
-        """Refuse a format nobody knows before anything is read."""
+        """Refuse a format or a scale nobody knows before anything is read."""
         check_format(self.curve_format, CurveTarget())
+        if self.scale is not None:
+            check_scale(self.scale)
+            if self.lids is None and self.report is None:
+                sys.stderr.write(
+                    "note: --scale has no effect here: mm stand in what --lids and --report write\n"
+                )
 
     def prepared(
         self, source: Path, eyes: Sequence[EyeBlinks], frame: pd.DataFrame

@@ -8,8 +8,8 @@ import pandas as pd
 
 from experiments.errors import InputError
 from experiments.files import whole_file
+from stimuli_builder.blinks.csv_table import few, read_table
 from stimuli_builder.blinks.profile import PROFILE_FPS, Array, BlinkProfile, Eye
-from stimuli_builder.blinks.series import read_table
 
 EYES: dict[str, Eye | None] = {"left": "left", "right": "right", "both": "both", "": None}
 TABLE_COLUMNS = {
@@ -56,7 +56,7 @@ def read_profile_table(path: Path) -> list[BlinkProfile]:
     table = read_table(path)
     for name in TABLE_COLUMNS:
         if name not in table.columns:
-            there = ", ".join(map(str, table.columns))
+            there = few(list(table.columns))
             raise InputError(
                 f"{path.name} is no table of profiles (NAME.profiles.csv of `stimuli blinks`): "
                 f"it lacks the column '{name}' and has {there}"

@@ -11,8 +11,9 @@ import pandas as pd
 
 from experiments.errors import InputError, did_you_mean
 from experiments.files import whole_file
+from stimuli_builder.blinks.csv_table import read_table
 from stimuli_builder.blinks.measure import MeasuredBlink
-from stimuli_builder.blinks.series import read_table, scaled_frames
+from stimuli_builder.blinks.series import scaled_frames
 
 Decision = Literal["accept", "reject"]
 MATCH_FRAMES = 10

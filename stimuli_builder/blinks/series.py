@@ -8,7 +8,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from experiments.errors import InputError, did_you_mean
+from experiments.errors import InputError, nearest
+from stimuli_builder.blinks.csv_table import NOTE, few, read_table
 from stimuli_builder.blinks.profile import Array
 from stimuli_builder.blinks.tracked_lid import tracked_lower_lid
 
@@ -36,6 +37,8 @@ class BlinkSeries:
         Frames filled by a straight line, and frames left out of the labelling.
     lower_up_mm, lower_nasal_mm : (n,) float64 array or None
         Place of the lower lid where a track holds it.
+    note : str
+        How its file was read, where that is not plain: semicolons, decimal commas.
     """
 
     distance: Array
@@ -46,6 +49,7 @@ class BlinkSeries:
     missing_frames: int = 0
     lower_up_mm: Array | None = None
     lower_nasal_mm: Array | None = None
+    note: str = ""
 
 
 def scaled_frames(paper_frames: float, fps: float) -> float:
@@ -69,20 +73,6 @@ def box_filter(values: Array, width_frames: float) -> Array:
     return np.asarray(np.convolve(values, kernel, mode="full")[reach : reach + values.size] / weight)
 
 
-def read_table(path: Path) -> pd.DataFrame:
-    """Read a series or track CSV, column names stripped of blanks."""
-    try:
-        table = pd.read_csv(path, skipinitialspace=True)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from error
-    except (pd.errors.ParserError, pd.errors.EmptyDataError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: expected a CSV table with a header line ({str(error).strip()})") from error
-    table.columns = table.columns.str.strip()
-    if table.empty:
-        raise InputError(f"{path}: the table has a header but no rows")
-    return table
-
-
 def choose_columns(table: pd.DataFrame, named: Sequence[str], path: Path) -> list[str]:
     """Return the distance columns to label: the wanted ones, else a track's, else the only candidate."""
     candidates = [
@@ -92,7 +82,7 @@ def choose_columns(table: pd.DataFrame, named: Sequence[str], path: Path) -> lis
     ]
     for name in named:
         if name not in table.columns:
-            raise InputError(f"{path.name} has no column '{name}'{did_you_mean(name, candidates)}")
+            raise InputError(f"{path.name} has no column '{name}'{_near_or_plausible(name, candidates)}")
     if named:
         return list(named)
     tracked = [name for name in DISTANCE_COLUMNS if name in table.columns]
@@ -100,8 +90,16 @@ def choose_columns(table: pd.DataFrame, named: Sequence[str], path: Path) -> lis
         return tracked
     if len(candidates) == 1:
         return candidates
-    there = ", ".join(candidates) or "no column of decimal numbers but the times"
+    there = few(candidates) or "no column of decimal numbers but the times"
     raise InputError(f"{path.name}: say with --column which series to label; it has {there}")
+
+
+def _near_or_plausible(name: str, candidates: Sequence[str]) -> str:
+    near = nearest(name, candidates)
+    if near is not None:
+        return f"; did you mean '{near}'?"
+    plausible = few([one for one in candidates if one in DISTANCE_COLUMNS] or candidates)
+    return f"; expected one of: {plausible}" if plausible else ""
 
 
 def series_fps(table: pd.DataFrame, fps: float | None, path: Path, *, uneven: bool = False) -> float:
@@ -112,7 +110,7 @@ def series_fps(table: pd.DataFrame, fps: float | None, path: Path, *, uneven: bo
     measured = _measured_fps(table, path, uneven=uneven) if "time_s" in table.columns else None
     if fps is None and measured is None:
         raise InputError(
-            f"{path.name} has no column time_s (it has {', '.join(map(str, table.columns))}); expected a "
+            f"{path.name} has no column time_s (it has {few(list(table.columns))}); expected a "
             "track, or lid distances: give the recording's rate with --fps"
         )
     if fps is not None and not (np.isfinite(fps) and 10 <= fps <= 10_000):
@@ -189,6 +187,7 @@ def make_series(
         fps=fps,
         column=column,
         is_px=column.endswith("_px"),
+        note=table.attrs.get(NOTE, ""),
         bridged_frames=bridged,
         missing_frames=int(missing.sum()),
         lower_up_mm=up,
@@ -227,7 +226,9 @@ def resampled(table: pd.DataFrame, columns: Sequence[str]) -> pd.DataFrame:
     if "status" in table.columns:
         nearest = np.clip(np.searchsorted(times, even), 0, times.size - 1)
         data["status"] = table["status"].iloc[nearest].reset_index(drop=True)
-    return pd.DataFrame(data)
+    even_table = pd.DataFrame(data)
+    even_table.attrs = table.attrs
+    return even_table
 
 
 def read_series(

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from experiments.errors import InputError, did_you_mean
+from experiments.errors import InputError, nearest
 from experiments.files import whole_file
 from stimuli_builder.blinks.events.levels import local_opening
 from stimuli_builder.blinks.profile import Array
@@ -34,6 +34,30 @@ class Scale:
     rule: str
 
 
+def check_scale(scale: str) -> float | None:
+    """Return the mm in a pixel that a wish for a scale gives, or None where it is a rule of `SCALES`.
+
+    Raises
+    ------
+    InputError
+        The wish is no number that can be, and no rule.
+    """
+    if scale in SCALES:
+        return None
+    try:
+        value = float(scale)
+    except ValueError:
+        rules = " or ".join(f"'{rule}'" for rule in SCALES)
+        near = nearest(scale, SCALES)
+        raise InputError(
+            f"--scale {scale}: expected a number of mm in a pixel, {rules}"
+            + (f"; did you mean '{near}'?" if near else "")
+        ) from None
+    if not (np.isfinite(value) and 0 < value < 10):
+        raise InputError(f"--scale is a number of mm in a pixel, above 0 and below 10, got {scale}")
+    return value
+
+
 def scale_of(table: pd.DataFrame, scale: str | None, path: Path) -> Scale | None:
     """Return the scale of a track: a number of mm in a pixel, or a rule of `SCALES`; None without a wish.
 
@@ -44,18 +68,13 @@ def scale_of(table: pd.DataFrame, scale: str | None, path: Path) -> Scale | None
     """
     if scale is None:
         return None
-    try:
-        value = float(scale)
-    except ValueError:
+    value = check_scale(scale)
+    if value is None:
         return _by_rule(table, scale, path)
-    if not (np.isfinite(value) and 0 < value < 10):
-        raise InputError(f"--scale is a number of mm in a pixel, above 0 and below 10, got {scale}")
     return Scale(value, f"{value:g} mm in a pixel, as given (a card or a ruler in the picture)")
 
 
 def _by_rule(table: pd.DataFrame, rule: str, path: Path) -> Scale:
-    if rule not in SCALES:
-        raise InputError(f"--scale {rule}: expected a number or a rule{did_you_mean(rule, SCALES)}")
     count = 18 if rule == "inter-ocular" else 9
     names = [f"{axis}{point:02d}" for point in range(1, count + 1) for axis in "xy"]
     if not set(names) <= set(table.columns):

@@ -23,7 +23,9 @@ Examples:
 
 
 def checks_command(
-    experiment: Annotated[str, typer.Argument(help="exp1, exp2, exp3 or a TOML file.", show_default=False)],
+    experiment: Annotated[
+        str, typer.Argument(help="exp1 to exp3, a demo, or a TOML file.", show_default=False)
+    ],
     out: Annotated[Path, typer.Option(help="Folder that holds the study's clips and manifest.json.")],
     seed: Annotated[
         int | None, typer.Option(min=0, help="Seed; a secret one is drawn, and kept, where not given.")

@@ -26,6 +26,17 @@ Examples:
 
   stimuli clip --profile mine.csv --character my_renders/ --size 1920x720 --fps 60 --out big.mp4
 """
+OPTIONS = {
+    "duration_frames": "--duration",
+    "duration_ms": "--duration-ms",
+    "brow_mm": "--brow-mm",
+    "cheek_mm": "--cheek-mm",
+    "squint_mm": "--squint-mm",
+    "gaze_mm": "--gaze-mm",
+    "width_px": "--size (width)",
+    "height_px": "--size (height)",
+}
+"""Keys of a declaration's [render], and the options that stand for them here."""
 Amplitude = Literal["full", "natural"]
 LowerLid = Literal["both", "vertical", "horizontal", "none"]
 Eyes = Literal["alike", "separate"]
@@ -112,5 +123,10 @@ def settings_from(**values: object) -> "RenderSettings":
         return RenderSettings.model_validate(values)
     except ValidationError as error:
         first = error.errors()[0]
-        option = str(first["loc"][-1]) if first["loc"] else "value"
-        raise InputError(f"{option}: {wrong_value(first)}") from error
+        option = f"{_option(str(first['loc'][-1]))}: " if first["loc"] else ""
+        words = wrong_value(first).split(" ")
+        raise InputError(option + " ".join(map(_option, words))) from error
+
+
+def _option(key: str) -> str:
+    return OPTIONS.get(key, key)

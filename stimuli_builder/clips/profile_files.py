@@ -6,11 +6,15 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from experiments.errors import InputError, did_you_mean
+from experiments.errors import InputError, nearest
 from stimuli_builder.blinks.profile import Array, BlinkProfile
 from stimuli_builder.blinks.profile_table import read_profile_table
 
 COLUMNS = ("closure", "closure_other", "lower_up_mm", "lower_nasal_mm")
+FORMATS = (
+    "expected one blink (a column closure, 0 open to 1 closed, at 300 fps) or a table of profiles "
+    "(NAME.profiles.csv of `stimuli blinks`, with a column profile_id)"
+)
 
 
 def read_closure_file(path: Path) -> list[BlinkProfile]:
@@ -28,9 +32,10 @@ def read_closure_file(path: Path) -> list[BlinkProfile]:
     table = _table(path)
     if "profile_id" in table.columns:
         return read_profile_table(path)
-    unknown = [str(name) for name in table.columns if name not in COLUMNS]
     if "closure" not in table.columns:
-        raise InputError(f"{path.name}: no column 'closure'{did_you_mean('closure', unknown)}")
+        near = nearest("closure", [str(name) for name in table.columns if name not in COLUMNS])
+        hint = f"did you mean '{near}'?" if near else FORMATS
+        raise InputError(f"{path.name}: no column 'closure'; {hint}")
     signals = {name: _numbers(path, table, name) for name in COLUMNS if name in table.columns}
     closure = signals["closure"]
     if len(closure) < 3:

@@ -37,7 +37,11 @@ def read_audio(path: Path) -> tuple[bytes, float]:
             ]
             frames += [part.to_ndarray() for part in resampler.resample(None)]
     except (av.FFmpegError, OSError) as error:
-        raise InputError(f"{path}: expected sound that can be read (WAV, MP3, FLAC, ...): {error}") from error
+        reason = error.strerror or "it cannot be decoded"  # without the number, which says nothing to people
+        raise InputError(
+            f"{path}: expected sound that can be read (WAV, MP3, FLAC, ...) or subtitles (.vtt, .srt): "
+            f"{reason}"
+        ) from error
     samples = np.concatenate([frame.ravel() for frame in frames]) if frames else np.zeros(0, dtype=np.int16)
     if not samples.size:
         raise InputError(f"{path}: expected sound, the file holds no samples")

@@ -26,7 +26,7 @@ def scope(
     film: Annotated[
         Path,
         typer.Argument(
-            metavar="VIDEO", help="Film of the patch, or CSV of a photodiode.", show_default=False
+            metavar="video", help="Film of the patch, or CSV of a photodiode.", show_default=False
         ),
     ],
     camera_fps: Annotated[

@@ -97,12 +97,16 @@ def _document(path: Path) -> dict[str, Any]:
 def _size(path: Path, document: dict[str, Any]) -> tuple[int, int]:
     size = document.get("image_size_px")
     whole = isinstance(size, list) and len(size) == 2 and all(type(side) is int and side > 0 for side in size)
+    if size is None:
+        raise InputError(f"{path}: 'image_size_px' is missing; expected [width, height] of the video")
     if not whole:
         raise InputError(f"{path}: expected 'image_size_px': [width, height], found {size!r}")
     return size[0], size[1]  # type: ignore[index]
 
 
 def _frames(path: Path, data: object) -> dict[int, Points]:
+    if data is None:
+        raise InputError(f"{path}: 'frames' is missing; expected the points of each labelled frame")
     if not isinstance(data, dict):
         raise InputError(f"{path}: expected 'frames': {{frame number: points}}, found {type(data).__name__}")
     if len(data) < FEWEST_FRAMES:

@@ -12,7 +12,11 @@ def test_each_test_that_the_page_names_is_there() -> None:
     named = NAMED.findall((REPOSITORY / "docs" / "security.md").read_text(encoding="utf-8"))
     assert len(named) > 30
     for file, name in named:
-        path = REPOSITORY / "tests" / (file if file.startswith("deploy/") else f"server/{file}")
+        path = (
+            REPOSITORY
+            / "tests"
+            / (file.removeprefix("tests/") if file.startswith("tests/") else f"server/{file}")
+        )
         functions = {
             node.name
             for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))

@@ -65,6 +65,10 @@ def test_an_unknown_experiment_is_refused_with_the_nearest() -> None:
         load_experiment("robots")
     with pytest.raises(InputError, match=r"no experiment 'exp11'; did you mean 'exp1'\?"):
         load_experiment("exp11")
+    with pytest.raises(
+        InputError, match=r"'exp9'; did you mean 'exp3'\? Expected one of: exp1, exp2, exp3, pairs"
+    ):
+        load_experiment("exp9")
 
 
 def test_a_missing_file_is_named() -> None:

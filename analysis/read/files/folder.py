@@ -95,7 +95,7 @@ def _look_through(folder: Path, stamps: tuple[tuple[Path, int, int], ...]) -> Fo
     # any cell that holds something: of runs broken off programs write empty files
     filled = [path for path, rows in tables.items() if any(rows[name].str.strip().any() for name in rows)]
     if not filled:
-        raise InputError(f"no data file of the folder {folder.name} has rows")
+        raise InputError(f"no data file of the folder {folder.resolve().name} has rows")
     files = tuple(DataFile(path, tuple(delimited_header(path)[0]), names_of(folder, path)) for path in filled)
     sort = "Psych-DS folder" if _is_psych_ds(folder) else "folder"
     said = [f"read {len(files)} data file{'s' * (len(files) > 1)} of the {sort} {folder.name}"]
@@ -120,7 +120,7 @@ def _data_paths(folder: Path) -> list[Path]:
         if path.is_file() and not any(part.startswith(".") for part in path.relative_to(folder).parts)
     )
     if not files:
-        raise InputError(f"{folder.name} is a folder without data files; expected {expected}")
+        raise InputError(f"{folder.resolve().name} is a folder without data files; expected {expected}")
     return files
 
 

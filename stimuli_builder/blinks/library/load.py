@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from experiments.errors import InputError
+from stimuli_builder.blinks.csv_table import read_table
 from stimuli_builder.blinks.library.recordings import LIBRARY_FOLDER
 from stimuli_builder.blinks.profile import Array, BlinkProfile
 from stimuli_builder.blinks.profile_table import read_profile_table
-from stimuli_builder.blinks.series import read_table
 
 
 def load_library(*, paired: bool = False) -> tuple[BlinkProfile, ...]:

@@ -36,6 +36,16 @@ def test_a_folder_with_a_file_a_person_is_one_table(tmp_path, psychopy) -> None:
     assert data.decisions[0] == "read 3 data files of the folder f"
 
 
+def test_a_column_that_a_folder_lacks_is_told_with_the_folder(tmp_path, monkeypatch) -> None:
+    folder = folder_of(tmp_path / "f")
+    told = r"^the folder f \(all its \.csv files as one table\) has no column 'rating'"
+    with pytest.raises(InputError, match=told):
+        read_long_table(folder, "file", "rating", ["face"])
+    monkeypatch.chdir(folder)
+    with pytest.raises(InputError, match=told):
+        read_long_table(Path(), "file", "rating", ["face"])
+
+
 def test_broken_runs_and_copies_in_a_folder_are_named(tmp_path) -> None:
     folder = folder_of(tmp_path / "f")
     (folder / "p8.csv").write_text("", encoding="utf-8")

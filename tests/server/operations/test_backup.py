@@ -145,7 +145,7 @@ class TestRefusals:
         with pytest.raises(InputError):
             restore(target, cut)
         (tmp_path / "text.tar").write_text("hello")
-        with pytest.raises(InputError, match="no backup"):
+        with pytest.raises(InputError, match=r"no backup of `server backup`; name a file that it wrote$"):
             restore(target, tmp_path / "text.tar")
         with pytest.raises(InputError, match="cannot be read"):
             restore(target, tmp_path / "nothing.tar")

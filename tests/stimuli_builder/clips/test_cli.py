@@ -112,10 +112,11 @@ def test_one_clip(
         (("--profile", "nowhere.csv"), "nowhere.csv"),
         (("--character", "cartoonn"), "no character 'cartoonn'"),
         (("--size", "big"), "expected WIDTHxHEIGHT"),
-        (("--size", "4000x360"), "width_px"),
+        (("--size", "4000x360"), "--size (width): expected at most"),
+        (("--duration", -4), "error: --duration: expected more than"),
         (("--lower-lid", "both"), "has no lower-lid layer"),
         (("--clip-frames", 12), "longer than the clip of 12 frames"),
-        (("--duration", 1), "duration_frames"),
+        (("--duration", 1), "got --duration 1 at 30 fps"),
         (("--profile", "espbm-left-01", "--eyes", "separate"), "shows one eye"),
     ],
 )

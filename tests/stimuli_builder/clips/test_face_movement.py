@@ -184,7 +184,7 @@ def test_what_cannot_move_is_said_in_one_line(alder: LevelSet) -> None:
     with pytest.raises(InputError, match="is drawn with eyes that look straight on; leave gaze_mm"):
         check_look(settings, geometry("cartoon"))
     check_look(settings_from(character="cartoon", gaze_mm=0.0), geometry("cartoon"))
-    with pytest.raises(InputError, match=r"brow_mm: expected at most 1, got 1\.5"):
+    with pytest.raises(InputError, match=r"--brow-mm: expected at most 1, got 1\.5"):
         settings_from(brow_mm=1.5)
     elsewhere = replace(geometry("alder@5"), inter_ocular_mm=16.0)
     with pytest.raises(InputError, match=r"no eye that shuts lies 8 mm beside .* leave out brow_mm"):

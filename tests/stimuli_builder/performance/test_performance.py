@@ -168,3 +168,7 @@ def test_a_file_without_sound_is_refused(tmp_path: Path) -> None:
     empty = write_wave(tmp_path / "empty.wav", np.zeros(0, dtype=np.int16))
     with pytest.raises(InputError, match="expected sound"):
         speech_in_audio(empty)
+    table = tmp_path / "empty.csv"
+    table.touch()
+    with pytest.raises(InputError, match=r"or subtitles \(\.vtt, \.srt\): [^\[]+$"):
+        speech_in_audio(table)

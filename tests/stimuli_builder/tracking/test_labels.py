@@ -45,6 +45,8 @@ def spoil(document, how):
         document["frames"]["0" + frame] = points
     elif how == "size":
         document["image_size_px"] = [512]
+    elif how == "no size":
+        del document["image_size_px"]
     elif how == "no frames":
         del document["frames"]
     elif how == "canthi":
@@ -62,6 +64,7 @@ def spoil(document, how):
         ("swapped points", "cross; check the point order"),
         ("lids crossed", "lies above the upper lid"),
         ("eyes swapped", "the eyes are swapped"),
+        ("no size", "'image_size_px' is missing; expected [width, height]"),
         ("count", "expected 18 points (or 9 for one eye), found 17"),
         ("mixed", "some frames have 9 points and some 18"),
         ("text", "point 1 is ['a', 3], expected [x, y]"),
@@ -69,7 +72,7 @@ def spoil(document, how):
         ("key", "expected a frame number from 0, found 'first'"),
         ("same frame", "occurs twice"),
         ("size", "expected 'image_size_px'"),
-        ("no frames", "expected 'frames'"),
+        ("no frames", "'frames' is missing; expected the points"),
         ("canthi", "under 4 px apart"),
         ("markers", "expected points 9 to 17"),
     ],

@@ -1,0 +1,76 @@
+"""Examples in `--help` are lines that a shell takes as they are printed."""
+
+import re
+import shlex
+from importlib import import_module
+
+import pytest
+import typer
+
+from experiments.help_examples import broken, whole_examples
+from experiments.lazy_commands import commands_of
+
+PROGRAMS = ("stimuli", "server", "analysis")
+MODULES = {"stimuli": "stimuli_builder.cli", "server": "server.cli", "analysis": "analysis.cli"}
+WIDTH = 78
+
+
+def commands(program):
+    """Every command of a program with its path, groups included."""
+    module = import_module(MODULES[program])
+    root = typer.main.get_command(module.app)
+    for name in {name for name, _ in getattr(module, "COMMANDS", {}).values()}:
+        root.commands.update(commands_of(name))
+    waiting = [(program, root)]
+    while waiting:
+        path, command = waiting.pop()
+        yield path, command
+        waiting += [(f"{path} {name}", one) for name, one in getattr(command, "commands", {}).items()]
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_every_example_can_be_pasted(program, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    seen = 0
+    for path, command in commands(program):
+        with command.context_class(command, info_name=path) as context:
+            printed = command.get_help(context)
+        joined = [
+            " ".join(shlex.split(line))
+            for line in printed.replace("\\\n", " ").splitlines()[1:]
+            if line.strip().startswith(program + " ") and line.startswith("    ")
+        ]
+        text = command.help or ""
+        examples = [one.strip().partition(" # ")[0] for one in text.split("\n\n") if is_example(one, program)]
+        for example in examples:
+            assert any(" ".join(shlex.split(example)) == line.partition(" # ")[0] for line in joined), example
+        seen += len(examples)
+        for line in printed.splitlines():
+            assert len(line) <= WIDTH, f"{path}: {line}"
+    assert seen > 10
+
+
+def is_example(paragraph, program):
+    return bool(re.match(rf" +{program} ", paragraph.strip("\n"))) and "\n" not in paragraph.strip()
+
+
+def test_a_command_is_broken_before_options():
+    assert broken("stimuli build exp1 --out clips --preview", 28) == [
+        "stimuli build exp1 \\",
+        "    --out clips --preview",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("comment", "expected"),
+    [
+        ("short", "  a bc --long value \\\n      --more x  # short"),
+        (
+            "a comment too long to stand",
+            "  # a comment too long to stand\n  a bc --long value \\\n      --more x",
+        ),
+    ],
+)
+def test_a_comment_never_swallows_the_rest_of_its_command(comment, expected):
+    text = f"What it is.\n\n  a bc --long value --more x   # {comment}"
+    assert whole_examples(text, 28) == f"What it is.\n\n\b\n{expected}"

@@ -1,0 +1,118 @@
+"""Series as spreadsheets and other programs write them, and files that are none."""
+
+import pandas as pd
+import pytest
+
+from experiments.errors import InputError
+from stimuli_builder.blinks.csv_table import NOTE, read_table
+from stimuli_builder.blinks.series import read_series
+
+
+def test_semicolons_and_decimal_commas_are_read_and_said(stimuli, series_file, tmp_path):
+    plain = ("--column", "gap_l", "--fps", 300, "--out")
+    german = tmp_path / "german.csv"
+    pd.read_csv(series_file).to_csv(german, sep=";", decimal=",", index=False)
+    assert stimuli("blinks", series_file, *plain, tmp_path / "a.csv").code == 0
+    ended = stimuli("blinks", german, *plain, tmp_path / "b.csv")
+    assert ended.code == 0, ended.err
+    assert "note: german.csv: columns parted by semicolons, decimal commas (e.g. '" in ended.err
+    assert (tmp_path / "a.csv").read_bytes() == (tmp_path / "b.csv").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("text", "values", "note"),
+    [
+        ("frame,a\n0,0.5\n1,\n", [0.5, None], None),
+        ("frame\ta\n0\t0.5\n1\t0.25\n", [0.5, 0.25], "t.csv: columns parted by tabs"),
+        ("\ufefframe;a\n0;0,5\n1;1\n", [0.5, 1], "read as decimal points"),
+        ('frame,a\n0,"0,5"\n1,\n', [0.5, None], "t.csv: decimal commas (e.g. '0,5') read"),
+    ],
+)
+def test_a_table_is_read_by_its_separator(tmp_path, text, values, note):
+    path = tmp_path / "t.csv"
+    path.write_text(text, encoding="utf-8")
+    table = read_table(path)
+    assert table["a"].astype(object).where(table["a"].notna(), None).tolist() == values
+    assert (note or "") in table.attrs.get(NOTE, "")
+    assert (NOTE in table.attrs) == (note is not None)
+
+
+def test_words_beside_decimal_commas_stay_words(tmp_path):
+    path = tmp_path / "t.csv"
+    path.write_text("frame;a\n0;0,5\n1;lost\n", encoding="utf-8")
+    with pytest.raises(InputError, match="must hold numbers"):
+        read_series(path, ["a"], 240)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (bytes([0x93, 0xFF, 0x00]), r"rub\.csv is not UTF-8 text .*; save it as CSV UTF-8"),
+        (b"\0\1", r"rub\.csv is not UTF-8 text .*; save it as CSV UTF-8"),
+        (b"", r"rub\.csv is empty; expected"),
+        (b"\n \n", r"rub\.csv is empty; expected"),
+    ],
+)
+def test_what_is_no_text_is_refused_by_what_it_is(tmp_path, content, message):
+    path = tmp_path / "rub.csv"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=message):
+        read_table(path)
+
+
+def test_a_folder_is_refused_as_one(tmp_path):
+    with pytest.raises(InputError, match="expected a CSV file, this is a folder"):
+        read_table(tmp_path)
+
+
+def test_an_unknown_column_is_answered_with_plausible_ones(tmp_path):
+    path = tmp_path / "t.csv"
+    points = ",".join(f"x{number:02d}" for number in range(1, 58))
+    row = ",".join(["0.5"] * 57)
+    path.write_text(f"frame,{points},left_distance_px,right_distance_px\n0,{row},3.5,3.5\n", encoding="utf-8")
+    with pytest.raises(InputError) as refused:
+        read_series(path, ["nope"], 240)
+    assert str(refused.value).endswith(
+        "no column 'nope'; expected one of: left_distance_px, right_distance_px"
+    )
+
+
+def test_many_candidates_are_not_all_listed(tmp_path):
+    path = tmp_path / "t.csv"
+    path.write_text(
+        ",".join(f"x{number}" for number in range(50)) + "\n" + ",".join(["0.5"] * 50) + "\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(InputError, match=r"it has x0, x1, x2, x3, x4, x5 and 44 more$"):
+        read_series(path, [], 240)
+
+
+@pytest.mark.parametrize("more", [(), ("--lids", "lids.csv")])
+def test_a_scale_nobody_knows_is_refused_always(stimuli, series_file, monkeypatch, tmp_path, more):
+    monkeypatch.chdir(tmp_path)
+    call = (
+        "blinks",
+        series_file,
+        "--column",
+        "gap_l",
+        "--fps",
+        300,
+        "--out",
+        "b.csv",
+        "--scale",
+        "foo",
+        *more,
+    )
+    ended = stimuli(*call)
+    assert ended.code == 2
+    assert ended.err == (
+        "error: --scale foo: expected a number of mm in a pixel, 'inter-ocular' or 'eye-width'\n"
+    )
+    assert not (tmp_path / "b.csv").exists()
+
+
+def test_a_scale_without_effect_is_said(stimuli, series_file, tmp_path):
+    call = ("blinks", series_file, "--column", "gap_l", "--fps", 300, "--out", tmp_path / "b.csv")
+    ended = stimuli(*call, "--scale", "0.25")
+    assert ended.code == 0
+    assert ended.err == "note: --scale has no effect here: mm stand in what --lids and --report write\n"
