@@ -20,6 +20,7 @@ OPENING_MM = {
     "alder@3": 10.07,
     "alder@4": 10.07,
     "birch": 9.66,
+    "birch@3": 9.66,
     "cedar": 9.85,
     "hazel": 10.91,
 }
