@@ -7,7 +7,7 @@ const page = new EventTarget();
 const WINDOW_PX = 800;
 
 beforeEach(() => {
-  vi.stubGlobal("Element", class {});
+  vi.stubGlobal("Element", AButton);
   vi.stubGlobal("window", Object.assign(new EventTarget(), { innerHeight: WINDOW_PX }));
   vi.stubGlobal("document", Object.assign(page, { querySelector: () => null, createElement: () => new AButton() }));
 });
