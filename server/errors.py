@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
-from fastapi.responses import JSONResponse
+from fastapi.responses import HTMLResponse, JSONResponse, Response
 from pydantic import BaseModel, Field
 from sqlalchemy.exc import DataError, DBAPIError
 from sqlalchemy.exc import TimeoutError as PoolTimeout
@@ -151,12 +151,36 @@ async def _not_valid(request: Request, error: Exception) -> JSONResponse:
     return error_response(422, "invalid", problems[0], {"problems": problems})
 
 
-async def _http(_request: Request, error: Exception) -> JSONResponse:
+async def _http(request: Request, error: Exception) -> Response:
     if not isinstance(error, HTTPException):
         raise error
+    if error.status_code == 404 and _is_for_a_person(request):
+        return HTMLResponse(_NOTHING_HERE, status_code=404)
     # Python has changed its mind about the name of 413.
     code = "too_large" if error.status_code == 413 else HTTPStatus(error.status_code).name.lower()
     return error_response(error.status_code, code, str(error.detail), headers=error.headers)
+
+
+_NOTHING_HERE = """<!doctype html>
+<html lang="en">
+  <head>
+    <meta charset="utf-8">
+    <meta name="viewport" content="width=device-width, initial-scale=1">
+    <title>Nothing is here</title>
+  </head>
+  <body>
+    <h1>Nothing is here</h1>
+    <p>The address may be mistyped. A study is reached by the link you were given.</p>
+    <p><a href="/admin/">For experimenters</a></p>
+  </body>
+</html>
+"""
+
+
+def _is_for_a_person(request: Request) -> bool:
+    """Whether a browser shows the answer as a page: it alone asks for HTML first, and not of the API."""
+    first = request.headers.get("accept", "").split(",")[0].split(";")[0].strip().lower()
+    return first == "text/html" and not request.url.path.startswith("/api/")
 
 
 async def _out_of_range(_request: Request, _error: Exception) -> JSONResponse:

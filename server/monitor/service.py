@@ -103,7 +103,7 @@ def monitored(run: Any, moment: datetime, lease: timedelta) -> MonitoredRun:
             "phase": run.phase,
             "origin": run.origin,
             "status": run.status,
-            "stage": run.stage,
+            "stage": stage_reached(run),
             "presence": presence,
             "started_at": run.started_at,
             "last_seen_at": run.last_seen_at,
@@ -119,11 +119,16 @@ def monitored(run: Any, moment: datetime, lease: timedelta) -> MonitoredRun:
     )
 
 
+def stage_reached(run: Any) -> str:
+    """The stage of a run or a count of runs; what a page told last stays behind once all is complete."""
+    return "done" if run.status == "complete" else str(run.stage)
+
+
 def funnel(kinds: Sequence[RunCount]) -> list[FunnelStep]:
     """How many runs reached each stage, in the order of a visit."""
     reached = Counter[int]()
     for kind in kinds:
-        reached[STAGES.index("done" if kind.status == "complete" else kind.stage)] += kind.runs
+        reached[STAGES.index(stage_reached(kind))] += kind.runs
     return [
         FunnelStep(stage=stage, runs=sum(runs for far, runs in reached.items() if far >= position))
         for position, stage in enumerate(STAGES)

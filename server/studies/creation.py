@@ -1,5 +1,7 @@
 """New studies and new versions: definition and clips are checked and stored before the database changes."""
 
+import shlex
+from functools import cache
 from pathlib import Path
 
 from experiments.definition import Experiment
@@ -23,16 +25,28 @@ from server.workspaces.service import workspace_for
 
 
 def shipped(services: Services) -> list[ShippedExperiment]:
-    """The experiments that come with the program; demonstrations where their clips are built."""
+    """The experiments and demonstrations that come with the program, their clips built or not."""
     experiments = []
     for name in (*SHIPPED, *DEMOS):
         text = locate(name).read_text(encoding="utf-8")
-        ready = (services.settings.stimuli_folder / name / MANIFEST_NAME).is_file()
-        if not ready and name in DEMOS:
-            continue
-        title = parse_experiment(text).title
-        experiments.append(ShippedExperiment(name=name, title=title, toml=text, clips_ready=ready))
+        folder = services.settings.stimuli_folder / name
+        experiments.append(
+            ShippedExperiment(
+                name=name,
+                title=_title(text),
+                toml=text,
+                demonstration=name in DEMOS,
+                clips_ready=(folder / MANIFEST_NAME).is_file(),
+                build=f"stimuli build {name} --out {shlex.quote(str(folder))}",
+            )
+        )
     return experiments
+
+
+@cache
+def _title(text: str) -> str:
+    """The declared title; kept, as all shipped declarations take most of a second to read."""
+    return parse_experiment(text).title
 
 
 def create(services: Services, order: NewStudy, identity: Identity) -> str:

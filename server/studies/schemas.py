@@ -20,7 +20,9 @@ class ShippedExperiment(BaseModel):
     name: str
     title: str
     toml: str
+    demonstration: bool = Field(description="True for those that are none of the paper's experiments.")
     clips_ready: bool = Field(description="True where `stimuli build` has made its clips on this server.")
+    build: str = Field(description="The command that builds its clips where this server looks for them.")
 
 
 class NewStudy(RequestBody):

@@ -59,6 +59,16 @@ def test_assets_do_not_climb_out(client: TestClient, pages: Path, name: str) -> 
     assert client.get(f"/assets/participant/{name}").status_code == 404
 
 
+def test_a_browser_gets_a_page_where_nothing_is_and_a_program_json(client: TestClient) -> None:
+    browser = {"accept": "text/html,application/xhtml+xml,application/xml;q=0.9,*/*;q=0.8"}
+    answer = client.get("/nothing", headers=browser)
+    assert (answer.status_code, answer.headers["content-type"]) == (404, "text/html; charset=utf-8")
+    assert "Nothing is here" in answer.text
+    assert "default-src 'none'" in answer.headers["content-security-policy"]
+    for path, headers in (("/api/nothing", browser), ("/nothing", {}), ("/nothing", {"accept": "*/*"})):
+        assert client.get(path, headers=headers).json()["error"]["code"] == "not_found"
+
+
 def test_pages_that_are_not_built_say_so(client: TestClient) -> None:
     answer = client.get("/run/some-token")
     assert (answer.status_code, answer.json()["error"]["code"]) == (503, "pages_not_built")

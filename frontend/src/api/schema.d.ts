@@ -8114,10 +8114,20 @@ export interface components {
             /** Toml */
             toml: string;
             /**
+             * Demonstration
+             * @description True for those that are none of the paper's experiments.
+             */
+            demonstration: boolean;
+            /**
              * Clips Ready
              * @description True where `stimuli build` has made its clips on this server.
              */
             clips_ready: boolean;
+            /**
+             * Build
+             * @description The command that builds its clips where this server looks for them.
+             */
+            build: string;
         };
         /**
          * ShownAnswer

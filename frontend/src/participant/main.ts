@@ -179,11 +179,16 @@ async function enter(entry: Entry, identity: Identity, store: OutboxStore, start
   for (const { reason } of warnings) session.events.add(reason === "gate_storage" ? "storage_blocked" : "unsupported", { reason });
   if (kept) session.events.add("offline", { loaded_without_server: true });
   if (run.resumable_until) serveOffline();
+  // Asked for now, so that it is here when it is wanted, also without a connection.
+  const last = loadModule(() => import("./screens/completion"));
   await play(session, started, store.durable, () => {
     keeping.begin({ link, started, run: session.run });
     if (session.run.resumable_until) serveOffline();
   });
-  if (session.completion) keeping.forget();
+  if (!session.completion) return;
+  keeping.forget();
+  const { nextPerson, showCompletion } = await last;
+  showCompletion(session, emptied(root), session.completion, nextPerson(session.t, identity));
 }
 
 /** An outbox whose answers keep the visit up to date, and tell where the run ends or goes on elsewhere. */
@@ -234,9 +239,8 @@ async function play(session: Session, started: RunStarted, durable: boolean, has
     end();
   });
   root.addEventListener("taken-over", end);
-  // Asked for now, so that they are here when they are wanted, also without a connection.
+  // Asked for now, as the last page is.
   const dialog = loadModule(() => import("./screens/stop-dialog"));
-  const last = loadModule(() => import("./screens/completion"));
   root.addEventListener("stop", () => void dialog.then(({ openStopDialog }) => openStopDialog(session)));
   watch(session);
   fetchFirst(session);
@@ -249,9 +253,7 @@ async function play(session: Session, started: RunStarted, durable: boolean, has
     root.replaceChildren();
   }
   await runTimeline(root, timeline(session, started.run_token), simulation(run));
-  if (!session.completion) return;
-  storageOf("sessionStorage")?.removeItem(RETURNED);
-  (await last).showCompletion(session, emptied(root), session.completion);
+  if (session.completion) storageOf("sessionStorage")?.removeItem(RETURNED);
 }
 
 /** Only previews and synthetic runs may answer themselves. */

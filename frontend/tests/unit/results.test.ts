@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { cellRows, marginRows } from "../../src/admin/results/figure-rows";
 import { labelOfOrigin } from "../../src/admin/results/origins";
-import { cellLabels, cellPlot, countTicks } from "../../src/admin/results/plots";
+import { cellLabels, cellPlot, countTicks, marginPlot } from "../../src/admin/results/plots";
 import { seriesLabels, seriesPlot } from "../../src/admin/results/threshold-plots";
 import { csvText } from "../../src/admin/ui/figure-files";
 import { counted } from "../../src/admin/ui/format";
@@ -12,6 +12,15 @@ const factor = (name: string, ...levels: [string, string][]) => ({
   levels: levels.map(([level, label]) => ({ name: level, label })),
 });
 const FACTORS = [factor("character", ["a", "Anna"], ["b", "Bert"]), factor("speed", ["100", "100 ms"], ["20", "20 ms"])];
+
+it("a figure of means tells of bars only where there are some", () => {
+  const caption = (se_within: number | null): unknown => {
+    const means = [{ levels: { speed: "20" }, mean: 2, se_within, participants: 1 }];
+    return marginPlot({ factors: ["speed"], means }, { scale: { name: "rating", minimum: 1, maximum: 7 } } as never, FACTORS).caption;
+  };
+  expect(caption(0.2)).toMatch(/^Bars:/);
+  expect(caption(null)).toMatch(/^No bars:/);
+});
 
 describe("figures that are saved", () => {
   it("have their numbers under the labels of the study, in declared order", () => {

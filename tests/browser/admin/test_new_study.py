@@ -110,3 +110,11 @@ def test_own_clips_to_a_live_link(dashboard: Dashboard, clips: list[Path]) -> No
 
     opened = page.request.get(dashboard.server.address + link[link.index("/run/") :])
     assert opened.ok
+
+
+def test_demonstrations_that_are_not_built_are_named_with_their_commands(dashboard: Dashboard) -> None:
+    page = dashboard.open("/")
+    page.get_by_role("link", name="New study").click()
+    expect(page.get_by_role("listitem").filter(has_text="stimuli build pairs-demo --out ")).to_have_count(1)
+    page.goto(f"{dashboard.server.address}/nothing")
+    expect(page.get_by_role("heading", name="Nothing is here")).to_be_visible()

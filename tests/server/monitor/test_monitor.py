@@ -84,6 +84,22 @@ def test_every_run_is_counted_and_the_latest_are_listed(
     assert (reached["consent"], reached["done"]) == (3, 1)
 
 
+def test_a_finished_run_is_done_in_the_table_as_in_the_funnel(
+    viewer: Admin, participant: Participant
+) -> None:
+    participant.agree()
+    participant.request("PUT", "/stage", {"stage": "debrief"})
+    participant.answer_all()
+    assert participant.request("POST", "/complete").status_code == 200
+    shown = viewer.get("/studies/short/monitor").json()
+    [run] = shown["runs"]
+    assert (run["presence"], run["stage"], shown["funnel"][-1]) == (
+        "finished",
+        "done",
+        {"stage": "done", "runs": 1},
+    )
+
+
 def test_the_monitor_is_of_one_origin_and_tells_how_many_others_there_are(
     viewer: Admin, study: StudyInDatabase, client: TestClient
 ) -> None:

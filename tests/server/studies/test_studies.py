@@ -449,3 +449,15 @@ def test_an_edit_that_cannot_be_used_is_refused_with_its_line(
     answer = experimenter.send("POST", "/studies/short/versions/check", wrong)
     assert answer.status_code == 422
     assert "per_cell" in answer.json()["error"]["message"]
+
+
+def test_shipped_experiments_say_how_their_clips_are_built(viewer: Admin, services: Services) -> None:
+    folder = services.settings.stimuli_folder
+    (folder / "sliders-demo").mkdir(parents=True)
+    (folder / "sliders-demo" / "manifest.json").write_text("{}")
+    shipped = {one["name"]: one for one in viewer.get("/experiments").json()}
+    assert shipped["sliders-demo"]["clips_ready"]
+    demo = shipped["pairs-demo"]
+    assert (demo["demonstration"], demo["clips_ready"]) == (True, False)
+    assert demo["build"] == f"stimuli build pairs-demo --out {folder / 'pairs-demo'}"
+    assert not shipped["exp1"]["demonstration"]

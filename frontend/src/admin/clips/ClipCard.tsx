@@ -8,13 +8,15 @@ import { changesOf } from "./changes";
 
 const ClosureFigure = onDemand(async () => (await import("../ui/ClosureFigure")).ClosureFigure);
 
-export function ClipCard({ study, clip }: { study: string; clip: Schemas["ClipOut"] }) {
+/** @param label the cell's name; by itself that of its levels */
+export function ClipCard({ study, clip, label = clip.cell }: { study: string; clip: Schemas["ClipOut"]; label?: string | undefined }) {
+  const name = `${label}, no. ${clip.exemplar}`;
   return (
     <Card withBorder padding="sm">
       <Text size="sm" fw={600} className="wrap-anywhere" mb={6}>
-        {clip.cell}, no. {clip.exemplar}
+        {name}
       </Text>
-      <ClipVideo url={clip.url} label={`${clip.cell}, no. ${clip.exemplar}`} />
+      <ClipVideo url={clip.url} label={name} />
       <Text size="xs" c="dimmed" mt={6} className="wrap-anywhere">
         {clip.profile !== "" && `${clip.profile}, `}
         {clip.frames} frames at {Number(clip.fps.toFixed(3))} fps, {Math.round(clip.bytes / 1024)} KiB

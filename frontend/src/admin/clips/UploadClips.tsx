@@ -1,7 +1,7 @@
 /** Clips of one's own: chosen or dropped, sent, looked into; what becomes of each. */
 
 import { Alert, Button, FileInput, Group, Progress, Select, Stack, Text } from "@mantine/core";
-import { useState } from "react";
+import { useState, type ReactNode } from "react";
 import type { Schemas } from "../api";
 import { onDemand } from "../ui/onDemand";
 import { sizeRemark } from "./sizes";
@@ -15,7 +15,7 @@ const FileTable = onDemand(async () => (await import("./FileTable")).FileTable);
 interface Props {
   upload: Upload;
   label?: string;
-  description?: string;
+  description?: ReactNode;
   accept?: string;
 }
 

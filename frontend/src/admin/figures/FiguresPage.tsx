@@ -2,7 +2,7 @@
 
 import { Stack, Tabs, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
-import { api, unwrap } from "../api";
+import { api, type Schemas, unwrap } from "../api";
 import { Answer } from "../ui/Answer";
 import { onDemand } from "../ui/onDemand";
 
@@ -28,7 +28,7 @@ export function FiguresPage() {
           <Tabs defaultValue="model" keepMounted={false}>
             <Tabs.List>
               <Tabs.Tab value="model">Model</Tabs.Tab>
-              <Tabs.Tab value="recorded">Recorded ({data.profiles.length})</Tabs.Tab>
+              <Tabs.Tab value="recorded">Recorded ({numberOf(data)})</Tabs.Tab>
               <Tabs.Tab value="playground">Playground</Tabs.Tab>
             </Tabs.List>
             <Tabs.Panel value="model" pt="md">
@@ -45,4 +45,10 @@ export function FiguresPage() {
       </Answer>
     </Stack>
   );
+}
+
+/** "21 + 9 in both eyes": as `stimuli profiles` counts, which tells pairs apart. */
+function numberOf({ profiles }: Schemas["BlinkLibrary"]): string {
+  const pairs = profiles.filter(({ eye }) => eye === "both").length;
+  return `${profiles.length - pairs}${pairs > 0 ? ` + ${pairs} in both eyes` : ""}`;
 }

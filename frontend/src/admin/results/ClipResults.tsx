@@ -49,7 +49,7 @@ export function ClipResults({ study, data, factors }: { study: string; data: Sch
                 <Table.Tr key={keyOf(clip)} bg={clip === current ? "var(--mantine-color-default-hover)" : ""}>
                   <Table.Td>
                     <button type="button" className="line-link" aria-pressed={clip === current} onClick={() => setChosen(keyOf(clip))}>
-                      {labels.get(clip.cell)} {clip.exemplar}
+                      {labels.get(clip.cell)}, no. {clip.exemplar}
                     </button>
                   </Table.Td>
                   <Table.Td className="number">{clip.ratings}</Table.Td>
@@ -66,7 +66,7 @@ export function ClipResults({ study, data, factors }: { study: string; data: Sch
           {shown === undefined ? (
             <Text c="dimmed">This clip is of an earlier version of the study.</Text>
           ) : (
-            <ClipCard key={shown.url} study={study} clip={shown} />
+            <ClipCard key={shown.url} study={study} clip={shown} label={labels.get(shown.cell)} />
           )}
         </Stack>
       </Group>

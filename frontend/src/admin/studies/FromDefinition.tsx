@@ -17,11 +17,12 @@ export function FromDefinition({ name, onTaken }: { name: string; onTaken: (mess
   const create = useCreate(onTaken, sent.forget);
   const [pattern, setPattern] = useState("");
   const levels = upload?.has_manifest === true ? null : { pattern };
+  const hasClips = experiments.data?.some(({ name: value, clips_ready }) => value === shipped && clips_ready) === true;
   const usable = useCheck(toml)?.design != null;
   const needed = [
     name === "" && "a short name (above)",
     !usable && "a definition without problems",
-    upload === null && shipped === null && "clips built for it, or a shipped experiment to begin with",
+    upload === null && !hasClips && "clips built for it, or a shipped experiment whose clips are built to begin with",
   ];
   return (
     <Stack>
@@ -42,7 +43,12 @@ export function FromDefinition({ name, onTaken }: { name: string; onTaken: (mess
       <UploadClips
         upload={sent}
         label="Clips built for it"
-        description="A zip of the folder that `stimuli build` or `stimuli manifest` wrote, or of clips alone. Not needed where the clips of the experiment chosen above fit."
+        description={
+          <>
+            A zip of the folder that <code>stimuli build</code> or <code>stimuli manifest</code> wrote, or of clips alone. Not needed where
+            the clips of the experiment chosen above fit.
+          </>
+        }
         accept=".zip"
       />
       {upload !== null && !upload.has_manifest && (

@@ -33,8 +33,18 @@ function beginning(session: Session): Node[] {
     if (needsScreenSetup(session) || needsSize(session)) steps.push((eyebrow) => screenNode(session, eyebrow));
     steps.push((eyebrow) => stageNode(session, "instructions", introduction(session, eyebrow)));
   }
-  const total = steps.length;
-  return steps.map((make, index) => make(t("step", { step: index + 1, steps: total })));
+  const before = stepsDone(session);
+  const total = before + steps.length;
+  return steps.map((make, index) => make(t("step", { step: before + index + 1, steps: total })));
+}
+
+/** Steps that this visit had before the page was loaded again: they keep their numbers. */
+function stepsDone(session: Session): number {
+  const { run, screen } = session;
+  if (!run.consented_at) return 0;
+  const forms = run.forms.filter(({ name, when }) => when === "before" && run.answered_forms.includes(name)).length;
+  const isMeasured = run.display.calibrate !== "off" && screen.calibration !== null && !needsScreenSetup(session);
+  return 1 + forms + Number(isMeasured);
 }
 
 const needsSize = ({ run, screen }: Session): boolean => run.display.calibrate !== "off" && screen.calibration === null;

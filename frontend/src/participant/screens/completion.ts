@@ -3,7 +3,20 @@ import type { Completion } from "../../api/schema";
 import { h } from "../../ui/element";
 import { markdown } from "../../ui/markdown";
 import { button, showPage } from "../../ui/page";
+import type { Translate } from "../../i18n";
+import type { Identity } from "../flow/identity";
 import type { Session } from "../session";
+
+/** Begin as another person: on a laboratory's computer she comes by the same link. */
+export function beginAnew(identity: Identity): void {
+  identity.forget();
+  location.reload();
+}
+
+/** The way on for another person; none where the address names who takes part. */
+export function nextPerson(t: Translate, identity: Identity): HTMLElement[] {
+  return identity.isNamed ? [] : [button(t("new_visit"), () => beginAnew(identity), "plain")];
+}
 
 /** The last page, also of who is screened out. It lies outside the timeline, which clears what its screens have shown. */
 export function showCompletion(

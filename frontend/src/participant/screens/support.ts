@@ -1,6 +1,6 @@
 /** What several screens need: a way to wait for one press, to save with a word about it, and to stop. */
 import { h } from "../../ui/element";
-import { isStartKey, listenKeys } from "../../ui/keys";
+import { clickNothing, isStartKey, listenKeys } from "../../ui/keys";
 import { button } from "../../ui/page";
 import type { Outcome } from "../outbox/outbox";
 import type { Session } from "../session";
@@ -21,7 +21,10 @@ export interface Choice<Value> {
   kind?: "primary" | "quiet" | "plain";
 }
 
-/** Buttons for `choices`; resolves with the one pressed. Enter presses the first where no field has the focus. */
+/**
+ * Buttons for `choices`; resolves with the one pressed. Enter presses the first where no field has the focus, and so does
+ * Space where there is no other, or `withSpace`.
+ */
 export function choose<Value>(session: Session, footer: HTMLElement, choices: Choice<Value>[], withSpace = false): Promise<Value> {
   const { signal, done } = screenSignal(session);
   return new Promise((resolve) => {
@@ -31,12 +34,19 @@ export function choose<Value>(session: Session, footer: HTMLElement, choices: Ch
     };
     const buttons = choices.map(({ label, value, kind }, index) => button(label, () => take(value), kind ?? (index ? "quiet" : "primary")));
     footer.append(...buttons);
+    const [first] = buttons;
     listenKeys((event) => {
-      if (event.key !== "Enter" && !(withSpace && isStartKey(event))) return;
-      event.preventDefault();
-      buttons[0]?.click();
+      if (!first || !isStartKey(event)) return;
+      if (event.key === " " && !withSpace && (choices.length > 1 || !isInSight(first))) return;
+      clickNothing(event);
+      first.click();
     }, signal);
   });
+}
+
+/** False where Space has still to scroll to it, as it does on every page that is read. */
+function isInSight(element: Element): boolean {
+  return element.getBoundingClientRect().bottom <= window.innerHeight;
 }
 
 /** What keeps answers from the server, in a word: it was not reached, or is busy; empty where it has answered or was not tried yet. */

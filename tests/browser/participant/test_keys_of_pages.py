@@ -1,0 +1,35 @@
+"""Space and Enter press a page's one button, also after presses of the mouse."""
+
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.browser.server_process import ServerProcess
+from tests.browser.studies import PLAIN
+from tests.browser.visit import Visit
+
+pytestmark = pytest.mark.browser
+
+
+def test_space_goes_on_after_presses_of_the_mouse(server: ServerProcess, tmp_path: Path, page: Page) -> None:
+    study = server.add_study(tmp_path / "clips", PLAIN)
+    server.start()
+    visit = Visit(page, server.address).open(study.link_token).begin()
+    page.wait_for_selector("text=Step 3 of 3")
+    page.reload()
+    page.wait_for_selector("text=Step 3 of 3")
+    page.keyboard.press(" ")
+    page.wait_for_selector("text=not part of the study")
+    page.click(".primary")
+    page.click(".below .primary")
+    page.click(".key >> nth=4")
+    page.wait_for_selector(".feedback")
+    page.keyboard.press(" ")
+    page.wait_for_selector("text=That was the practice")
+    page.keyboard.press(" ")
+    visit.trials()
+    expect(page.get_by_role("button", name="Another person takes part")).to_be_visible()
+    page.get_by_role("button", name="Another person takes part").click()
+    page.wait_for_selector("text=About")
+    assert visit.problems == []
