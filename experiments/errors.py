@@ -11,10 +11,10 @@ class InputError(ValueError):
     """
 
 
-def nearest(word: str, candidates: Iterable[str]) -> str | None:
-    """Return the candidate most like `word`, or None where nothing is near."""
+def nearest(word: str, candidates: Iterable[str], cutoff: float = 0.5) -> str | None:
+    """Return the candidate most like `word`, or None where none is as like as `cutoff` (1: the same)."""
     choices = {candidate.casefold(): candidate for candidate in candidates}
-    nearest = get_close_matches(word.casefold(), list(choices), n=1, cutoff=0.5)
+    nearest = get_close_matches(word.casefold(), list(choices), n=1, cutoff=cutoff)
     return choices[nearest[0]] if nearest else None
 
 

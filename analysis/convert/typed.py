@@ -34,7 +34,8 @@ def _reason(detail: Mapping[str, Any]) -> str:
         return "this is no JSON"
     parts = [f"column {part + 1}" if isinstance(part, int) else str(part) for part in detail["loc"][:2]]
     said = expectation(detail) is not None or detail["type"] == "missing"
-    problem = wrong_value(detail) if said else f"got {shown(detail['input'])}"
+    # what it says of the way out after the semicolon is TOML's
+    problem = wrong_value(detail).partition("; ")[0] if said else f"got {shown(detail['input'])}"
     return ": ".join([*parts, problem])
 
 

@@ -1,5 +1,6 @@
 """`stimuli clip`: one clip, without an experiment."""
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -124,8 +125,8 @@ def settings_from(**values: object) -> "RenderSettings":
     except ValidationError as error:
         first = error.errors()[0]
         option = f"{_option(str(first['loc'][-1]))}: " if first["loc"] else ""
-        words = wrong_value(first).split(" ")
-        raise InputError(option + " ".join(map(_option, words))) from error
+        words = re.sub(r"\w+", lambda key: _option(key[0]), wrong_value(first))
+        raise InputError(option + words) from error
 
 
 def _option(key: str) -> str:

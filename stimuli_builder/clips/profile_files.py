@@ -11,6 +11,8 @@ from stimuli_builder.blinks.profile import Array, BlinkProfile
 from stimuli_builder.blinks.profile_table import read_profile_table
 
 COLUMNS = ("closure", "closure_other", "lower_up_mm", "lower_nasal_mm")
+NEAR = 0.7
+"""Below it `score` would be taken for `closure`."""
 FORMATS = (
     "expected one blink (a column closure, 0 open to 1 closed, at 300 fps) or a table of profiles "
     "(NAME.profiles.csv of `stimuli blinks`, with a column profile_id)"
@@ -33,7 +35,7 @@ def read_closure_file(path: Path) -> list[BlinkProfile]:
     if "profile_id" in table.columns:
         return read_profile_table(path)
     if "closure" not in table.columns:
-        near = nearest("closure", [str(name) for name in table.columns if name not in COLUMNS])
+        near = nearest("closure", [str(name) for name in table.columns if name not in COLUMNS], NEAR)
         hint = f"did you mean '{near}'?" if near else FORMATS
         raise InputError(f"{path.name}: no column 'closure'; {hint}")
     signals = {name: _numbers(path, table, name) for name in COLUMNS if name in table.columns}

@@ -101,7 +101,7 @@ def _size(path: Path, document: dict[str, Any]) -> tuple[int, int]:
         raise InputError(f"{path}: 'image_size_px' is missing; expected [width, height] of the video")
     if not whole:
         raise InputError(f"{path}: expected 'image_size_px': [width, height], found {size!r}")
-    return size[0], size[1]  # type: ignore[index]
+    return size[0], size[1]
 
 
 def _frames(path: Path, data: object) -> dict[int, Points]:

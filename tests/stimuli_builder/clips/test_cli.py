@@ -113,10 +113,10 @@ def test_one_clip(
         (("--character", "cartoonn"), "no character 'cartoonn'"),
         (("--size", "big"), "expected WIDTHxHEIGHT"),
         (("--size", "4000x360"), "--size (width): expected at most"),
-        (("--duration", -4), "error: --duration: expected more than"),
+        (("--duration", -4), "error: --duration: expected 3 or more, got -4"),
         (("--lower-lid", "both"), "has no lower-lid layer"),
         (("--clip-frames", 12), "longer than the clip of 12 frames"),
-        (("--duration", 1), "got --duration 1 at 30 fps"),
+        (("--duration", 9, "--duration-ms", 300), "error: expected --duration or --duration-ms, got both"),
         (("--profile", "espbm-left-01", "--eyes", "separate"), "shows one eye"),
     ],
 )
