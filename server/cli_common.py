@@ -19,11 +19,17 @@ Word = TypeVar("Word", bound=str)
 
 
 @contextmanager
-def migrated_services(settings: Settings | None = None) -> Iterator[Services]:
-    """Database and clip store of the settings, the database brought to the newest revision."""
+def migrated_services(settings: Settings | None = None, *, stored: bool = False) -> Iterator[Services]:
+    """Database and clip store of the settings, the database brought to the newest revision.
+
+    Where something must be `stored`, a database without tables is refused.
+    """
     services = open_services(settings or Settings())
     try:
         revision = _stored_revision(services)
+        if revision is None and stored:
+            address = services.database.url.render_as_string(hide_password=True)
+            raise _no_database(address, "nothing in the database")
         if revision is not None and not known_revision(revision):
             raise InputError(
                 f"the database has revision {revision}, which this program does not know; "
@@ -42,24 +48,29 @@ def migrated_services(settings: Settings | None = None) -> Iterator[Services]:
 
 
 @contextmanager
-def stored_services() -> Iterator[Services]:
+def stored_services(settings: Settings | None = None) -> Iterator[Services]:
     """Database and clip store of the settings, for commands on what is already there.
 
     Raises
     ------
     InputError
-        There is no SQLite file: in a folder beside the server's, an empty database made on the spot would
-        look as if all studies were lost.
+        There is no database yet, or it has no tables: in a folder beside the server's, an empty one made on
+        the spot would look as if all studies were lost, and its backup as if they were kept.
     """
-    settings = Settings()
+    settings = settings or Settings()
     url = checked_url(settings.resolved_database_url)
+    # Opened, a SQLite file that is not there would be.
     if url.get_backend_name() == "sqlite" and url.database and not Path(url.database).exists():
-        raise InputError(
-            f"there is no database at {url.database}; run this in the folder where the server runs, or name "
-            "its data by PALPEBRA_DATA_FOLDER or DATABASE_URL"
-        )
-    with migrated_services(settings) as services:
+        raise _no_database(url.database, "no database at")
+    with migrated_services(settings, stored=True) as services:
         yield services
+
+
+def _no_database(address: str, what: str) -> InputError:
+    return InputError(
+        f"there is {what} {address}; run this in the folder where the server runs, or name its data by "
+        "PALPEBRA_DATA_FOLDER or DATABASE_URL"
+    )
 
 
 def _stored_revision(services: Services) -> str | None:

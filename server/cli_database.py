@@ -8,7 +8,7 @@ import typer
 from experiments.command_groups import command_group
 from experiments.counted import counted
 from experiments.errors import InputError
-from server.cli_common import migrated_services, out
+from server.cli_common import migrated_services, out, stored_services
 from server.db import open_database
 from server.migrate import current_revision, newest_revision
 from server.operations import cli_snapshots
@@ -57,7 +57,7 @@ def recount() -> None:
     Results, monitor and participants read these counts; `server doctor` says whether they are right.
     Example: server database recount
     """
-    with migrated_services() as services:
+    with stored_services() as services:
         mended, runs = repair(services.database, services.versions)
     out.print(f"{counted(runs, 'run')} counted, {mended} mended")
 
@@ -79,7 +79,7 @@ def rewrap(
         old = old_key_file.read_bytes().strip()
     except OSError as error:
         raise InputError(f"{old_key_file} cannot be read: {error.strerror or error}") from error
-    with migrated_services() as services, services.database.write() as session:
+    with stored_services() as services, services.database.write() as session:
         carried = carry_over(session, old, services.settings.key)
     out.print(f"{carried.identities} keys wrapped anew; {carried.unreadable} are not under that key")
     out.print(f"{counted(carried.second_factors, 'second factor')} carried over")
@@ -106,6 +106,6 @@ def erase_again() -> None:
     that was brought back by other means.
     Example: server database erase-again
     """
-    with migrated_services() as services, services.database.write() as session:
+    with stored_services() as services, services.database.write() as session:
         erased = replay(session, services.settings)
     out.print(f"{counted(erased, 'run')} erased")

@@ -10,7 +10,7 @@ from experiments.errors import InputError
 from server.accounts import invitations, notices, service
 from server.accounts.passwords import hash_password
 from server.accounts.people import invitation_url
-from server.cli_common import migrated_services, one_of, out
+from server.cli_common import migrated_services, one_of, out, stored_services
 from server.db import open_database
 from server.errors import ApiError
 from server.models import ROLES
@@ -77,7 +77,7 @@ def reset_password(
 
     Example: server account reset-password ada
     """
-    with migrated_services() as services:
+    with stored_services() as services:
         with services.database.write() as session:
             service.check_known(session, name)
         # Only now: who mistyped the name has typed no password twice.
@@ -98,7 +98,7 @@ def reset_second_factor(name: Annotated[str, typer.Argument(help="Name of the ac
     Its sessions and API tokens end, and the audit log says so. Make sure that it is she who asks.
     Example: server account reset-second-factor ada
     """
-    with migrated_services() as services:
+    with stored_services() as services:
         with services.database.write() as session:
             account_id = service.reset_second_factor(session, name)
         notices.tell(services, account_id, notices.SECOND_FACTOR_REMOVED)

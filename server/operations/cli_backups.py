@@ -12,7 +12,7 @@ import typer
 from pyrage import x25519
 
 from experiments.errors import InputError
-from server.cli_common import migrated_services, out, stored_services
+from server.cli_common import out, stored_services
 from server.clock import now
 from server.context import open_services
 from server.operations import backup as backups
@@ -123,7 +123,7 @@ def _back_up_to(to: str, recipient: str, name: str, *, with_clips: bool, keep: i
         )
     key = recipient_of(public)
     store = backup_store(to, settings)
-    with migrated_services(settings) as services:
+    with stored_services(settings) as services:
         kept_as, described = back_up_to(services, store, name, key, with_clips=with_clips)
         ending = ending_of(settings.key)
     out.print(f"{store.address}/{kept_as}: {_contents(described)}, encrypted")

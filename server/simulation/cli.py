@@ -14,7 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from experiments.counted import counted
 from experiments.errors import InputError
 from server.app import create_app
-from server.cli_common import migrated_services, out
+from server.cli_common import out, stored_services
 from server.settings import Settings
 from server.simulation.adversaries import act, manner_called, summary, write
 from server.simulation.http import JsonClient, Refused, running_server
@@ -83,7 +83,7 @@ def simulate(
         return
     if json_file is not None:
         raise InputError("--json goes with --as, which gives the verdicts to write")
-    with migrated_services(settings) as services:
+    with stored_services(settings) as services:
         token, raters = link_and_raters(services, study, observer)
     people = range(seed * 1_000_000, seed * 1_000_000 + participants)
     with (
@@ -110,7 +110,7 @@ def _as(
 ) -> None:
     """Simulated people in a manner, with the verdict on each."""
     manner = manner_called(name)
-    with migrated_services(settings) as services:
+    with stored_services(settings) as services:
         token, raters = link_and_raters(services, study)
     everyone = [raters(number, people.start) for number in people]
     runs = act(settings, token, everyone, manner, at_once)

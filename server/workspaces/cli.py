@@ -76,7 +76,7 @@ def set_member(
     Example: server workspace member perception-lab ada --role owner
     """
     new_role = None if remove else one_of(ROLES, role, "the role")
-    with migrated_services() as services, services.database.write() as session:
+    with stored_services() as services, services.database.write() as session:
         known = service.managed(session, workspace, OPERATOR)
         service.set_member(session, known, account, new_role, OPERATOR)
     out.print(f"workspace {workspace}: {account} {'is out' if remove else f'is {role}'}")
@@ -93,7 +93,7 @@ def grant(
     Example: server workspace grant exp3 ada --rights view,export
     """
     given = [one_of(RIGHTS, word.strip(), "rights of") for word in rights.split(",") if word.strip()]
-    with migrated_services() as services, services.database.write() as session:
+    with stored_services() as services, services.database.write() as session:
         service.grant(session, find_study(session, study, OPERATOR, "own"), account, given, OPERATOR)
     out.print(f"study {study}: {account} may {', '.join(given) or 'do what the role allows'}")
 
@@ -104,7 +104,7 @@ def move(study: StudyArgument, workspace: WorkspaceArgument) -> None:
 
     Example: server workspace move exp3 perception-lab
     """
-    with migrated_services() as services, services.database.write() as session:
+    with stored_services() as services, services.database.write() as session:
         known = find_study(session, study, OPERATOR, "own")
         service.move(session, known, service.find_workspace(session, workspace), OPERATOR)
     out.print(f"study {study}: in the workspace {workspace}")

@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 import pytest
+from pyrage.x25519 import Identity
 
 from experiments.load import parse_experiment
 from experiments.trials.clip_rating.columns import RATINGS
@@ -195,10 +196,13 @@ def test_other_bad_input_is_one_line_too(
         ("study", "list"),
         ("export", "short", "--out", "x.csv"),
         ("backup", "x.tar"),
+        ("backup", "--to", "backups", "--recipient", str(Identity.generate().to_public())),
+        ("database", "recount"),
+        ("simulate", "short"),
         ("workspace", "list"),
         ("audit", "verify"),
     ],
-    ids=" ".join,
+    ids=lambda command: "-".join(command[:2]),
 )
 @pytest.mark.parametrize("empty_database_url", ["sqlite"], indirect=True)
 def test_a_folder_without_a_database_gets_none(
@@ -213,6 +217,19 @@ def test_a_folder_without_a_database_gets_none(
     assert refused.stderr.startswith(f"error: there is no database at {file}; ")
     assert refused.stderr.count("\n") == 1
     assert not file.exists()
+
+
+@pytest.mark.parametrize("empty_database_url", BACKENDS, indirect=True)
+def test_a_database_without_tables_gets_none(
+    tmp_path: Path, empty_database_url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`server doctor` looks at one that is not there yet, and SQLite makes an empty file of a look."""
+    monkeypatch.chdir(tmp_path)
+    settings = Settings(data_folder=tmp_path / "data", database_url=empty_database_url)
+    run_server_command(settings, "doctor")
+    refused = run_server_command(settings, "study", "list")
+    assert refused.returncode == 2
+    assert refused.stderr.startswith("error: there is nothing in the database ")
 
 
 def test_an_export_makes_no_folders(settings: Settings, study, tmp_path: Path) -> None:
