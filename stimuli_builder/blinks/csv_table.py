@@ -1,8 +1,8 @@
 """A CSV with a header line as a table, however a spreadsheet wrote it: commas, semicolons or tabs."""
 
 import re
+import warnings
 from collections.abc import Sequence
-from io import StringIO
 from pathlib import Path
 
 import pandas as pd
@@ -13,7 +13,10 @@ NOTE = "note"
 """Key of `DataFrame.attrs` under which a table says how it was read; absent where that is plain."""
 MAX_NAMED = 6
 _SEPARATORS = {";": "semicolons", "\t": "tabs"}
-_COMMA_OR_WHOLE = re.compile(r"[+-]?[0-9]+(,[0-9]+)?")
+_COMMA_OR_WHOLE = re.compile(r"[+-]?[0-9]*(,[0-9]+|(?<=[0-9]))([eE][+-]?[0-9]+)?")
+_THOUSANDS = re.compile(r"[+-]?[0-9]{1,3}(,[0-9]{3})+")
+FIRST_BYTES = 1 << 16
+"""What is looked at for the header line."""
 
 
 def read_table(path: Path) -> pd.DataFrame:
@@ -35,18 +38,28 @@ def read_table(path: Path) -> pd.DataFrame:
     InputError
         A folder, no UTF-8 text, or no table with rows.
     """
-    text = _text(path)
-    header = text.splitlines()[0]
-    separator = max(",;\t", key=header.count)
+    separator = _separator(_header(path))
     try:
-        table = pd.read_csv(StringIO(text), sep=separator, skipinitialspace=True)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", pd.errors.ParserWarning)
+            # Else a field too many makes the first column an index, and shifts the others under its name.
+            table = pd.read_csv(
+                path, sep=separator, skipinitialspace=True, index_col=False, encoding="utf-8-sig"
+            )
+    except pd.errors.ParserWarning as error:
+        raise InputError(
+            f"{path}: rows have more fields than the header names columns; numbers with decimal commas want "
+            "semicolons between columns"
+        ) from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path} is not UTF-8 text ({error.reason}); save it as CSV UTF-8") from error
     except (pd.errors.ParserError, pd.errors.EmptyDataError) as error:
         raise InputError(f"{path}: expected a CSV table with a header line ({str(error).strip()})") from error
     table.columns = table.columns.astype(str).str.strip()
     if table.empty:
         raise InputError(f"{path}: the table has a header but no rows")
     said = [f"columns parted by {_SEPARATORS[separator]}"] if separator in _SEPARATORS else []
-    if example := _read_decimal_commas(table):
+    if example := _read_decimal_commas(table, separator):
         said.append(f"decimal commas (e.g. '{example}') read as decimal points")
     if said:
         table.attrs[NOTE] = f"{path.name}: {', '.join(said)}"
@@ -59,29 +72,41 @@ def few(names: Sequence[str]) -> str:
     return ", ".join(names[:MAX_NAMED]) + (f" and {rest} more" if rest > 0 else "")
 
 
-def _text(path: Path) -> str:
+def _header(path: Path) -> str:
+    """The first line that is not blank; the rest of a long recording is read once, by pandas."""
     if path.is_dir():
         raise InputError(f"{path}: expected a CSV file, this is a folder; name a file in it")
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        with path.open("rb") as content:
+            start = content.read(FIRST_BYTES)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})") from error
+    if b"\0" in start:
+        raise InputError(f"{path} is not UTF-8 text (it holds null bytes); save it as CSV UTF-8")
+    try:
+        lines = start.decode("utf-8-sig", "strict" if len(start) < FIRST_BYTES else "ignore").split("\n")
     except UnicodeDecodeError as error:
         raise InputError(f"{path} is not UTF-8 text ({error.reason}); save it as CSV UTF-8") from error
-    if "\0" in text:
-        raise InputError(f"{path} is not UTF-8 text (it holds null bytes); save it as CSV UTF-8")
-    if not text.strip():
+    header = next((line for line in lines if line.strip()), None)
+    if header is None:
         raise InputError(f"{path} is empty; expected a CSV table with a header line")
-    return text.lstrip("\r\n")
+    return header
 
 
-def _read_decimal_commas(table: pd.DataFrame) -> str:
+def _separator(header: str) -> str:
+    unquoted = re.sub(r'"[^"]*"', "", header)
+    return max(",;\t", key=unquoted.count)
+
+
+def _read_decimal_commas(table: pd.DataFrame, separator: str) -> str:
     """Make numbers of the columns written with decimal commas; return one of their cells, or nothing."""
     example = ""
     for name in table.columns[[kind.kind not in "fiub" for kind in table.dtypes]]:
         words = [str(word).strip() for word in table[name].dropna()]
         commas = [word for word in words if "," in word]
-        if commas and all(map(_COMMA_OR_WHOLE.fullmatch, words)):
+        # Among quoted cells of a table with commas, 1,234 is as likely a thousand.
+        thousands = separator == "," and all(map(_THOUSANDS.fullmatch, commas))
+        if commas and not thousands and all(map(_COMMA_OR_WHOLE.fullmatch, words)):
             example = example or commas[0]
             table[name] = pd.to_numeric(table[name].astype(str).str.replace(",", "."), errors="coerce")
     return example

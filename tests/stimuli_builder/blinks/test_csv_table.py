@@ -26,6 +26,9 @@ def test_semicolons_and_decimal_commas_are_read_and_said(stimuli, series_file, t
         ("frame\ta\n0\t0.5\n1\t0.25\n", [0.5, 0.25], "t.csv: columns parted by tabs"),
         ("\ufefframe;a\n0;0,5\n1;1\n", [0.5, 1], "read as decimal points"),
         ('frame,a\n0,"0,5"\n1,\n', [0.5, None], "t.csv: decimal commas (e.g. '0,5') read"),
+        ("frame;a\n0;1,5E-05\n1;-0,5\n", [1.5e-05, -0.5], "read as decimal points"),
+        ('"frame; b; c",a\n0,0.5\n1,0.25\n', [0.5, 0.25], None),
+        ("frame,a\n0,0.5,\n1,0.25,\n", [0.5, 0.25], None),  # every row ends in a comma
     ],
 )
 def test_a_table_is_read_by_its_separator(tmp_path, text, values, note):
@@ -35,6 +38,22 @@ def test_a_table_is_read_by_its_separator(tmp_path, text, values, note):
     assert table["a"].astype(object).where(table["a"].notna(), None).tolist() == values
     assert (note or "") in table.attrs.get(NOTE, "")
     assert (NOTE in table.attrs) == (note is not None)
+
+
+@pytest.mark.parametrize("text", ["a\n10,52\n10,48\n", "frame,a\n0,0,5\n1,0,7\n"])
+def test_decimal_commas_among_commas_are_refused(tmp_path, text):
+    """The first column would have become an index, and the digits behind the commas the distance."""
+    path = tmp_path / "t.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match="more fields than the header names columns"):
+        read_table(path)
+
+
+def test_thousands_are_no_decimals(tmp_path):
+    path = tmp_path / "t.csv"
+    path.write_text('frame,a\n0,"1,234"\n1,999\n', encoding="utf-8")
+    with pytest.raises(InputError, match="must hold numbers"):
+        read_series(path, ["a"], 240)
 
 
 def test_words_beside_decimal_commas_stay_words(tmp_path):
