@@ -42,7 +42,8 @@ class WholeLineGroup(TyperGroup):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Find the command; one that is not there is answered with those whose names are like it."""
-        if args and not args[0].startswith("-") and self.get_command(ctx, args[0]) is None:
+        lacks = args and not args[0].startswith("-") and self.get_command(ctx, args[0]) is None
+        if lacks and not ctx.resilient_parsing:
             near = get_close_matches(args[0], self.list_commands(ctx), cutoff=NEAR)
             hint = f" Did you mean {', '.join(map(repr, near))}?" if near else ""
             ctx.fail(f"No such command {args[0]!r}.{hint}")

@@ -5,6 +5,7 @@ import re
 CONTINUED = " \\"
 INDENT = "    "
 _BEFORE_OPTION = re.compile(r" (?=--?[a-z])")
+_BESIDE_ITS_WORD = re.compile(r"\n?^Example: (.+)(?=\n\n|\Z)", re.MULTILINE)
 
 
 def whole_examples(text: str, width: int) -> str:
@@ -13,7 +14,7 @@ def whole_examples(text: str, width: int) -> str:
     Parameters
     ----------
     text : str
-        A help text; an example is an indented paragraph, of one line.
+        A help text; an example is an indented paragraph of one line, or what stands behind `Example: `.
     width : int
         Characters in a line.
 
@@ -22,7 +23,8 @@ def whole_examples(text: str, width: int) -> str:
     str
         The text; before each example stands click's mark of a paragraph that is not wrapped.
     """
-    paragraphs = text.split("\n\n")
+    # Behind its word, within a paragraph, click would wrap it as prose.
+    paragraphs = _BESIDE_ITS_WORD.sub(r"\n\nExample:\n\n  \1", text.strip()).split("\n\n")
     return "\n\n".join(
         _whole(one, width) if one.startswith("  ") and "\n" not in one.strip() else one for one in paragraphs
     )

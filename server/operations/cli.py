@@ -60,7 +60,7 @@ def copy(
 
     Stop the server first: what is rated meanwhile would stay behind. Clips and the secret key stay where they
     are. Where anything differs nothing is kept in the target.
-    Example: server database copy sqlite:///data/palpebra.sqlite postgresql://me@host/palpebra
+    Example: server database copy sqlite:///data/palpebra.sqlite postgresql://me@db/lab
     """
 
     def told(name: str, content: Content) -> None:

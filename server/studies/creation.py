@@ -37,7 +37,7 @@ def shipped(services: Services) -> list[ShippedExperiment]:
                 toml=text,
                 demonstration=name in DEMOS,
                 clips_ready=(folder / MANIFEST_NAME).is_file(),
-                build=f"stimuli build {name} --out {shlex.quote(str(folder))}",
+                build=f"stimuli build {name} --out {shlex.quote(str(folder.resolve()))}",
             )
         )
     return experiments

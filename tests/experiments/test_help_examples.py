@@ -1,5 +1,6 @@
 """Examples in `--help` are lines that a shell takes as they are printed."""
 
+import inspect
 import re
 import shlex
 from importlib import import_module
@@ -38,10 +39,11 @@ def test_every_example_can_be_pasted(program, monkeypatch):
         joined = [
             " ".join(shlex.split(line))
             for line in printed.replace("\\\n", " ").splitlines()[1:]
-            if line.strip().startswith(program + " ") and line.startswith("    ")
+            if f"{program} " in line and line.startswith("    ")
         ]
         text = command.help or ""
         examples = [one.strip().partition(" # ")[0] for one in text.split("\n\n") if is_example(one, program)]
+        examples += re.findall(r"^Example: (.+)$", inspect.cleandoc(text), re.MULTILINE)
         for example in examples:
             assert any(" ".join(shlex.split(example)) == line.partition(" # ")[0] for line in joined), example
         seen += len(examples)
@@ -74,3 +76,9 @@ def test_a_command_is_broken_before_options():
 def test_a_comment_never_swallows_the_rest_of_its_command(comment, expected):
     text = f"What it is.\n\n  a bc --long value --more x   # {comment}"
     assert whole_examples(text, 27) == f"What it is.\n\n\b\n{expected}"
+
+
+def test_an_example_behind_its_word_gets_lines_of_its_own():
+    text = "What it is.\nExample: a bc --long value --more x"
+    expected = "What it is.\n\nExample:\n\n\b\n  a bc --long value \\\n      --more x"
+    assert whole_examples(text, 27) == expected

@@ -27,17 +27,17 @@ class AButton extends EventTarget {
 }
 
 /** What a page of these choices answers to a press of the key; null where it stays. */
-async function answer(key: string, labels: string[]): Promise<string | null> {
+async function answer(key: string, labels: string[], space?: "never"): Promise<string | null> {
   const session = { over: new AbortController() } as unknown as Session;
   const choices = labels.map((label) => ({ label, value: label }));
-  const chosen = choose(session, { append: () => {} } as unknown as HTMLElement, choices);
+  const chosen = choose(session, { append: () => {} } as unknown as HTMLElement, choices, space);
   page.dispatchEvent(Object.assign(new Event("keydown", { cancelable: true }), { key }));
   const answered = await Promise.race([chosen, new Promise<null>((resolve) => setTimeout(() => resolve(null)))]);
   session.over.abort();
   return answered;
 }
 
-it("Space and Enter press a page's one button, whatever has the focus", async () => {
+it("Space and Enter press a page's one button", async () => {
   bottom = WINDOW_PX;
   expect([await answer(" ", ["go on"]), await answer("Enter", ["go on"])]).toEqual(["go on", "go on"]);
 });
@@ -47,4 +47,9 @@ it("Space scrolls to a button that is below the window, and takes none of severa
   expect([await answer(" ", ["one", "other"]), await answer("Enter", ["one", "other"])]).toEqual([null, "one"]);
   bottom = WINDOW_PX + 1;
   expect(await answer(" ", ["go on"])).toBeNull();
+});
+
+it("Space does not skip a break, and Enter ends it", async () => {
+  bottom = WINDOW_PX;
+  expect([await answer(" ", ["go on"], "never"), await answer("Enter", ["go on"], "never")]).toEqual([null, "go on"]);
 });

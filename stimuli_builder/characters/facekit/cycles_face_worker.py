@@ -117,8 +117,9 @@ def pose(things: Things, file: str) -> None:
                 data.update_tag()
                 continue
             data.vertices.foreach_set("co", stored[f"{k}_vertices"].ravel())
-            if f"{k}_value_shade" in stored.files:
-                data.attributes["shade"].data.foreach_set("value", stored[f"{k}_value_shade"])
+            for name in ("shade", "flush"):
+                if f"{k}_value_{name}" in stored.files:
+                    data.attributes[name].data.foreach_set("value", stored[f"{k}_value_{name}"])
             data.update()
 
 

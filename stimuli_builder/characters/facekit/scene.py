@@ -30,6 +30,7 @@ SIDE_NAMES = {1: "left", -1: "right"}
 MOVES_CM = 0.004
 LIDS_MOVE_CM = 0.10
 """What moves farther is lid or lash: there noise is not the open eye's, and takes samples of its own."""
+MOVING = ("points", "vertices", "value_shade", "value_flush")
 SMALL_WIDTH_PX = 480
 """Below this width a pixel is larger than the quads of one subdivision less."""
 TEXTURE_SHARE = 1400 / 960
@@ -54,9 +55,9 @@ class Part:
         return out | {f"value_{name}": _single(value) for name, value in self.shape.values.items()}
 
     def moving(self) -> dict[str, Any]:
-        """What differs from closure to closure."""
+        """What differs from pose to pose; what lies on an eye's white does not turn with its gaze."""
         arrays = self.arrays()
-        return {name: arrays[name] for name in ("points", "vertices", "value_shade") if name in arrays}
+        return {name: arrays[name] for name in MOVING if name in arrays}
 
 
 class FaceScene:

@@ -27,7 +27,7 @@ export async function rest(session: Session, display: HTMLElement, { block, bloc
   section.append(stopButton(session));
   await countDown(session, wait, footer, seconds_min);
   wait.textContent = t("break_ready");
-  await choose(session, footer, [{ label: t("break_go_on"), value: true }]);
+  await choose(session, footer, [{ label: t("break_go_on"), value: true }], "never");
   return { rested_ms: Math.round(performance.now() - started) };
 }
 

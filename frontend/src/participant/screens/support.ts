@@ -23,9 +23,9 @@ export interface Choice<Value> {
 
 /**
  * Buttons for `choices`; resolves with the one pressed. Enter presses the first where no field has the focus, and so does
- * Space where there is no other, or `withSpace`.
+ * Space: always, where it is alone and in sight, or never, as on a break, which a press by habit would skip.
  */
-export function choose<Value>(session: Session, footer: HTMLElement, choices: Choice<Value>[], withSpace = false): Promise<Value> {
+export function choose<Value>(session: Session, footer: HTMLElement, choices: Choice<Value>[], space: "always" | "alone" | "never" = "alone"): Promise<Value> {
   const { signal, done } = screenSignal(session);
   return new Promise((resolve) => {
     const take = (value: Value): void => {
@@ -37,7 +37,7 @@ export function choose<Value>(session: Session, footer: HTMLElement, choices: Ch
     const [first] = buttons;
     listenKeys((event) => {
       if (!first || !isStartKey(event)) return;
-      if (event.key === " " && !withSpace && (choices.length > 1 || !isInSight(first))) return;
+      if (event.key === " " && (space === "never" || (space === "alone" && (choices.length > 1 || !isInSight(first))))) return;
       clickNothing(event);
       first.click();
     }, signal);

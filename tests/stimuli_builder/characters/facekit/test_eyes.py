@@ -8,6 +8,7 @@ from stimuli_builder.characters.facekit.eyes import Mesh, eyeball
 from stimuli_builder.characters.facekit.identity import identity_of_seed
 from stimuli_builder.characters.facekit.kit import FaceKit
 from stimuli_builder.characters.facekit.lid_loops import EDGE_LOOP, SIDES
+from stimuli_builder.characters.facekit.scene import Part
 from stimuli_builder.characters.facekit.sphere import IRIS_CM
 
 
@@ -42,3 +43,15 @@ def test_the_white_is_darkest_at_the_lids(path: BlinkPath) -> None:
     lowest, highest = shade[order][[0, -1]]
     assert shade.max() > 0.9
     assert max(lowest, highest) < 0.7
+
+
+def test_the_pink_stays_at_the_nose_as_the_eye_turns(kit: FaceKit) -> None:
+    """A renderer gets each pose's own: the white's vertices turn with the gaze, and flesh does not."""
+    identity = identity_of_seed(4)
+    ahead, aside = (BlinkPath(kit, identity.rest(kit), identity.movement) for _ in range(2))
+    aside.look = (25.0, 0.0)
+    first, turned = (Part("eye_left", "eye", eye(path, 1)).moving() for path in (ahead, aside))
+    assert not np.allclose(first["value_flush"], turned["value_flush"])
+    tip = nasal_tip(ahead, ahead.rest, 1, EDGE_LOOP)
+    near = np.linalg.norm(turned["vertices"] - tip, axis=1) < 0.15
+    assert turned["value_flush"][near].min() > 0.9

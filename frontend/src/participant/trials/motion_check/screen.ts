@@ -127,7 +127,7 @@ async function otherWay(session: Session, display: HTMLElement, trial: TrialInfo
   const footer = h("footer", { class: "actions" });
   const text = session.run.checks?.other_way?.text ?? "";
   showPage(display, { body: [h("div", { class: "prose" }, ...markdown(text)), footer] });
-  await choose(session, footer, [{ label: session.t("continue"), value: true }], true);
+  await choose(session, footer, [{ label: session.t("continue"), value: true }], "always");
   const playback = playbackRecord(null, [], session.screen.record());
   return checkBody(session, trial, { check: null, other_way: true }, playback);
 }

@@ -16,7 +16,7 @@ export function unlessBroken(session: Session, display: HTMLElement, trial: Tria
     const footer = h("footer", { class: "actions" });
     const text = h("p", { role: "alert" }, session.t("clip_broken"));
     showPage(display, { title: session.t("clip_broken_title"), body: [text, footer] });
-    await choose(session, footer, [{ label: session.t("continue"), value: true }]);
+    await choose(session, footer, [{ label: session.t("continue"), value: true }], "never");
     return unrated();
   };
 }
