@@ -79,7 +79,7 @@ async function oneRound(
       { label: t("distance_start"), value: "go" },
       { label: t("distance_type"), value: "type", kind: "plain" },
     ],
-    true,
+    "always",
   );
   if (step === "type") return "type";
   footer.replaceChildren();
