@@ -25,7 +25,12 @@ export interface Choice<Value> {
  * Buttons for `choices`; resolves with the one pressed. Enter presses the first where no field has the focus, and so does
  * Space: always, where it is alone and in sight, or never, as on a break, which a press by habit would skip.
  */
-export function choose<Value>(session: Session, footer: HTMLElement, choices: Choice<Value>[], space: "always" | "alone" | "never" = "alone"): Promise<Value> {
+export function choose<Value>(
+  session: Session,
+  footer: HTMLElement,
+  choices: Choice<Value>[],
+  space: "always" | "alone" | "never" = "alone",
+): Promise<Value> {
   const { signal, done } = screenSignal(session);
   return new Promise((resolve) => {
     const take = (value: Value): void => {
