@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from analysis.commands.output import JsonOption, save_json, saying, show_tables
-from experiments.errors import InputError
+from experiments.files import check_targets
 
 if TYPE_CHECKING:
     from analysis.power.simulate import PowerResult
@@ -125,8 +125,7 @@ def synthesise_command(
     from analysis.synthetic.ratings_file import write_ratings
     from analysis.synthetic.synthesise import make_plans, synthesise
 
-    if not out.parent.is_dir():
-        raise InputError(f"{out}: the folder {out.parent} does not exist; make it first")
+    check_targets([out])
     plans = make_plans(experiment, n, mean or (), effect or ())
     with saying("searching"):
         scales = [synthesise(plan, seed) for plan in plans]

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from experiments.errors import InputError
+from experiments.files import check_targets
 from server.accounts.audit import record
 from server.accounts.identity import OPERATOR
 from server.capsules.build import CapsuleContents, CapsuleOrigin, build_capsule
@@ -53,8 +53,7 @@ def capsule(
 
       analysis verify exp3-capsule.zip
     """
-    if not out_file.parent.is_dir():
-        raise InputError(f"{out_file}: the folder {out_file.parent} does not exist; make it first")
+    check_targets([out_file])
     with stored_services() as services, Console(stderr=True).status("capsule") as status:
         with services.database.write() as session:
             known = find_study(session, study, OPERATOR, "view")

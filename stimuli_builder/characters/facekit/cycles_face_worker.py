@@ -117,9 +117,9 @@ def pose(things: Things, file: str) -> None:
                 data.update_tag()
                 continue
             data.vertices.foreach_set("co", stored[f"{k}_vertices"].ravel())
-            for name in ("shade", "flush"):
-                if f"{k}_value_{name}" in stored.files:
-                    data.attributes[name].data.foreach_set("value", stored[f"{k}_value_{name}"])
+            values = f"{k}_value_"
+            for name in (name for name in stored.files if name.startswith(values)):
+                data.attributes[name.removeprefix(values)].data.foreach_set("value", stored[name])
             data.update()
 
 
