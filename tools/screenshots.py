@@ -10,12 +10,18 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from io import BytesIO
 from pathlib import Path
 
+import numpy as np
+from PIL import Image
 from playwright.sync_api import Page, sync_playwright
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
+
+from tools.screenshots_clips import save  # noqa: E402
+
 IMAGES = ROOT / "docs" / "images"
 BIN = ROOT / ".venv" / "bin"
 
@@ -80,7 +86,7 @@ def visit(page: Page, address: str) -> None:
     page.wait_for_selector(".ready")
     page.keyboard.press(" ")
     page.wait_for_timeout(500)
-    page.screenshot(path=IMAGES / "participant.png")
+    save(np.asarray(Image.open(BytesIO(page.screenshot())).convert("RGB")), IMAGES / "participant.webp")
     page.wait_for_selector(".scale")
     page.screenshot(path=IMAGES / "scale.png")
 

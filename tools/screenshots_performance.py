@@ -36,13 +36,13 @@ def main() -> None:
     curve = performance_curve(SETTINGS, "", EXEMPLAR, SEED)
     print("blinks at", ", ".join(f"{one:.2f}" for one in curve.blinks_s), "s")
     starts = [int(FPS * curve.blinks_s[index]) for index in CHOSEN]
-    characters = [name for name in ("alder@5", "cartoon") if name in shipped_names()]
+    characters = [name for name in ("alder@6", "cartoon") if name in shipped_names()]
     painters = [FramePainter(find_character(name).levels(SIZE)) for name in characters]
     rows = []
     for start in starts:
         rows.append(numbered(range(start, start + COLUMNS)))
         rows += [strip(painter, curve, start) for painter in painters]
-    save(np.vstack(rows), folder / "performance-blinks.jpg")
+    save(np.vstack(rows), folder / "performance-blinks.webp")
 
 
 def strip(painter: FramePainter, curve: ClipCurve, start: int) -> Rgb:

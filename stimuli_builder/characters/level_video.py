@@ -18,8 +18,8 @@ from stimuli_builder.characters.declaration import REPAIR, Picture
 from stimuli_builder.characters.level_planes import FORMAT, frame_planes, picture_of, planes_of
 from stimuli_builder.characters.writing import write_bytes_declared
 
-QUANTISER = 13
-"""x264's constant quantiser of ten-bit planes: 51.7 dB or more against the pictures given (decision 0950)."""
+QUANTISER = 18
+"""x264's constant quantiser of ten-bit planes: 50 dB or more against the pictures given (decision 0956)."""
 STILL_CODES = 2
 """Code values that the encoder may change of a pixel which stands still: skin must not flicker."""
 

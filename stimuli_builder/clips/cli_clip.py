@@ -19,7 +19,7 @@ CSV file of closure samples at 300 fps (0 open, 1 closed; docs/clips.md).
 
 Examples:
 
-  stimuli clip --profile real --character alder@5 --out blink.mp4
+  stimuli clip --profile real --character alder@6 --out blink.mp4
 
   stimuli clip --profile AL_ease --duration 9 --character cartoon --no-blur --out textbook.mp4
 

@@ -1,4 +1,4 @@
-"""Levels of `alder@5` as one video against single lossless pictures: size, loss, and time to read.
+"""Levels of `alder@6` as one video against single lossless pictures: size, loss, and time to read.
 
 `make bench`, or: python -m pytest tests/bench/bench_level_video.py -o python_files='bench_*.py' -s
 """
@@ -21,7 +21,7 @@ from stimuli_builder.characters.writing import write_picture
 @pytest.fixture(scope="module")
 def pictures(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[NDArray[np.uint8]], float, float]:
     """Every level, the megabytes they take as lossless pictures, and the processor-seconds to read those."""
-    atlas, folder = load_atlas(SHIPPED / "alder@5"), tmp_path_factory.mktemp("single")
+    atlas, folder = load_atlas(SHIPPED / "alder@6"), tmp_path_factory.mktemp("single")
     levels = [atlas.level_srgb(number) for number in range(len(atlas.closures))]
     files = [write_picture(folder, f"{number:03d}.webp", level) for number, level in enumerate(levels)]
     began = time.process_time()
@@ -31,7 +31,7 @@ def pictures(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[NDArray[np.
     return levels, sum((folder / file.file).stat().st_size for file in files) / 1e6, seconds
 
 
-@pytest.mark.parametrize("quantiser", [11, 13, 15, 20])
+@pytest.mark.parametrize("quantiser", [13, 16, 18, 20])
 def test_levels_in_a_video(
     pictures: tuple[list[NDArray[np.uint8]], float, float],
     quantiser: int,

@@ -6986,7 +6986,7 @@ export interface components {
         RenderSettings: {
             /**
              * Character
-             * @description A shipped character (`stimuli character list`: `alder@5`, `cartoon`), or the path of a folder of
+             * @description A shipped character (`stimuli character list`: `alder@6`, `cartoon`), or the path of a folder of
              *     your own; a list of them is short for a last factor `character` with a level each. Left out, it is the
              *     retired `photorealistic`, so that old declarations keep their meaning.
              * @default photorealistic

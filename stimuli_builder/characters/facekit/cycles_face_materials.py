@@ -14,7 +14,7 @@ SKIN_SHARE = "skin"
 """Pass that says which share of a pixel is skin."""
 SHADE = (0.75, 1.15, 1.4)
 """Exponents (red, green, blue) of the light that lids leave near their edges: it came by way of skin."""
-FLUSH = (0.97, 0.77, 0.72)
+FLUSH = (0.95, 0.53, 0.51)
 """Share of light (red, green, blue) that the eye's white keeps at its nasal end, which turns to flesh."""
 DARK_MELANIN = 0.9
 """Optical depth of melanin above which skin scatters and shines as dark skin does."""
@@ -32,8 +32,8 @@ def materials(settings: dict[str, Any]) -> dict[str, Any]:
         "tear": tear(settings["lights"]),
         "flesh": flesh(look),
         "spectacles": spectacles(),
-        "lash": hair("lash", [min(0.004, c * 0.12) for c in look["hair"]], 0.25),
-        "brow": hair("brow", look["hair"], 0.33),
+        "lash": hair("lash", [min(0.004, c * 0.12) for c in look["hair"]], 0.25, (0.55, 1.9)),
+        "brow": hair("brow", look["hair"], 0.33, (0.7, 1.45)),
     }
 
 
@@ -111,7 +111,7 @@ def flesh(look: dict[str, Any]) -> Any:
     n = Nodes("flesh")
     dark = math.exp(-0.25 * look["melanin"])
     shader = n.add("BsdfPrincipled", Roughness=0.5, Coat_Weight=0.25, Coat_Roughness=0.25)
-    shader.inputs["Base Color"].default_value = (0.56 * dark, 0.25 * dark, 0.21 * dark, 1)
+    shader.inputs["Base Color"].default_value = (0.62 * dark, 0.23 * dark, 0.19 * dark, 1)
     shader.inputs["Subsurface Weight"].default_value = 0.8
     shader.inputs["Subsurface Radius"].default_value = (1.0, 0.35, 0.25)
     shader.inputs["Subsurface Scale"].default_value = 0.08
@@ -128,13 +128,13 @@ def spectacles() -> Any:
     return n.surface(shader)
 
 
-def hair(name: str, colour: list[float], rough: float) -> Any:
-    """Hairs of one colour, each a little lighter or darker."""
+def hair(name: str, colour: list[float], rough: float, lightness: tuple[float, float]) -> Any:
+    """Hairs of one colour, each a little lighter or darker, between two shares of it."""
     n = Nodes(name)
     info = n.add("HairInfo")
     varied = n.add("VectorMath", operation="SCALE")
     varied.inputs[0].default_value = colour
-    lighter = n.ramp(info.outputs["Random"], 0.0, 1.0, 0.55, 1.9, False)
+    lighter = n.ramp(info.outputs["Random"], 0.0, 1.0, *lightness, False)
     tipped = n.math("MULTIPLY", lighter, n.ramp(info.outputs["Intercept"], 0.3, 1.0, 1.0, 1.5, False))
     n.put(tipped, varied.inputs["Scale"])
     shader = n.add("BsdfHairPrincipled", parametrization="COLOR", Roughness=rough)

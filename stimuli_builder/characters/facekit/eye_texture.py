@@ -10,7 +10,7 @@ from stimuli_builder.characters.facekit.kit import Array
 from stimuli_builder.characters.facekit.sphere import IRIS_CM, smooth
 
 GLOBE_CM = 1.5
-WHITE = (0.69, 0.64, 0.595)
+WHITE = (0.61, 0.56, 0.52)
 VEINS = 60
 DRIFT, DRIFT_CM = 0.006, 0.07
 """How far fibres wander on their way outwards: standard deviation at the rim, turns, and its scale, cm.

@@ -15,7 +15,7 @@ TEXTURE_LIMIT = 1.25
 """Radians from the gaze axis at the edge of the eye's texture."""
 _SHADE_REACH_CM = (0.26, 0.07)
 _SHADE_DEPTH = (0.52, 0.42)
-_FLUSHED_CM = (0.18, 0.40)
+_FLUSHED_CM = (0.16, 0.36)
 """Distances from the nasal corner between which the eye's white turns from the corner's pink to its own."""
 
 
@@ -141,9 +141,9 @@ def caruncle(path: BlinkPath, posed: Array, side: int) -> Mesh:
     corner = nasal_tip(path, posed, side, EDGE_LOOP + 1)
     tilt = -side * 0.5
     # So wide that the lids' edges bound them, and sunk in: what ended within the corner looked like a bead.
-    main = _ellipsoid(tip + np.array([side * 0.13, -0.02, -0.082]), (0.42, 0.25, 0.115), tilt)
-    fold = _ellipsoid(tip + np.array([side * 0.30, -0.02, -0.105]), (0.17, 0.14, 0.08), tilt)
-    filling = _ellipsoid(corner + np.array([side * 0.09, -0.01, -0.075]), (0.15, 0.075, 0.055), tilt)
+    main = _ellipsoid(tip + np.array([side * 0.13, -0.02, -0.097]), (0.42, 0.25, 0.115), tilt)
+    fold = _ellipsoid(tip + np.array([side * 0.30, -0.02, -0.115]), (0.17, 0.14, 0.08), tilt)
+    filling = _ellipsoid(corner + np.array([side * 0.09, -0.01, -0.085]), (0.15, 0.075, 0.055), tilt)
     meshes = [main, fold, filling]
     starts = np.cumsum([0, *[len(mesh.vertices) for mesh in meshes[:-1]]])
     quads = np.concatenate([mesh.quads + start for mesh, start in zip(meshes, starts, strict=True)])

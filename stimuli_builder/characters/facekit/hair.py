@@ -13,6 +13,8 @@ from stimuli_builder.characters.facekit.lid_skin import FaceSkin, normals
 from stimuli_builder.characters.facekit.sphere import smooth
 
 LASH_POINTS, BROW_POINTS = 12, 8
+CLUMPS = {True: [0.28, 0.32, 0.26, 0.14], False: [0.60, 0.28, 0.09, 0.03]}
+"""Shares of clumps of one to four lashes of upper and lower lids: lower ones in even bundles look planted."""
 _EDGE_POINTS = 200
 LEFT_BROW, RIGHT_BROW = slice(22, 27), slice(21, 16, -1)
 
@@ -96,10 +98,10 @@ def _clumped(points: Array, leader: Index) -> Array:
 
 
 def _draw_row(hair: Hair, upper: bool, rng: np.random.Generator) -> _LashRow:
-    count = round((135 if upper else 75) * hair.lashes)
+    count = round((135 if upper else 105) * hair.lashes)
     low, high = (0.13, 0.985) if upper else (0.22, 0.97)
     along_lid = np.sort(rng.uniform(low, high, count))
-    clump = np.repeat(np.arange(count), rng.choice([1, 2, 3, 4], count, p=[0.28, 0.32, 0.26, 0.14]))[:count]
+    clump = np.repeat(np.arange(count), rng.choice([1, 2, 3, 4], count, p=CLUMPS[upper]))[:count]
     _, clump = np.unique(clump, return_inverse=True)
     groups = int(clump.max()) + 1 if count else 0
     longer, fanned, curled = (
@@ -125,15 +127,15 @@ def _draw_row(hair: Hair, upper: bool, rng: np.random.Generator) -> _LashRow:
         radius = 0.0060 * rng.normal(1, 0.18, count)
     else:
         size = 0.24 + 0.12 * np.exp(-(((along_lid - 0.62) / 0.3) ** 2))
-        size = size * longer[clump] * rng.normal(0.95, 0.18, count)
-        fan = 0.40 * middle + fanned[clump] + rng.normal(0, 0.08, count) + gather * 3.5
-        start, end = np.full(count, -12.0), -58.0 * curled[clump]
-        radius = 0.0034 * rng.normal(1, 0.18, count)
+        size = size * longer[clump] * rng.normal(0.95, 0.26, count)
+        fan = 0.40 * middle + fanned[clump] + rng.normal(0, 0.16, count) + gather * 2.0
+        start, end = rng.normal(-8.0, 8.0, count), -50.0 * curled[clump] * rng.normal(1, 0.2, count)
+        radius = 0.0032 * rng.normal(1, 0.3, count)
     size = np.clip(size, 0.12, 1.2) * hair.lash_length
     leader = np.array(
         [np.flatnonzero(clump == g)[np.argmax(size[clump == g])] for g in range(groups)], np.int64
     )
-    lift = rng.uniform(-0.02, 0.02, count)
+    lift = rng.uniform(-0.02, 0.02, count) if upper else rng.uniform(-0.045, 0.02, count)
     return _LashRow(along_lid, size, fan, start, end, np.clip(radius, 0.002, None), lift, leader[clump])
 
 
@@ -166,7 +168,7 @@ class Brow:
         return height, normal / np.linalg.norm(normal, axis=1, keepdims=True), index[:, 0]
 
     def _draw(self, line: Array, hair: Hair, side: int, rng: np.random.Generator) -> None:
-        n = int(3600 * hair.brow)
+        n = int(1900 * hair.brow)
         fine = rng.random(n) < 0.6
         along = rng.uniform(-0.06, 1.06, n) + rng.normal(0, 0.03, n)
         # Thin at both ends: hairs grow sparser towards the temple, they do not run together to a point.
@@ -197,7 +199,7 @@ class Brow:
         self._points, self._root = self._laid(
             along_lid, lean, length, rng.normal(26, 9, n), rng.uniform(0.012, 0.045, n), side
         )
-        self._radii = np.where(fine, 0.0015, 0.0031) * np.clip(rng.normal(1, 0.35, n), 0.4, 1.9)
+        self._radii = np.where(fine, 0.0022, 0.0042) * np.clip(rng.normal(1, 0.35, n), 0.4, 1.9)
 
     def _laid(
         self, along_lid: Array, lean: Array, length: Array, bend: Array, rise: Array, side: int

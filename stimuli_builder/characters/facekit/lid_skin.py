@@ -6,41 +6,17 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from stimuli_builder.characters.facekit.blink_path import BlinkPath, corner_line
-from stimuli_builder.characters.facekit.field_noise import value_noise
+from stimuli_builder.characters.facekit.blink_path import BlinkPath
 from stimuli_builder.characters.facekit.identity import Identity
 from stimuli_builder.characters.facekit.kit import RIM_FACES, SKIN_FACES, Array, FaceKit, Index
-from stimuli_builder.characters.facekit.lid_loops import LOOPS, SIDES
-from stimuli_builder.characters.facekit.sphere import smooth, spherical
+from stimuli_builder.characters.facekit.lid_coordinates import lid_coordinates
+from stimuli_builder.characters.facekit.lid_loops import SIDES
+from stimuli_builder.characters.facekit.lid_relief import LidRelief, corner_flesh
 from stimuli_builder.characters.facekit.subdivision import Subdivision, subdivide
 
 LEAST_CLEARANCE_CM = 0.02
-LID_MIDDLE = 0.15
-"""Azimuth half way along the lids, radians."""
 STROKES = 17
 LEVELS = 3
-
-
-@dataclass(frozen=True, eq=False)
-class LidCoordinates:
-    """Where each fine vertex lies on the lids.
-
-    Attributes
-    ----------
-    loop : float64 array (n,)
-        Loop of vertices, continued between the loops; 14 beyond the last.
-    upper : float64 array (n,)
-        1 above the line through the eye's corners, 0 below.
-    azimuth : float64 array (n,)
-        About the globe of its side, towards the temple, radians.
-    side : float64 array (n,)
-        1 on the person's left, -1 on the right.
-    """
-
-    loop: Array
-    upper: Array
-    azimuth: Array
-    side: Array
 
 
 def lid_faces(kit: FaceKit, path: BlinkPath, loops: int) -> Index:
@@ -79,7 +55,7 @@ class FaceSkin:
     ) -> None:
         self.path, self.identity, self.fine = path, identity, fine
         self.rest = fine(path.rest)
-        self.coordinates = _coordinates(path, fine, self.rest)
+        self.coordinates = lid_coordinates(path, fine, self.rest)
         self._strokes = strokes
 
     @cached_property
@@ -95,7 +71,7 @@ class FaceSkin:
         """(n, 3) vertices with each side's lid at a stroke, the lower lids moved (up, towards the nose)."""
         posed = self.fine(self.path.at(strokes, lower_cm))
         stroke = np.where(self.coordinates.side > 0, strokes[1], strokes[-1])
-        posed = posed + normals(posed, self.fine.quads) * self._relief(stroke)[:, None]
+        posed = posed + normals(posed, self.fine.quads) * self.relief.displacement(stroke)[:, None]
         return self._outside_the_eye(posed, strokes)
 
     def _outside_the_eye(self, posed: Array, strokes: dict[int, float]) -> Array:
@@ -115,41 +91,10 @@ class FaceSkin:
         return self.fine(self.path.at(dict.fromkeys(SIDES, 1.0)))
 
     @cached_property
-    def _waves(self) -> tuple[Array, Array, Array]:
-        """Noise along the lid (which bends the fold), across it (fine lines) and of the skin's surface."""
-        at, seed = self.coordinates, self.identity.seed
-        zero = np.zeros_like(at.loop)
-        along = np.stack([at.azimuth * 2.2, at.side * 3, zero], -1)
-        lines = np.stack([at.azimuth * 3.0 + 11 * at.side, at.loop * 1.9, zero], -1)
-        return (
-            0.35 * value_noise(along, seed + 5, 2),
-            value_noise(lines, seed + 8, 3),
-            value_noise(self.flat * 4.5, seed + 30, 3),
-        )
-
-    def _relief(self, stroke: Array) -> Array:
-        """Displacement along the normal in cm: the open lid's fold, its remnants, and lines when shut."""
-        at, lids = self.coordinates, self.identity.lids
-        wander, lines, surface = self._waves
-        years = age_depth(self.identity.skin.age)
-        envelope = smooth(-0.85, -0.35, at.azimuth) * smooth(1.25, 0.75, at.azimuth) * at.upper
-        height = lids.crease + wander * 0.6
-        height = height - 0.9 * smooth(0.1, -0.8, at.azimuth) - 0.5 * smooth(0.5, 1.2, at.azimuth)
-        above, opened = at.loop - height, 1 - stroke
-        # Of one depth from end to end it was a line drawn round the eye: it runs out, and is nowhere gone.
-        uneven = np.clip(0.85 + 0.9 * wander - 0.35 * np.abs(at.azimuth - LID_MIDDLE), 0.35, 1.1)
-        fold = -lids.depth * uneven * (0.022 + 0.030 * opened) * np.exp(-((above / 0.48) ** 2))
-        fold += lids.depth * 0.030 * opened * np.exp(-(((above - 1.15) / 0.8) ** 2))
-        second = np.exp(-(((above - 1.5) / 0.22) ** 2)) * (0.4 + 0.6 * stroke)
-        fold -= 0.012 * years * second * np.clip(0.5 + 1.2 * wander, 0, 1)
-        furrows = np.exp(-((lines / 0.22) ** 2)) * smooth(3.6, 5.0, at.loop) * smooth(11.5, 8.5, at.loop)
-        fold -= 0.006 * years * furrows
-        below = (1 - at.upper) * smooth(-0.9, -0.5, at.azimuth) * smooth(1.2, 0.8, at.azimuth)
-        bag = 0.010 * years * np.exp(-(((at.loop - 5.2) / 1.0) ** 2))
-        bag -= 0.016 * np.exp(-(((at.loop - 7.6 - 0.8 * wander) / 0.55) ** 2))
-        bag -= 0.004 * (years - 0.4) * np.exp(-((lines / 0.25) ** 2)) * smooth(4.0, 6.0, at.loop)
-        grain = 0.0020 * surface * smooth(3.5, 6.0, at.loop)
-        return np.asarray(fold * envelope + bag * below + grain)
+    def relief(self) -> LidRelief:
+        """What stands out of the skin or goes into it."""
+        flesh = corner_flesh(self.path, self.rest)
+        return LidRelief(self.coordinates, self.flat, flesh, self.identity)
 
     def opening(self, posed: Array, side: int, offset_cm: float = 0.0) -> float:
         """Height in cm of what is seen of the eye in a column `offset_cm` from the globe's centre.
@@ -215,30 +160,9 @@ class LinearStrokes:
         return cls(tables, opened)
 
 
-def age_depth(age: float) -> float:
-    """Depth of lines and furrows relative to 35 years."""
-    return float(np.clip(0.35 + 0.65 * (age - 18) / 17, 0.3, 2.2))
-
-
 def lid_skin(path: BlinkPath, identity: Identity, loops: int = 10, levels: int = LEVELS) -> FaceSkin:
     """The lids alone: enough to measure the opening by and to learn the strokes from."""
     return FaceSkin(path, identity, subdivide(lid_faces(path.kit, path, loops), levels))
-
-
-def _coordinates(path: BlinkPath, fine: Subdivision, rest: Array) -> LidCoordinates:
-    number = np.full(len(path.rest), float(LOOPS))
-    for side in SIDES:
-        for k, loop in enumerate(path.loops[side]):
-            number[loop] = k
-    sides = np.where(rest[:, 0] >= 0, 1.0, -1.0)
-    upper, azimuth = np.zeros(len(rest)), np.zeros(len(rest))
-    for side in SIDES:
-        here = (sides == side) & (rest[:, 2] > 4)
-        _, turned, elevation = spherical(rest[here] - path.globes[side].centre)
-        nasal, height, slope, _ = corner_line(path, side)
-        azimuth[here] = turned * side
-        upper[here] = smooth(-0.03, 0.05, elevation - (height + slope * (turned * side - nasal)))
-    return LidCoordinates(fine(number), upper, azimuth, sides)
 
 
 def _uncovered(spans: Array) -> float:

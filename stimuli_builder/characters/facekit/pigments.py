@@ -6,8 +6,10 @@ from scipy.spatial import cKDTree
 from stimuli_builder.characters.facekit.blink_path import nasal_tip
 from stimuli_builder.characters.facekit.field_noise import value_noise
 from stimuli_builder.characters.facekit.kit import Array
+from stimuli_builder.characters.facekit.lid_coordinates import LID_MIDDLE
 from stimuli_builder.characters.facekit.lid_loops import EDGE_LOOP, SIDES
-from stimuli_builder.characters.facekit.lid_skin import LID_MIDDLE, FaceSkin, age_depth
+from stimuli_builder.characters.facekit.lid_relief import age_depth
+from stimuli_builder.characters.facekit.lid_skin import FaceSkin, normals
 from stimuli_builder.characters.facekit.sphere import smooth
 
 SPOTS = 220
@@ -22,6 +24,10 @@ MARGIN_MELANIN = 1.3
 """Optical depth of melanin that an upper lid's margin has beyond the skin's: lashes' roots are dark."""
 CORNER_CM, CORNER_BLOOD = 0.30, 0.28
 """Reach and added blood of a nasal corner's duller skin: lit and smooth, its fold shone as a white dot."""
+LID_VESSELS = 0.10
+"""Optical depth of blood in vessels that shine through the upper lid, the thinnest skin there is."""
+FLESH_BLOOD, FLESH_PALER, FLESH_WET = 0.5, 0.6, 0.3
+"""The flesh of a nasal corner against the skin about it: blood more, share of melanin and roughness less."""
 NOSE, CHIN, BRIDGE, NOSTRILS, LIPS = 30, 8, 27, (31, 35), slice(48, 60)
 """Numbers of Multi-PIE landmarks."""
 
@@ -37,6 +43,11 @@ class Pigments:
         self.landmarks = skin.path.rest[skin.path.kit.landmarks]
         self.front = smooth(2.0, 5.0, self.rest[:, 2])
         self.dark = self.look.melanin > 0.4
+        # Foreshortened towards the temples, fine noise becomes upright streaks.
+        self.facing = smooth(0.25, 0.75, normals(skin.rest, skin.fine.quads)[:, 2])
+        # Fine speckle is per vertex: as noise in the shader it doubled the time of a render. It is fainter on
+        # the lids, where the blink stretches it into streaks.
+        self.calm = self.facing * (0.35 + 0.65 * smooth(8.0, 13.0, skin.coordinates.loop))
         self.contrast = min(1.0, (0.2 / self.look.melanin) ** 0.5)
         self.centres = {side: skin.path.globes[side].centre for side in SIDES}
 
@@ -44,21 +55,10 @@ class Pigments:
         """Values by attribute name: (n,) or, of coordinates, (n, 3)."""
         lips = self._lips()
         wet, fine, coordinates = self._lid_values()
-        lid, corner = self._upper_lid(), self._nasal_corner()
-        margin = wet * self.skin.coordinates.upper
-        melanin = self._melanin(lips) * (1 - 0.35 * wet) * (1 + LID_MELANIN * lid)
-        melanin += MARGIN_MELANIN * margin * np.clip(1 + 0.5 * self._noise(7.0, 42, 2), 0.4, 1.5)
-        haemoglobin = (
-            self._haemoglobin(lips) + wet * self._rim_blood() + LID_BLOOD * lid + CORNER_BLOOD * corner
-        )
-        melanin *= 1 + self.contrast * (0.10 * self._noise(1.3, 11) + 0.10 * self._noise(6.0, 12))
-        haemoglobin *= 1 + 0.13 * self._noise(1.8, 13, 4) + 0.15 * self._noise(9.0, 14)
-        # Fine speckle per vertex: as noise in the shader it doubled the time of a render.
-        # Fainter on the lids, where the blink stretches it into streaks.
-        calm = 0.35 + 0.65 * smooth(8.0, 13.0, self.skin.coordinates.loop)
-        melanin *= np.clip(1 + self.contrast * calm * 0.12 * self._noise(11.0, 22, 3), 0.5, 1.6)
-        haemoglobin *= np.clip(1 + calm * 0.13 * self._noise(15.0, 23, 2), 0.5, 1.6)
-        melanin += self._spots()
+        lid, corner, flesh = self._upper_lid(), self._nasal_corner(), self.skin.relief.flesh
+        melanin = self._varied_melanin(lips, wet, lid) * (1 - FLESH_PALER * flesh)
+        haemoglobin = self._varied_haemoglobin(lips, wet, lid, corner) + FLESH_BLOOD * flesh
+        rough = self._roughness(lips) + LID_ROUGH * np.maximum(lid, corner) - FLESH_WET * flesh
         warp = 0.045 * np.stack([self._noise(3.5, k, 2) for k in (19, 20, 21)], -1)
         return {
             "rest": self.flat,
@@ -69,11 +69,28 @@ class Pigments:
             "pore": np.clip(self._pores(lips), 0, 1.5)
             * np.clip(0.7 + 0.4 * self._noise(5.0, 16, 1), 0.15, 1.2),
             "net": np.clip(0.75 + 0.35 * self._noise(2.6, 17, 2), 0.2, 1.3) * age_depth(self.look.age) ** 0.5,
-            "rough": np.clip(self._roughness(lips) + LID_ROUGH * np.maximum(lid, corner), 0.2, 0.6),
-            "shine": (1 - LID_DULL * lid) * (1 - 0.85 * corner),
+            "rough": np.clip(rough, 0.2, 0.6),
+            "shine": (1 - LID_DULL * lid) * (1 - 0.85 * corner * (1 - flesh)),
             "wet": wet,
             "fine": fine * age_depth(self.look.age) ** 0.7,
         }
+
+    def _varied_melanin(self, lips: Array, wet: Array, lid: Array) -> Array:
+        """(n,) optical depth of melanin with what varies it: lids, margins, mottling, speckle, freckles."""
+        out = self._melanin(lips) * (1 - 0.35 * wet) * (1 + LID_MELANIN * lid)
+        margin = wet * self.skin.coordinates.upper
+        out += MARGIN_MELANIN * margin * np.clip(1 + 0.5 * self._noise(7.0, 42, 2), 0.4, 1.5)
+        mottled = self._noise(1.3, 11) + self.facing * self._noise(6.0, 12)
+        out *= 1 + self.contrast * 0.10 * mottled
+        out *= np.clip(1 + self.contrast * self.calm * 0.16 * self._noise(11.0, 22, 3), 0.5, 1.6)
+        return out + self._spots()
+
+    def _varied_haemoglobin(self, lips: Array, wet: Array, lid: Array, corner: Array) -> Array:
+        """(n,) optical depth of blood with what varies it: margins, mottling, speckle, the lids' vessels."""
+        out = self._haemoglobin(lips) + wet * self._rim_blood() + LID_BLOOD * lid + CORNER_BLOOD * corner
+        out *= 1 + 0.13 * self._noise(1.8, 13, 4) + 0.15 * self.facing * self._noise(9.0, 14)
+        out += LID_VESSELS * lid * np.exp(-((self._noise(4.5, 43, 3) / 0.07) ** 2))
+        return np.asarray(out * np.clip(1 + self.calm * 0.18 * self._noise(15.0, 23, 2), 0.5, 1.6))
 
     def _rim_blood(self) -> Array:
         """(n,) blood of the lids' wet margins, more towards the corners: even, it is a drawn line."""

@@ -28,3 +28,13 @@ def test_a_shut_lids_lashes_hang_down_as_long_as_they_stood(path: BlinkPath) -> 
     assert np.mean(shut[:, 1] < 0) > 0.9
     # Curled by 88 degrees they were 0.83 times as long, and a seventh of them pointed up.
     assert np.median(np.linalg.norm(shut, axis=1)) > 0.95 * np.median(np.linalg.norm(opened, axis=1))
+
+
+def test_most_lower_lashes_stand_alone(path: BlinkPath) -> None:
+    """In even bundles, as upper ones are, they looked planted."""
+    alone = {}
+    for upper in (True, False):
+        leaders = Lashes(path, identity_of_seed(4).hair, 1, upper, 4).row.leader
+        _, clump = np.unique(leaders, return_counts=True)
+        alone[upper] = float(np.mean(clump == 1))
+    assert alone[False] > 0.5 > alone[True] + 0.1

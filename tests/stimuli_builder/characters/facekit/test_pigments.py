@@ -7,7 +7,9 @@ from numpy.typing import NDArray
 from stimuli_builder.characters.facekit.blink_path import BlinkPath
 from stimuli_builder.characters.facekit.identity import identity_of_seed
 from stimuli_builder.characters.facekit.kit import FaceKit
-from stimuli_builder.characters.facekit.lid_skin import LID_MIDDLE, FaceSkin, lid_skin
+from stimuli_builder.characters.facekit.lid_coordinates import LID_MIDDLE
+from stimuli_builder.characters.facekit.lid_relief import FLESH_RISE_CM
+from stimuli_builder.characters.facekit.lid_skin import FaceSkin, lid_skin, normals
 from stimuli_builder.characters.facekit.pigments import Pigments
 
 Array = NDArray[np.float64]
@@ -66,7 +68,7 @@ def test_the_wet_margins_blood_gathers_towards_the_corners(skin: FaceSkin) -> No
 def test_the_fold_runs_out_towards_the_corners(skin: FaceSkin) -> None:
     """Its depth is read off as what the open lid's relief takes from the mesh without it."""
     at = skin.coordinates
-    depth = -skin._relief(np.zeros(len(skin.rest)))
+    depth = -skin.relief.displacement(np.zeros(len(skin.rest)))
     fold = (at.upper > 0.95) & (at.loop < 12)
     middle, outer = (
         np.percentile(depth[fold & part], 99)
@@ -104,11 +106,38 @@ def test_no_lines_run_together_on_the_line_of_the_corners(skin: FaceSkin, values
     assert values["fine"][apart].min() > 0
 
 
-def test_the_nasal_corner_is_redder_and_duller_than_the_skin_beyond(
+def test_the_skin_beside_a_nasal_corner_is_redder_and_duller_than_the_skin_beyond(
     skin: FaceSkin, values: dict[str, Array]
 ) -> None:
     corner = Pigments(skin)._nasal_corner()
-    near, beyond = corner > 0.9, (corner == 0) & (skin.rest[:, 2] > 4)
+    near = (corner > 0.9) & (skin.relief.flesh == 0)
+    beyond = (corner == 0) & (skin.rest[:, 2] > 4)
     assert near.sum() > 50
     assert values["shine"][near].max() < 0.25
     assert np.median(values["hem"][near]) > np.median(values["hem"][beyond]) + 0.15
+
+
+def test_the_fold_of_the_nasal_corner_is_moist_flesh(skin: FaceSkin, values: dict[str, Array]) -> None:
+    """Of the colour of skin it was a pit behind a corner that ended blunt."""
+    flesh, beside = skin.relief.flesh > 0.9, (skin.relief.flesh == 0) & (Pigments(skin)._nasal_corner() > 0.5)
+    assert flesh.sum() > 20
+    assert np.abs(skin.coordinates.azimuth[flesh] - skin.coordinates.azimuth[flesh].mean()).max() < 0.5
+    assert values["mel"][flesh].mean() < 0.6 * values["mel"][beside].mean()
+    assert values["hem"][flesh].mean() > values["hem"][beside].mean() + 0.3
+    assert values["rough"][flesh].mean() < values["rough"][beside].mean() - 0.2
+    assert values["shine"][flesh].min() > values["shine"][beside].max() - 0.2
+
+
+def test_that_flesh_stands_out_of_its_fold_only_while_the_eye_is_open(skin: FaceSkin) -> None:
+    flesh, still = skin.relief.flesh > 0.9, np.ones(len(skin.rest))
+    opened, shut = skin.relief.displacement(0 * still)[flesh], skin.relief.displacement(still)[flesh]
+    assert (opened - shut).mean() == pytest.approx(FLESH_RISE_CM, rel=0.35)
+    assert np.abs(shut).max() < 0.2 * FLESH_RISE_CM
+
+
+def test_fine_grain_ends_where_skin_turns_away(skin: FaceSkin) -> None:
+    """Seen from the side it became upright streaks at the temples."""
+    facing = Pigments(skin).facing
+    away = normals(skin.rest, skin.fine.quads)[:, 2]
+    assert facing[away > 0.8].min() == 1
+    assert facing[away < 0.2].max() == 0

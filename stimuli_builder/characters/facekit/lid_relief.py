@@ -1,0 +1,107 @@
+"""What stands out of the lids' skin or goes into it: folds, furrows, bags, flesh, grain."""
+
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from stimuli_builder.characters.facekit.blink_path import BlinkPath, nasal_tip
+from stimuli_builder.characters.facekit.field_noise import value_noise
+from stimuli_builder.characters.facekit.identity import Identity
+from stimuli_builder.characters.facekit.kit import Array
+from stimuli_builder.characters.facekit.lid_coordinates import LID_MIDDLE, LidCoordinates
+from stimuli_builder.characters.facekit.lid_loops import SIDES
+from stimuli_builder.characters.facekit.sphere import smooth
+
+FLESH_LOOPS, FLESH_CM, FLESH_RISE_CM = (2, 3, 4, 5), (0.04, 0.12), 0.045
+"""Loops whose nasal ends are flesh, how far it reaches beside them, and how far it stands out of their fold.
+
+The lids' edges end short of the fold between them, and skin there looked like a pit behind a blunt corner.
+"""
+
+
+class LidRelief:
+    """Relief of one face's skin about the eyes.
+
+    Parameters
+    ----------
+    coordinates : LidCoordinates
+        Where each vertex lies on the lids.
+    flat : float64 array (n, 3)
+        Vertices of the shut lids, on which the grain is drawn, cm.
+    flesh : float64 array (n,)
+        1 on the flesh of the nasal corners, 0 beyond it.
+    identity : Identity
+        Whose folds, age and seed.
+    """
+
+    def __init__(self, coordinates: LidCoordinates, flat: Array, flesh: Array, identity: Identity) -> None:
+        self.coordinates, self.flesh = coordinates, flesh
+        self._flat, self._lids, self._seed = flat, identity.lids, identity.seed
+        self._years = age_depth(identity.skin.age)
+
+    @cached_property
+    def _waves(self) -> tuple[Array, Array, Array]:
+        """Noise along the lid (which bends the fold), across it (fine lines) and of the skin's surface."""
+        at, seed = self.coordinates, self._seed
+        zero = np.zeros_like(at.loop)
+        along = np.stack([at.azimuth * 2.2, at.side * 3, zero], -1)
+        lines = np.stack([at.azimuth * 3.0 + 11 * at.side, at.loop * 1.9, zero], -1)
+        return (
+            0.35 * value_noise(along, seed + 5, 2),
+            value_noise(lines, seed + 8, 3),
+            value_noise(self._flat * 4.5, seed + 30, 3),
+        )
+
+    def displacement(self, stroke: Array) -> Array:
+        """(n,) cm along the normal, at each vertex's stroke: folds, the nasal corner's flesh, grain."""
+        at, surface, opened = self.coordinates, self._waves[2], 1 - stroke
+        grain = 0.0020 * surface * smooth(3.5, 6.0, at.loop)
+        mound = FLESH_RISE_CM * opened * self.flesh * (1 + 0.5 * surface)
+        return np.asarray(self._upper_folds(stroke) + self._lower_folds() + grain + mound)
+
+    def _upper_folds(self, stroke: Array) -> Array:
+        """The open lid's fold, what is left of it on a shut lid, and that one's lines."""
+        at, lids = self.coordinates, self._lids
+        wander, lines, _ = self._waves
+        years = self._years
+        envelope = smooth(-0.85, -0.35, at.azimuth) * smooth(1.25, 0.75, at.azimuth) * at.upper
+        height = lids.crease + wander * 0.6
+        height = height - 0.9 * smooth(0.1, -0.8, at.azimuth) - 0.5 * smooth(0.5, 1.2, at.azimuth)
+        above, opened = at.loop - height, 1 - stroke
+        # Of one depth from end to end it was a line drawn round the eye: it runs out, and is nowhere gone.
+        uneven = np.clip(0.85 + 0.9 * wander - 0.35 * np.abs(at.azimuth - LID_MIDDLE), 0.35, 1.1)
+        width = 0.30 + 0.18 * opened
+        fold = -lids.depth * uneven * (0.026 + 0.026 * opened) * np.exp(-((above / width) ** 2))
+        fold += lids.depth * 0.030 * opened * np.exp(-(((above - 1.15) / 0.8) ** 2))
+        second = np.exp(-(((above - 1.5) / 0.22) ** 2)) * (0.4 + 0.6 * stroke)
+        fold -= 0.012 * years * second * np.clip(0.5 + 1.2 * wander, 0, 1)
+        furrows = np.exp(-((lines / 0.22) ** 2)) * smooth(3.6, 5.0, at.loop) * smooth(11.5, 8.5, at.loop)
+        fold -= (0.006 * years + 0.005 * stroke) * furrows
+        return np.asarray(fold * envelope)
+
+    def _lower_folds(self) -> Array:
+        """The bag below the eye, its fold and its lines."""
+        at, years = self.coordinates, self._years
+        wander, lines, _ = self._waves
+        below = (1 - at.upper) * smooth(-0.9, -0.5, at.azimuth) * smooth(1.2, 0.8, at.azimuth)
+        bag = 0.010 * years * np.exp(-(((at.loop - 5.2) / 1.0) ** 2))
+        bag -= 0.016 * np.exp(-(((at.loop - 7.6 - 0.8 * wander) / 0.55) ** 2))
+        bag -= 0.004 * (years - 0.4) * np.exp(-((lines / 0.25) ** 2)) * smooth(4.0, 6.0, at.loop)
+        return np.asarray(bag * below)
+
+
+def corner_flesh(path: BlinkPath, rest: Array) -> Array:
+    """(n,) 1 in the folds where the lids' edges meet at the nose, 0 from `FLESH_CM[1]` beside them."""
+    here = []
+    for side in SIDES:
+        tips = np.stack([nasal_tip(path, path.rest, side, loop) for loop in FLESH_LOOPS])
+        share = np.linspace(0, len(tips) - 1, 30)
+        here.append(np.stack([np.interp(share, np.arange(len(tips)), tips[:, k]) for k in range(3)], -1))
+    away, _ = cKDTree(np.concatenate(here)).query(rest)
+    return smooth(FLESH_CM[1], FLESH_CM[0], away)
+
+
+def age_depth(age: float) -> float:
+    """Depth of lines and furrows relative to 35 years."""
+    return float(np.clip(0.35 + 0.65 * (age - 18) / 17, 0.3, 2.2))
