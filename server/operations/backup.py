@@ -21,7 +21,7 @@ from pydantic import BaseModel, Field
 from sqlalchemy import Connection, Table
 
 from experiments.errors import InputError
-from experiments.files import whole_private_file
+from experiments.files import check_targets, whole_private_file
 from server.clock import iso, now
 from server.context import Services
 from server.file_locks import locked
@@ -61,8 +61,14 @@ def back_up(
 
     The key file (`keys`, beside the backup where None) and a copy of the ledger of erasures beside that are
     written before the backup has its name: no backup stands there without its keys.
+
+    Raises
+    ------
+    InputError
+        A folder is missing, or a file cannot be written or holds the keys of another installation.
     """
     key_path = keys or keys_apart.beside(path)
+    check_targets([path, key_path])
     keys_apart.check_replaceable(key_path, services.settings.key)
     with _written(path) as stream:
         described, kept = write_backup(services, stream, with_clips=with_clips)
@@ -72,7 +78,6 @@ def back_up(
 
 def _write_keys(services: Services, path: Path, kept: KeyFile) -> None:
     """Key file and ledger, by one backup of the installation at a time."""
-    path.parent.mkdir(parents=True, exist_ok=True)
     with locked(services.settings.common_folder / "backup-keys.lock"):
         keys_apart.check_replaceable(path, services.settings.key)
         keys_apart.write_keys(path, kept)
@@ -165,7 +170,6 @@ def _plain(entry: tarfile.TarInfo) -> tarfile.TarInfo:
 def _written(path: Path) -> Iterator[IO[bytes]]:
     # It holds the secret key and everybody's answers: for the owner of the file alone.
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
         with whole_private_file(path) as stream:
             yield stream
     except OSError as error:

@@ -85,6 +85,8 @@ def test_a_backup_without_its_key_file_opens_no_id_and_says_so(
     services: Services, people: list[Participant], link: str, empty_database_url: str, tmp_path: Path
 ) -> None:
     backup, keys = tmp_path / "a" / "b.tar", tmp_path / "safe" / "keys.json"
+    for path in (backup, keys):
+        path.parent.mkdir()
     back_up(services, backup, with_clips=False, keys=keys)
     assert not (tmp_path / "a" / NAME).exists()
     assert keys.stat().st_mode & 0o077 == 0
@@ -127,6 +129,7 @@ def test_with_the_key_file_ids_and_pseudonyms_are_as_before(
     services: Services, people: list[Participant], empty_database_url: str, tmp_path: Path
 ) -> None:
     keys = tmp_path / "keys.json"
+    (tmp_path / "a").mkdir()
     back_up(services, tmp_path / "a" / "b.tar", with_clips=False, keys=keys)
     settings = Settings(database_url=empty_database_url, data_folder=tmp_path / "new")
     done = run_server_command(settings, "restore", str(tmp_path / "a" / "b.tar"), "--keys", str(keys))
@@ -228,6 +231,7 @@ def test_the_ledger_goes_along_so_that_a_new_machine_erases_again(
     services: Services, experimenter: Admin, people: list[Participant], tmp_path: Path
 ) -> None:
     older = tmp_path / "b" / "older.tar"
+    older.parent.mkdir()
     back_up(services, older, with_clips=False)
     run = people[0].run_id
     experimenter.send("POST", f"/studies/short/runs/{run}/erase", {"confirm": run})

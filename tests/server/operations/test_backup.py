@@ -153,9 +153,20 @@ class TestRefusals:
         assert not (tmp_path / "new" / "secret_key").exists()
         target.database.close()
 
-    def test_a_folder_that_cannot_be_written(
-        self, services: Services, empty_database_url: str, tmp_path: Path
+    @pytest.mark.parametrize(
+        ("path", "keys"), [("no/b.tar", None), ("b.tar", "no/keys.json"), ("file/b.tar", None)]
+    )
+    def test_a_folder_that_is_not_there(
+        self, services: Services, empty_database_url: str, path: str, keys: str | None, tmp_path: Path
     ) -> None:
         (tmp_path / "file").write_text("")
-        with pytest.raises(InputError, match="cannot be written"):
-            back_up(services, tmp_path / "file" / "b.tar")
+        with pytest.raises(InputError, match=r"the folder .*(no|file) does not exist; make it first$"):
+            back_up(services, tmp_path / path, keys=tmp_path / keys if keys else None)
+        assert not (tmp_path / "no").exists()
+        assert not (tmp_path / "b.tar").exists(), "no backup without its keys"
+
+    def test_a_key_file_in_the_backups_place(
+        self, services: Services, empty_database_url: str, tmp_path: Path
+    ) -> None:
+        with pytest.raises(InputError, match="already in use in this call"):
+            back_up(services, tmp_path / "b.tar", keys=tmp_path / "b.tar")

@@ -98,6 +98,7 @@ def test_a_key_file_older_than_the_backup_fails_drill_and_restore(
     services: Services, client: TestClient, link: str, first: Participant, tmp_path: Path
 ) -> None:
     folder = tmp_path / "b"
+    folder.mkdir()
     back_up(services, folder / "older.tar", with_clips=False)
     shutil.copy(folder / NAME, tmp_path / "stale.json")
     came(client, link, "40178")
@@ -135,6 +136,7 @@ def test_the_keys_stand_there_before_the_backup(
             seen.append({entry.name for entry in self.entries()})
 
     if kind == "here":
+        (tmp_path / "b").mkdir()
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(keys_apart, "write_keys", _killed)
             with pytest.raises(KeyboardInterrupt):
@@ -161,6 +163,7 @@ def test_a_backup_that_is_overtaken_brings_no_key_back(
     tmp_path: Path,
 ) -> None:
     folder = tmp_path / "b"
+    folder.mkdir()
 
     def event() -> None:
         erase(experimenter, first.run_id)
@@ -217,6 +220,8 @@ def test_a_key_file_of_the_future_is_replaced(
 def test_a_restore_takes_no_keys_of_another_installation(
     services: Services, first: Participant, tmp_path: Path
 ) -> None:
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
     back_up(services, tmp_path / "a" / TAR, with_clips=False)
     other = with_secret(services, "another installation of this machine")
     back_up(other, tmp_path / "b" / TAR, with_clips=False)
@@ -235,6 +240,7 @@ def test_after_a_change_of_the_secret_key_older_backups_keep_their_keys(
     services: Services, first: Participant, tmp_path: Path
 ) -> None:
     folder, old = tmp_path / "b", tmp_path / "old_key"
+    folder.mkdir()
     back_up(services, folder / "older.tar", with_clips=False)
     old.write_bytes(services.settings.key)
     changed = with_secret(services, "another key of this installation")
@@ -299,6 +305,8 @@ def test_the_weekly_drill_knows_where_the_key_file_is(
     services: Services, first: Participant, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     keys = tmp_path / "safe" / "keys.json"
+    for folder in (keys.parent, tmp_path / "b"):
+        folder.mkdir()
     monkeypatch.setenv("PALPEBRA_BACKUP_KEYS", str(keys))
     settings = Settings(
         **services.settings.model_dump() | {"backup_folder": str(tmp_path / "b"), "backup_keys": keys}

@@ -277,6 +277,7 @@ def test_days_are_kept_in_a_store_too(rated: Services, keys: tuple[str, Path], t
 
 
 def test_the_plain_folder_of_before_is_drilled_as_before(rated: Services, tmp_path: Path) -> None:
+    (tmp_path / "b").mkdir()
     back_up(rated, tmp_path / "b" / "palpebra-2026-03-01.tar")
     called = run_server_command(rated.settings, "drill", str(tmp_path / "b"))
     assert "came back whole" in called.stdout, called.stderr
