@@ -4,6 +4,7 @@ import re
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -13,14 +14,15 @@ NOTE = "note"
 """Key of `DataFrame.attrs` under which a table says how it was read; absent where that is plain."""
 MAX_NAMED = 6
 _SEPARATORS = {";": "semicolons", "\t": "tabs"}
+_NUMBER = re.compile(r"[+-]?[0-9]*([.,][0-9]+|(?<=[0-9])[.]?)([eE][+-]?[0-9]+)?")
 _COMMA_OR_WHOLE = re.compile(r"[+-]?[0-9]*(,[0-9]+|(?<=[0-9]))([eE][+-]?[0-9]+)?")
 _THOUSANDS = re.compile(r"[+-]?[0-9]{1,3}(,[0-9]{3})+")
 FIRST_BYTES = 1 << 16
 """What is looked at for the header line."""
 
 
-def read_table(path: Path) -> pd.DataFrame:
-    """Read a series, track, review or table of profiles, column names stripped of blanks.
+def read_table(path: Path, *, alone: str = "", blank_lines: bool = False) -> pd.DataFrame:
+    """Read a series, track, review, blink or table of profiles, column names stripped of blanks.
 
     The separator is taken from the header line. Decimal commas are read as points; `attrs[NOTE]` then
     says so, for the person to see.
@@ -28,6 +30,10 @@ def read_table(path: Path) -> pd.DataFrame:
     Parameters
     ----------
     path : Path
+    alone : str
+        A column that may be the file's only one, with a header line or without: its commas are decimal.
+    blank_lines : bool
+        Blank lines below the header are rows.
 
     Returns
     -------
@@ -38,13 +44,30 @@ def read_table(path: Path) -> pd.DataFrame:
     InputError
         A folder, no UTF-8 text, or no table with rows.
     """
-    separator = _separator(_header(path))
+    header = _header(path).strip()
+    headless = bool(alone and _NUMBER.fullmatch(header))
+    one_column = headless or header.strip('"') == (alone or None)
+    separator = ";" if one_column else _separator(header)
+    options: dict[str, Any] = {"header": None, "names": [alone]} if headless else {}
+    table = _cells(path, sep=separator, skip_blank_lines=not blank_lines, **options)
+    said = []
+    if separator in _SEPARATORS and not one_column:
+        said.append(f"columns parted by {_SEPARATORS[separator]}")
+    if example := _read_decimal_commas(table, separator):
+        said.append(f"decimal commas (e.g. '{example}') read as decimal points")
+    if said:
+        table.attrs[NOTE] = f"{path.name}: {', '.join(said)}"
+    return table
+
+
+def _cells(path: Path, **options: Any) -> pd.DataFrame:
+    """The cells as pandas reads them by these options; what is no table is refused."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", pd.errors.ParserWarning)
             # Else a field too many makes the first column an index, and shifts the others under its name.
-            table = pd.read_csv(
-                path, sep=separator, skipinitialspace=True, index_col=False, encoding="utf-8-sig"
+            table: pd.DataFrame = pd.read_csv(
+                path, skipinitialspace=True, index_col=False, encoding="utf-8-sig", **options
             )
     except pd.errors.ParserWarning as error:
         raise InputError(
@@ -58,11 +81,6 @@ def read_table(path: Path) -> pd.DataFrame:
     table.columns = table.columns.astype(str).str.strip()
     if table.empty:
         raise InputError(f"{path}: the table has a header but no rows")
-    said = [f"columns parted by {_SEPARATORS[separator]}"] if separator in _SEPARATORS else []
-    if example := _read_decimal_commas(table, separator):
-        said.append(f"decimal commas (e.g. '{example}') read as decimal points")
-    if said:
-        table.attrs[NOTE] = f"{path.name}: {', '.join(said)}"
     return table
 
 

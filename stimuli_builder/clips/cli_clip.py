@@ -1,6 +1,7 @@
 """`stimuli clip`: one clip, without an experiment."""
 
 import re
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -15,7 +16,8 @@ CLIP_HELP = """
 Render one clip from a blink profile and a character.
 
 PROFILE is real, model, SL, AL, SL_ease, AL_ease, the name of a shipped recording (`stimuli profiles`), or a
-CSV file of closure samples at 300 fps (0 open, 1 closed; docs/clips.md).
+CSV file of closure samples at 300 fps (0 open, 1 closed; docs/clips.md), columns parted by commas, semicolons
+or tabs, with decimal points or commas.
 
 Examples:
 
@@ -73,6 +75,7 @@ def clip_command(
     barcode: Annotated[bool, typer.Option("--test-barcode", help="Draw each frame's number.")] = False,
 ) -> None:
     """Render one clip."""
+    from stimuli_builder.clips.profile_files import reading_note
     from stimuli_builder.clips.single import SingleClip, render_single
 
     if out.suffix.lower() != ".mp4":
@@ -97,6 +100,8 @@ def clip_command(
         width_px=width,
         height_px=height,
     )
+    if profile.endswith(".csv") and (note := reading_note(Path(profile))):
+        sys.stderr.write(f"note: {note}\n")
     clip = SingleClip(settings, profile, exemplar, seed, clip_frames, barcode)
     made = render_single(clip, out)
     print(

@@ -1,12 +1,12 @@
 """Blinks from files of closure samples at 300 fps: a table of profiles, or one blink alone."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from experiments.errors import InputError, nearest
+from stimuli_builder.blinks.csv_table import NOTE, read_table
 from stimuli_builder.blinks.profile import Array, BlinkProfile
 from stimuli_builder.blinks.profile_table import read_profile_table
 
@@ -24,7 +24,8 @@ def read_closure_file(path: Path) -> list[BlinkProfile]:
 
     A file with a column `profile_id` is a table of profiles as `stimuli blinks` writes it. Any other
     holds one blink: a column `closure` (0 open, 1 closed) at 300 fps, and where wanted `closure_other`
-    (right eye), `lower_up_mm` and `lower_nasal_mm`; or numbers alone, one a line.
+    (right eye), `lower_up_mm` and `lower_nasal_mm`; or numbers alone, one a line. Semicolons, tabs and
+    decimal commas are read as in a series (`stimuli_builder.blinks.csv_table`).
 
     Raises
     ------
@@ -68,43 +69,29 @@ def read_closure_file(path: Path) -> list[BlinkProfile]:
     ]
 
 
+def reading_note(path: Path) -> str:
+    """How the cells of such a file were read, where that is not plain: for the person who gave it to see."""
+    return str(_table(path).attrs.get(NOTE, ""))
+
+
 def _table(path: Path) -> pd.DataFrame:
-    """The cells as they are written, without blank lines at the end."""
-    if not path.is_file():
-        raise InputError(f"{path}: expected a CSV file of closure samples, found none; check the path")
-    try:
-        table = _cells(path)
-        if all(_is_number(str(name)) for name in table.columns):
-            table = _cells(path, header=None, names=["closure"])
-    except (ValueError, UnicodeDecodeError, OSError) as error:
-        reason = " ".join(str(error).split())
-        raise InputError(f"{path.name}: not a CSV file that can be read ({reason})") from error
-    if not isinstance(table.index, pd.RangeIndex):
-        raise InputError(f"{path.name}: expected as many values in a line as there are columns, got more")
-    filled = np.flatnonzero((table != "").any(axis=1))
+    """The cells, without blank lines at the end; one among samples is a sample that is missing."""
+    table = read_table(path, alone="closure", blank_lines=True)
+    filled = np.flatnonzero(table.notna().any(axis=1))
     return table.iloc[: filled[-1] + 1 if len(filled) else 0]
-
-
-def _cells(path: Path, **more: Any) -> pd.DataFrame:
-    """Text of every cell: messages quote it, and a blank line among samples is a sample that is missing."""
-    table: pd.DataFrame = pd.read_csv(path, dtype=str, keep_default_na=False, skip_blank_lines=False, **more)
-    return table
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 def _numbers(path: Path, table: pd.DataFrame, name: str) -> Array:
     values = pd.to_numeric(table[name], errors="coerce").to_numpy(dtype=np.float64)
     wrong = np.flatnonzero(~np.isfinite(values))
     if len(wrong):
-        text = table[name].iloc[int(wrong[0])]
-        raise InputError(f"{path.name}: {name} must be a number, sample {wrong[0] + 1} is '{text}'")
+        # Beside a word decimal commas are still commas; the word is what is wrong.
+        cells = table[name].astype(str).str.replace(",", ".")
+        words = np.flatnonzero(pd.to_numeric(cells, errors="coerce").isna())
+        sample = int([*words, *wrong][0])
+        cell = table[name].iloc[sample]
+        said = "missing" if pd.isna(cell) else f"'{cell}'"
+        raise InputError(f"{path.name}: {name} must be a number, sample {sample + 1} is {said}")
     return values
 
 

@@ -105,6 +105,17 @@ def test_one_clip(
         assert len(list(container.decode(video=0))) == 90
 
 
+def test_a_clip_of_a_file_with_decimal_commas(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    file, out = tmp_path / "blink.csv", tmp_path / "clip.mp4"
+    file.write_text("closure;lower_up_mm\n" + "".join(f"0,{n};0\n" for n in (0, 2, 4, 6, 8, 9, 7, 5, 3, 1)))
+    call = ("--profile", file, "--size", "320x120", "--out", out)
+    assert stimuli(monkeypatch, "clip", *call) == 0
+    said = "columns parted by semicolons, decimal commas (e.g. '0,0') read as decimal points"
+    assert capsys.readouterr().err == f"note: blink.csv: {said}\n"
+
+
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
