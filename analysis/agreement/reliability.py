@@ -25,6 +25,8 @@ Floats = NDArray[np.float64]
 MIN_CASES = 3
 MIN_OMEGA_ITEMS = 3
 """One factor of two items is not identified."""
+STARTS = 10
+"""Starts of the fit of one factor: from a single one it ends, at times, at a lesser maximum, or at none."""
 FLAT = 1e-3
 """Slope of the deviance a case, in units of log variance, below which a fit of one factor has ended."""
 
@@ -197,9 +199,6 @@ def _item(data: ItemAnswers, position: int, loading: float | None) -> ItemStatis
 
 def _one_factor(answers: Floats) -> tuple[Floats | None, str]:
     """Standardised loadings on one factor, the sum positive; None with the reason where there are none."""
-    from statsmodels.multivariate.factor import Factor
-    from statsmodels.tools.sm_exceptions import ConvergenceWarning
-
     n, items = answers.shape
     if items < MIN_OMEGA_ITEMS:
         return None, f"omega needs {MIN_OMEGA_ITEMS} items or more"
@@ -208,16 +207,28 @@ def _one_factor(answers: Floats) -> tuple[Floats | None, str]:
     correlations: Floats = np.atleast_2d(np.corrcoef(answers, rowvar=False))
     if np.linalg.cond(correlations) > 1e8:
         return None, "an item follows from the others, so that omega is not defined"
-    with warnings.catch_warnings():
-        # of where it ended the two refusals below tell more than that it did not converge
-        warnings.simplefilter("ignore", ConvergenceWarning)
-        fitted: Any = Factor(corr=correlations, n_factor=1, method="ml", nobs=n).fit(maxiter=500, tol=1e-10)
-    loadings = np.asarray(fitted.loadings, dtype=np.float64)[:, 0]
+    loadings = _likeliest(correlations, n)
     if not np.isfinite(loadings).all() or (np.abs(loadings) > 1 - 1e-6).any():
         return None, "one factor explains an item wholly (a Heywood case), so that omega is not defined"
     if not _is_maximum(correlations, loadings):
         return None, "the fit of one factor did not end, so that omega is not defined"
     return loadings * (np.sign(loadings.sum()) or 1.0), ""
+
+
+def _likeliest(correlations: Floats, n: int) -> Floats:
+    """The likeliest loadings that fits from `STARTS` starts end at, the same starts in every run."""
+    from statsmodels.multivariate.factor import Factor
+    from statsmodels.tools.sm_exceptions import ConvergenceWarning, EstimationWarning
+
+    model: Any = Factor(corr=correlations, n_factor=1, method="ml", nobs=n)
+    with warnings.catch_warnings():
+        # of where it ended the refusals of `_one_factor` tell more: not converged, nothing left of an item
+        for sort in (ConvergenceWarning, EstimationWarning):
+            warnings.simplefilter("ignore", sort)
+        fits = [model.fit(maxiter=500, tol=1e-10, rng=start) for start in range(STARTS)]
+        likelihoods = [model.loglike((fit.loadings, fit.uniqueness)) for fit in fits]
+    best = fits[int(np.argmax(np.nan_to_num(likelihoods, nan=-np.inf)))]
+    return np.asarray(best.loadings, dtype=np.float64)[:, 0]
 
 
 def _is_maximum(correlations: Floats, loadings: Floats) -> bool:

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from analysis.agreement.raters import LEVELS, agreement
-from analysis.agreement.reliability import read_items, reliability
+from analysis.agreement.reliability import _is_maximum, _one_factor, read_items, reliability
 from analysis.cli import app
 from analysis.opinion.scores import read_votes
 from experiments.errors import InputError
@@ -171,3 +171,42 @@ def test_a_factor_that_does_not_converge_is_a_reason_and_no_warning(tmp_path: Pa
     assert result.exit_code == 0, result.exception
     told = json.loads(out.read_text())
     assert (told["omega"] is None) == bool(told["omega_reason"])
+
+
+def test_the_likelihood_is_flat_at_the_maximum_alone() -> None:
+    """Three items have one factor exactly: the loading of a is the root of r_ab r_ac / r_bc."""
+    loadings = np.array([0.9, 0.6, 0.4])
+    correlations = np.outer(loadings, loadings)
+    np.fill_diagonal(correlations, 1.0)
+    assert _is_maximum(correlations, loadings)
+    assert _is_maximum(correlations, -loadings), "the sign of a factor is open"
+    for item in range(3):
+        for step in (-0.01, 0.01):
+            assert not _is_maximum(correlations, loadings + step * np.eye(3)[item])
+    assert not _is_maximum(correlations, loadings[::-1])
+
+
+def noise(seed: int, shape: tuple[int, int]) -> np.ndarray:
+    return np.random.default_rng(seed).integers(1, 6, shape).astype(float)
+
+
+def common(seed: int) -> np.ndarray:
+    """Three items that share most of what they say, rounded to a scale."""
+    draw = np.random.default_rng(seed)
+    return np.clip(np.round(draw.normal(3, 1, (26, 1)) + draw.normal(0, 0.3, (26, 3))), 1, 7)
+
+
+@pytest.mark.parametrize("answers", [common(12), common(3), noise(31, (28, 5)), noise(5, (11, 5))])
+def test_omega_is_the_same_in_every_run(answers: np.ndarray) -> None:
+    """From a start drawn anew the fit ended now and then at another maximum, or without one."""
+    ends = {str(_one_factor(answers)) for _ in range(8)}
+    assert len(ends) == 1
+
+
+def test_an_item_with_nothing_of_its_own_is_a_reason_and_no_warning() -> None:
+    """Statsmodels warns of uniquenesses that are nearly zero, by a line of its source."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ends = [_one_factor(noise(seed, (30, 3))) for seed in range(12)]
+    assert any("Heywood" in reason for _, reason in ends)
+    assert all((loadings is None) == bool(reason) for loadings, reason in ends)
