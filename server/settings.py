@@ -1,7 +1,5 @@
 """Every setting of the server in one documented class, read from environment variables."""
 
-import os
-import secrets
 from datetime import timedelta
 from email.utils import parseaddr
 from functools import cached_property
@@ -15,6 +13,7 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 from experiments.database_url import with_driver
 from server.audit.syslog_address import syslog_address
 from server.providers.declaration import LOCAL_HOSTS, Provider, ProviderId
+from server.secret_key_file import kept_key, secret_key_path
 
 KEY_LENGTH_MIN = 32
 """Characters of a secret key that somebody sets; the ones that are made here have 64."""
@@ -290,21 +289,4 @@ class Settings(BaseSettings):
         """The secret key; generated at first use with file mode 600 where none is set."""
         if self.secret_key:
             return self.secret_key.encode("utf-8")
-        return _kept_key(self.data_folder / "secret_key")
-
-
-def _kept_key(path: Path) -> bytes:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
-    if not path.is_file():
-        descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-        with os.fdopen(descriptor, "w", encoding="ascii") as stream:
-            stream.write(secrets.token_hex(32))
-        try:
-            # A link fails where another worker was first, so that all of them read one key.
-            os.link(temporary, path)
-        except FileExistsError:
-            pass
-        finally:
-            temporary.unlink()
-    return path.read_bytes().strip()
+        return kept_key(secret_key_path(self.data_folder))

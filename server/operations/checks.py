@@ -25,6 +25,7 @@ from server.operations.modes import open_to_others, own_folders
 from server.operations.shared_checks import connection_pool, ledger, return_addresses
 from server.row_policies_repository import OLDEST_POSTGRES as OLDEST_WITH_WALL
 from server.row_security_repository import ROLE
+from server.secret_key_file import secret_key_path
 from server.settings import KEY_LENGTH_MIN
 from server.tallies.recount import Recount
 
@@ -88,7 +89,7 @@ def file_modes(services: Services) -> Iterator[Finding]:
 def secret_key(services: Services) -> Iterator[Finding]:
     """The key is there, and no other user can read it."""
     settings = services.settings
-    path = settings.data_folder / "secret_key"
+    path = secret_key_path(settings.data_folder)
     if settings.secret_key:
         fine = not settings.has_short_key
         advice = "" if fine else LONGER_KEY

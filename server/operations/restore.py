@@ -3,7 +3,6 @@
 import errno
 import gzip
 import json
-import os
 import tarfile
 import zlib
 from collections.abc import Callable, Iterator
@@ -27,6 +26,7 @@ from server.operations.keys_apart import NAME, KeyFile, beside, check_fits, key_
 from server.operations.rows import Content, Row
 from server.operations.rows_repository import refuse_unless_empty, tables_of, write_rows
 from server.runs.erasure import replay
+from server.secret_key_file import put_key, secret_key_path
 from server.settings import Settings
 
 FORMAT = 1
@@ -228,27 +228,21 @@ def _content(tar: tarfile.TarFile, name: str) -> bytes:
     return _member(tar, name).read()
 
 
-def _key_path(settings: Settings) -> Path:
-    return settings.data_folder / "secret_key"
-
-
 def _check_key(settings: Settings, key: bytes) -> None:
     """Links that were handed out hold with their own key alone."""
     there = settings.secret_key.encode() if settings.secret_key else b""
-    if not there and _key_path(settings).is_file():
-        there = _key_path(settings).read_bytes().strip()
+    path = secret_key_path(settings.data_folder)
+    if not there and path.is_file():
+        there = path.read_bytes().strip()
     if there and there != key:
         raise InputError(
             "this installation has another secret key than the backup, so that links already handed out "
-            f"could not be shown again; remove {_key_path(settings)} (or unset PALPEBRA_SECRET_KEY) "
+            f"could not be shown again; remove {path} (or unset PALPEBRA_SECRET_KEY) "
             "where it is not in use"
         )
 
 
 def _keep_key(settings: Settings, key: bytes) -> None:
-    path = _key_path(settings)
-    if settings.secret_key or path.is_file():
-        return
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as stream:
-        stream.write(key)
+    path = secret_key_path(settings.data_folder)
+    if not settings.secret_key and not path.is_file():
+        put_key(path, key)
