@@ -4,8 +4,8 @@ from fastapi import APIRouter, BackgroundTasks
 from fastapi.concurrency import run_in_threadpool
 
 from server.accounts import notices, second_factor, service, tokens
-from server.accounts.identity import FreshMyself, Myself
 from server.accounts.passwords import hash_password
+from server.accounts.permission import FreshMyself, Myself
 from server.accounts.proof import must_fit, must_prove
 from server.accounts.schemas import (
     ChangePassword,

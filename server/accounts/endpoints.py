@@ -7,16 +7,9 @@ from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.orm import Session
 
 from server.accounts import invitations, notices, second_factor, service, signing_in, tokens
-from server.accounts.identity import (
-    COOKIE,
-    Identity,
-    Myself,
-    NotSignedIn,
-    account_of,
-    check_origin,
-    identify,
-)
+from server.accounts.identity import COOKIE, Identity, NotSignedIn, account_of, check_origin, identify
 from server.accounts.passwords import checked_password, hash_password
+from server.accounts.permission import Myself
 from server.accounts.schemas import (
     AccountOut,
     InvitationState,

@@ -6,7 +6,7 @@ from fastapi import APIRouter, Query
 
 from server.accounts import audit, invitations, service
 from server.accounts.endpoints import account_out
-from server.accounts.identity import FreshOwner, Owner
+from server.accounts.permission import FreshOwner, Owner
 from server.accounts.schemas import (
     AccountOut,
     AuditOut,

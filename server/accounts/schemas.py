@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
-from server.accounts.identity import Scope
+from server.accounts.permission import Scope
 from server.models import Role
 from server.request_body import RequestBody
 from server.text import VisibleObject

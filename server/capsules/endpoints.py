@@ -3,7 +3,7 @@
 from fastapi import APIRouter
 from fastapi.responses import FileResponse
 
-from server.accounts.identity import ReportReader, Viewer, Writer
+from server.accounts.permission import ReportReader, Viewer, Writer
 from server.capsules import service
 from server.capsules.schemas import CapsuleOut, NewCapsule
 from server.context import ServicesDep

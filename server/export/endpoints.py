@@ -13,7 +13,8 @@ from fastapi.responses import FileResponse, StreamingResponse
 from starlette.background import BackgroundTask
 
 from server.accounts.audit import record
-from server.accounts.identity import Exporter, Identity, Myself, Viewer
+from server.accounts.identity import Identity
+from server.accounts.permission import Exporter, Myself, Viewer
 from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES, Conflict
 from server.export.converted import convert, write_table

@@ -10,7 +10,7 @@ from typing import Any
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
-from server.accounts.identity import Viewer
+from server.accounts.permission import Viewer
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES, NotFound
 

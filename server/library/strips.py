@@ -5,7 +5,7 @@ from pathlib import Path
 from fastapi import APIRouter, Response
 from pydantic import BaseModel, Field, ValidationError
 
-from server.accounts.identity import Viewer
+from server.accounts.permission import Viewer
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES, NotFound
 

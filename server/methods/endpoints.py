@@ -5,7 +5,7 @@ from typing import Literal
 from fastapi import APIRouter, Response
 from pydantic import BaseModel, Field
 
-from server.accounts.identity import Viewer
+from server.accounts.permission import Viewer
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.methods import service

@@ -8,7 +8,8 @@ from fastapi import APIRouter, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import StreamingResponse
 
-from server.accounts.identity import Identity, NotAllowed, NotSignedIn, SecondFactorNeeded, Viewer, identify
+from server.accounts.identity import Identity, NotAllowed, NotSignedIn, identify
+from server.accounts.permission import SecondFactorNeeded, Viewer
 from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES, NotFound
 from server.monitor import service

@@ -5,7 +5,7 @@ import hmac
 from fastapi import APIRouter, Request, Response
 from prometheus_client import CONTENT_TYPE_LATEST
 
-from server.accounts.identity import Owner
+from server.accounts.permission import Owner
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES, ApiError
 from server.operations.metrics import exposition

@@ -2,7 +2,7 @@
 
 from fastapi import APIRouter, Response
 
-from server.accounts.identity import Myself
+from server.accounts.permission import Myself
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.persons import service

@@ -8,7 +8,8 @@ from fastapi.responses import RedirectResponse
 
 from server.accounts import notices
 from server.accounts.endpoints import address_of, set_session_cookie
-from server.accounts.identity import FreshMyself, Myself, check_origin
+from server.accounts.identity import check_origin
+from server.accounts.permission import FreshMyself, Myself
 from server.accounts.proof import must_prove
 from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES, ApiError

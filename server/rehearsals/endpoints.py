@@ -3,7 +3,7 @@
 from fastapi import APIRouter
 from fastapi.responses import FileResponse
 
-from server.accounts.identity import Viewer, Writer
+from server.accounts.permission import Viewer, Writer
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.rehearsals import service

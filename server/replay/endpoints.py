@@ -5,7 +5,7 @@ from typing import Annotated
 from fastapi import APIRouter, Path
 
 from server.accounts.audit import record
-from server.accounts.identity import PersonalReader
+from server.accounts.permission import PersonalReader
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.replay import service

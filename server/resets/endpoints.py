@@ -7,8 +7,9 @@ from fastapi.concurrency import run_in_threadpool
 
 from server import mail
 from server.accounts.endpoints import address_of
-from server.accounts.identity import Myself, account_of, check_origin
+from server.accounts.identity import account_of, check_origin
 from server.accounts.passwords import hash_password
+from server.accounts.permission import Myself
 from server.accounts.proof import must_fit, must_prove
 from server.accounts.schemas import ConfirmPassword
 from server.accounts.throttle import DEVICE_COOKIE

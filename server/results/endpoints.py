@@ -5,7 +5,7 @@ from typing import Annotated
 from fastapi import APIRouter, Header, Response
 from pydantic import Field
 
-from server.accounts.identity import Viewer
+from server.accounts.permission import Viewer
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.numbers import Number

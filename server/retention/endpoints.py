@@ -2,7 +2,7 @@
 
 from fastapi import APIRouter
 
-from server.accounts.identity import Myself
+from server.accounts.permission import Myself
 from server.clock import now
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES

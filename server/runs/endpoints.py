@@ -5,7 +5,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query
 
 from server.accounts.audit import record
-from server.accounts.identity import Eraser, Myself, PersonalReader, Writer
+from server.accounts.permission import Eraser, Myself, PersonalReader, Writer
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.runs import service

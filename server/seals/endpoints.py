@@ -6,7 +6,8 @@ from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from experiments.seal import Seal
-from server.accounts.identity import Identity, Viewer, Writer
+from server.accounts.identity import Identity
+from server.accounts.permission import Viewer, Writer
 from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES, NotFound
 from server.seals.page import page

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
-from server.accounts.identity import Viewer, Writer
+from server.accounts.permission import Viewer, Writer
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.numbers import Number

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query, Response
 
 from server.accounts.audit import record
-from server.accounts.identity import Myself, Writer
+from server.accounts.permission import Myself, Writer
 from server.clock import now
 from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES

@@ -10,7 +10,8 @@ from fastapi.params import File
 from fastapi.responses import PlainTextResponse, StreamingResponse
 
 from experiments.source_video import FrameRate
-from server.accounts.identity import Identity, Viewer
+from server.accounts.identity import Identity
+from server.accounts.permission import Viewer
 from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES, Invalid
 from server.studies import left_out, originals, uploads

@@ -4,7 +4,8 @@ from typing import Annotated
 
 from fastapi import Depends, Request
 
-from server.accounts.identity import WRITER, Identity, NotAllowed, Writer
+from server.accounts.identity import Identity, NotAllowed
+from server.accounts.permission import WRITER, Writer
 from server.context import Services, ServicesDep
 from server.workspaces import repository
 

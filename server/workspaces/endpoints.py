@@ -2,7 +2,7 @@
 
 from fastapi import APIRouter
 
-from server.accounts.identity import Founder, FreshMyself, Myself, Owner
+from server.accounts.permission import Founder, FreshMyself, Myself, Owner
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.workspaces import service

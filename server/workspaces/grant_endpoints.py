@@ -2,7 +2,7 @@
 
 from fastapi import APIRouter
 
-from server.accounts.identity import FreshMyself, Myself
+from server.accounts.permission import FreshMyself, Myself
 from server.context import ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.studies.lookup import find_study

@@ -8,7 +8,8 @@ from sqlalchemy.orm import Session
 from experiments.errors import did_you_mean
 from server.accounts import repository as accounts
 from server.accounts.audit import record
-from server.accounts.identity import Identity, NotAllowed, Operator, account_of, must_be_fresh
+from server.accounts.identity import Identity, NotAllowed, Operator, account_of
+from server.accounts.permission import must_be_fresh
 from server.errors import Conflict, Invalid, NotFound
 from server.models import DEFAULT_WORKSPACE, Account, Right, Role, Study, Workspace
 from server.row_security_repository import every_row

@@ -9,7 +9,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from server.accounts.identity import Scope
+from server.accounts.permission import Scope
 from server.accounts.service import create_account
 from server.context import Services
 from server.models import ApiToken

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from sqlalchemy import update
 
-from server.accounts.identity import FRESH_FOR
+from server.accounts.permission import FRESH_FOR
 from server.clock import now
 from server.context import Services
 from server.models import Account, AccountLogin, AdminSession, Workspace
