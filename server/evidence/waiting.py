@@ -18,11 +18,11 @@ from sqlalchemy.orm import Session
 
 from server.clock import now
 from server.db import Database
-from server.evidence import repository
+from server.evidence import waiting_repository
 from server.evidence.clip_bytes import ClipBytes, clip_digest
 from server.evidence.intake import Intake
-from server.evidence.repository import WaitingClip
 from server.evidence.service import judge_run
+from server.evidence.waiting_repository import WaitingClip
 from server.models import StudyRun
 from server.tokens import hash_token
 
@@ -39,7 +39,7 @@ def judge_waiting(database: Database, intake: Intake, token: str) -> None:
     """Judge the digests of a run that nothing was said of; clips are read while no transaction is open."""
     token_hash = hash_token(token)
     with database.read() as session:
-        waiting = repository.waiting(session.connection(), token_hash)
+        waiting = waiting_repository.waiting(session.connection(), token_hash)
     judged = _judged(intake.clips, waiting, time.monotonic() + LIMIT_S, set())
     if judged:
         with database.write_connection() as connection:
@@ -57,18 +57,18 @@ def judge_later(database: Database, clips: ClipBytes, stopped: Callable[[], bool
         Asked between two runs; once true no further one is looked at.
     """
     with database.read() as session:
-        runs = repository.unchecked_runs(session)
+        runs = waiting_repository.unchecked_runs(session)
     away: set[str] = set()
     return sum(_judge_run_later(database, clips, run, away) for run in runs if not stopped())
 
 
 def _judge_run_later(database: Database, clips: ClipBytes, run_id: int, away: set[str]) -> int:
     with database.read() as session:
-        waiting = repository.waiting_of_run(session.connection(), run_id)
+        waiting = waiting_repository.waiting_of_run(session.connection(), run_id)
     judged = _judged(clips, waiting, time.monotonic() + LATER_LIMIT_S, away)
     if judged:
         with database.write() as session:
-            run = repository.lock_run(session, run_id)
+            run = waiting_repository.lock_run(session, run_id)
             stored = _stored(session.connection(), judged)
             if stored and run.evidence_verdict is not None and run.erased_at is None:
                 _judge_again(session, run, stored)
@@ -80,7 +80,7 @@ def _judge_again(session: Session, run: StudyRun, judged: Mapping[AnswerKey, boo
     before, run.evidence_verdict = run.evidence_verdict, judge_run(session, run).verdict
     wrong = sum(not right for right in judged.values())
     said = {"answers": len(judged), "wrong": wrong, "before": before, "verdict": run.evidence_verdict}
-    repository.note_digests(session, run, said, now())
+    waiting_repository.note_digests(session, run, said, now())
 
 
 def _answers(waiting: Iterable[WaitingClip]) -> int:
@@ -119,7 +119,7 @@ def _stored(connection: Connection, judged: Mapping[AnswerKey, bool]) -> dict[An
     return {
         answer: right
         for answer, right in judged.items()
-        if repository.judge_digest(connection, *answer, right=right)
+        if waiting_repository.judge_digest(connection, *answer, right=right)
     }
 
 
