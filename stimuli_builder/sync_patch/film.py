@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from experiments.errors import InputError
 from stimuli_builder.sync_patch import code, locate
-from stimuli_builder.video import opened, scan_video
+from stimuli_builder.video import opened
+from stimuli_builder.video_scan import scan_video
 
 PICTURES_PER_S_MIN = 100.0
 CONTRAST_MIN = 25.0

@@ -23,7 +23,7 @@ from stimuli_builder.tracking.learn import learn
 from stimuli_builder.tracking.shapes import default_markers
 from stimuli_builder.tracking.track import track_video
 from stimuli_builder.tracking.training import TrainingOptions
-from stimuli_builder.video import scan_video
+from stimuli_builder.video_scan import scan_video
 from tests.bench.bench_blinks import matches
 from tests.bench.bench_tracking import print_line
 

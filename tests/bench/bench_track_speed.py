@@ -23,7 +23,7 @@ from stimuli_builder.tracking.labelfree import label_free_lesson
 from stimuli_builder.tracking.survey import survey
 from stimuli_builder.tracking.table import numbers, point_columns, track_rows
 from stimuli_builder.tracking.track import track_video
-from stimuli_builder.video import scan_video
+from stimuli_builder.video_scan import scan_video
 
 try:
     from stimuli_builder.tracking.model_file import load_model, save_model

@@ -13,7 +13,8 @@ from stimuli_builder.actor.recording import Actor, ActorOptions, choose_frames, 
 from stimuli_builder.cli import main
 from stimuli_builder.tracking.labels import load_labels
 from stimuli_builder.tracking.shapes import default_markers, inter_eyelid_distances
-from stimuli_builder.video import frames, scan_video
+from stimuli_builder.video import frames
+from stimuli_builder.video_scan import scan_video
 
 
 @pytest.fixture(scope="module")
