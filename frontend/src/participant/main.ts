@@ -1,38 +1,25 @@
-/** Where the participant's page begins: link, gates, one tab, the run, its timeline. */
+/** Where the participant's page begins: link, gates, one tab, the run. */
 import "./style/index.css";
-import type { LinkState, RunStarted, RunState } from "../api/schema";
+import type { LinkState, RunStarted } from "../api/schema";
 import { Refused } from "./request";
 import { loadMessages, type MessageKey, preferred, SHIPPED, translator, type Translate } from "../i18n";
-import { setLanguage, setScales, setSurround } from "./flow/appearance";
-import { fetchFirst } from "./flow/blocks";
+import { setLanguage, setSurround } from "./flow/appearance";
+import { enter, RETURNED } from "./flow/enter";
 import { abilities, findings, type GateFinding, lackOfRoom, measures } from "./flow/gates";
 import { Identity, recruiterQuery, storageKey, storageOf } from "./flow/identity";
 import { type Kept, KeptVisit } from "./flow/kept-visit";
-import { fetchRun, persistently, reach, startRun, wayBack } from "./flow/link";
-import { describeDevice, flush, openSession } from "./flow/open-session";
+import { persistently, reach, startRun, wayBack } from "./flow/link";
 import { asksForCode, type Claim } from "./flow/resume-code";
-import { serveOffline } from "./flow/serve-offline";
 import { type Beginning, startPage, titleOf } from "./flow/start-page";
-import { timeline } from "./flow/timeline";
-import { watch } from "./flow/watchers";
-import { runTimeline, type SimulationMode } from "./jspsych";
-import { choosePlayer } from "./playback/choose";
 import { IndexedDbStore } from "./outbox/indexed-db";
-import { Outbox } from "./outbox/outbox";
 import { MemoryStore, type OutboxStore } from "./outbox/store";
 import { loadModule } from "../ui/load-module";
 import { claimTab } from "./screen/one-tab";
 import { AnswersMissing } from "./screens/finish";
-import { emptied, showNotice } from "./screens/notice";
-import type { Session } from "./session";
-import { loadKind } from "./trials";
-import { saveInterrupted } from "./trials/save-rating";
-import { settleInterrupted } from "./views/ledger";
+import { showNotice } from "./screens/notice";
 
 /** How often the end may lead back to what is missing, before the page says that something is wrong. */
 const RETURNS = 3;
-const RETURNED = "palpebra returns";
-
 /** What is known when the link has answered, or an earlier visit answers for it. */
 export interface Entry {
   root: HTMLElement;
@@ -45,7 +32,6 @@ export interface Entry {
 }
 
 const loadRefusal = (): Promise<typeof import("./flow/refusal")> => loadModule(() => import("./flow/refusal"));
-const loadEnd = (): Promise<typeof import("./flow/ended")> => loadModule(() => import("./flow/ended"));
 
 export async function main(root: HTMLElement): Promise<void> {
   const spoken = preferred(SHIPPED, navigator.languages);
@@ -143,75 +129,6 @@ async function begun({ root, link_token }: Entry, identity: Identity, { language
   }
 }
 
-/** From a started run to its timeline: what an earlier page left is sent, or counted, first. */
-async function enter(entry: Entry, identity: Identity, store: OutboxStore, started: RunStarted, warnings: GateFinding[]): Promise<void> {
-  const { root, t, link, keeping, kept } = entry;
-  const outbox = outboxOf(root, store, keeping);
-  // Loaded before anything is sent where the kind is known: an answer that ends the run must find its listener.
-  const known = kept && (await loadKind(kept.run.trial.kind));
-  const unsent = await flush(outbox, started, kept ? 0 : undefined);
-  const run = kept?.run ?? (await persistently(root, t, () => fetchRun(started.run_token)));
-  if (!kept) keeping.begin({ link, started, run });
-  const kind = known ?? (await loadKind(run.trial.kind));
-  identity.keepTab();
-  const checks = run.checks ? await loadKind("motion_check") : kind;
-  await loadMessages(run.language);
-  const player = await choosePlayer(run.display);
-  const session = openSession({ root, link, run, kind, checks, player, outbox, unsent });
-  setLanguage(run.language);
-  setScales(run.display.right_to_left_scales);
-  const over = (): Promise<void> => {
-    keeping.forget();
-    return persistently(root, session.t, () => fetchRun(started.run_token)).then(async (now) =>
-      (await loadEnd()).ended(root, session.t, now, started, identity, wayBack(session.t, link)),
-    );
-  };
-  if (run.status !== "active") return over();
-  root.addEventListener(
-    "run-over",
-    () => {
-      session.over.abort();
-      emptied(root);
-      void over();
-    },
-    { once: true },
-  );
-  for (const { reason } of warnings) session.events.add(reason === "gate_storage" ? "storage_blocked" : "unsupported", { reason });
-  if (kept) session.events.add("offline", { loaded_without_server: true });
-  if (run.resumable_until) serveOffline();
-  // Asked for now, so that it is here when it is wanted, also without a connection.
-  const last = loadModule(() => import("./screens/completion"));
-  await play(session, started, store.durable, () => {
-    keeping.begin({ link, started, run: session.run });
-    if (session.run.resumable_until) serveOffline();
-  });
-  if (!session.completion) return;
-  keeping.forget();
-  const { nextPerson, showCompletion } = await last;
-  showCompletion(session, emptied(root), session.completion, nextPerson(session.t, identity));
-}
-
-/** An outbox whose answers keep the visit up to date, and tell where the run ends or goes on elsewhere. */
-function outboxOf(root: HTMLElement, store: OutboxStore, keeping: KeptVisit): Outbox {
-  const tell = (what: "run-over" | "taken-over"): void => void root.dispatchEvent(new CustomEvent(what));
-  return new Outbox(store, {
-    onAccepted(item, body) {
-      keeping.note(item, body);
-      if (statusIn(body) === "screened_out") tell("run-over");
-    },
-    onRefused({ status, code }) {
-      if (status === 401) tell("taken-over");
-      else if (code === "run_closed") tell("run-over");
-    },
-  });
-}
-
-/** The run's status in the answer to a write, or in its receipt. */
-function statusIn(body: unknown): RunState["status"] | undefined {
-  const answer = body as { status?: RunState["status"]; receipt?: { status: RunState["status"] } } | null;
-  return answer?.receipt?.status ?? answer?.status;
-}
-
 /** Whether this tab has the study as the first one, has taken it from another tab as it was asked to, or left it there. */
 async function oneTab(root: HTMLElement, t: Translate, link_token: string): Promise<"first" | "taken" | "left"> {
   const taken = (): void => void root.dispatchEvent(new CustomEvent("tab-taken"));
@@ -225,41 +142,6 @@ async function oneTab(root: HTMLElement, t: Translate, link_token: string): Prom
     showNotice(root, { title: t("second_tab_title"), text: t("second_tab"), actions: [{ label: t("second_tab_take"), press: resolve }] });
   });
   return (await claimTab(`palpebra ${link_token}`, true, taken)) === "held" ? "taken" : "left";
-}
-
-/** `hasTrials` is called where an answer in this visit decides the group, and with it the trials. */
-async function play(session: Session, started: RunStarted, durable: boolean, hasTrials: () => void): Promise<void> {
-  const { root, run, outbox, over } = session;
-  const end = (): void => {
-    over.abort();
-    outbox.stop();
-  };
-  root.addEventListener("tab-taken", () => {
-    session.events.add("second_tab");
-    end();
-  });
-  root.addEventListener("taken-over", end);
-  // Asked for now, as the last page is.
-  const dialog = loadModule(() => import("./screens/stop-dialog"));
-  root.addEventListener("stop", () => void dialog.then(({ openStopDialog }) => openStopDialog(session)));
-  watch(session);
-  fetchFirst(session);
-  void describeDevice(session, durable);
-  await settleInterrupted(session, (trial, play) => saveInterrupted(session, trial, play));
-  root.replaceChildren();
-  if (run.awaits_group) {
-    await runTimeline(root, timeline(session, started.run_token), simulation(run));
-    hasTrials();
-    root.replaceChildren();
-  }
-  await runTimeline(root, timeline(session, started.run_token), simulation(run));
-  if (session.completion) storageOf("sessionStorage")?.removeItem(RETURNED);
-}
-
-/** Only previews and synthetic runs may answer themselves. */
-function simulation(run: RunState): SimulationMode | null {
-  const mode = new URLSearchParams(location.search).get("simulate");
-  return (run.origin === "preview" || run.origin === "simulated") && (mode === "visual" || mode === "data-only") ? mode : null;
 }
 
 function showProblem(root: HTMLElement, t: Translate, error: unknown): void {
