@@ -1,15 +1,20 @@
 """The classifier itself: a small network over the features of a dip; its weights ship beside it."""
 
-import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from experiments.files import whole_file
 from stimuli_builder.blinks.profile import Array
 
-WEIGHTS = Path(__file__).with_name("weights.json")
+WEIGHTS = Path(__file__).with_name("weights.npz")
+TICKS = 10_000
+"""Weights are stored as whole numbers of ten-thousandths: two bytes each, and the same floats everywhere."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +48,29 @@ class Network:
 @cache
 def shipped_network() -> Network:
     """The network that ships, made by `train.py` beside it."""
-    document = json.loads(WEIGHTS.read_text(encoding="utf-8"))
-    layers = tuple((np.array(w), np.array(b)) for w, b in document["layers"])
-    return Network(tuple(document["kinds"]), np.array(document["mean"]), np.array(document["spread"]), layers)
+    return stored_network(WEIGHTS)
+
+
+def stored_network(path: Path) -> Network:
+    """Read a network that `store` wrote."""
+    with np.load(path, allow_pickle=False) as stored:
+        count = sum(name.startswith("weights") for name in stored)
+        layers = tuple((stored[f"weights{n}"] / TICKS, stored[f"offsets{n}"] / TICKS) for n in range(count))
+        return Network(tuple(stored["kinds"].tolist()), stored["mean"], stored["spread"], layers)
+
+
+def store(network: Network, path: Path, **about: str | int | Sequence[str]) -> None:
+    """Write a network, its weights rounded to ten-thousandths, and what is told `about` it, as npz."""
+    arrays: dict[str, Any] = {name: np.array(value) for name, value in about.items()}
+    arrays |= {"kinds": np.array(network.kinds), "mean": network.mean, "spread": network.spread}
+    for number, (weights, offsets) in enumerate(network.layers):
+        arrays |= {f"weights{number}": _ticks(weights), f"offsets{number}": _ticks(offsets)}
+    with whole_file(path) as temporary:
+        np.savez_compressed(temporary, **arrays)
+
+
+def _ticks(values: Array) -> NDArray[np.int16] | NDArray[np.int32]:
+    whole = np.rint(values * TICKS)
+    if np.abs(whole).max() < 2**15:
+        return whole.astype(np.int16)
+    return whole.astype(np.int32)

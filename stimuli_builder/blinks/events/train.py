@@ -5,7 +5,6 @@
 Needs scikit-learn, which comes with pingouin. The same seed gives the same weights.
 """
 
-import json
 import sys
 import warnings
 
@@ -14,7 +13,6 @@ from numpy.typing import NDArray
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.neural_network import MLPClassifier
 
-from experiments.files import whole_text
 from stimuli_builder.blinks.events.candidates import (
     FEATURES,
     Candidate,
@@ -24,7 +22,7 @@ from stimuli_builder.blinks.events.candidates import (
 )
 from stimuli_builder.blinks.events.generated import KINDS, Generated, Motion, generate
 from stimuli_builder.blinks.events.levels import Depth, depth_of
-from stimuli_builder.blinks.events.network import WEIGHTS
+from stimuli_builder.blinks.events.network import WEIGHTS, Network, store
 from stimuli_builder.blinks.profile import Array
 
 SEED = 20261121
@@ -117,23 +115,18 @@ def main() -> None:
     spread = features.std(0, dtype=np.float64) + 1e-6
     standard = np.clip((features - mean) / spread, -6, 6).astype(np.float32)
     network = trained(standard, np.array([CLASSES.index(k) for k in kinds]))
-    layers = [
-        [np.round(w.astype(np.float64), 4).tolist(), np.round(b.astype(np.float64), 4).tolist()]
-        for w, b in zip(network.coefs_, network.intercepts_, strict=True)
-    ]
-    document = {
-        "made_by": f"python -m stimuli_builder.blinks.events.train {count}",
-        "seed": SEED,
-        "dips": len(kinds),
-        "kinds": list(CLASSES),
-        "features": list(FEATURES),
-        "mean": np.round(mean, 6).tolist(),
-        "spread": np.round(spread, 6).tolist(),
-        "layers": layers,
-    }
-    with whole_text(WEIGHTS) as stream:
-        json.dump(document, stream)
-        stream.write("\n")
+    layers = tuple(
+        (weights.astype(np.float64), offsets.astype(np.float64))
+        for weights, offsets in zip(network.coefs_, network.intercepts_, strict=True)
+    )
+    store(
+        Network(CLASSES, np.round(mean, 6), np.round(spread, 6), layers),
+        WEIGHTS,
+        made_by=f"python -m stimuli_builder.blinks.events.train {count}",
+        seed=SEED,
+        dips=len(kinds),
+        features=FEATURES,
+    )
     sys.stdout.write(f"{WEIGHTS}: {len(kinds)} dips, loss {network.loss_:.3f}\n")
 
 
