@@ -13,7 +13,7 @@ def reduced(picture: Picture, factor: int) -> Picture:
     if factor == 1:
         return picture
     height, width = (side // factor for side in picture.shape)
-    whole = np.ascontiguousarray(picture[: height * factor, : width * factor])
+    whole = picture[: height * factor, : width * factor]
     return np.asarray(cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
 
 

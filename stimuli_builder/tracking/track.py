@@ -6,6 +6,8 @@ from itertools import islice
 from pathlib import Path
 from types import MappingProxyType
 
+from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+
 from experiments.errors import InputError
 from stimuli_builder.tracking.model import CoupledModel
 from stimuli_builder.tracking.outcome import TrackSummary
@@ -47,7 +49,8 @@ def track_video(
         )
     tracker, summary = Tracker(model, info.fps), TrackSummary()
     begun = time.perf_counter()
-    with TrackWriter(out, model.eyes) as writer:
+    # a second thread for matrices this small only waits, on the core that decodes
+    with threadpool_limits(1, "blas"), TrackWriter(out, model.eyes) as writer:
         pictures = frames(info.path, lambda full: reduced(full, model.reduction))
         for picture in islice(pictures, info.frame_count):
             before = time.thread_time()
