@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 REACH_CM = (0.030, 0.0104, 0.0044)
-"""Letter d of eq. (1) for red, green and blue on a head of the kit's size: green and blue 0.22 and 0.11 mm over
-s = 1.9 - A + 3.5 (A - 0.8)^2 of the same paper, A the mean colour of light skin, 0.39 and 0.29. Of red it is
+"""Letter d of eq. (1) for red, green and blue on a head of the kit's size: green and blue 0.22 and 0.11 mm
+over s = 1.9 - A + 3.5 (A - 0.8)^2 of the same paper, A the mean colour of light skin, 0.39 and 0.29. Red is
 0.048 by that formula (0.65 mm, A 0.64), for even skin: narrow folds, filled with red light, were orange.
 """
 TAIL = 8.0
