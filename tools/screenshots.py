@@ -31,12 +31,10 @@ def call(*command: str | Path) -> None:
 
 
 def analysis_pictures(folder: Path) -> None:
-    """Table III and its figure from synthetic ratings."""
+    """Table III from synthetic ratings."""
     ratings, report = folder / "exp3.csv", folder / "report"
     call("analysis", "synthesise", "exp3", "--seed", "1", "--out", ratings)
     call("analysis", "run", "exp3", "--csv", ratings, "--out", report)
-    for figure in report.glob("figure-*.png"):
-        shutil.copy(figure, IMAGES / figure.name)
     page = next(report.glob("*.html"))
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
@@ -79,7 +77,6 @@ def visit(page: Page, address: str) -> None:
     page.check("input[value=normal]")
     page.click(".primary")
     page.wait_for_selector(".prose h1, .prose h2")
-    page.screenshot(path=IMAGES / "instructions.png")
     page.click(".primary")
     page.wait_for_selector("text=not part of the study")
     page.click(".primary")

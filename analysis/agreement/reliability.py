@@ -225,10 +225,20 @@ def _likeliest(correlations: Floats, n: int) -> Floats:
         # of where it ended the refusals of `_one_factor` tell more: not converged, nothing left of an item
         for sort in (ConvergenceWarning, EstimationWarning):
             warnings.simplefilter("ignore", sort)
-        fits = [model.fit(maxiter=500, tol=1e-10, rng=start) for start in range(STARTS)]
+        fits = [fit for start in range(STARTS) if (fit := _fit(model, start)) is not None]
         likelihoods = [model.loglike((fit.loadings, fit.uniqueness)) for fit in fits]
+    if not fits:
+        return np.full(len(correlations), np.nan)
     best = fits[int(np.argmax(np.nan_to_num(likelihoods, nan=-np.inf)))]
     return np.asarray(best.loadings, dtype=np.float64)[:, 0]
+
+
+def _fit(model: Any, start: int) -> Any:
+    """One fit from a start's random numbers; None where it ended in no numbers."""
+    try:
+        return model.fit(rng=start)
+    except np.linalg.LinAlgError:
+        return None
 
 
 def _is_maximum(correlations: Floats, loadings: Floats) -> bool:

@@ -68,7 +68,7 @@ def back_up(
         A folder is missing, or a file cannot be written or holds the keys of another installation.
     """
     key_path = keys or keys_apart.beside(path)
-    check_targets([path, key_path])
+    check_targets([path, key_path, key_path.parent / erasures.NAME])
     keys_apart.check_replaceable(key_path, services.settings.key)
     with _written(path) as stream:
         described, kept = write_backup(services, stream, with_clips=with_clips)

@@ -81,6 +81,8 @@ def backup(
     encrypt it for another host by --to. The keys of recruiters' ids are in palpebra-keys.json, which each
     backup replaces: keep one copy of it, the newest, so that who is erased is erased from older backups too.
 
+    Folders of FILE and of the key file must be there.
+
     Examples:
 
       server backup backups/palpebra-$(date -u +%FT%H%M%S).tar --keep 14

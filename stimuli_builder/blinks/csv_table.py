@@ -21,7 +21,7 @@ FIRST_BYTES = 1 << 16
 """What is looked at for the header line."""
 
 
-def read_table(path: Path, *, alone: str = "", blank_lines: bool = False) -> pd.DataFrame:
+def read_table(path: Path, *, alone: str = "", as_written: bool = False) -> pd.DataFrame:
     """Read a series, track, review, blink or table of profiles, column names stripped of blanks.
 
     The separator is taken from the header line. Decimal commas are read as points; `attrs[NOTE]` then
@@ -31,9 +31,10 @@ def read_table(path: Path, *, alone: str = "", blank_lines: bool = False) -> pd.
     ----------
     path : Path
     alone : str
-        A column that may be the file's only one, with a header line or without: its commas are decimal.
-    blank_lines : bool
-        Blank lines below the header are rows.
+        A column that may be the file's only one: its commas are decimal. A first line that is a number
+        without a comma is its first value, where no header line stands.
+    as_written : bool
+        Cells are the text in the file, and blank lines below the header are rows: only a blank is missing.
 
     Returns
     -------
@@ -45,11 +46,13 @@ def read_table(path: Path, *, alone: str = "", blank_lines: bool = False) -> pd.
         A folder, no UTF-8 text, or no table with rows.
     """
     header = _header(path).strip()
-    headless = bool(alone and _NUMBER.fullmatch(header))
+    headless = bool(alone and "," not in header and _NUMBER.fullmatch(header))
     one_column = headless or header.strip('"') == (alone or None)
     separator = ";" if one_column else _separator(header)
     options: dict[str, Any] = {"header": None, "names": [alone]} if headless else {}
-    table = _cells(path, sep=separator, skip_blank_lines=not blank_lines, **options)
+    if as_written:
+        options |= {"dtype": str, "keep_default_na": False, "na_values": [""], "skip_blank_lines": False}
+    table = _cells(path, sep=separator, **options)
     said = []
     if separator in _SEPARATORS and not one_column:
         said.append(f"columns parted by {_SEPARATORS[separator]}")

@@ -19,7 +19,7 @@ from stimuli_builder.characters.level_planes import FORMAT, frame_planes, pictur
 from stimuli_builder.characters.writing import write_bytes_declared
 
 QUANTISER = 18
-"""x264's constant quantiser of ten-bit planes: 50 dB or more against the pictures given (decision 0956)."""
+"""x264's constant quantiser of ten-bit planes: 49.8 dB or more against those of `alder@6` (decision 0956)."""
 STILL_CODES = 2
 """Code values that the encoder may change of a pixel which stands still: skin must not flicker."""
 

@@ -76,7 +76,7 @@ def reading_note(path: Path) -> str:
 
 def _table(path: Path) -> pd.DataFrame:
     """The cells, without blank lines at the end; one among samples is a sample that is missing."""
-    table = read_table(path, alone="closure", blank_lines=True)
+    table = read_table(path, alone="closure", as_written=True)
     filled = np.flatnonzero(table.notna().any(axis=1))
     return table.iloc[: filled[-1] + 1 if len(filled) else 0]
 

@@ -165,8 +165,13 @@ class TestRefusals:
         assert not (tmp_path / "no").exists()
         assert not (tmp_path / "b.tar").exists(), "no backup without its keys"
 
-    def test_a_key_file_in_the_backups_place(
-        self, services: Services, empty_database_url: str, tmp_path: Path
+    @pytest.mark.parametrize(
+        ("path", "keys"), [("b.tar", "b.tar"), ("erasures.ndjson", None), ("b.tar", "erasures.ndjson")]
+    )
+    def test_one_file_in_anothers_place(
+        self, services: Services, empty_database_url: str, path: str, keys: str | None, tmp_path: Path
     ) -> None:
+        """Backup, key file and the copy of the ledger of erasures beside that are three files."""
         with pytest.raises(InputError, match="already in use in this call"):
-            back_up(services, tmp_path / "b.tar", keys=tmp_path / "b.tar")
+            back_up(services, tmp_path / path, keys=tmp_path / keys if keys else None)
+        assert not (tmp_path / path).exists()

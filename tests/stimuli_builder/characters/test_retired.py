@@ -24,6 +24,7 @@ OPENING_MM = {
     "birch@3": 9.66,
     "cedar": 9.85,
     "hazel": 10.91,
+    "hazel@3": 10.91,
 }
 """Of the eyes of each character that has left, as its declaration has it."""
 

@@ -55,7 +55,7 @@ def test_a_blink_as_spreadsheets_write_it(tmp_path: Path, text: str) -> None:
     np.testing.assert_array_equal(profile.closure_other, [0, 0.4, 0.9, 0.5, 0])
 
 
-@pytest.mark.parametrize("first", ["closure\n0", "0", "0,0"])
+@pytest.mark.parametrize("first", ["closure\n0", "closure\n0,0", "0"])
 def test_commas_of_one_column_are_decimal(tmp_path: Path, first: str) -> None:
     file = tmp_path / "blink.csv"
     file.write_text(f"{first}\n0,5\n1\n0,4\n0\n")
@@ -75,7 +75,10 @@ def test_a_table_of_profiles_with_semicolons(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "line"),
     [
-        ("closure\n0\nnan\n1\n0\n", "closure must be a number, sample 2 is missing"),
+        ("closure\n0\nnan\n1\n0\n", "closure must be a number, sample 2 is 'nan'"),
+        ("closure\n0\n0.5\n1\n0.6\nnan\nnan\n", "closure must be a number, sample 5 is 'nan'"),
+        ("closure\nFALSE\nTRUE\nFALSE\n", "closure must be a number, sample 1 is 'FALSE'"),
+        ("0,0\n0,3\n0,9\n0,2\n", "no column 'closure'"),
         ("closure;other\n0;0\n0,5;0\nx;0\n0;0\n", "closure must be a number, sample 3 is 'x'"),
         ("closure\n0\nx\n1\n0\n", "closure must be a number, sample 2 is 'x'"),
         ("closure\n0\n0.5\n\n1\n0\n", "closure must be a number, sample 3 is missing"),

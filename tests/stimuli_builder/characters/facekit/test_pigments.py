@@ -5,12 +5,14 @@ import pytest
 from numpy.typing import NDArray
 
 from stimuli_builder.characters.facekit.blink_path import BlinkPath
+from stimuli_builder.characters.facekit.framing import FRAMINGS
 from stimuli_builder.characters.facekit.identity import identity_of_seed
 from stimuli_builder.characters.facekit.kit import FaceKit
 from stimuli_builder.characters.facekit.lid_coordinates import LID_MIDDLE
 from stimuli_builder.characters.facekit.lid_relief import FLESH_RISE_CM
-from stimuli_builder.characters.facekit.lid_skin import FaceSkin, lid_skin, normals
+from stimuli_builder.characters.facekit.lid_skin import FaceSkin, face_part, lid_skin, normals
 from stimuli_builder.characters.facekit.pigments import Pigments
+from stimuli_builder.characters.facekit.subdivision import subdivide
 
 Array = NDArray[np.float64]
 
@@ -135,9 +137,18 @@ def test_that_flesh_stands_out_of_its_fold_only_while_the_eye_is_open(skin: Face
     assert np.abs(shut).max() < 0.2 * FLESH_RISE_CM
 
 
-def test_fine_grain_ends_where_skin_turns_away(skin: FaceSkin) -> None:
+def test_fine_grain_ends_where_skin_turns_away(kit: FaceKit, skin: FaceSkin) -> None:
     """Seen from the side it became upright streaks at the temples."""
-    facing = Pigments(skin).facing
-    away = normals(skin.rest, skin.fine.quads)[:, 2]
-    assert facing[away > 0.8].min() == 1
-    assert facing[away < 0.2].max() == 0
+    eyes = FRAMINGS["eyes"]
+    part = subdivide(face_part(kit, eyes.low, eyes.high), 2)
+    face = FaceSkin(skin.path, skin.identity, part, skin.strokes)
+    blood, away, quads = Pigments(face).values()["hem"], normals(face.rest, part.quads)[:, 2], part.quads
+
+    def grain(where: NDArray[np.bool_]) -> float:
+        """Median step of blood from vertex to vertex beyond the lids, per cm."""
+        chosen = quads[(where & (face.coordinates.loop > 13.5) & (face.rest[:, 2] > 2))[quads].all(axis=1)]
+        following = np.roll(chosen, -1, axis=1)
+        step = np.abs(np.log(blood[chosen] / blood[following]))
+        return float(np.median(step / np.linalg.norm(face.flat[chosen] - face.flat[following], axis=-1)))
+
+    assert grain(away < 0.2) < 0.7 * grain(away > 0.8)
