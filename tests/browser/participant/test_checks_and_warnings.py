@@ -116,6 +116,6 @@ def test_a_warning_is_read_and_left_by_key(server: ServerProcess, tmp_path: Path
     page.focus(".primary")
     page.keyboard.press("Enter")
     page.wait_for_selector(".ready, .break")
-    shown = server.rows("SELECT type FROM run_events WHERE type = 'warning_shown'")
+    shown = server.rows_soon("SELECT type FROM run_events WHERE type = 'warning_shown'", 1)
     assert len(shown) == 1
     assert visit.problems == []
