@@ -14,7 +14,7 @@ NOTE = "note"
 """Key of `DataFrame.attrs` under which a table says how it was read; absent where that is plain."""
 MAX_NAMED = 6
 _SEPARATORS = {";": "semicolons", "\t": "tabs"}
-_NUMBER = re.compile(r"[+-]?[0-9]*([.,][0-9]+|(?<=[0-9])[.]?)([eE][+-]?[0-9]+)?")
+_POINT_OR_WHOLE = re.compile(r"[+-]?[0-9]*([.][0-9]+|(?<=[0-9])[.]?)([eE][+-]?[0-9]+)?")
 _COMMA_OR_WHOLE = re.compile(r"[+-]?[0-9]*(,[0-9]+|(?<=[0-9]))([eE][+-]?[0-9]+)?")
 _THOUSANDS = re.compile(r"[+-]?[0-9]{1,3}(,[0-9]{3})+")
 FIRST_BYTES = 1 << 16
@@ -46,7 +46,7 @@ def read_table(path: Path, *, alone: str = "", as_written: bool = False) -> pd.D
         A folder, no UTF-8 text, or no table with rows.
     """
     header = _header(path).strip()
-    headless = bool(alone and "," not in header and _NUMBER.fullmatch(header))
+    headless = bool(alone and _POINT_OR_WHOLE.fullmatch(header))
     one_column = headless or header.strip('"') == (alone or None)
     separator = ";" if one_column else _separator(header)
     options: dict[str, Any] = {"header": None, "names": [alone]} if headless else {}

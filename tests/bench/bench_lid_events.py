@@ -68,15 +68,20 @@ def papers(eyes: Sequence[Array], fps: float) -> list[float]:
 METHODS: dict[str, Method] = {"classifier": classified, "prominent peaks": peaks, "paper's rule": papers}
 
 
+def matched(times: Sequence[float], spans: Sequence[tuple[float, float]]) -> list[float | None]:
+    """For each span the first time in it that no other has, in seconds; None where there is none."""
+    free, taken = sorted(times), list[float | None]()
+    for start, end in spans:
+        inside = next((time for time in free if start - SLACK_S <= time <= end + SLACK_S), None)
+        if inside is not None:
+            free.remove(inside)
+        taken.append(inside)
+    return taken
+
+
 def counts(found: Sequence[float], true: Sequence[tuple[float, float]]) -> Array:
     """Hits, false alarms and misses; each blink is matched once."""
-    free = sorted(found)
-    hits = 0
-    for start, end in true:
-        inside = [time for time in free if start - SLACK_S <= time <= end + SLACK_S]
-        hits += bool(inside)
-        if inside:
-            free.remove(inside[0])
+    hits = sum(time is not None for time in matched(found, true))
     return np.array([hits, len(found) - hits, len(true) - hits], float)
 
 

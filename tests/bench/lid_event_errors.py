@@ -15,7 +15,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
-from bench_lid_events import SLACK_S, f1, rates
+from bench_lid_events import SLACK_S, f1, matched, rates
 
 from stimuli_builder.blinks.events.generated import Generated, Motion, generate
 from stimuli_builder.blinks.events.levels import depth_of
@@ -25,18 +25,6 @@ from stimuli_builder.blinks.series import BlinkSeries
 
 BESIDE_S = 0.1
 FAINT_DEPTH, FAINT_NOISES = 0.2, 5.0
-
-
-def matched(blinks: Sequence[LidEvent], true: Sequence[Motion]) -> tuple[list[Motion], list[LidEvent]]:
-    """Motions that no blink matches, and blinks that match none; each is matched once."""
-    free, missed = sorted(blinks, key=lambda event: event.minimum_s), []
-    for motion in true:
-        inside = [e for e in free if motion.onset_s - SLACK_S <= e.minimum_s <= motion.end_s + SLACK_S]
-        if inside:
-            free.remove(inside[0])
-        else:
-            missed.append(motion)
-    return missed, free
 
 
 def listed_as(motion: Motion, events: Sequence[LidEvent]) -> str:
@@ -79,7 +67,9 @@ def judge(series: Sequence[Generated]) -> None:
         events = recognise(eyes)[0].events
         true = [motion for motion in one.motions if motion.kind == "blink"]
         told = [event for event in events if event.kind == "blink"]
-        lost, free = matched(told, true)
+        hits = matched([event.minimum_s for event in told], [(m.onset_s, m.end_s) for m in true])
+        lost = [motion for motion, hit in zip(true, hits, strict=True) if hit is None]
+        free = [event for event in told if event.minimum_s not in hits]
         totals += [len(true) - len(lost), len(free), len(lost)]
         for motion in lost:
             of_kind = missed.setdefault(listed_as(motion, events), Counter())
@@ -90,8 +80,8 @@ def judge(series: Sequence[Generated]) -> None:
         for event in free:
             kinds = [m.kind for m in one.motions if m.onset_s <= event.minimum_s <= m.end_s]
             false["blink told twice" if "blink" in kinds else kinds[0] if kinds else "nothing"] += 1
-    hits, alarms, misses = totals
-    sys.stdout.write(f"F1 {f1(totals):.3f} ({hits:.0f} hits, {alarms:.0f} false, {misses:.0f} missed)\n")
+    right, alarms, misses = totals
+    sys.stdout.write(f"F1 {f1(totals):.3f} ({right:.0f} hits, {alarms:.0f} false, {misses:.0f} missed)\n")
     for kind, counts in sorted(missed.items(), key=lambda item: -item[1]["in all"]):
         tell(f"missed, listed as {kind}", counts)
     tell("false, in truth", false)

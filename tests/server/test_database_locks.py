@@ -3,10 +3,9 @@
 import subprocess
 import sys
 import threading
-import time
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
+from functools import partial
 from typing import Any
 
 import psycopg
@@ -23,8 +22,10 @@ from server.rate_limit import RateLimit
 from server.settings import Settings
 from server.shared_counts_repository import SharedCounts
 from tests.helpers.databases import server_environment
+from tests.helpers.waiting import until
 
 PATIENCE_S = 20.0
+soon = partial(until, limit_s=PATIENCE_S)
 HOLDS = """
 import sys
 from server.locks_repository import DatabaseLocks
@@ -42,13 +43,6 @@ pytestmark = pytest.mark.parametrize(
 @pytest.fixture
 def locks(services: Services) -> DatabaseLocks:
     return DatabaseLocks(services.database)
-
-
-def soon(holds: Callable[[], bool]) -> None:
-    until = time.monotonic() + PATIENCE_S
-    while not holds():
-        assert time.monotonic() < until
-        time.sleep(0.05)
 
 
 def cut_lines_of_locks(services: Services) -> None:

@@ -21,6 +21,7 @@ from server.reports.jobs import begun
 from server.studies.lookup import find_study
 from tests.helpers.admins import Admin
 from tests.helpers.studies import SHORT, StudyInDatabase, add_study
+from tests.helpers.waiting import until
 
 PATH = "/studies/short/rehearsals"
 ENDS = "raise SystemExit(0)"
@@ -59,13 +60,6 @@ def program(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
         monkeypatch.setattr(service, "_program", lambda folder: [sys.executable, "-c", text, str(folder)])
 
     return run
-
-
-def until(condition: Callable[[], Any], limit_s: float = 60) -> None:
-    limit = time.monotonic() + limit_s
-    while not condition():
-        assert time.monotonic() < limit
-        time.sleep(0.05)
 
 
 def latest(admin: Admin, study: str = "short") -> Any:
