@@ -20,14 +20,18 @@ As oily as a brow, a shut lid shone as bright as the catchlight that it had cove
 """
 RIM_BLOOD = 0.13
 """Optical depth of blood that a lid's wet margin has beyond the skin's; about the pupil half of it."""
-MARGIN_MELANIN = 1.3
-"""Optical depth of melanin that an upper lid's margin has beyond the skin's: lashes' roots are dark."""
+UPPER_MARGIN, LOWER_MARGIN = 1.3, 0.25
+"""Optical depth of melanin that a lid's margin has beyond the skin's: lashes' roots are dark."""
+RIM_PALER = 0.35
+"""Share of its melanin that a light skin lacks on the lids' wet margins; dark skin, paler there by as much, had
+a bright band all along its lower lids, as if it wore goggles."""
 CORNER_CM, CORNER_BLOOD = 0.30, 0.28
 """Reach and added blood of a nasal corner's duller skin: lit and smooth, its fold shone as a white dot."""
 LID_VESSELS = 0.10
 """Optical depth of blood in vessels that shine through the upper lid, the thinnest skin there is."""
 FLESH_BLOOD, FLESH_PALER, FLESH_WET = 0.5, 0.6, 0.3
-"""The flesh of a nasal corner against the skin about it: blood more, share of melanin and roughness less."""
+"""The flesh of a nasal corner against the skin about it: blood more, share of melanin (of light skin;
+of dark skin down to half of it) and roughness less."""
 NOSE, CHIN, BRIDGE, NOSTRILS, LIPS = 30, 8, 27, (31, 35), slice(48, 60)
 """Numbers of Multi-PIE landmarks."""
 
@@ -43,8 +47,9 @@ class Pigments:
         self.landmarks = skin.path.rest[skin.path.kit.landmarks]
         self.front = smooth(2.0, 5.0, self.rest[:, 2])
         self.dark = self.look.melanin > 0.4
-        # Foreshortened towards the temples, fine noise becomes upright streaks.
-        self.facing = smooth(0.25, 0.75, normals(skin.rest, skin.fine.quads)[:, 2])
+        # Foreshortened towards the temples, fine noise becomes upright streaks. Told of the shut lids: of the
+        # open ones, skin that lies in their fold would have too little of it when it comes out.
+        self.facing = smooth(0.25, 0.75, normals(skin.flat, skin.fine.quads)[:, 2])
         # Fine speckle is per vertex: as noise in the shader it doubled the time of a render. It is fainter on
         # the lids, where the blink stretches it into streaks.
         self.calm = self.facing * (0.35 + 0.65 * smooth(8.0, 13.0, skin.coordinates.loop))
@@ -56,7 +61,8 @@ class Pigments:
         lips = self._lips()
         wet, fine, coordinates = self._lid_values()
         lid, corner, flesh = self._upper_lid(), self._nasal_corner(), self.skin.relief.flesh
-        melanin = self._varied_melanin(lips, wet, lid) * (1 - FLESH_PALER * flesh)
+        paler = FLESH_PALER * (1 + self.contrast) / 2
+        melanin = self._varied_melanin(lips, wet, lid) * (1 - paler * flesh)
         haemoglobin = self._varied_haemoglobin(lips, wet, lid, corner) + FLESH_BLOOD * flesh
         rough = self._roughness(lips) + LID_ROUGH * np.maximum(lid, corner) - FLESH_WET * flesh
         warp = 0.045 * np.stack([self._noise(3.5, k, 2) for k in (19, 20, 21)], -1)
@@ -77,9 +83,9 @@ class Pigments:
 
     def _varied_melanin(self, lips: Array, wet: Array, lid: Array) -> Array:
         """(n,) optical depth of melanin with what varies it: lids, margins, mottling, speckle, freckles."""
-        out = self._melanin(lips) * (1 - 0.35 * wet) * (1 + LID_MELANIN * lid)
-        margin = wet * self.skin.coordinates.upper
-        out += MARGIN_MELANIN * margin * np.clip(1 + 0.5 * self._noise(7.0, 42, 2), 0.4, 1.5)
+        upper, uneven = self.skin.coordinates.upper, np.clip(1 + 0.5 * self._noise(7.0, 42, 2), 0.4, 1.5)
+        out = self._melanin(lips) * (1 - RIM_PALER * self.contrast * wet) * (1 + LID_MELANIN * lid)
+        out += wet * uneven * (UPPER_MARGIN * upper + LOWER_MARGIN * (1 - upper))
         mottled = self._noise(1.3, 11) + self.facing * self._noise(6.0, 12)
         out *= 1 + self.contrast * 0.10 * mottled
         out *= np.clip(1 + self.contrast * self.calm * 0.16 * self._noise(11.0, 22, 3), 0.5, 1.6)
