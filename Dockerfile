@@ -9,9 +9,9 @@ RUN npm run --silent build
 
 FROM python:3.11.14-slim AS packages
 WORKDIR /app
-COPY deploy/requirements.lock ./
+COPY requirements.lock deploy/s3.lock ./
 RUN python -m venv venv
-RUN venv/bin/python -m pip install --no-cache-dir --disable-pip-version-check --require-hashes -r requirements.lock
+RUN venv/bin/python -m pip install --no-cache-dir --disable-pip-version-check --require-hashes -r requirements.lock -r s3.lock
 COPY pyproject.toml LICENSE docs/server.md ./
 COPY experiments experiments
 COPY server server

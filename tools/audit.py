@@ -15,14 +15,14 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
-LOCK = "requirements-dev.lock"
-"""Holds all that the other locks hold."""
+LOCKS = "-r requirements.lock -r requirements-dev.lock"
+"""The second holds what deploy/s3.lock holds."""
 ACCEPTED: dict[str, str] = {}
 """Advisories that are known and harmless here: their id, and why."""
 LONGEST_S = 300
 NO_ANSWER = "skipped: the advisory database did not answer (no internet, or a mirror without it)"
 PIP_AUDIT = (
-    f"-m pip_audit --disable-pip --require-hashes -r {LOCK} --format json --progress-spinner off --timeout 15"
+    f"-m pip_audit --disable-pip --require-hashes {LOCKS} --format json --progress-spinner off --timeout 15"
 )
 
 

@@ -14,7 +14,8 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
 OUT = ROOT / "dist" / "sbom.cdx.json"
-PYTHON_LOCK, NPM_LOCK = ROOT / "deploy/requirements.lock", ROOT / "frontend/package-lock.json"
+PYTHON_LOCKS = (ROOT / "requirements.lock", ROOT / "deploy/s3.lock")
+NPM_LOCK = ROOT / "frontend/package-lock.json"
 COMPATIBLE = re.compile(
     r"\b(MIT|BSD|0BSD|Apache|ISC|PSF|Python Software Foundation|MPL|Mozilla|LGPL|Lesser General|GPL-3|GPLv3|"
     r"GPL-2\.0-or-later|GPLv2\+|Unlicense|Zlib|HPND|CC0|BlueOak|OFL|BSL|Boost|Public Domain)\b",
@@ -43,6 +44,11 @@ class Part:
     def is_compatible(self) -> bool:
         """Whether its licence may be joined with ours; False where none is known."""
         return self.licence is not None and bool(COMPATIBLE.search(self.licence))
+
+
+def python_lock() -> str:
+    """The pins of every package of a server."""
+    return "".join(lock.read_text(encoding="utf-8") for lock in PYTHON_LOCKS)
 
 
 def python_parts(lock: str) -> Iterator[Part]:
@@ -115,7 +121,7 @@ def bill(parts: list[Part]) -> str:
 def locked_parts() -> list[Part]:
     """Every part of a server and its pages."""
     return [
-        *python_parts(PYTHON_LOCK.read_text(encoding="utf-8")),
+        *python_parts(python_lock()),
         *npm_parts(NPM_LOCK.read_text(encoding="utf-8")),
     ]
 

@@ -15,7 +15,7 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -23,6 +23,7 @@ VENV = ROOT / ".venv"
 BIN = VENV / ("Scripts" if os.name == "nt" else "bin")
 STAMPS = VENV / "stamps"
 FRONTEND = ROOT / "frontend"
+RUN_LOCK, TEST_LOCK = ROOT / "requirements.lock", ROOT / "requirements-dev.lock"
 MINIMUM_NODE = 20
 # What the three programs import when they do their work, and what every figure and report needs.
 STARTED = (
@@ -93,17 +94,19 @@ def make_environment() -> None:
         )
 
 
-def install_python(lock: str) -> None:
-    say(f"installing Python packages from {lock}")
+def install_python(locks: Sequence[str]) -> None:
+    say(f"installing Python packages from {' and '.join(locks)}")
     if not (BIN / "uv").exists():
         subprocess.run(
             [BIN / "python", "-m", "pip", "install", "-q", "--disable-pip-version-check", "uv"], check=False
         )
     if (BIN / "uv").exists():
-        call(BIN / "uv", "pip", "sync", "-q", "--require-hashes", lock)
+        call(BIN / "uv", "pip", "sync", "-q", "--require-hashes", *locks)
         call(BIN / "uv", "pip", "install", "-q", "--no-deps", "-e", ".")
     else:  # platforms without a wheel of uv
-        call(BIN / "python", "-m", "pip", "install", "-q", "--require-hashes", "-r", lock)
+        call(
+            BIN / "python", "-m", "pip", "install", "-q", "--require-hashes", *(f"-r{lock}" for lock in locks)
+        )
         call(BIN / "python", "-m", "pip", "install", "-q", "--no-deps", "-e", ".")
 
 
@@ -194,12 +197,12 @@ def main() -> None:
     if sys.version_info < (3, 11):  # noqa: UP036 - this script runs before anything has checked
         fail(f"Python 3.11 or newer is needed, this is {sys.version.split()[0]}")
     make_environment()
-    test_lock, run_lock = ROOT / "requirements-dev.lock", ROOT / "requirements.lock"
-    # Once the test packages are in, `run` keeps them: they are a superset.
+    # Once the test packages are in, `run` keeps them.
     with_tests = purpose == "test" or (STAMPS / "python-test").is_file()
-    lock, name = (test_lock, "python-test") if with_tests else (run_lock, "python")
-    step(name, [lock, ROOT / "pyproject.toml"], lambda: install_python(lock.name), BIN / "server")
-    step("bytecode", [lock, ROOT / "pyproject.toml"], keep_bytecode)
+    name, locks = ("python-test", [RUN_LOCK, TEST_LOCK]) if with_tests else ("python", [RUN_LOCK])
+    inputs = [*locks, ROOT / "pyproject.toml"]
+    step(name, inputs, lambda: install_python([lock.name for lock in locks]), BIN / "server")
+    step("bytecode", inputs, keep_bytecode)
     provide_node()
     npm_inputs = [FRONTEND / "package.json", FRONTEND / "package-lock.json"]
     step("npm", npm_inputs, install_npm, FRONTEND / "node_modules")

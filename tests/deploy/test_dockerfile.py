@@ -39,10 +39,10 @@ def test_what_runs_is_not_root_and_has_no_building_tools(stages: list[Stage]) ->
 
 def test_packages_are_installed_by_hash(stages: list[Stage]) -> None:
     runs = [step.text for stage in stages for step in stage.steps if step.word == "RUN"]
-    [install] = [run for run in runs if "-r requirements.lock" in run]
+    [install] = [run for run in runs if "-r requirements.lock -r s3.lock" in run]
     assert "--require-hashes" in install
     assert any(run.startswith("npm ci") for run in runs)
-    lock = (REPOSITORY / "deploy" / "requirements.lock").read_text(encoding="utf-8")
+    lock = (REPOSITORY / "deploy" / "s3.lock").read_text(encoding="utf-8")
     assert "\nboto3==" in lock
 
 
