@@ -26,6 +26,7 @@ from server.operations.watched_backups import DrillResult, last_drill, newest_ba
 from server.settings import Settings
 from tests.helpers.databases import run_server_command
 from tests.helpers.studies import Participant
+from tests.helpers.waiting import until
 
 DAY = timedelta(days=1)
 NOW = datetime(2026, 3, 1, 12, tzinfo=UTC)
@@ -173,9 +174,8 @@ def test_a_stop_in_mid_drill_leaves_no_copy(watched: Settings) -> None:
         f"{slow}import sys\nsys.argv = ['server', 'drill', '--when-due']\nfrom server.cli import main\nmain()"
     )
     with subprocess.Popen([sys.executable, "-c", command], env=environment) as process:
-        while not list(watched.data_folder.glob(".drill-*")):
-            assert process.poll() is None
-            time.sleep(0.05)
+        until(lambda: process.poll() is not None or list(watched.data_folder.glob(".drill-*")))
+        assert process.poll() is None
         process.terminate()
         process.wait(60)
     assert not list(watched.data_folder.glob(".drill-*"))

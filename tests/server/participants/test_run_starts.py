@@ -1,6 +1,5 @@
 """Many visits begun at once share transactions; what one of them is refused touches no other."""
 
-import time
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -13,6 +12,7 @@ from server.context import Services
 from server.models import AssignedTrial, Study, StudyRun
 from server.participants.repository import lock_study
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study
+from tests.helpers.waiting import until
 
 AT_ONCE = 24
 
@@ -93,9 +93,8 @@ def test_a_completion_waits_for_a_start_without_holding_its_run(
         lock_study(session, study.id)
         completion = pool.submit(participant.request, "POST", "/complete")
         waits = "SELECT count(*) FROM pg_locks WHERE NOT granted"
-        while not session.scalar(text(waits)):
-            assert not completion.done()
-            time.sleep(0.02)
+        until(lambda: completion.done() or session.scalar(text(waits)))
+        assert not completion.done()
         session.execute(text("SELECT 1 FROM study_runs FOR UPDATE NOWAIT"))
         session.commit()
         assert completion.result(30).json()["status"] == "complete"
