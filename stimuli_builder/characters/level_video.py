@@ -18,8 +18,8 @@ from stimuli_builder.characters.declaration import REPAIR, Picture
 from stimuli_builder.characters.level_planes import FORMAT, frame_planes, picture_of, planes_of
 from stimuli_builder.characters.writing import write_bytes_declared
 
-QUANTISER = 18
-"""x264's constant quantiser of ten-bit planes: 49.8 dB or more against those of `alder@6` (decision 0956)."""
+QUANTISER = 20
+"""x264's constant quantiser of ten-bit planes: 49.0 dB or more against those of `alder@6` (decision 0958)."""
 STILL_CODES = 2
 """Code values that the encoder may change of a pixel which stands still: skin must not flicker."""
 

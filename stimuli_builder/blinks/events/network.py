@@ -1,4 +1,4 @@
-"""The classifier itself: a small network over the features of a dip; its weights ship beside it."""
+"""The classifier itself: small networks over the features of a dip; their weights ship beside them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from experiments.files import whole_file
 from stimuli_builder.blinks.profile import Array
 
-WEIGHTS = Path(__file__).with_name("weights.npz")
+FIRST_LOOK, SECOND_LOOK = (Path(__file__).with_name(f"{look}_look.npz") for look in ("first", "second"))
 TICKS = 10_000
 """Weights are stored as whole numbers of ten-thousandths: two bytes each, and the same floats everywhere."""
 
@@ -46,9 +46,9 @@ class Network:
 
 
 @cache
-def shipped_network() -> Network:
-    """The network that ships, made by `train.py` beside it."""
-    return stored_network(WEIGHTS)
+def shipped_network(path: Path) -> Network:
+    """One of the networks that ship, `FIRST_LOOK` or `SECOND_LOOK`, made by `train.py` beside them."""
+    return stored_network(path)
 
 
 def stored_network(path: Path) -> Network:

@@ -6,27 +6,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from stimuli_builder.blinks.events.apart import apart
-from stimuli_builder.blinks.events.candidates import (
-    RIPPLE,
-    Candidate,
-    candidate_at,
-    deep_level,
-    features_of,
-    find_candidates,
-)
+from stimuli_builder.blinks.events.candidates import RIPPLE, Candidate, candidate_at
 from stimuli_builder.blinks.events.generated import CLOSED_EYE_S
-from stimuli_builder.blinks.events.levels import Depth, depth_of
+from stimuli_builder.blinks.events.levels import Depth
 from stimuli_builder.blinks.events.lid_event import LidEvent
-from stimuli_builder.blinks.events.network import shipped_network
+from stimuli_builder.blinks.events.network import SECOND_LOOK, shipped_network
+from stimuli_builder.blinks.events.pieces import Piece, looked_at
+from stimuli_builder.blinks.events.second_look import second_look
 from stimuli_builder.blinks.events.template import Timing, timing_of
 from stimuli_builder.blinks.profile import Array
-from stimuli_builder.blinks.series import BlinkSeries, runs
+from stimuli_builder.blinks.series import BlinkSeries
 
-SHORTEST_PIECE_S = 0.8
 LEAST_PROBABILITY = 0.5
-BLINK_TO_SQUINT = 10.0
+BLINK_TO_SQUINT = 5.0
 """What would be a blink is a squint where it is not this much likelier a blink. Brief squints are partial
-blinks but for slower lids, and rarer: by the likelier of both one in eight of them was called a blink."""
+blinks but for slower lids, and rarer: by the likelier of both one in twenty of them is called a blink."""
 STILL_CLOSED = 0.8
 """Part of its depth at which a lid that stays closed for half a second is for most of that time. A blink on a
 gaze shift down comes back to where the gaze leaves it, and the template takes that for its closed phase."""
@@ -48,15 +42,6 @@ class Recognised:
 
 
 @dataclass(frozen=True, eq=False)
-class _Piece:
-    """A gapless piece of one eye with its dips."""
-
-    start: int
-    depth: Depth
-    candidates: list[Candidate]
-
-
-@dataclass(frozen=True, eq=False)
 class _Told:
     """Events of a piece, what a blink is instead where a squint may well explain it, and cut blinks.
 
@@ -70,47 +55,26 @@ class _Told:
 
 def recognise(eyes: Sequence[BlinkSeries]) -> list[Recognised]:
     """Return the events of each series; two series are taken as the two eyes of one face."""
-    pieces = [_pieces(series) for series in eyes]
+    pieces = looked_at(eyes)
+    odds = second_look(pieces, [series.distance.size for series in eyes])
     results = []
-    for number, series in enumerate(eyes):
-        other = _whole(pieces[1 - number], series.distance.size) if len(eyes) == 2 else None
+    for series, of_eye, odds_of_eye in zip(eyes, pieces, odds, strict=True):
         events: list[LidEvent] = []
         cut: list[int] = []
-        for piece in pieces[number]:
-            told = _judged(piece, series.fps, other)
+        for piece, of_piece in zip(of_eye, odds_of_eye, strict=True):
+            told = _judged(piece, of_piece, series.fps)
             cut += told.cut
             events += apart(_listed(told), piece.depth.smooth, piece.start, series.fps)
         results.append(Recognised(tuple(events), tuple(cut)))
     return results
 
 
-def _pieces(series: BlinkSeries) -> list[_Piece]:
-    pieces = []
-    for start, stop in runs(np.isfinite(series.distance)):
-        if stop - start >= max(5, SHORTEST_PIECE_S * series.fps):
-            depth = depth_of(series.distance[start:stop], series.fps)
-            pieces.append(_Piece(start, depth, find_candidates(depth)))
-    return pieces
-
-
-def _whole(pieces: list[_Piece], size: int) -> Array:
-    """Depth of an eye over the whole series, its deep level 1; NaN in gaps."""
-    whole = np.full(size, np.nan)
-    for piece in pieces:
-        stop = min(size, piece.start + piece.depth.smooth.size)
-        level = deep_level(piece.candidates, piece.depth)
-        whole[piece.start : stop] = piece.depth.smooth[: stop - piece.start] / level
-    return whole
-
-
-def _judged(piece: _Piece, fps: float, other: Array | None) -> _Told:
-    """What each dip of a piece is."""
+def _judged(piece: Piece, odds: Array, fps: float) -> _Told:
+    """What each dip of a piece is, by its probabilities (dips, kinds)."""
     told = _Told([], {}, [])
-    network = shipped_network()
-    beside = None if other is None else other[piece.start : piece.start + piece.depth.smooth.size]
-    rows = features_of(piece.candidates, piece.depth, beside)
-    for candidate, row in zip(piece.candidates, network.probabilities(rows), strict=True):
-        shares = dict(zip(network.kinds, row.tolist(), strict=True))
+    kinds = shipped_network(SECOND_LOOK).kinds
+    for candidate, row in zip(piece.candidates, odds, strict=True):
+        shares = dict(zip(kinds, row.tolist(), strict=True))
         sure = shares["blink"] >= LEAST_PROBABILITY
         likeliest = "blink" if sure else max(shares, key=shares.__getitem__)
         if likeliest == "nothing":

@@ -1,51 +1,71 @@
 """Train the classifier of lid events on generated series and write its weights.
 
-    python -m stimuli_builder.blinks.events.train [series, default 12000]
+    python -m stimuli_builder.blinks.events.train first [series, default 12000]
+    python -m stimuli_builder.blinks.events.train second [series, default 20000]
 
-Needs scikit-learn, which comes with pingouin. The same seed gives the same weights.
+The second look learns from what the first one, as it ships, says of other series. Needs scikit-learn, which
+comes with pingouin. The same seed gives the same weights.
 """
 
+import argparse
 import sys
 import warnings
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.neural_network import MLPClassifier
 
-from stimuli_builder.blinks.events.candidates import (
-    FEATURES,
-    Candidate,
-    deep_level,
-    features_of,
-    find_candidates,
-)
+from stimuli_builder.blinks.events.candidates import FEATURES, Candidate
 from stimuli_builder.blinks.events.generated import KINDS, Generated, Motion, generate
-from stimuli_builder.blinks.events.levels import Depth, depth_of
-from stimuli_builder.blinks.events.network import WEIGHTS, Network, store
+from stimuli_builder.blinks.events.levels import Depth
+from stimuli_builder.blinks.events.network import FIRST_LOOK, SECOND_LOOK, Network, store
+from stimuli_builder.blinks.events.pieces import Piece, looked_at
+from stimuli_builder.blinks.events.second_look import CONTEXT, contexts
 from stimuli_builder.blinks.profile import Array
+from stimuli_builder.blinks.series import BlinkSeries
 
+
+@dataclass(frozen=True)
+class Lesson:
+    """What a look learns from: features, generated series, units of the network, and where its weights go."""
+
+    features: tuple[str, ...]
+    seed: int
+    series: int
+    units: tuple[int, ...]
+    weights: Path
+
+
+LESSONS = {
+    "first": Lesson(FEATURES, 20261121, 12000, (256, 128), FIRST_LOOK),
+    "second": Lesson(CONTEXT, 20261122, 20000, (256, 128), SECOND_LOOK),
+}
 SEED = 20261121
-SERIES = 12000
-UNITS = (256, 128)
+"""Of the networks' own draws."""
 STAGES = ((2e-3, 6), (5e-4, 4), (1e-4, 3))
 """Rate of learning and passes over the dips of each stage; the last ones settle what the first one found."""
 NEAR_HOLD_S = 0.1
 CLASSES = (*KINDS, "nothing")
 
 
-def labelled_features(series: Generated) -> tuple[Array, list[str]]:
-    """Features of every dip of every eye, and what each is."""
-    depths = [depth_of(distance, series.fps) for distance in series.distances]
-    of_eyes = [find_candidates(depth) for depth in depths]
-    rows, kinds = [], []
-    for eye, (depth, candidates) in enumerate(zip(depths, of_eyes, strict=True)):
-        other = None
-        if len(depths) == 2:
-            other = depths[1 - eye].smooth / deep_level(of_eyes[1 - eye], depths[1 - eye])
-        rows.append(features_of(candidates, depth, other))
-        kinds += true_kinds(candidates, depth, series.motions)
-    return np.concatenate(rows), kinds
+def labelled_features(look: str, series: Generated) -> tuple[Array, list[str]]:
+    """What a look is told of every dip of every eye, and what each is."""
+    eyes = [BlinkSeries(distance=d, fps=series.fps, column="d", is_px=False) for d in series.distances]
+    pieces = looked_at(eyes)
+    told = (
+        [[piece.features for piece in of_eye] for of_eye in pieces]
+        if look == "first"
+        else contexts(pieces, [series.distances.shape[1]] * len(eyes))
+    )
+    rows = np.concatenate([row for of_eye in told for row in of_eye])
+    return rows, [kind for of_eye in pieces for piece in of_eye for kind in _kinds(piece, series)]
+
+
+def _kinds(piece: Piece, series: Generated) -> list[str]:
+    return true_kinds(piece.candidates, piece.depth, series.motions)
 
 
 def true_kinds(candidates: list[Candidate], depth: Depth, motions: tuple[Motion, ...]) -> list[str]:
@@ -84,20 +104,21 @@ def _event_at(time: float, motions: tuple[Motion, ...], slack: float) -> str:
     return min(near)[1] if near else "nothing"
 
 
-def training_data(count: int, seed: int) -> tuple[NDArray[np.float32], list[str]]:
+def training_data(look: str, count: int) -> tuple[NDArray[np.float32], list[str]]:
     """Features and kinds of `count` generated series."""
     rows, kinds = [], []
     for number in range(count):
-        features, names = labelled_features(generate(np.random.default_rng([seed, number])))
+        series = generate(np.random.default_rng([LESSONS[look].seed, number]))
+        features, names = labelled_features(look, series)
         rows.append(features.astype(np.float32))  # a million rows
         kinds += names
     return np.concatenate(rows), kinds
 
 
-def trained(features: NDArray[np.float32], classes: NDArray[np.int64]) -> MLPClassifier:
+def trained(features: NDArray[np.float32], classes: NDArray[np.int64], lesson: Lesson) -> MLPClassifier:
     """Train the network on standardised features (n, features), stage by stage."""
     network = MLPClassifier(
-        UNITS, activation="tanh", alpha=1e-4, batch_size=512, random_state=SEED, warm_start=True
+        lesson.units, activation="tanh", alpha=1e-4, batch_size=512, random_state=SEED, warm_start=True
     )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)  # a stage ends after its passes
@@ -107,27 +128,41 @@ def trained(features: NDArray[np.float32], classes: NDArray[np.int64]) -> MLPCla
     return network
 
 
-def main() -> None:
-    """Train and write."""
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else SERIES
-    features, kinds = training_data(count, SEED)
+def learn(look: str, count: int, weights: Path) -> str:
+    """Train a look, write its weights, and say how it went."""
+    lesson = LESSONS[look]
+    features, kinds = training_data(look, count)
     mean = features.mean(0, dtype=np.float64)
     spread = features.std(0, dtype=np.float64) + 1e-6
-    standard = np.clip((features - mean) / spread, -6, 6).astype(np.float32)
-    network = trained(standard, np.array([CLASSES.index(k) for k in kinds]))
+    features -= mean.astype(np.float32)
+    features /= spread.astype(np.float32)
+    np.clip(features, -6, 6, out=features)
+    network = trained(features, np.array([CLASSES.index(k) for k in kinds]), lesson)
     layers = tuple(
-        (weights.astype(np.float64), offsets.astype(np.float64))
-        for weights, offsets in zip(network.coefs_, network.intercepts_, strict=True)
+        (matrix.astype(np.float64), offsets.astype(np.float64))
+        for matrix, offsets in zip(network.coefs_, network.intercepts_, strict=True)
     )
     store(
         Network(CLASSES, np.round(mean, 6), np.round(spread, 6), layers),
-        WEIGHTS,
-        made_by=f"python -m stimuli_builder.blinks.events.train {count}",
-        seed=SEED,
+        weights,
+        made_by=f"python -m stimuli_builder.blinks.events.train {look} {count}",
+        seed=lesson.seed,
         dips=len(kinds),
-        features=FEATURES,
+        features=lesson.features,
     )
-    sys.stdout.write(f"{WEIGHTS}: {len(kinds)} dips, loss {network.loss_:.3f}\n")
+    return f"{weights}: {len(kinds)} dips, loss {network.loss_:.3f}"
+
+
+def main() -> None:
+    """Train and write."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("look", choices=sorted(LESSONS))
+    parser.add_argument("series", nargs="?", type=int, help="generated series to learn from")
+    asked = parser.parse_args()
+    lesson = LESSONS[asked.look]
+    sys.stdout.write(learn(asked.look, asked.series or lesson.series, lesson.weights) + "\n")
 
 
 if __name__ == "__main__":

@@ -23,8 +23,10 @@ RIM_BLOOD = 0.13
 UPPER_MARGIN, LOWER_MARGIN = 1.3, 0.25
 """Optical depth of melanin that a lid's margin has beyond the skin's: lashes' roots are dark."""
 RIM_PALER = 0.35
-"""Share of its melanin that a light skin lacks on the lids' wet margins; dark skin, paler there by as much, had
-a bright band all along its lower lids, as if it wore goggles."""
+"""Share of its melanin that a light skin lacks on the lids' wet margins.
+
+Dark skin, paler there by as much, had a bright band all along its lower lids, as if it wore goggles.
+"""
 CORNER_CM, CORNER_BLOOD = 0.30, 0.28
 """Reach and added blood of a nasal corner's duller skin: lit and smooth, its fold shone as a white dot."""
 LID_VESSELS = 0.10

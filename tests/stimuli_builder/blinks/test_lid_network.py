@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from stimuli_builder.blinks.events.candidates import FEATURES
-from stimuli_builder.blinks.events.network import WEIGHTS, Network, store, stored_network
+from stimuli_builder.blinks.events.network import FIRST_LOOK, SECOND_LOOK, Network, store, stored_network
+from stimuli_builder.blinks.events.second_look import CONTEXT, KINDS
 
 
 def drawn(largest: float) -> Network:
@@ -29,8 +30,16 @@ def test_a_network_is_read_as_it_was_stored(tmp_path: Path, largest: float) -> N
     assert np.load(file, allow_pickle=False)["made_by"] == "a test"
 
 
-def test_the_network_that_ships_knows_the_features_and_is_small() -> None:
-    with np.load(WEIGHTS, allow_pickle=False) as stored:
-        assert tuple(stored["features"].tolist()) == FEATURES
-        assert stored["weights0"].shape[0] == len(FEATURES)
-    assert WEIGHTS.stat().st_size < 120_000
+@pytest.mark.parametrize(("weights", "features"), [(FIRST_LOOK, FEATURES), (SECOND_LOOK, CONTEXT)])
+def test_the_networks_that_ship_know_the_features_and_are_small(
+    weights: Path, features: tuple[str, ...]
+) -> None:
+    assert len(set(features)) == len(features)
+    with np.load(weights, allow_pickle=False) as stored:
+        assert tuple(stored["features"].tolist()) == features
+        assert stored["weights0"].shape[0] == len(features)
+    assert weights.stat().st_size < 160_000
+
+
+def test_both_looks_tell_the_same_kinds() -> None:
+    assert stored_network(FIRST_LOOK).kinds == stored_network(SECOND_LOOK).kinds == KINDS
