@@ -23,6 +23,7 @@ OPENING_MM = {
     "birch": 9.66,
     "birch@3": 9.66,
     "cedar": 9.85,
+    "cedar@3": 9.85,
     "hazel": 10.91,
     "hazel@3": 10.91,
 }
