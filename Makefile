@@ -56,10 +56,10 @@ format: setup-test ## rewrite Python and TypeScript in the house format
 	@$(BIN)/ruff format -q . && $(BIN)/ruff check --fix -q .
 	@cd frontend && npm run --silent format
 
-RESOLVE = $(BIN)/uv pip compile -q --universal --generate-hashes --no-header --no-annotate --python-version 3.11 pyproject.toml
+RESOLVE = $(BIN)/uv pip compile -q --upgrade --universal --generate-hashes --no-header --no-annotate --python-version 3.11 pyproject.toml
 lock: ## resolve the Python dependencies again, with hashes: what runs, what tests and servers add
 	@mkdir -p build
-	@$(RESOLVE) --upgrade --all-extras --group dev -o build/all.lock
+	@$(RESOLVE) --all-extras --group dev -o build/all.lock
 	@$(RESOLVE) -c build/all.lock -o requirements.lock
 	@$(RESOLVE) -c build/all.lock --extra s3 -o build/server.lock
 	@$(BIN)/python tools/split_locks.py build/all.lock requirements.lock requirements-dev.lock

@@ -1,4 +1,6 @@
-"""Write the part of one lock file that another lacks, so that no package is pinned twice.
+"""Write the part of one lock file that another lacks.
+
+A package that the whole wants on more systems than the base does stands in both, at one version.
 
     python tools/split_locks.py WHOLE BASE REST
 
@@ -27,16 +29,21 @@ def rest(whole: str, base: str) -> str:
         `base` has a pin that `whole` lacks: installed together they would contradict each other.
     """
     pinned = set(entries(base))
-    known = {_version(entry) for entry in entries(whole)}
-    strangers = sorted({_version(entry) for entry in pinned} - known)
+    known = {_version(entry): _hashes(entry) for entry in entries(whole)}
+    strangers = sorted(_version(entry) for entry in pinned if known.get(_version(entry)) != _hashes(entry))
     if strangers:
-        raise ValueError(f"expected every pin of the base in the whole, which lacks {', '.join(strangers)}")
+        names = ", ".join(strangers)
+        raise ValueError(f"expected every pin and hash of the base in the whole, which lacks {names}")
     return "".join(entry for entry in entries(whole) if entry not in pinned)
 
 
 def _version(entry: str) -> str:
     """`name==version` of a pin: a package may be asked for on more systems by the whole than by the base."""
     return entry.split()[0]
+
+
+def _hashes(entry: str) -> list[str]:
+    return [word for word in entry.split() if word.startswith("--hash=")]
 
 
 def main() -> int:

@@ -4,6 +4,7 @@ import re
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -18,13 +19,27 @@ def stages() -> list[Stage]:
     return parse((REPOSITORY / "Dockerfile").read_text(encoding="utf-8"))
 
 
+def reaches_the_build(source: str) -> bool:
+    """Whether a file or folder is there, and .dockerignore lets it or a folder above it in."""
+    lines = (REPOSITORY / ".dockerignore").read_text(encoding="utf-8").splitlines()
+    let_in = {Path(line.removeprefix("!")) for line in lines if line.startswith("!")}
+    path = Path(source)
+    return (REPOSITORY / path).exists() and bool({path, *path.parents} & let_in) and source not in lines
+
+
+def test_what_dockerignore_keeps_out_does_not_reach_the_build() -> None:
+    assert reaches_the_build("deploy/s3.lock")
+    assert not reaches_the_build("requirements-dev.lock")
+    assert not reaches_the_build("frontend/dist")
+
+
 def test_everything_copied_is_in_the_repository_or_an_earlier_stage(stages: list[Stage]) -> None:
     earlier: set[str] = set()
     for stage in stages:
         for step in stage.steps:
             if step.word == "COPY":
                 for source in step.sources:
-                    assert step.stage in earlier if step.stage else (REPOSITORY / source).exists(), step
+                    assert step.stage in earlier if step.stage else reaches_the_build(source), step
         earlier.add(stage.name)
 
 

@@ -14,6 +14,8 @@ from stimuli_builder.blinks.profile import Array
 
 Kind = Literal["blink", "squint", "gaze_shift", "closed_eye"]
 KINDS: tuple[Kind, ...] = ("blink", "squint", "gaze_shift", "closed_eye")
+CLASSES = (*KINDS, "nothing")
+"""What a dip of a series may be."""
 RATES = (15.0, 20.0, 24.0, 25.0, 29.97, 30.0, 30.0, 30.0, 50.0, 60.0, 90.0, 120.0, 240.0, 300.0, 500.0)
 CLOSED_EYE_S = 0.5
 """A closed phase of half a second or more is a closed eye, not a blink."""

@@ -15,7 +15,7 @@ SHORTEST_PIECE_S = 0.8
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class Measured:
     """A gapless piece of one eye with its dips.
 
     Attributes
@@ -24,8 +24,8 @@ class Piece:
         Its first frame in the series.
     deep : float
         How deep this piece's blinks go, as depth.
-    features, odds : float64 array (dips, features), (dips, kinds)
-        What the first look is told of each dip, and the probabilities that it gives.
+    features : float64 array (dips, features)
+        What the first look is told of each dip.
     """
 
     start: int
@@ -33,7 +33,6 @@ class Piece:
     candidates: list[Candidate]
     deep: float
     features: Array
-    odds: Array
 
     @property
     def peaks_s(self) -> Array:
@@ -46,44 +45,72 @@ class Piece:
         return np.array([c.depth for c in self.candidates])
 
 
+@dataclass(frozen=True, eq=False)
+class Piece(Measured):
+    """A piece after the first look.
+
+    Attributes
+    ----------
+    probabilities : float64 array (dips, kinds)
+        The probability of each kind that the first look gives each dip.
+    """
+
+    probabilities: Array
+
+
 def looked_at(eyes: Sequence[BlinkSeries]) -> list[list[Piece]]:
-    """Pieces of each series after a first look at its dips; two series are the two eyes of one face."""
-    pieces = [dips_of(series) for series in eyes]
-    if len(eyes) == 1:
-        return [[_first_look(piece, None) for piece in pieces[0]]]
-    others = [beside(pieces[1 - number], series.distance.size) for number, series in enumerate(eyes)]
+    """Pieces of each series after a first look at their dips; two series are the two eyes of one face."""
+    network = shipped_network(FIRST_LOOK)
     return [
-        [_first_look(piece, of_piece(other, piece)) for piece in of_eye]
+        [Piece(**vars(piece), probabilities=network.probabilities(piece.features)) for piece in of_eye]
+        for of_eye in measured(eyes)
+    ]
+
+
+def measured(eyes: Sequence[BlinkSeries]) -> list[list[Measured]]:
+    """Pieces of each series with what the first look is told of their dips."""
+    pieces = [_dips_of(series) for series in eyes]
+    others = partners(pieces, [series.distance.size for series in eyes])
+    return [
+        [
+            replace(piece, features=features_of(piece.candidates, piece.depth, of_piece(other, piece)))
+            for piece in of_eye
+        ]
         for of_eye, other in zip(pieces, others, strict=True)
     ]
 
 
-def dips_of(series: BlinkSeries) -> list[Piece]:
-    """Pieces of a series with their dips, not looked at yet."""
-    pieces, none = [], np.empty((0, 0))
+def _dips_of(series: BlinkSeries) -> list[Measured]:
+    """Pieces of a series with their dips, of which nothing is told yet."""
+    pieces = []
     for start, stop in runs(np.isfinite(series.distance)):
         if stop - start >= max(5, SHORTEST_PIECE_S * series.fps):
             depth = depth_of(series.distance[start:stop], series.fps)
             candidates = find_candidates(depth)
-            pieces.append(Piece(start, depth, candidates, deep_level(candidates, depth), none, none))
+            pieces.append(Measured(start, depth, candidates, deep_level(candidates, depth), np.empty((0, 0))))
     return pieces
 
 
-def beside(pieces: list[Piece], size: int) -> Array:
+def partners(eyes: Sequence[Sequence[Measured]], sizes: Sequence[int]) -> list[Array | None]:
+    """Depth of each eye's other eye over its whole series; None where there are not two."""
+    if len(eyes) != 2:
+        return [None] * len(eyes)
+    return [beside(eyes[1 - number], size) for number, size in enumerate(sizes)]
+
+
+def beside(pieces: Sequence[Measured], size: int) -> Array:
     """Depth of an eye over the whole series (size,), its deep level 1; NaN in gaps."""
     whole = np.full(size, np.nan)
     for piece in pieces:
-        stop = min(size, piece.start + piece.depth.smooth.size)
-        whole[piece.start : stop] = piece.depth.smooth[: stop - piece.start] / piece.deep
+        part = whole[piece.start : piece.start + piece.depth.smooth.size]
+        part[:] = piece.depth.smooth[: part.size] / piece.deep
     return whole
 
 
-def of_piece(whole: Array, piece: Piece) -> Array:
-    """The part of a whole series that lies beside a piece."""
-    return whole[piece.start : piece.start + piece.depth.smooth.size]
-
-
-def _first_look(piece: Piece, other: Array | None) -> Piece:
-    features = features_of(piece.candidates, piece.depth, other)
-    odds = shipped_network(FIRST_LOOK).probabilities(features)
-    return replace(piece, features=features, odds=odds)
+def of_piece(whole: Array | None, piece: Measured) -> Array | None:
+    """The part of a whole series that lies beside a piece, as long as it; NaN beyond the end."""
+    if whole is None:
+        return None
+    size = piece.depth.smooth.size
+    part = whole[piece.start : piece.start + size]
+    return np.pad(part, (0, size - part.size), constant_values=np.nan)

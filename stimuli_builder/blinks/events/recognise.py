@@ -20,7 +20,8 @@ from stimuli_builder.blinks.series import BlinkSeries
 LEAST_PROBABILITY = 0.5
 BLINK_TO_SQUINT = 5.0
 """What would be a blink is a squint where it is not this much likelier a blink. Brief squints are partial
-blinks but for slower lids, and rarer: by the likelier of both one in twenty of them is called a blink."""
+blinks but for slower lids, and rarer: by the likelier of both one in eleven to eighteen of them is called a
+blink (decision 0957)."""
 STILL_CLOSED = 0.8
 """Part of its depth at which a lid that stays closed for half a second is for most of that time. A blink on a
 gaze shift down comes back to where the gaze leaves it, and the template takes that for its closed phase."""
@@ -56,12 +57,12 @@ class _Told:
 def recognise(eyes: Sequence[BlinkSeries]) -> list[Recognised]:
     """Return the events of each series; two series are taken as the two eyes of one face."""
     pieces = looked_at(eyes)
-    odds = second_look(pieces, [series.distance.size for series in eyes])
+    probabilities = second_look(pieces, [series.distance.size for series in eyes])
     results = []
-    for series, of_eye, odds_of_eye in zip(eyes, pieces, odds, strict=True):
+    for series, of_eye, told_of_eye in zip(eyes, pieces, probabilities, strict=True):
         events: list[LidEvent] = []
         cut: list[int] = []
-        for piece, of_piece in zip(of_eye, odds_of_eye, strict=True):
+        for piece, of_piece in zip(of_eye, told_of_eye, strict=True):
             told = _judged(piece, of_piece, series.fps)
             cut += told.cut
             events += apart(_listed(told), piece.depth.smooth, piece.start, series.fps)
@@ -69,11 +70,11 @@ def recognise(eyes: Sequence[BlinkSeries]) -> list[Recognised]:
     return results
 
 
-def _judged(piece: Piece, odds: Array, fps: float) -> _Told:
+def _judged(piece: Piece, probabilities: Array, fps: float) -> _Told:
     """What each dip of a piece is, by its probabilities (dips, kinds)."""
     told = _Told([], {}, [])
     kinds = shipped_network(SECOND_LOOK).kinds
-    for candidate, row in zip(piece.candidates, odds, strict=True):
+    for candidate, row in zip(piece.candidates, probabilities, strict=True):
         shares = dict(zip(kinds, row.tolist(), strict=True))
         sure = shares["blink"] >= LEAST_PROBABILITY
         likeliest = "blink" if sure else max(shares, key=shares.__getitem__)

@@ -10,6 +10,7 @@ comes with pingouin. The same seed gives the same weights.
 import argparse
 import sys
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,10 +20,10 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.neural_network import MLPClassifier
 
 from stimuli_builder.blinks.events.candidates import FEATURES, Candidate
-from stimuli_builder.blinks.events.generated import KINDS, Generated, Motion, generate
+from stimuli_builder.blinks.events.generated import CLASSES, Generated, Motion, generate
 from stimuli_builder.blinks.events.levels import Depth
 from stimuli_builder.blinks.events.network import FIRST_LOOK, SECOND_LOOK, Network, store
-from stimuli_builder.blinks.events.pieces import Piece, looked_at
+from stimuli_builder.blinks.events.pieces import Measured, looked_at, measured
 from stimuli_builder.blinks.events.second_look import CONTEXT, contexts
 from stimuli_builder.blinks.profile import Array
 from stimuli_builder.blinks.series import BlinkSeries
@@ -48,24 +49,25 @@ SEED = 20261121
 STAGES = ((2e-3, 6), (5e-4, 4), (1e-4, 3))
 """Rate of learning and passes over the dips of each stage; the last ones settle what the first one found."""
 NEAR_HOLD_S = 0.1
-CLASSES = (*KINDS, "nothing")
 
 
 def labelled_features(look: str, series: Generated) -> tuple[Array, list[str]]:
     """What a look is told of every dip of every eye, and what each is."""
     eyes = [BlinkSeries(distance=d, fps=series.fps, column="d", is_px=False) for d in series.distances]
-    pieces = looked_at(eyes)
-    told = (
-        [[piece.features for piece in of_eye] for of_eye in pieces]
-        if look == "first"
-        else contexts(pieces, [series.distances.shape[1]] * len(eyes))
-    )
-    rows = np.concatenate([row for of_eye in told for row in of_eye])
-    return rows, [kind for of_eye in pieces for piece in of_eye for kind in _kinds(piece, series)]
-
-
-def _kinds(piece: Piece, series: Generated) -> list[str]:
-    return true_kinds(piece.candidates, piece.depth, series.motions)
+    pieces: Sequence[Sequence[Measured]]
+    if look == "first":
+        pieces = measured(eyes)
+        told = [[piece.features for piece in of_eye] for of_eye in pieces]
+    else:
+        pieces = seen = looked_at(eyes)
+        told = contexts(seen, [eye.distance.size for eye in eyes])
+    kinds = [
+        kind
+        for of_eye in pieces
+        for piece in of_eye
+        for kind in true_kinds(piece.candidates, piece.depth, series.motions)
+    ]
+    return np.concatenate([row for of_eye in told for row in of_eye]), kinds
 
 
 def true_kinds(candidates: list[Candidate], depth: Depth, motions: tuple[Motion, ...]) -> list[str]:

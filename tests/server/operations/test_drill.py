@@ -174,10 +174,13 @@ def test_a_stop_in_mid_drill_leaves_no_copy(watched: Settings) -> None:
         f"{slow}import sys\nsys.argv = ['server', 'drill', '--when-due']\nfrom server.cli import main\nmain()"
     )
     with subprocess.Popen([sys.executable, "-c", command], env=environment) as process:
-        until(lambda: process.poll() is not None or list(watched.data_folder.glob(".drill-*")))
-        assert process.poll() is None
-        process.terminate()
-        process.wait(60)
+        try:
+            until(lambda: process.poll() is not None or list(watched.data_folder.glob(".drill-*")))
+            assert process.poll() is None
+            process.terminate()
+            process.wait(60)
+        finally:
+            process.kill()
     assert not list(watched.data_folder.glob(".drill-*"))
 
 

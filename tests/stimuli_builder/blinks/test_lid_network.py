@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from stimuli_builder.blinks.events.candidates import FEATURES
+from stimuli_builder.blinks.events.generated import CLASSES
 from stimuli_builder.blinks.events.network import FIRST_LOOK, SECOND_LOOK, Network, store, stored_network
-from stimuli_builder.blinks.events.second_look import CONTEXT, KINDS
+from stimuli_builder.blinks.events.second_look import CONTEXT
 
 
 def drawn(largest: float) -> Network:
@@ -42,4 +43,4 @@ def test_the_networks_that_ship_know_the_features_and_are_small(
 
 
 def test_both_looks_tell_the_same_kinds() -> None:
-    assert stored_network(FIRST_LOOK).kinds == stored_network(SECOND_LOOK).kinds == KINDS
+    assert stored_network(FIRST_LOOK).kinds == stored_network(SECOND_LOOK).kinds == CLASSES
