@@ -91,7 +91,7 @@ class Pigments:
         mottled = self._noise(1.3, 11) + self.facing * self._noise(6.0, 12)
         out *= 1 + self.contrast * 0.10 * mottled
         out *= np.clip(1 + self.contrast * self.calm * 0.16 * self._noise(11.0, 22, 3), 0.5, 1.6)
-        return out + self._spots()
+        return np.asarray(out + self._spots())
 
     def _varied_haemoglobin(self, lips: Array, wet: Array, lid: Array, corner: Array) -> Array:
         """(n,) optical depth of blood with what varies it: margins, mottling, speckle, the lids' vessels."""

@@ -22,6 +22,7 @@ OPENING_MM = {
     "alder@5": 10.07,
     "birch": 9.66,
     "birch@3": 9.66,
+    "birch@4": 9.66,
     "cedar": 9.85,
     "cedar@3": 9.85,
     "hazel": 10.91,
