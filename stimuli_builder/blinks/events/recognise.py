@@ -18,7 +18,7 @@ from stimuli_builder.blinks.profile import Array
 from stimuli_builder.blinks.series import BlinkSeries
 
 LEAST_PROBABILITY = 0.5
-BLINK_TO_SQUINT = 5.0
+BLINK_TO_SQUINT = 10.0
 """What would be a blink is a squint where it is not this much likelier a blink. Brief squints are partial
 blinks but for slower lids, and rarer: by the likelier of both one in eleven to eighteen of them is called a
 blink (decision 0957)."""
