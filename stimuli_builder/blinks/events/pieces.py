@@ -70,7 +70,7 @@ def looked_at(eyes: Sequence[BlinkSeries]) -> list[list[Piece]]:
 def measured(eyes: Sequence[BlinkSeries]) -> list[list[Measured]]:
     """Pieces of each series with what the first look is told of their dips."""
     pieces = [_dips_of(series) for series in eyes]
-    others = partners(pieces, [series.distance.size for series in eyes])
+    others = partners(pieces)
     return [
         [
             replace(piece, features=features_of(piece.candidates, piece.depth, of_piece(other, piece)))
@@ -91,19 +91,19 @@ def _dips_of(series: BlinkSeries) -> list[Measured]:
     return pieces
 
 
-def partners(eyes: Sequence[Sequence[Measured]], sizes: Sequence[int]) -> list[Array | None]:
-    """Depth of each eye's other eye over its whole series; None where there are not two."""
+def partners(eyes: Sequence[Sequence[Measured]]) -> list[Array | None]:
+    """Depth of each eye's other eye, to the end of its last piece; None where there are not two."""
     if len(eyes) != 2:
         return [None] * len(eyes)
-    return [beside(eyes[1 - number], size) for number, size in enumerate(sizes)]
+    return [_whole(eyes[1 - number]) for number in range(2)]
 
 
-def beside(pieces: Sequence[Measured], size: int) -> Array:
-    """Depth of an eye over the whole series (size,), its deep level 1; NaN in gaps."""
-    whole = np.full(size, np.nan)
-    for piece in pieces:
-        part = whole[piece.start : piece.start + piece.depth.smooth.size]
-        part[:] = piece.depth.smooth[: part.size] / piece.deep
+def _whole(pieces: Sequence[Measured]) -> Array:
+    """Depth of an eye to the end of its last piece, its deep level 1; NaN in gaps."""
+    ends = [piece.start + piece.depth.smooth.size for piece in pieces]
+    whole = np.full(max(ends, default=0), np.nan)
+    for piece, end in zip(pieces, ends, strict=True):
+        whole[piece.start : end] = piece.depth.smooth / piece.deep
     return whole
 
 

@@ -7,10 +7,9 @@ import numpy as np
 
 from stimuli_builder.blinks.events.apart import apart
 from stimuli_builder.blinks.events.candidates import RIPPLE, Candidate, candidate_at
-from stimuli_builder.blinks.events.generated import CLOSED_EYE_S
+from stimuli_builder.blinks.events.generated import CLASSES, CLOSED_EYE_S
 from stimuli_builder.blinks.events.levels import Depth
 from stimuli_builder.blinks.events.lid_event import LidEvent
-from stimuli_builder.blinks.events.network import SECOND_LOOK, shipped_network
 from stimuli_builder.blinks.events.pieces import Piece, looked_at
 from stimuli_builder.blinks.events.second_look import second_look
 from stimuli_builder.blinks.events.template import Timing, timing_of
@@ -57,7 +56,7 @@ class _Told:
 def recognise(eyes: Sequence[BlinkSeries]) -> list[Recognised]:
     """Return the events of each series; two series are taken as the two eyes of one face."""
     pieces = looked_at(eyes)
-    probabilities = second_look(pieces, [series.distance.size for series in eyes])
+    probabilities = second_look(pieces)
     results = []
     for series, of_eye, told_of_eye in zip(eyes, pieces, probabilities, strict=True):
         events: list[LidEvent] = []
@@ -73,9 +72,8 @@ def recognise(eyes: Sequence[BlinkSeries]) -> list[Recognised]:
 def _judged(piece: Piece, probabilities: Array, fps: float) -> _Told:
     """What each dip of a piece is, by its probabilities (dips, kinds)."""
     told = _Told([], {}, [])
-    kinds = shipped_network(SECOND_LOOK).kinds
     for candidate, row in zip(piece.candidates, probabilities, strict=True):
-        shares = dict(zip(kinds, row.tolist(), strict=True))
+        shares = dict(zip(CLASSES, row.tolist(), strict=True))
         sure = shares["blink"] >= LEAST_PROBABILITY
         likeliest = "blink" if sure else max(shares, key=shares.__getitem__)
         if likeliest == "nothing":

@@ -48,22 +48,16 @@ CONTEXT = (
 )  # fmt: skip
 
 
-def second_look(eyes: list[list[Piece]], sizes: list[int]) -> list[list[Array]]:
-    """Probabilities (dips, kinds) of each piece of each eye, by the network of the second look.
-
-    Parameters
-    ----------
-    sizes : list of int
-        Frames of each eye's series.
-    """
+def second_look(eyes: list[list[Piece]]) -> list[list[Array]]:
+    """Probabilities (dips, kinds) of each piece of each eye, by the network of the second look."""
     network = shipped_network(SECOND_LOOK)
-    return [[network.probabilities(context) for context in of_eye] for of_eye in contexts(eyes, sizes)]
+    return [[network.probabilities(context) for context in of_eye] for of_eye in contexts(eyes)]
 
 
-def contexts(eyes: list[list[Piece]], sizes: list[int]) -> list[list[Array]]:
+def contexts(eyes: list[list[Piece]]) -> list[list[Array]]:
     """Rows of `CONTEXT` (dips, features) of each piece of each eye."""
     out = []
-    for number, (pieces, whole) in enumerate(zip(eyes, partners(eyes, sizes), strict=True)):
+    for number, (pieces, whole) in enumerate(zip(eyes, partners(eyes), strict=True)):
         other = [] if whole is None else eyes[1 - number]
         out.append([_context(piece, pieces, other, whole) for piece in pieces])
     return out

@@ -60,7 +60,7 @@ def labelled_features(look: str, series: Generated) -> tuple[Array, list[str]]:
         told = [[piece.features for piece in of_eye] for of_eye in pieces]
     else:
         pieces = seen = looked_at(eyes)
-        told = contexts(seen, [eye.distance.size for eye in eyes])
+        told = contexts(seen)
     kinds = [
         kind
         for of_eye in pieces

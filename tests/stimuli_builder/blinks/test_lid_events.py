@@ -175,6 +175,15 @@ def test_a_brief_slow_squint_is_no_blink(fps, depth, down, hold, up):
 
 
 @pytest.mark.parametrize("fps", [30.0, 120.0])
+@pytest.mark.parametrize(("depth", "down", "hold", "up"), [(0.4, 0.14, 0.1, 0.4), (0.55, 0.22, 0.03, 0.35)])
+def test_a_squint_that_looked_more_like_a_blink_has_the_squints_probability(fps, depth, down, hold, up):
+    squint = Motion("squint", 9, down, hold, up, depth)
+    (seen,) = recognise([eye(lids([*blinks_at(3, 6, 14, 17), squint], fps), fps)])
+    (told,) = [event for event in seen.events if event.kind == "squint"]
+    assert told.probability < 0.5
+
+
+@pytest.mark.parametrize("fps", [30.0, 120.0])
 @pytest.mark.parametrize("depth", [0.5, 0.7, 0.9])
 def test_a_brisk_partial_blink_stays_a_blink(fps, depth):
     partial = Motion("blink", 9, 0.09, 0.02, 0.22, depth)

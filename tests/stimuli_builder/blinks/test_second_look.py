@@ -30,7 +30,7 @@ def series(onsets: tuple[float, ...] = ONSETS_S, gap: slice | None = None) -> Bl
 def told(eyes: list[BlinkSeries]) -> tuple[Array, Array]:
     """Times of the first eye's deep dips and what the second look is told of them."""
     pieces = looked_at(eyes)
-    rows = contexts(pieces, [eye.distance.size for eye in eyes])
+    rows = contexts(pieces)
     times = np.concatenate([piece.peaks_s for piece in pieces[0]])
     deep = np.concatenate([piece.depths for piece in pieces[0]]) > 0.5
     return times[deep], np.concatenate(rows[0])[deep]
@@ -93,9 +93,9 @@ def test_a_gap_parts_the_dips_but_not_what_the_eye_does() -> None:
 
 def test_three_columns_are_three_eyes_alone() -> None:
     columns = [series(), series((2.05, 8.0)), series((4.0,))]
-    together = contexts(looked_at(columns), [column.distance.size for column in columns])
+    together = contexts(looked_at(columns))
     for column, rows in zip(columns, together, strict=True):
-        [alone] = contexts(looked_at([column]), [column.distance.size])
+        [alone] = contexts(looked_at([column]))
         assert np.array_equal(rows[0], alone[0])
 
 
@@ -117,7 +117,7 @@ def test_an_eye_without_dips_tells_nothing(other: Array) -> None:
     assert np.isfinite(rows).all()
     assert [value(row, "other eye has dips") for row in rows] == [0, 0, 0]
     still = [BlinkSeries(distance=np.full(1440, 30.0), fps=FPS, column="d", is_px=True)] * 2
-    shapes = [row.shape for of_eye in contexts(looked_at(still), [1440] * 2) for row in of_eye]
+    shapes = [row.shape for of_eye in contexts(looked_at(still)) for row in of_eye]
     assert shapes == [(0, len(CONTEXT))] * 2
 
 
