@@ -8,10 +8,6 @@ export interface paths {
             cookie?: never;
         };
         get?: never;
-        /**
-         * Put Rating
-         * @description Store one rating (201); the same again is answered with the same receipt (200).
-         */
         put: operations["put_rating"];
         post?: never;
         delete?: never;
@@ -29,10 +25,6 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /**
-         * Post Views
-         * @description Begin views durably and complete them; sending the same again changes nothing.
-         */
         post: operations["post_views"];
         delete?: never;
         options?: never;
@@ -47,10 +39,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Get Link
-         * @description Where a link leads and whether it is open.
-         */
         get: operations["get_link"];
         put?: never;
         post?: never;
@@ -69,10 +57,6 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /**
-         * Start Run
-         * @description Begin a run (201), or take up the one this browser, person or personal link has (200).
-         */
         post: operations["start_run"];
         delete?: never;
         options?: never;
@@ -89,10 +73,6 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /**
-         * Report Unsupported
-         * @description Tell the server that a browser or screen was turned away before a run began.
-         */
         post: operations["report_unsupported"];
         delete?: never;
         options?: never;
@@ -107,10 +87,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Get Run
-         * @description Everything the page needs to begin or to go on.
-         */
         get: operations["get_run"];
         put?: never;
         post?: never;
@@ -128,10 +104,6 @@ export interface paths {
             cookie?: never;
         };
         get?: never;
-        /**
-         * Put Consent
-         * @description Agree to take part; `agreed: false` ends the run.
-         */
         put: operations["put_consent"];
         post?: never;
         delete?: never;
@@ -148,10 +120,6 @@ export interface paths {
             cookie?: never;
         };
         get?: never;
-        /**
-         * Put Calibration
-         * @description Add a size calibration.
-         */
         put: operations["put_calibration"];
         post?: never;
         delete?: never;
@@ -168,10 +136,6 @@ export interface paths {
             cookie?: never;
         };
         get?: never;
-        /**
-         * Put Device
-         * @description Add facts about browser and screen.
-         */
         put: operations["put_device"];
         post?: never;
         delete?: never;
@@ -188,10 +152,6 @@ export interface paths {
             cookie?: never;
         };
         get?: never;
-        /**
-         * Put Form
-         * @description Store the answers of a declared form; the one that decides the group gives the run with its trials.
-         */
         put: operations["put_form"];
         post?: never;
         delete?: never;
@@ -208,10 +168,6 @@ export interface paths {
             cookie?: never;
         };
         get?: never;
-        /**
-         * Put Stage
-         * @description Tell where the participant is.
-         */
         put: operations["put_stage"];
         post?: never;
         delete?: never;
@@ -228,10 +184,6 @@ export interface paths {
             cookie?: never;
         };
         get?: never;
-        /**
-         * Put Language
-         * @description Change the language.
-         */
         put: operations["put_language"];
         post?: never;
         delete?: never;
@@ -249,10 +201,6 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /**
-         * Post Events
-         * @description Tell what happened; an event with a known id is left as it is.
-         */
         post: operations["post_events"];
         delete?: never;
         options?: never;
@@ -269,10 +217,6 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /**
-         * Complete Run
-         * @description Close the run and get the code; refused while trials or required questions are unanswered.
-         */
         post: operations["complete_run"];
         delete?: never;
         options?: never;
@@ -289,10 +233,6 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /**
-         * Screen Out
-         * @description End the run because browser or screen will not do; refused where the study does not screen devices.
-         */
         post: operations["screen_out"];
         delete?: never;
         options?: never;
@@ -309,10 +249,6 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /**
-         * Withdraw Run
-         * @description Stop taking part.
-         */
         post: operations["withdraw_run"];
         delete?: never;
         options?: never;
@@ -327,10 +263,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Get Clip
-         * @description The clip's bytes, whole or the part that Range asks for.
-         */
         get: operations["get_clip"];
         put?: never;
         post?: never;
@@ -347,10 +279,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Healthz
-         * @description The process answers.
-         */
         get: operations["healthz"];
         put?: never;
         post?: never;
@@ -367,10 +295,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Readyz
-         * @description The database answers, is writable and has the newest revision; the disk has room, clips are read.
-         */
         get: operations["readyz"];
         put?: never;
         post?: never;
@@ -387,10 +311,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Get Backups
-         * @description How old the newest backup is, and how the last restore drill went.
-         */
         get: operations["get_backups"];
         put?: never;
         post?: never;
@@ -407,21 +327,9 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Get Session
-         * @description Who is signed in here.
-         */
         get: operations["get_session"];
         put?: never;
-        /**
-         * Sign In
-         * @description Sign in; sets the session cookie. After some wrong attempts from one place the next must wait.
-         */
         post: operations["sign_in"];
-        /**
-         * Sign Out
-         * @description End this session.
-         */
         delete: operations["sign_out"];
         options?: never;
         head?: never;
@@ -435,10 +343,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Get Invitation
-         * @description Whether a one-time link still works, and as what.
-         */
         get: operations["get_invitation"];
         put?: never;
         post?: never;
@@ -457,10 +361,6 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /**
-         * Accept Invitation
-         * @description Use a one-time link: make the account and sign in.
-         */
         post: operations["accept_invitation"];
         delete?: never;
         options?: never;
@@ -475,10 +375,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * List Sessions
-         * @description One's own signed-in browsers, the latest first.
-         */
         get: operations["list_sessions"];
         put?: never;
         post?: never;
@@ -498,10 +394,6 @@ export interface paths {
         get?: never;
         put?: never;
         post?: never;
-        /**
-         * Revoke Session
-         * @description Sign another of one's own browsers out.
-         */
         delete: operations["revoke_session"];
         options?: never;
         head?: never;
@@ -516,10 +408,6 @@ export interface paths {
             cookie?: never;
         };
         get?: never;
-        /**
-         * Change Password
-         * @description Change the password; every other session and every API token ends.
-         */
         put: operations["change_password"];
         post?: never;
         delete?: never;
@@ -536,20 +424,8 @@ export interface paths {
             cookie?: never;
         };
         get?: never;
-        /**
-         * Confirm Second Factor
-         * @description Turn the second factor on with the app's first code; gives the recovery codes, this once.
-         */
         put: operations["confirm_second_factor"];
-        /**
-         * Start Second Factor
-         * @description Begin the set-up of a second factor: a secret for an authenticator app.
-         */
         post: operations["start_second_factor"];
-        /**
-         * Remove Second Factor
-         * @description Turn the second factor off; asks for the password, and where the account has none for a code.
-         */
         delete: operations["remove_second_factor"];
         options?: never;
         head?: never;
@@ -563,16 +439,8 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * List Tokens
-         * @description One's own API tokens.
-         */
         get: operations["list_tokens"];
         put?: never;
-        /**
-         * Create Token
-         * @description Make an API token; its secret is shown this once. It can do no more than the account.
-         */
         post: operations["create_token"];
         delete?: never;
         options?: never;
@@ -590,10 +458,6 @@ export interface paths {
         get?: never;
         put?: never;
         post?: never;
-        /**
-         * Revoke Token
-         * @description Revoke one's own API token.
-         */
         delete: operations["revoke_token"];
         options?: never;
         head?: never;
@@ -607,10 +471,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Ways In
-         * @description How one can sign in here, besides by name and password.
-         */
         get: operations["ways_in"];
         put?: never;
         post?: never;
@@ -629,10 +489,6 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /**
-         * Begin Sign In
-         * @description Begin to sign in with a provider: where the browser goes, and a cookie by which it is known again.
-         */
         post: operations["begin_sign_in"];
         delete?: never;
         options?: never;
@@ -649,10 +505,6 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /**
-         * Begin Invited
-         * @description Begin to make an invited account that signs in with a provider: where the browser goes.
-         */
         post: operations["begin_invited"];
         delete?: never;
         options?: never;
@@ -669,10 +521,6 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /**
-         * Begin Link
-         * @description Begin to give one's own account a login with a provider; asks for the password once more.
-         */
         post: operations["begin_link"];
         delete?: never;
         options?: never;
@@ -687,13 +535,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Come Back
-         * @description Where the provider sends the browser back to; what was refused, the page to sign in says.
-         *
-         *     Nothing of the query is shown or followed: the page to go on with was kept when the sign-in began. Who is
-         *     refused for coming too often may come again: the state is not used up.
-         */
         get: operations["come_back"];
         put?: never;
         post?: never;
@@ -712,10 +553,6 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /**
-         * Finish With Code
-         * @description Enter the second factor after a provider signed one in; gives the page to go on with.
-         */
         post: operations["finish_with_code"];
         delete?: never;
         options?: never;
@@ -732,13 +569,6 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /**
-         * End By Provider
-         * @description Where the provider itself tells that somebody signed out there (OpenID Connect Back-Channel Logout).
-         *
-         *     Who sends what is no logout token is kept waiting, not the provider: its people may all sign out at once.
-         *     A token that comes again ends nothing that was begun since.
-         */
         post: operations["end_by_provider"];
         delete?: never;
         options?: never;
@@ -753,10 +583,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * List Logins
-         * @description One's own logins with providers.
-         */
         get: operations["list_logins"];
         put?: never;
         post?: never;
@@ -776,10 +602,6 @@ export interface paths {
         get?: never;
         put?: never;
         post?: never;
-        /**
-         * Remove Login
-         * @description Take a login off one's own account.
-         */
         delete: operations["remove_login"];
         options?: never;
         head?: never;
@@ -795,10 +617,6 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /**
-         * Forgot Password
-         * @description Ask for a link by mail for a new password; the answer is the same whether there is such an account.
-         */
         post: operations["forgot_password"];
         delete?: never;
         options?: never;
@@ -815,10 +633,6 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /**
-         * Set Password
-         * @description Choose a new password by a link; every session and every API token of the account ends.
-         */
         post: operations["set_password"];
         delete?: never;
         options?: never;
@@ -833,21 +647,9 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Own Address
-         * @description Where a link for a new password goes.
-         */
         get: operations["own_address"];
-        /**
-         * Change Address
-         * @description Enter an address of mail; it is the account's once the link that goes there was opened.
-         */
         put: operations["change_address"];
         post?: never;
-        /**
-         * Remove Address
-         * @description Take the address of mail off one's own account; passwords are then reset by the command line alone.
-         */
         delete: operations["remove_address"];
         options?: never;
         head?: never;
@@ -863,10 +665,6 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /**
-         * Confirm Address
-         * @description Confirm an address of mail by the link that went there; the address before it is told.
-         */
         post: operations["confirm_address"];
         delete?: never;
         options?: never;
@@ -881,10 +679,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * List Accounts
-         * @description Every account.
-         */
         get: operations["list_accounts"];
         put?: never;
         post?: never;
@@ -907,10 +701,6 @@ export interface paths {
         delete?: never;
         options?: never;
         head?: never;
-        /**
-         * Change Account
-         * @description Change a role, or disable an account.
-         */
         patch: operations["change_account"];
         trace?: never;
     };
@@ -921,16 +711,8 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * List Invitations
-         * @description Invitations that have neither been used nor expired.
-         */
         get: operations["list_invitations"];
         put?: never;
-        /**
-         * Create Invitation
-         * @description Invite somebody by a one-time link, shown this once.
-         */
         post: operations["create_invitation"];
         delete?: never;
         options?: never;
@@ -948,10 +730,6 @@ export interface paths {
         get?: never;
         put?: never;
         post?: never;
-        /**
-         * Revoke Invitation
-         * @description Take an invitation back.
-         */
         delete: operations["revoke_invitation"];
         options?: never;
         head?: never;
@@ -965,10 +743,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * List Audit
-         * @description The audit log, newest first; `before` pages on.
-         */
         get: operations["list_audit"];
         put?: never;
         post?: never;
@@ -985,16 +759,8 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * List Workspaces
-         * @description The workspaces one belongs to; all of them for who manages the server.
-         */
         get: operations["list_workspaces"];
         put?: never;
-        /**
-         * Create Workspace
-         * @description Make a workspace and own it; gives the list with it.
-         */
         post: operations["create_workspace"];
         delete?: never;
         options?: never;
@@ -1010,16 +776,8 @@ export interface paths {
             cookie?: never;
         };
         get?: never;
-        /**
-         * Change Workspace
-         * @description Change the title, or whether a second factor is asked for.
-         */
         put: operations["change_workspace"];
         post?: never;
-        /**
-         * Delete Workspace
-         * @description Remove a workspace without studies.
-         */
         delete: operations["delete_workspace"];
         options?: never;
         head?: never;
@@ -1033,10 +791,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * List Members
-         * @description Who belongs to a workspace; for its owners.
-         */
         get: operations["list_members"];
         put?: never;
         post?: never;
@@ -1054,16 +808,8 @@ export interface paths {
             cookie?: never;
         };
         get?: never;
-        /**
-         * Set Member
-         * @description Take an account into a workspace, or change its role there.
-         */
         put: operations["set_member"];
         post?: never;
-        /**
-         * Remove Member
-         * @description Take an account out of a workspace; rights granted on single studies stay.
-         */
         delete: operations["remove_member"];
         options?: never;
         head?: never;
@@ -1077,10 +823,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * List Grants
-         * @description The rights granted on a study.
-         */
         get: operations["list_grants"];
         put?: never;
         post?: never;
@@ -1098,10 +840,6 @@ export interface paths {
             cookie?: never;
         };
         get?: never;
-        /**
-         * Set Grant
-         * @description Grant an account rights on a study, beside those it has by its role; an empty list takes them back.
-         */
         put: operations["set_grant"];
         post?: never;
         delete?: never;
@@ -1118,10 +856,6 @@ export interface paths {
             cookie?: never;
         };
         get?: never;
-        /**
-         * Move Study
-         * @description Put a study into another workspace in which one may make studies.
-         */
         put: operations["move_study"];
         post?: never;
         delete?: never;
@@ -1137,10 +871,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * List Experiments
-         * @description The experiments that come with the program.
-         */
         get: operations["list_experiments"];
         put?: never;
         post?: never;
@@ -1159,10 +889,6 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /**
-         * Check Definition
-         * @description Check a definition: every problem with its line and the nearest right name, or what it expands to.
-         */
         post: operations["check_definition"];
         delete?: never;
         options?: never;
@@ -1179,10 +905,6 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /**
-         * Edit Definition
-         * @description Write changed data into a definition: its comments, order and form stay. Nothing is stored.
-         */
         post: operations["edit_definition"];
         delete?: never;
         options?: never;
@@ -1197,16 +919,8 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * List Studies
-         * @description The studies that are open to the account, the latest first.
-         */
         get: operations["list_studies"];
         put?: never;
-        /**
-         * Create Study
-         * @description Create a draft from a shipped experiment, a definition, or uploaded clips.
-         */
         post: operations["create_study"];
         delete?: never;
         options?: never;
@@ -1221,17 +935,9 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Get Study
-         * @description One study with its declaration.
-         */
         get: operations["get_study"];
         put?: never;
         post?: never;
-        /**
-         * Delete Study
-         * @description Delete a draft that nobody has taken part in.
-         */
         delete: operations["delete_study"];
         options?: never;
         head?: never;
@@ -1247,10 +953,6 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /**
-         * Add Version
-         * @description Store a changed definition as a new version; runs keep the version they began with.
-         */
         post: operations["add_version"];
         delete?: never;
         options?: never;
@@ -1267,10 +969,6 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /**
-         * Judge Version
-         * @description Say, before a changed definition is saved, what changes and whether a new data series would begin.
-         */
         post: operations["judge_version"];
         delete?: never;
         options?: never;
@@ -1285,10 +983,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Get Version
-         * @description The TOML of one version.
-         */
         get: operations["get_version"];
         put?: never;
         post?: never;
@@ -1306,10 +1000,6 @@ export interface paths {
             cookie?: never;
         };
         get?: never;
-        /**
-         * Change Status
-         * @description draft -> pilot -> live -> closed.
-         */
         put: operations["change_status"];
         post?: never;
         delete?: never;
@@ -1326,10 +1016,6 @@ export interface paths {
             cookie?: never;
         };
         get?: never;
-        /**
-         * Change Settings
-         * @description Pause, quota and recruiter.
-         */
         put: operations["change_settings"];
         post?: never;
         delete?: never;
@@ -1345,10 +1031,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * List Clips
-         * @description Every clip of the active version with the closure curve it shows.
-         */
         get: operations["list_clips"];
         put?: never;
         post?: never;
@@ -1367,12 +1049,6 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /**
-         * Upload Clips
-         * @description Begin an upload: videos, a CSV table, or a zip of them. It waits a day to become a study.
-         *
-         *     Videos are looked into, and converted where browsers cannot play them, after the answer: see the progress.
-         */
         post: operations["upload_clips"];
         delete?: never;
         options?: never;
@@ -1389,12 +1065,6 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /**
-         * Upload More
-         * @description Send more files of an upload; those that have come already are passed over.
-         *
-         *     With `replaces`, the one file that is sent takes the place of that file, which may have been refused.
-         */
         post: operations["upload_more"];
         delete?: never;
         options?: never;
@@ -1409,10 +1079,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Get Upload
-         * @description Every file of an upload: what it is, how it was changed, or why it cannot be used.
-         */
         get: operations["get_upload"];
         put?: never;
         post?: never;
@@ -1429,10 +1095,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Upload Progress
-         * @description How far an upload has been looked into and converted.
-         */
         get: operations["upload_progress"];
         put?: never;
         post?: never;
@@ -1450,10 +1112,6 @@ export interface paths {
             cookie?: never;
         };
         get?: never;
-        /**
-         * Ask Frame Rate
-         * @description Ask for one frame rate of all clips, or for each its own; they are looked into again.
-         */
         put: operations["ask_frame_rate"];
         post?: never;
         delete?: never;
@@ -1470,10 +1128,6 @@ export interface paths {
             cookie?: never;
         };
         get?: never;
-        /**
-         * Leave File Out
-         * @description Leave one file of an upload out, or put it back; its bytes stay as long as the upload does.
-         */
         put: operations["leave_file_out"];
         post?: never;
         delete?: never;
@@ -1489,10 +1143,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Get Original
-         * @description The file that a converted clip was made from, as it was sent.
-         */
         get: operations["get_original"];
         put?: never;
         post?: never;
@@ -1509,10 +1159,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Get Frame Map
-         * @description For each frame of a converted clip the frame of its original that it shows, both from 0.
-         */
         get: operations["get_frame_map"];
         put?: never;
         post?: never;
@@ -1531,10 +1177,6 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /**
-         * Clone Study
-         * @description Copy a version's declaration and clips into a new draft; links, quota and recruiter are not copied.
-         */
         post: operations["clone_study"];
         delete?: never;
         options?: never;
@@ -1550,10 +1192,6 @@ export interface paths {
             cookie?: never;
         };
         get?: never;
-        /**
-         * Archive Study
-         * @description Put a draft or closed study into the archive, where it can be read but not changed, or take it out.
-         */
         put: operations["archive_study"];
         post?: never;
         delete?: never;
@@ -1569,10 +1207,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Compare Versions
-         * @description What differs between two versions: keys of the declaration, word by word, and clips.
-         */
         get: operations["compare_versions"];
         put?: never;
         post?: never;
@@ -1589,16 +1223,8 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * List Links
-         * @description The links of a study in the order they were made, a page at a time: go on with `after` = `next`.
-         */
         get: operations["list_links"];
         put?: never;
-        /**
-         * Create Links
-         * @description Make a general or preview link, or many personal ones: by their labels, or `count` numbered ones.
-         */
         post: operations["create_links"];
         delete?: never;
         options?: never;
@@ -1613,12 +1239,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Get Signing
-         * @description The secret for signed addresses, with examples; for owners alone, each look is in the audit log.
-         *
-         *     Where a link has a recruiter of its own, give its id as `link`; the study's recruiter counts without.
-         */
         get: operations["get_signing"];
         put?: never;
         post?: never;
@@ -1635,10 +1255,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Download Personal Links
-         * @description The personal links as CSV: label, link, runs, complete, group.
-         */
         get: operations["download_personal_links"];
         put?: never;
         post?: never;
@@ -1658,10 +1274,6 @@ export interface paths {
         get?: never;
         put?: never;
         post?: never;
-        /**
-         * Revoke Link
-         * @description Withdraw a link; runs that began with it go on.
-         */
         delete: operations["revoke_link"];
         options?: never;
         head?: never;
@@ -1675,10 +1287,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Get Monitor
-         * @description The monitor at this moment, of one origin; that of people now taking part where none is given.
-         */
         get: operations["get_monitor"];
         put?: never;
         post?: never;
@@ -1695,13 +1303,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Stream Monitor
-         * @description Server-sent events: the whole monitor first, then what has changed, within two seconds of it.
-         *
-         *     Each event's data is a MonitorSnapshot whose `runs` hold only changed runs. The stream ends after an hour,
-         *     when the session ends or the server does; the browser then connects again by itself.
-         */
         get: operations["stream_monitor"];
         put?: never;
         post?: never;
@@ -1718,14 +1319,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Get Results
-         * @description What the answers so far look like, by kind of trial, with response times and playback.
-         *
-         *     They are of one origin, one data series (that of the active version where none is given) and, where
-         *     clips are rated, one scale (the first). With the ETag of an earlier answer as `If-None-Match` it is 304
-         *     where nothing has changed. Where counting takes long `counted_at` may lie some time back.
-         */
         get: operations["get_results"];
         put?: never;
         post?: never;
@@ -1742,10 +1335,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * List Runs
-         * @description The runs, the latest first, a page at a time: go on with `before` = `next`.
-         */
         get: operations["list_runs"];
         put?: never;
         post?: never;
@@ -1762,10 +1351,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Get Timeline
-         * @description One run: each trial with its frames and rating, forms, calibrations, events.
-         */
         get: operations["get_timeline"];
         put?: never;
         post?: never;
@@ -1782,10 +1367,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Get Identity
-         * @description Who the participant is to the recruiter; for owners of the study, and each look is in the audit log.
-         */
         get: operations["get_identity"];
         put?: never;
         post?: never;
@@ -1803,16 +1384,8 @@ export interface paths {
             cookie?: never;
         };
         get?: never;
-        /**
-         * Exclude Run
-         * @description Exclude a run from exports' `excluded = 0` and from the analysis; its data stay.
-         */
         put: operations["exclude_run"];
         post?: never;
-        /**
-         * Include Run
-         * @description Undo an exclusion.
-         */
         delete: operations["include_run"];
         options?: never;
         head?: never;
@@ -1828,10 +1401,6 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /**
-         * Erase Run
-         * @description Delete one person's data for good (a request under data protection law).
-         */
         post: operations["erase_run"];
         delete?: never;
         options?: never;
@@ -1846,10 +1415,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Get Replay
-         * @description The trials of a run that can be played back, and how they were to look.
-         */
         get: operations["get_replay"];
         put?: never;
         post?: never;
@@ -1866,10 +1431,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Get Replayed Trial
-         * @description One trial: each view's frames and when they were drawn, its answers and events.
-         */
         get: operations["get_replayed_trial"];
         put?: never;
         post?: never;
@@ -1886,10 +1447,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Get Subject Access
-         * @description Everything stored of one person in the study, as JSON; for owners, and in the audit log.
-         */
         get: operations["get_subject_access"];
         put?: never;
         post?: never;
@@ -1906,10 +1463,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Get Retention
-         * @description The periods that the study declares, what is due by them now, and when something is due next.
-         */
         get: operations["get_retention"];
         put?: never;
         post?: never;
@@ -1926,16 +1479,8 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Get Seal
-         * @description Whether there is a sealed plan.
-         */
         get: operations["get_seal"];
         put?: never;
-        /**
-         * Seal Study
-         * @description Seal design, exclusions, analysis plan and power, once, before the first participant.
-         */
         post: operations["seal_study"];
         delete?: never;
         options?: never;
@@ -1950,10 +1495,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Download Seal
-         * @description The sealed file, or a page of it that prints well.
-         */
         get: operations["download_seal"];
         put?: never;
         post?: never;
@@ -1970,10 +1511,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Download Ratings
-         * @description One row a play: the columns of the codebook, one column a factor.
-         */
         get: operations["download_ratings"];
         put?: never;
         post?: never;
@@ -1990,10 +1527,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Download Wide
-         * @description One row a visit: a column a question of the forms, and a column a cell with the mean rating in it.
-         */
         get: operations["download_wide"];
         put?: never;
         post?: never;
@@ -2010,10 +1543,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Download Runs
-         * @description One row a visit, a column a question of the forms.
-         */
         get: operations["download_runs"];
         put?: never;
         post?: never;
@@ -2030,10 +1559,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Download Script
-         * @description A script that analyses the long CSV, saved beside it under its own name: for R, or for Python.
-         */
         get: operations["download_script"];
         put?: never;
         post?: never;
@@ -2050,10 +1575,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Download Raw
-         * @description Everything stored, one JSON object a run and line.
-         */
         get: operations["download_raw"];
         put?: never;
         post?: never;
@@ -2070,10 +1591,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Download Psych Ds
-         * @description A Psych-DS dataset as a zip.
-         */
         get: operations["download_psych_ds"];
         put?: never;
         post?: never;
@@ -2090,10 +1607,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Download Identities
-         * @description Recruiters' ids beside the pseudonyms, one row a visit; for owners of the study, and audited.
-         */
         get: operations["download_identities"];
         put?: never;
         post?: never;
@@ -2110,10 +1623,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Download Codebook
-         * @description What every column means.
-         */
         get: operations["download_codebook"];
         put?: never;
         post?: never;
@@ -2130,10 +1639,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Download Converted
-         * @description One row a play, or the wide table, for SPSS or as Parquet: with labels of variables and levels.
-         */
         get: operations["download_converted"];
         put?: never;
         post?: never;
@@ -2150,16 +1655,8 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * List Reports
-         * @description The latest reports, the newest first.
-         */
         get: operations["list_reports"];
         put?: never;
-        /**
-         * Build Report
-         * @description Begin a report: exclusions, the paper's table, every test, figures.
-         */
         post: operations["build_report"];
         delete?: never;
         options?: never;
@@ -2174,10 +1671,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Get Report File
-         * @description One file of a finished report: needs the right `export`, for it holds rows of single persons.
-         */
         get: operations["get_report_file"];
         put?: never;
         post?: never;
@@ -2194,10 +1687,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Get Latest Rehearsal
-         * @description The latest rehearsal, and how far it is; null where there is none.
-         */
         get: operations["get_latest_rehearsal"];
         put?: never;
         post?: never;
@@ -2216,10 +1705,6 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /**
-         * Begin Rehearsal
-         * @description Simulate people in a database of their own; it takes the place of the rehearsal before.
-         */
         post: operations["begin_rehearsal"];
         delete?: never;
         options?: never;
@@ -2234,10 +1719,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Get Rehearsal
-         * @description What a rehearsal showed: orders, times, columns, report and power.
-         */
         get: operations["get_rehearsal"];
         put?: never;
         post?: never;
@@ -2256,10 +1737,6 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /**
-         * Cancel Rehearsal
-         * @description End a rehearsal that waits or goes on.
-         */
         post: operations["cancel_rehearsal"];
         delete?: never;
         options?: never;
@@ -2274,10 +1751,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Get Rehearsed Report File
-         * @description One file of the report that the simulated people would give.
-         */
         get: operations["get_rehearsed_report_file"];
         put?: never;
         post?: never;
@@ -2294,16 +1767,8 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * List Capsules
-         * @description The latest capsules, the newest first.
-         */
         get: operations["list_capsules"];
         put?: never;
-        /**
-         * Build Study Capsule
-         * @description Begin a capsule: Psych-DS and RO-Crate with data, clips, definition, seal, plan and report.
-         */
         post: operations["build_study_capsule"];
         delete?: never;
         options?: never;
@@ -2318,10 +1783,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Get Capsule
-         * @description A finished capsule. Anybody can verify it with `analysis verify`.
-         */
         get: operations["get_capsule"];
         put?: never;
         post?: never;
@@ -2341,10 +1802,6 @@ export interface paths {
         get?: never;
         put?: never;
         post?: never;
-        /**
-         * Remove Capsule
-         * @description Delete a capsule for good; one that is being made is left alone.
-         */
         delete: operations["remove_capsule"];
         options?: never;
         head?: never;
@@ -2358,10 +1815,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Get Methods
-         * @description Recruitment, screening, checks, exclusions, display and automated answers, in sentences with counts.
-         */
         get: operations["get_methods"];
         put?: never;
         post?: never;
@@ -2378,10 +1831,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Get Methods Text
-         * @description The paragraph as plain text, with the query of each number below it.
-         */
         get: operations["get_methods_text"];
         put?: never;
         post?: never;
@@ -2398,10 +1847,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Get Library
-         * @description Recorded profiles and the PCA model.
-         */
         get: operations["get_library"];
         put?: never;
         post?: never;
@@ -2418,10 +1863,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Get Strips
-         * @description What strips there are; none where they have not been made on this server.
-         */
         get: operations["get_strips"];
         put?: never;
         post?: never;
@@ -2438,10 +1879,6 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /**
-         * Get Strip
-         * @description The strip of one character.
-         */
         get: operations["get_strip"];
         put?: never;
         post?: never;
@@ -2455,1616 +1892,652 @@ export interface paths {
 export type webhooks = Record<string, never>;
 export interface components {
     schemas: {
-        /**
-         * AccountOut
-         * @description An account as others see it.
-         */
         AccountOut: {
-            /** Id */
             id: number;
-            /** Name */
             name: string;
-            /**
-             * Role
-             * @enum {string}
-             */
+            /** @enum {string} */
             role: "viewer" | "experimenter" | "owner";
-            /** Second Factor */
             second_factor: boolean;
-            /** Disabled */
             disabled: boolean;
-            /**
-             * Created At
-             * Format: date-time
-             */
+            /** Format: date-time */
             created_at: string;
         };
-        /**
-         * Active
-         * @description The server chooses, when a participant begins, the pairs that tell most by what is answered so far.
-         */
         Active: {
             /**
-             * @description Names this way of dealing. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             by: "active";
-            /**
-             * Random Share
-             * @description Share of a participant's pairs that is drawn by lot from the others, whatever they tell.
-             * @default 0.2
-             */
+            /** @default 0.2 */
             random_share: number;
         };
-        /**
-         * AllPairs
-         * @description Every clip with every other; `matched` compares clips of the same exemplar number only.
-         */
         AllPairs: {
             /**
-             * @description Names this choice of pairs. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             among: "all";
             /**
-             * Exemplars
-             * @description Only clips of the same exemplar number, or any two clips of the design.
              * @default matched
              * @enum {string}
              */
             exemplars: "matched" | "any";
         };
-        /**
-         * AnalysisPlan
-         * @description The analysis fixed before the data: factor order, the test of the table, and the pairs.
-         */
         AnalysisPlan: {
             /**
-             * Kind
-             * @description Analysis of variance of participants' cell means, repeated over the factors within participants.
              * @default within_anova
              * @constant
              */
             kind: "within_anova";
-            /**
-             * Factors
-             * @description Factors in the order of the tables; over those left out ratings are averaged. Empty takes all.
-             * @default []
-             */
+            /** @default [] */
             factors: string[];
             /**
-             * Statistic
-             * @description Test that tables print: of the multivariate model (no sphericity needed), or univariate with
-             *     Greenhouse-Geisser's correction. The JSON output holds both.
              * @default multivariate
              * @enum {string}
              */
             statistic: "multivariate" | "univariate";
-            /**
-             * Pairs
-             * @description Factors whose levels the report compares pair by pair; empty takes every factor of the analysis.
-             *     p values are given as they are, and corrected by Bonferroni and by Holm.
-             * @default []
-             */
+            /** @default [] */
             pairs: string[];
             /**
-             * Table
-             * @description Layout of the table: a row an effect, pairs beside interactions, or one factor.
              * @default two_level_factors
              * @enum {string}
              */
             table: "two_level_factors" | "pairs_and_interactions" | "one_factor";
         };
-        /**
-         * Answer
-         * @description What a participant answers to one trial; each kind adds its own keys, and a constant as its `kind`.
-         */
         Answer: {
-            /**
-             * Kind
-             * @description Kind of the trial that is answered.
-             */
             kind: string;
         };
-        /**
-         * ArchiveStudy
-         * @description Put a study into the archive, or take it out.
-         */
         ArchiveStudy: {
-            /**
-             * Revision
-             * @description The revision this edit started from.
-             */
             revision: number;
-            /** Archived */
             archived: boolean;
         };
-        /**
-         * AskFrameRate
-         * @description The frame rate that clips are to have: one for all, or each its own.
-         */
         AskFrameRate: {
-            /** Fps */
             fps: number | null;
         };
-        /**
-         * Assignment
-         * @description Which clips of their cells participants see; without a key everybody sees every clip.
-         *
-         *     Places are dealt in turn: one that is given up, or screened out, goes to the next participant.
-         */
         Assignment: {
-            /**
-             * Clips Per Cell
-             * @description Clips of each cell that a participant sees, with the same exemplar numbers in all cells, so that cells
-             *     are compared over the same blinks. Over participants each clip is seen equally often, give or take one.
-             */
             clips_per_cell: number | null;
-            /**
-             * Lists
-             * @description Lists of clips, dealt to participants in turn. A clip is written as cell and exemplar: `"SL/30/1"`.
-             * @default []
-             */
+            /** @default [] */
             lists: string[][];
         };
-        /**
-         * AttentionChecks
-         * @description Instructed ratings put between trials: 'please answer 2 this time'.
-         */
         AttentionChecks: {
-            /**
-             * Per Block
-             * @description Checks in each block, at random places but never first. They are stored with kind `attention`.
-             * @default 0
-             */
+            /** @default 0 */
             per_block: number;
-            /**
-             * Text
-             * @description Markdown of the check, `{response}` standing for the answer asked for.
-             */
             text: {
                 [key: string]: string;
             };
         };
-        /**
-         * AuditOut
-         * @description One line of the audit log.
-         */
         AuditOut: {
-            /** Id */
             id: number;
-            /**
-             * At
-             * Format: date-time
-             */
+            /** Format: date-time */
             at: string;
-            /** Actor */
             actor: string;
-            /** Action */
             action: string;
-            /** Target Kind */
             target_kind: string;
-            /** Target */
             target: string;
-            /** Details */
             details: {
                 [key: string]: unknown;
             };
         };
-        /**
-         * BackupsOut
-         * @description How the backups are.
-         */
         BackupsOut: {
-            /**
-             * Watched
-             * @description Whether the settings name where they are (PALPEBRA_BACKUP_FOLDER).
-             */
             watched: boolean;
-            /** Address */
             address: string;
-            /**
-             * Problem
-             * @description Why their store could not be asked; empty where it could.
-             */
             problem: string;
-            /** Number */
             number: number;
-            /** Newest */
             newest: string | null;
-            /**
-             * Age Hours
-             * @description Of the newest.
-             */
             age_hours: number | null;
-            /**
-             * Old
-             * @description There is none, or none of the last two days.
-             */
             old: boolean;
             drill: components["schemas"]["DrillResult"] | null;
-            /**
-             * Drilled Elsewhere
-             * @description They are encrypted, and this server has no private key to drill them.
-             */
             drilled_elsewhere: boolean;
         };
-        /**
-         * BeginLink
-         * @description Who asks proves that she is the account's own person, not only somebody at her open browser.
-         */
         BeginLink: {
-            /**
-             * Proof
-             * @description The present password; where the account has none, a code of its second factor.
-             */
             proof: string;
         };
-        /**
-         * BeginSignIn
-         * @description Where to go after signing in.
-         */
         BeginSignIn: {
-            /**
-             * Next
-             * @default /
-             */
+            /** @default / */
             next?: string;
         };
-        /**
-         * BlinkLibrary
-         * @description The recorded profiles, and the PCA model as `stimuli model fit` wrote it.
-         */
         BlinkLibrary: {
-            /** Fps */
             fps: number;
-            /** Profiles */
             profiles: components["schemas"]["RecordedProfile"][];
-            /** Model */
             model: {
                 [key: string]: unknown;
             };
         };
-        /**
-         * BlockInfo
-         * @description One block: its number (0 is practice) and how many trials it has.
-         */
         BlockInfo: {
-            /** Block */
             block: number;
-            /** Trials */
             trials: number;
         };
-        /**
-         * BlockOut
-         * @description A block of the design.
-         */
         BlockOut: {
-            /** Label */
             label: string;
-            /** Trials */
             trials: number;
         };
-        /**
-         * Blocks
-         * @description How a participant's trials are cut into blocks.
-         *
-         *     `split_by` puts each level of a factor into a block of its own; without it a block holds every clip.
-         *     `repeats` shows each such block that often. `order` is drawn per participant: `random` shuffles the
-         *     blocks, `alternating` cycles through the levels from a random (or counterbalanced) start,
-         *     `counterbalanced` deals block orders evenly over participants, `fixed` keeps the declared order.
-         */
         Blocks: {
-            /**
-             * Split By
-             * @description Factor each level of which makes a block; without it every block holds all clips.
-             */
             split_by: string | null;
-            /**
-             * Repeats
-             * @description How often each block is shown. A participant's cell mean is taken over the repeats.
-             * @default 1
-             */
+            /** @default 1 */
             repeats: number;
             /**
-             * Order
-             * @description Order of the blocks: shuffled for each participant, cycling through the levels, orders dealt evenly
-             *     over participants (every order up to five blocks, a balanced Latin square beyond), or as declared.
              * @default random
              * @enum {string}
              */
             order: "random" | "alternating" | "counterbalanced" | "fixed";
             /**
-             * Trial Order
-             * @description Order of the clips in a block: shuffled for each participant, or cell by cell as declared.
              * @default random
              * @enum {string}
              */
             trial_order: "random" | "fixed";
-            /**
-             * Break Seconds Min
-             * @description Seconds a break between blocks lasts at least; the participant may take longer.
-             * @default 0
-             */
+            /** @default 0 */
             break_seconds_min: number;
         };
-        /** Body_end_by_provider */
         Body_end_by_provider: {
-            /**
-             * Logout Token
-             * @default
-             */
+            /** @default  */
             logout_token?: string;
         };
-        /** Body_upload_clips */
         Body_upload_clips: {
-            /** Files */
             files?: string[] | null;
-            /** Fps */
             fps?: number | null;
         };
-        /** Body_upload_more */
         Body_upload_more: {
-            /** Files */
             files?: string[] | null;
-            /** Replaces */
             replaces?: string | null;
         };
-        /**
-         * CalibrationResult
-         * @description One size calibration; each is kept, the latest counts.
-         *
-         *     What has a default was not sent by the pages of before.
-         */
         CalibrationResult: {
-            /** Px Per Mm */
             px_per_mm: number;
-            /**
-             * Method
-             * @enum {string}
-             */
+            /** @enum {string} */
             method: "card" | "ruler";
-            /** Viewing Distance Mm */
             viewing_distance_mm?: number | null;
-            /** Device Pixel Ratio */
             device_pixel_ratio: number;
-            /** Screen Width Px */
             screen_width_px: number;
-            /** Screen Height Px */
             screen_height_px: number;
-            /** Window Width Px */
             window_width_px: number;
-            /** Window Height Px */
             window_height_px: number;
-            /**
-             * Zoom
-             * @default 1
-             */
+            /** @default 1 */
             zoom?: number;
             /**
-             * Occasion
-             * @description Why it was made.
              * @default first
              * @enum {string}
              */
             occasion?: "first" | "screen_changed" | "zoom" | "recheck";
-            /**
-             * Repeats
-             * @description Measurements made, those included that differed too much.
-             */
             repeats?: number | null;
-            /**
-             * Spread Percent
-             * @description Largest less smallest of those that count, of their mean.
-             */
             spread_percent?: number | null;
-            /**
-             * Ruler Check
-             * @description What a ruler said of the card's size; null where none was asked.
-             */
             ruler_check?: ("agrees" | "no_ruler" | "differs") | null;
-            /** Distance Method */
             distance_method?: ("blind_spot" | "typed") | null;
-            /**
-             * Distance Spread Mm
-             * @description Standard deviation of the rounds of the blind-spot test.
-             */
             distance_spread_mm?: number | null;
-            /**
-             * Distance Typed Mm
-             * @description The distance as it was typed in, where it was.
-             */
             distance_typed_mm?: number | null;
-            /**
-             * Recheck Percent
-             * @description By how much a later measurement differed from the one before.
-             */
             recheck_percent?: number | null;
         };
-        /**
-         * CalibrationState
-         * @description The latest calibration.
-         */
         CalibrationState: {
-            /** Px Per Mm */
             px_per_mm: number;
-            /**
-             * Method
-             * @enum {string}
-             */
+            /** @enum {string} */
             method: "card" | "ruler";
-            /** Viewing Distance Mm */
             viewing_distance_mm: number | null;
-            /** Device Pixel Ratio */
             device_pixel_ratio: number;
-            /** Screen Width Px */
             screen_width_px: number;
-            /** Screen Height Px */
             screen_height_px: number;
-            /** Window Width Px */
             window_width_px: number;
-            /** Window Height Px */
             window_height_px: number;
-            /** Zoom */
             zoom: number;
-            /**
-             * Occasion
-             * @enum {string}
-             */
+            /** @enum {string} */
             occasion: "first" | "screen_changed" | "zoom" | "recheck";
-            /** Repeats */
             repeats: number | null;
-            /** Spread Percent */
             spread_percent: number | null;
-            /** Ruler Check */
             ruler_check: ("agrees" | "no_ruler" | "differs") | null;
-            /** Distance Method */
             distance_method: ("blind_spot" | "typed") | null;
-            /** Distance Spread Mm */
             distance_spread_mm: number | null;
-            /** Distance Typed Mm */
             distance_typed_mm: number | null;
-            /** Recheck Percent */
             recheck_percent: number | null;
         };
-        /**
-         * CapsuleOut
-         * @description A capsule that waits, is made, is done or has failed (then `message` says why).
-         */
         CapsuleOut: {
-            /** Id */
             id: string;
-            /**
-             * Status
-             * @enum {string}
-             */
+            /** @enum {string} */
             status: "queued" | "running" | "done" | "failed" | "cancelled";
-            /** Progress */
             progress: number;
-            /** Message */
             message: string;
-            /** Origin */
             origin: string;
-            /** Series */
             series: number | null;
-            /** Clips */
             clips: boolean;
-            /**
-             * Created At
-             * Format: date-time
-             */
+            /** Format: date-time */
             created_at: string;
-            /**
-             * Bytes
-             * @description Length of the zip; null until it is there.
-             */
             bytes: number | null;
-            /**
-             * Sha256
-             * @description What `analysis verify` prints of it.
-             */
             sha256: string | null;
         };
-        /**
-         * CellPair
-         * @description Two cells to compare, by their labels, each exemplar of the one with the same exemplar of the other.
-         */
         CellPair: {
-            /**
-             * Cell
-             * @description Label of the one cell: its level names in factor order, joined by slashes.
-             */
             cell: string;
-            /**
-             * Other
-             * @description Label of the other cell.
-             */
             other: string;
         };
-        /**
-         * CellResult
-         * @description The answers one cell got.
-         */
         CellResult: {
-            /** Cell */
             cell: string;
-            /** Ratings */
             ratings: number;
-            /** Mean */
             mean: number | null;
-            /** Counts */
             counts: number[];
         };
-        /**
-         * ChangeAccount
-         * @description What an owner may change of an account.
-         */
         ChangeAccount: {
-            /** Role */
             role?: ("viewer" | "experimenter" | "owner") | null;
-            /** Disabled */
             disabled?: boolean | null;
         };
-        /**
-         * ChangeOut
-         * @description One key of a definition that an edit changes.
-         */
         ChangeOut: {
-            /** Path */
             path: string;
-            /**
-             * Effect
-             * @enum {string}
-             */
+            /** @enum {string} */
             effect: "wording" | "measured";
-            /**
-             * Text
-             * @description The change in words.
-             */
             text: string;
         };
-        /**
-         * ChangePassword
-         * @description The present password and a new one.
-         */
         ChangePassword: {
-            /** Password */
             password: string;
-            /** New Password */
             new_password: string;
         };
-        /**
-         * ChangeSettings
-         * @description Pause, quota and recruiter.
-         */
         ChangeSettings: {
-            /**
-             * Revision
-             * @description The revision this edit started from.
-             */
             revision: number;
-            /** Paused */
             paused: boolean;
-            /** Quota */
             quota: number | null;
             recruiter: components["schemas"]["Recruiter"] | null;
         };
-        /**
-         * ChangeStatus
-         * @description Open or close a study.
-         */
         ChangeStatus: {
-            /**
-             * Revision
-             * @description The revision this edit started from.
-             */
             revision: number;
-            /**
-             * Status
-             * @enum {string}
-             */
+            /** @enum {string} */
             status: "draft" | "pilot" | "live" | "closed";
         };
-        /**
-         * ChangeWorkspace
-         * @description What an owner may change of a workspace.
-         */
         ChangeWorkspace: {
-            /** Title */
             title: string;
-            /** Second Factor Required */
             second_factor_required: boolean;
         };
-        /**
-         * CheckAnswer
-         * @description The number of the choice; none where the clip could not be shown, or the other way was taken.
-         */
         CheckAnswer: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "check";
-            /**
-             * Check
-             * @description Number of the choice, from 1.
-             */
             check: number | null;
-            /**
-             * Other Way
-             * @description True where the way around was taken that the study offers.
-             * @default false
-             */
+            /** @default false */
             other_way?: boolean;
         };
-        /**
-         * CheckWording
-         * @description The words of one kind of check, in place of the program's own.
-         */
         CheckWording: {
-            /**
-             * Check
-             * @description The kind of check.
-             * @enum {string}
-             */
+            /** @enum {string} */
             check: "digit" | "direction" | "shape" | "first_blink" | "first_eye";
-            /**
-             * Question
-             * @description What is asked after the clip.
-             */
             question: {
                 [key: string]: string;
             };
-            /**
-             * Choices
-             * @description The answers in the order of the kind's own.
-             */
             choices: {
                 [key: string]: string;
             }[];
         };
-        /**
-         * Checked
-         * @description Whether a definition can be used, and what it expands to.
-         */
         Checked: {
-            /** Problems */
             problems: components["schemas"]["ProblemOut"][];
             design: components["schemas"]["DesignOut"] | null;
         };
-        /**
-         * ChoiceField
-         * @description One of several answers.
-         */
         ChoiceField: {
-            /**
-             * Name
-             * @description Key of the answer in the runs CSV's `forms`; [[screening]] names it as `field`.
-             */
             name: string;
-            /**
-             * Label
-             * @description The question, in every language.
-             */
             label: {
                 [key: string]: string;
             };
-            /**
-             * Help
-             * @description Smaller text under the question.
-             */
             help: {
                 [key: string]: string;
             } | null;
-            /**
-             * Required
-             * @description Whether the form can be sent only once this is answered.
-             * @default false
-             */
+            /** @default false */
             required: boolean;
             /**
-             * @description Names this type of field. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             type: "choice";
-            /**
-             * Options
-             * @description The answers, in the order in which they are listed.
-             */
             options: components["schemas"]["Option"][];
         };
-        /**
-         * ClipDifference
-         * @description A clip that one of the versions lacks, or that has other bytes in each.
-         */
         ClipDifference: {
-            /**
-             * Kind
-             * @enum {string}
-             */
+            /** @enum {string} */
             kind: "gone" | "new" | "replaced";
-            /** Cell */
             cell: string;
-            /** Exemplar */
             exemplar: number;
-            /** Old File */
             old_file: string | null;
-            /** New File */
             new_file: string | null;
         };
-        /**
-         * ClipInRole
-         * @description Which clip a trial was assigned in which role.
-         */
         ClipInRole: {
-            /**
-             * Role
-             * @enum {string}
-             */
+            /** @enum {string} */
             role: "shown" | "left" | "right" | "first" | "second" | "reference";
-            /** Cell */
             cell: string;
-            /** Exemplar */
             exemplar: number;
         };
-        /**
-         * ClipOut
-         * @description A clip of a study, with the curve it shows.
-         */
         ClipOut: {
-            /** Clip Sha256 */
             clip_sha256: string;
-            /** Url */
             url: string;
-            /** File */
             file: string;
-            /** Cell */
             cell: string;
-            /** Levels */
             levels: {
                 [key: string]: string;
             };
-            /** Exemplar */
             exemplar: number;
-            /** Profile */
             profile: string;
-            /** Fps */
             fps: number;
-            /** Frames */
             frames: number;
-            /** Width Px */
             width_px: number;
-            /** Height Px */
             height_px: number;
-            /** Bytes */
             bytes: number;
-            /** Closure */
             closure: number[];
-            /** @description What it was converted from, without its frame map; null where it is shown as it came. */
             source: components["schemas"]["SourceVideo"] | null;
         };
-        /**
-         * ClipRating
-         * @description The single-clip rating: start by key, one view (or `views`), answer after the clip's end.
-         *
-         *     A mouse that has not moved since its last press chooses nothing until `pointer_delay_ms` have passed.
-         */
         ClipRating: {
             /**
-             * @description Names this kind of trial. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "clip_rating";
-            /**
-             * Expected Seconds
-             * @description Seconds a trial takes on average, from which the length of a visit is reckoned.
-             * @default 6
-             */
+            /** @default 6 */
             expected_seconds: number;
-            /**
-             * Scale
-             * @description The question and its scale, where there is one: [trial.scale].
-             */
             scale: (components["schemas"]["Points"] | components["schemas"]["Slider"]) | null;
-            /**
-             * Scales
-             * @description One to eight scales, each with a name, instead of the one: [[trial.scales]].
-             * @default []
-             */
+            /** @default [] */
             scales: (components["schemas"]["Points"] | components["schemas"]["Slider"])[];
             /**
-             * Arrangement
-             * @description Several scales below one another on one screen, or a screen each in their order.
              * @default one_screen
              * @enum {string}
              */
             arrangement: "one_screen" | "one_after_the_other";
-            /**
-             * Views
-             * @description How often the clip is shown before it is rated.
-             * @default 1
-             */
+            /** @default 1 */
             views: number;
-            /** @description A clip shown before each rated one, in degradation category rating: [trial.reference]. */
             reference: components["schemas"]["RatingReference"] | null;
             /**
-             * Start
-             * @description A clip begins on a key press, or by itself after a fixation cross.
              * @default key
              * @enum {string}
              */
             start: "key" | "fixation";
-            /**
-             * Fixation Ms
-             * @description How long the fixation cross stands before the clip, in ms; with `start = "fixation"`.
-             * @default 500
-             */
+            /** @default 500 */
             fixation_ms: number;
-            /**
-             * Pointer Delay Ms
-             * @description Time, in ms, for which a mouse that has not moved since its last press chooses nothing.
-             * @default 1500
-             */
+            /** @default 1500 */
             pointer_delay_ms: number;
-            /**
-             * Confirm
-             * @description Whether a rating counts only once it is confirmed, so that it can be changed before.
-             * @default false
-             */
+            /** @default false */
             confirm: boolean;
-            /**
-             * Comment
-             * @description Adds a line of free text beside the rating; it stands in the column `comment`.
-             * @default false
-             */
+            /** @default false */
             comment: boolean;
         };
-        /**
-         * ClipResult
-         * @description The answers one clip got.
-         */
         ClipResult: {
-            /** Clip Sha256 */
             clip_sha256: string;
-            /** File */
             file: string;
-            /** Cell */
             cell: string;
-            /** Exemplar */
             exemplar: number;
-            /** Ratings */
             ratings: number;
-            /** Mean */
             mean: number | null;
-            /**
-             * Counts
-             * @description Answers a bin, from the lowest.
-             */
             counts: number[];
         };
-        /**
-         * CloneStudy
-         * @description A copy of a study under a name of its own.
-         */
         CloneStudy: {
-            /** Name */
             name: string;
-            /**
-             * Version
-             * @description The version to copy; the active one where none is given.
-             */
             version?: number | null;
-            /**
-             * Workspace
-             * @description Where the copy goes; needed where one may make no studies beside its source.
-             */
             workspace?: string | null;
         };
-        /**
-         * ComparedVersion
-         * @description One side of a comparison.
-         */
         ComparedVersion: {
-            /** Study */
             study: string;
-            /** Version */
             version: number;
-            /** Series */
             series: number;
-            /**
-             * Created At
-             * Format: date-time
-             */
+            /** Format: date-time */
             created_at: string;
-            /** Note */
             note: string;
         };
-        /**
-         * Comparison
-         * @description What differs between two versions, of one study or of two.
-         */
         Comparison: {
             old: components["schemas"]["ComparedVersion"];
             new: components["schemas"]["ComparedVersion"];
-            /**
-             * Pooled
-             * @description Whether both measure the same, by the same clips.
-             */
             pooled: boolean;
-            /**
-             * Keys
-             * @description Of the declaration, what is measured first.
-             */
             keys: components["schemas"]["KeyDifference"][];
-            /**
-             * Clips
-             * @description At most 200 of them.
-             */
             clips: components["schemas"]["ClipDifference"][];
-            /** Clips Differing */
             clips_differing: number;
-            /** Clips Same */
             clips_same: number;
         };
-        /**
-         * ComparisonAnswer
-         * @description The clip chosen, or a tie; None where the pair could not be shown.
-         *
-         *     `left` is the first of two clips in turn, and the upper of two stacked ones.
-         */
         ComparisonAnswer: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "paired_comparison";
-            /** Winner */
             winner: ("left" | "right" | "tie") | null;
-            /**
-             * Arrangement
-             * @description How the two were in fact shown, not as declared where two clips beside one another did not fit.
-             */
             arrangement?: ("side_by_side" | "stacked" | "one_after_the_other") | null;
         };
-        /**
-         * Completion
-         * @description How the run ended, the code the participant takes away, and where to go.
-         */
         Completion: {
-            /**
-             * Status
-             * @enum {string}
-             */
+            /** @enum {string} */
             status: "complete" | "screened_out";
-            /** Completion Code */
             completion_code: string | null;
-            /** Redirect Url */
             redirect_url: string | null;
-            /**
-             * Reason
-             * @description Why the run ended, where the page must tell.
-             */
             reason?: string | null;
         };
-        /**
-         * ConfirmAddress
-         * @description The link's token.
-         */
         ConfirmAddress: {
-            /** Token */
             token: string;
         };
-        /**
-         * ConfirmCode
-         * @description A code from the authenticator app.
-         */
         ConfirmCode: {
-            /** Code */
             code: string;
         };
-        /**
-         * ConfirmPassword
-         * @description The present password, asked for again before something is weakened; a code where there is none.
-         */
         ConfirmPassword: {
-            /** Password */
             password: string;
         };
-        /**
-         * Consent
-         * @description The participant's answer on the consent page; false ends the run.
-         */
         Consent: {
-            /** Agreed */
             agreed: boolean;
         };
-        /**
-         * ContinuousAnswer
-         * @description The answer; no values where the clip could not be shown.
-         */
         ContinuousAnswer: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "continuous_rating";
-            /**
-             * Values
-             * @description The slider's place at frames 0, `step_frames`, 2 `step_frames` and so on.
-             */
             values?: number[] | null;
-            /** Step Frames */
             step_frames?: number | null;
-            /**
-             * Moves
-             * @description How often the slider began to move.
-             * @default 0
-             */
+            /** @default 0 */
             moves?: number;
-            /**
-             * Chosen
-             * @description The number given to an attention check, which has no clip.
-             */
             chosen?: number | null;
         };
-        /**
-         * ContinuousRating
-         * @description A slider that is moved while the clip is shown; its place is sampled at frames of the clip.
-         */
         ContinuousRating: {
             /**
-             * @description Names this kind of trial. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "continuous_rating";
-            /**
-             * Expected Seconds
-             * @description Seconds a trial takes on average, from which the length of a visit is reckoned.
-             * @default 6
-             */
+            /** @default 6 */
             expected_seconds: number;
-            /**
-             * Question
-             * @description What is asked, in every language.
-             */
             question: {
                 [key: string]: string;
             };
-            /**
-             * Low
-             * @description Label of the low end.
-             */
             low: {
                 [key: string]: string;
             };
-            /**
-             * High
-             * @description Label of the high end.
-             */
             high: {
                 [key: string]: string;
             };
-            /**
-             * Minimum
-             * @description The number at the low end.
-             * @default 0
-             */
+            /** @default 0 */
             minimum: number;
-            /**
-             * Maximum
-             * @description The number at the high end.
-             * @default 100
-             */
+            /** @default 100 */
             maximum: number;
             /**
-             * Input
-             * @description Moved by pointer or arrow keys a step a press (`slider`), or also by holding an arrow key, which
-             *     moves it evenly (`keys`).
              * @default slider
              * @enum {string}
              */
             input: "slider" | "keys";
-            /**
-             * Seconds Across
-             * @description Time that a held key takes from end to end, in seconds; with `input = "keys"`.
-             * @default 3
-             */
+            /** @default 3 */
             seconds_across: number;
-            /**
-             * Sample Hz
-             * @description Samples a second of the clip: its place when every so manyth frame is drawn.
-             * @default 10
-             */
+            /** @default 10 */
             sample_hz: number;
-            /**
-             * Max Lag S
-             * @description Longest lag of ratings behind what they answer that the analysis looks for, in seconds.
-             * @default 3
-             */
+            /** @default 3 */
             max_lag_s: number;
-            /**
-             * Pointer Delay Ms
-             * @description Time, in ms, for which a mouse that has not moved since its last press starts nothing.
-             * @default 1500
-             */
+            /** @default 1500 */
             pointer_delay_ms: number;
         };
-        /**
-         * Creator
-         * @description A person or an institution that made the data.
-         */
         Creator: {
-            /**
-             * Name
-             * @description Name as it is cited.
-             */
             name: string;
-            /**
-             * Orcid
-             * @description ORCID of a person, as four groups of four digits.
-             */
             orcid: string | null;
-            /**
-             * Affiliation
-             * @description Where the person works.
-             * @default
-             */
+            /** @default  */
             affiliation: string;
         };
-        /**
-         * Dataset
-         * @description Who made the data and who may do what with them; stands in Psych-DS datasets and capsules.
-         */
         Dataset: {
-            /**
-             * Creators
-             * @description Who is cited for the data, in order.
-             * @default []
-             */
+            /** @default [] */
             creators: components["schemas"]["Creator"][];
-            /**
-             * Licence
-             * @description Under which licence the data are handed on. Without it nobody else may use them.
-             */
             licence: string | null;
-            /**
-             * Description
-             * @description What the data are, in some sentences; empty takes the title.
-             * @default
-             */
+            /** @default  */
             description: string;
-            /**
-             * Keywords
-             * @description Words under which the data should be found, beside the factors' labels.
-             * @default []
-             */
+            /** @default [] */
             keywords: string[];
         };
-        /**
-         * Declaration
-         * @description A frozen piece of a declaration; unknown keys are refused by name.
-         *
-         *     The text under a key is its description: docs/reference/experiment.md and the API's schema are made of it.
-         */
         Declaration: Record<string, never>;
-        /**
-         * DeclaredPairs
-         * @description The pairs of cells in this list and no others.
-         */
         DeclaredPairs: {
             /**
-             * @description Names this choice of pairs. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             among: "declared";
-            /**
-             * Cells
-             * @description The pairs of cells.
-             */
             cells: components["schemas"]["CellPair"][];
         };
-        /**
-         * DefinitionText
-         * @description A definition to check.
-         */
         DefinitionText: {
-            /** Toml */
             toml: string;
         };
-        /**
-         * DesignOut
-         * @description What a definition expands to.
-         */
         DesignOut: {
-            /** Experiment */
             experiment: string;
-            /** Title */
             title: string;
-            /** Factors */
             factors: components["schemas"]["FactorOut"][];
-            /** Cells */
             cells: number;
-            /** Exemplars */
             exemplars: number;
-            /** Unique Clips */
             unique_clips: number;
-            /** Trials Per Participant */
             trials_per_participant: number;
-            /** Blocks */
             blocks: components["schemas"]["BlockOut"][];
-            /** Expected Minutes */
             expected_minutes: number;
-            /**
-             * Notes
-             * @description Groups, and how often each clip or pair is expected to be shown.
-             */
             notes: string[];
-            /**
-             * Groups
-             * @description Groups that links decide; empty where they decide none.
-             */
             groups: string[];
-            /**
-             * Turned Away
-             * @description Devices that can take no part, in a sentence; empty where all can.
-             */
             turned_away: string;
         };
-        /**
-         * Display
-         * @description How the clip must appear: size on the screen, surround, and what the device must offer.
-         */
         Display: {
-            /**
-             * Inter Ocular Mm
-             * @description Distance between the eyes' centres on the screen, in mm; calibration turns it into pixels.
-             * @default 60
-             */
+            /** @default 60 */
             inter_ocular_mm: number;
             /**
-             * Calibrate
-             * @description Whether the participant fits a card's outline to learn the screen's pixels per mm. Without it clips are
-             *     shown pixel by pixel and `px_per_mm` is empty in the data.
              * @default required
              * @enum {string}
              */
             calibrate: "required" | "optional" | "off";
-            /**
-             * Calibration Repeats
-             * @description How often the size is measured, each time from another one; what differs too much is measured up to
-             *     twice more. The spread of the repeats is `calibration_spread` in the data.
-             * @default 2
-             */
+            /** @default 2 */
             calibration_repeats: number;
-            /**
-             * Recheck Size
-             * @description Asks for one more measurement in each break; one that differs by more than 4% leads to a new
-             *     calibration.
-             * @default false
-             */
+            /** @default false */
             recheck_size: boolean;
-            /**
-             * Viewing Distance
-             * @description Adds the blind-spot test, which estimates `viewing_distance_mm` from where a dot vanishes.
-             * @default false
-             */
+            /** @default false */
             viewing_distance: boolean;
             /**
-             * Right To Left Scales
-             * @description Where a language is read from right to left: whether scales run that way too, their lowest point on the
-             *     right, or stay as in the other languages. Digits answer alike, arrow keys follow what is seen.
              * @default mirrored
              * @enum {string}
              */
             right_to_left_scales: "mirrored" | "same";
-            /**
-             * Full Screen
-             * @description Asks for full screen before the first trial and again where it was left.
-             * @default true
-             */
+            /** @default true */
             full_screen: boolean;
-            /**
-             * Background
-             * @description Colour of the page around the clip.
-             * @default #808080
-             */
+            /** @default #808080 */
             background: string;
-            /**
-             * Minimum Width Px
-             * @description Smallest window width, in CSS pixels, in which a run may begin.
-             * @default 800
-             */
+            /** @default 800 */
             minimum_width_px: number;
-            /**
-             * Minimum Height Px
-             * @description Smallest window height, in CSS pixels, in which a run may begin.
-             * @default 500
-             */
+            /** @default 500 */
             minimum_height_px: number;
-            /**
-             * Allow Touch
-             * @description Lets in devices that have a touch screen and no mouse, phones and tablets. Off: turns them away.
-             * @default true
-             */
+            /** @default true */
             allow_touch: boolean;
-            /**
-             * Sync Patch
-             * @description Draws a square into the clip's lower left corner that codes the frame's number, for a photodiode or a
-             *     phone's film (`stimuli scope`). For measuring a set-up, not for participants.
-             * @default false
-             */
+            /** @default false */
             sync_patch: boolean;
         };
-        /**
-         * Disturbances
-         * @description What each disturbance of a view does to its play: `ignore`, `flag`, or `repeat` (it is failed).
-         *
-         *     Every one is recorded with the view whatever it does. A view that was broken off, by a reload or a crash,
-         *     always fails its play.
-         */
         Disturbances: {
             /**
-             * Full Screen Left
-             * @description Full screen was left during the clip, or before its start key.
              * @default flag
              * @enum {string}
              */
             full_screen_left: "ignore" | "flag" | "repeat";
             /**
-             * Window Too Small
-             * @description The window became smaller than the clip.
              * @default flag
              * @enum {string}
              */
             window_too_small: "ignore" | "flag" | "repeat";
             /**
-             * Clip Cut Off
-             * @description Less than the whole clip was inside the window.
              * @default flag
              * @enum {string}
              */
             clip_cut_off: "ignore" | "flag" | "repeat";
             /**
-             * Zoomed
-             * @description The page was zoomed or went to another screen, in the clip or before its start key: a wrong size.
              * @default flag
              * @enum {string}
              */
             zoomed: "ignore" | "flag" | "repeat";
             /**
-             * Refresh Dropped
-             * @description The screen refreshed much less often than it did before, as a power saver makes it.
              * @default flag
              * @enum {string}
              */
             refresh_dropped: "ignore" | "flag" | "repeat";
             /**
-             * Scale Reloaded
-             * @description The page was left after the clip and the answer given on a later page, without a second view.
              * @default flag
              * @enum {string}
              */
             scale_reloaded: "ignore" | "flag" | "repeat";
-            /**
-             * Focus Lost
-             * @description The page was hidden or lost focus during the clip; where not given, `fail_on_focus_lost` decides.
-             */
             focus_lost: ("ignore" | "flag" | "repeat") | null;
         };
-        /**
-         * DrillResult
-         * @description How a drill went.
-         *
-         *     Attributes
-         *     ----------
-         *     at : datetime
-         *         When it ended.
-         *     backup, backed_up_at : str
-         *         Name of the file, and when it was written by its own word; empty where it could not be read.
-         *     passed : bool
-         *     said : str
-         *         What was wrong; empty where nothing was.
-         *     rows, clips : int
-         *     seconds : float
-         */
         DrillResult: {
-            /**
-             * At
-             * Format: date-time
-             */
+            /** Format: date-time */
             at: string;
-            /** Backup */
             backup: string;
-            /**
-             * Backed Up At
-             * @default
-             */
+            /** @default  */
             backed_up_at?: string;
-            /** Passed */
             passed: boolean;
-            /**
-             * Said
-             * @default
-             */
+            /** @default  */
             said?: string;
-            /**
-             * Rows
-             * @default 0
-             */
+            /** @default 0 */
             rows?: number;
-            /**
-             * Clips
-             * @default 0
-             */
+            /** @default 0 */
             clips?: number;
-            /**
-             * Seconds
-             * @default 0
-             */
+            /** @default 0 */
             seconds?: number;
         };
-        /**
-         * DropFailedPlays
-         * @description Leave out trials whose clip was not shown as declared (verdict failed).
-         */
         DropFailedPlays: {
             /**
-             * @description Names this rule. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             rule: "failed_plays";
         };
-        /**
-         * DropSlowTrials
-         * @description Leave out trials answered later than `above_ms` after the clip's end.
-         */
         DropSlowTrials: {
             /**
-             * @description Names this rule. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             rule: "slow_trials";
-            /**
-             * Above Ms
-             * @description Response time, in ms from the clip's end, over which a trial is left out.
-             * @default 60000
-             */
+            /** @default 60000 */
             above_ms: number;
         };
-        /**
-         * EditDefinition
-         * @description A definition's text, and what it shall say instead; without `data` the text is read only.
-         */
         EditDefinition: {
-            /** Toml */
             toml: string;
-            /**
-             * Data
-             * @description The declaration as the TOML's tables.
-             */
             data?: {
                 [key: string]: unknown;
             } | null;
         };
-        /**
-         * EditedDefinition
-         * @description A definition as text and as data, with its problems, or what it expands to.
-         */
         EditedDefinition: {
-            /** Toml */
             toml: string;
-            /**
-             * Data
-             * @description Null where the text is not TOML.
-             */
             data: {
                 [key: string]: unknown;
             } | null;
-            /** Problems */
             problems: components["schemas"]["ProblemOut"][];
             design: components["schemas"]["DesignOut"] | null;
         };
-        /**
-         * Elsewhere
-         * @description An address of the provider to which the browser goes.
-         */
         Elsewhere: {
-            /** Url */
             url: string;
         };
-        /**
-         * Erase
-         * @description The run's identifier once more, as a guard against a slip.
-         */
         Erase: {
-            /** Confirm */
             confirm: string;
         };
-        /**
-         * Erased
-         * @description What was erased, and what still holds the person until it is made again or removed.
-         */
         Erased: {
-            /**
-             * Runs
-             * @description The run asked for, and other visits of the same person.
-             */
             runs: string[];
-            /**
-             * Reports
-             * @description Reports of the study; make them again.
-             */
             reports: components["schemas"]["HeldReport"][];
-            /**
-             * Ledger
-             * @description File from which a restore of an older backup erases these runs again; keep it.
-             */
             ledger: string;
         };
-        /**
-         * ErrorBody
-         * @description The shape of every answer with a status of 400 or above.
-         */
         ErrorBody: {
             error: components["schemas"]["ErrorDetail"];
         };
-        /**
-         * ErrorDetail
-         * @description What went wrong.
-         */
         ErrorDetail: {
-            /**
-             * Code
-             * @description Short name of the error, for programs.
-             */
             code: string;
-            /**
-             * Message
-             * @description One plain sentence: expected, got, what to do.
-             */
             message: string;
-            /**
-             * Details
-             * @description Further values, by error code.
-             */
             details: {
                 [key: string]: unknown;
             };
         };
-        /**
-         * Event
-         * @description Something that happened in the page; `at` is the participant's clock.
-         */
         Event: {
-            /**
-             * Id
-             * Format: uuid
-             */
+            /** Format: uuid */
             id: string;
-            /** Type */
             type: string;
-            /** At */
             at?: string | null;
-            /** Data */
             data?: {
                 [key: string]: unknown;
             };
         };
-        /**
-         * Events
-         * @description Up to 100 events; those the server already has are left as they are.
-         */
         Events: {
-            /** Events */
             events: components["schemas"]["Event"][];
         };
-        /**
-         * Evidence
-         * @description What is asked for to tell people from programs, beside what every page brings (docs/evidence.md).
-         */
         Evidence: {
             /**
-             * @description Checks that show their content by motion alone.
              * @default {
              *       "per_block": 0,
              *       "kinds": [
@@ -4079,194 +2552,92 @@ export interface components {
              */
             motion_checks: components["schemas"]["MotionChecks"];
         };
-        /**
-         * Exclude
-         * @description Why a run is excluded; kept with the data.
-         */
         Exclude: {
-            /** Reason */
             reason: string;
         };
-        /**
-         * ExcludeAttention
-         * @description Leave out participants who failed more than `more_than` attention checks.
-         */
         ExcludeAttention: {
             /**
-             * @description Names this rule. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             rule: "attention_checks_failed";
-            /**
-             * More Than
-             * @description Failed checks that are still allowed; 0 excludes at the first.
-             * @default 0
-             */
+            /** @default 0 */
             more_than: number;
         };
-        /**
-         * ExcludeEvidence
-         * @description Leave out runs by the verdict on whether a person answered (docs/evidence.md).
-         */
         ExcludeEvidence: {
             /**
-             * @description Names this rule. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             rule: "evidence_verdict";
             /**
-             * Verdicts
-             * @description Verdicts that leave a run out. Assistive technology can be `unclear`; runs of pages that brought no
-             *     evidence are `not_judged`.
              * @default [
              *       "unlikely"
              *     ]
              */
             verdicts: ("unlikely" | "unclear" | "not_judged")[];
         };
-        /**
-         * ExcludeFast
-         * @description Leave out participants whose median response time lies below `below_ms`.
-         */
         ExcludeFast: {
             /**
-             * @description Names this rule. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             rule: "median_response_time";
-            /**
-             * Below Ms
-             * @description Median response time, in ms from the clip's end, under which a run is left out.
-             * @default 200
-             */
+            /** @default 200 */
             below_ms: number;
         };
-        /**
-         * ExcludeIncomplete
-         * @description Leave out participants who did not finish the run.
-         */
         ExcludeIncomplete: {
             /**
-             * @description Names this rule. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             rule: "incomplete";
         };
-        /**
-         * ExcludePlayback
-         * @description Leave out participants with more than this share of plays that were flagged or failed.
-         */
         ExcludePlayback: {
             /**
-             * @description Names this rule. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             rule: "poor_playback_share";
-            /**
-             * More Than
-             * @description Share of plays, flagged or failed, from 0 to 1, over which a run is left out.
-             * @default 0.2
-             */
+            /** @default 0.2 */
             more_than: number;
         };
-        /**
-         * ExcludeStraightLining
-         * @description Leave out participants who gave one and the same answer in more than this share of trials.
-         */
         ExcludeStraightLining: {
             /**
-             * @description Names this rule. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             rule: "same_response_share";
-            /**
-             * More Than
-             * @description Share of trials with the commonest answer, from 0 to 1, over which a run is left out.
-             * @default 0.95
-             */
+            /** @default 0.95 */
             more_than: number;
         };
-        /**
-         * Exemplars
-         * @description How many clips a cell has, and which factors bring exemplars of their own.
-         *
-         *     Exemplar 3 of two cells shows the same blink unless the cells differ in a factor named in `own_per`.
-         */
         Exemplars: {
-            /**
-             * Per Cell
-             * @description Clips (different blinks) in each cell. More of them make means less dependent on single blinks.
-             */
             per_cell: number;
-            /**
-             * Own Per
-             * @description Factors whose levels show different blinks; over all other factors exemplar n is the same blink.
-             * @default []
-             */
+            /** @default [] */
             own_per: string[];
-            /**
-             * Seed
-             * @description Seed of the draw of recorded blinks. Another seed gives other clips, and with them another study.
-             * @default 2011
-             */
+            /** @default 2011 */
             seed: number;
         };
-        /**
-         * Experiment
-         * @description A factorial study of clips, complete: this is what an `expN.toml` declares.
-         */
         Experiment: {
-            /**
-             * Name
-             * @description Name of the experiment in manifests, exports and file names.
-             */
             name: string;
-            /**
-             * Title
-             * @description Title that experimenters read, and participants where `participant_title` is not given.
-             */
             title: string;
-            /**
-             * Participant Title
-             * @description Title on the participant's first page and the browser's tab, in every language. A study's own title may
-             *     tell what is expected of the answers.
-             */
             participant_title: {
                 [key: string]: string;
             } | null;
-            /**
-             * Version
-             * @description The experimenter's own count of versions; nothing depends on it.
-             * @default 1
-             */
+            /** @default 1 */
             version: number;
-            /**
-             * Source
-             * @description Where the design comes from, such as a reference to a paper. Stands in reports.
-             * @default
-             */
+            /** @default  */
             source: string;
-            /**
-             * Participants
-             * @description Planned number of participants, for `stimuli plan`. The study's quota is set on the server.
-             * @default 20
-             */
+            /** @default 20 */
             participants: number;
             /**
-             * Languages
-             * @description Languages offered to participants, the first where theirs is none of them; each needs its [texts].
              * @default [
              *       "en"
              *     ]
              */
             languages: string[];
-            /**
-             * Factors
-             * @description The factors. Their levels, every one with every other, make the cells.
-             */
             factors: components["schemas"]["Factor"][];
             /**
-             * @description How every clip is rendered, unless a level changes it.
              * @default {
              *       "character": "photorealistic",
              *       "profile": "real",
@@ -4287,17 +2658,14 @@ export interface components {
              *     }
              */
             render: components["schemas"]["RenderSettings"];
-            /** @description How many clips a cell has. */
             exemplars: components["schemas"]["Exemplars"];
             /**
-             * @description Who sees which clips.
              * @default {
              *       "lists": []
              *     }
              */
             assignment: components["schemas"]["Assignment"];
             /**
-             * @description How participants come into the groups that factors between them make.
              * @default {
              *       "by": "turn",
              *       "quotas": {},
@@ -4306,7 +2674,6 @@ export interface components {
              */
             groups: components["schemas"]["Groups"];
             /**
-             * @description Blocks and their order.
              * @default {
              *       "repeats": 1,
              *       "order": "random",
@@ -4316,19 +2683,13 @@ export interface components {
              */
             blocks: components["schemas"]["Blocks"];
             /**
-             * @description Practice before the first block.
              * @default {
              *       "trials": 4
              *     }
              */
             practice: components["schemas"]["Practice"];
-            /**
-             * Trial
-             * @description What one trial shows and asks, by its kind.
-             */
             trial: components["schemas"]["ClipRating"] | components["schemas"]["PairedComparison"] | components["schemas"]["Threshold"] | components["schemas"]["ContinuousRating"];
             /**
-             * @description Size and surround of the clip, and what the device must offer.
              * @default {
              *       "inter_ocular_mm": 60,
              *       "calibrate": "required",
@@ -4346,7 +2707,6 @@ export interface components {
              */
             display: components["schemas"]["Display"];
             /**
-             * @description Coming back, and for how long a place is kept.
              * @default {
              *       "resume": "resume",
              *       "maximum_age_hours": 72,
@@ -4355,7 +2715,6 @@ export interface components {
              */
             session: components["schemas"]["Session"];
             /**
-             * @description When a play is flagged or failed.
              * @default {
              *       "flagged_missing_frames": 0,
              *       "failed_missing_frames": 3,
@@ -4378,7 +2737,6 @@ export interface components {
              */
             playback: components["schemas"]["PlaybackRules"];
             /**
-             * @description Attention checks between the trials.
              * @default {
              *       "per_block": 0,
              *       "text": {
@@ -4389,7 +2747,6 @@ export interface components {
              */
             attention: components["schemas"]["AttentionChecks"];
             /**
-             * @description What is asked for to tell people from programs.
              * @default {
              *       "motion_checks": {
              *         "clips": 24,
@@ -4405,14 +2762,9 @@ export interface components {
              *     }
              */
             evidence: components["schemas"]["Evidence"];
-            /**
-             * Screening
-             * @description Rules that end a run while it goes on. The participant is told so, and the place is free again.
-             * @default []
-             */
+            /** @default [] */
             screening: (components["schemas"]["ScreenFormAnswer"] | components["schemas"]["ScreenAttention"] | components["schemas"]["ScreenDevice"])[];
             /**
-             * @description Kind words to who answers without care, and when the run then ends.
              * @default {
              *       "rules": [],
              *       "maximum": 2,
@@ -4425,27 +2777,14 @@ export interface components {
              *     }
              */
             warnings: components["schemas"]["Warnings"];
-            /**
-             * Exclusions
-             * @description Rules, fixed before the data, that leave out runs or trials when the study is analysed.
-             * @default []
-             */
+            /** @default [] */
             exclusions: (components["schemas"]["ExcludeIncomplete"] | components["schemas"]["ExcludeAttention"] | components["schemas"]["ExcludePlayback"] | components["schemas"]["ExcludeStraightLining"] | components["schemas"]["ExcludeFast"] | components["schemas"]["ExcludeEvidence"] | components["schemas"]["DropFailedPlays"] | components["schemas"]["DropSlowTrials"])[];
-            /**
-             * Forms
-             * @description Questionnaires before and after the trials.
-             * @default []
-             */
+            /** @default [] */
             forms: components["schemas"]["Form"][];
-            /**
-             * Texts
-             * @description The pages, a table a language: [texts.en].
-             */
             texts: {
                 [key: string]: components["schemas"]["Texts"];
             };
             /**
-             * @description The analysis, fixed before the data.
              * @default {
              *       "kind": "within_anova",
              *       "factors": [],
@@ -4455,1462 +2794,561 @@ export interface components {
              *     }
              */
             analysis: components["schemas"]["AnalysisPlan"];
-            /**
-             * @description How long data of persons are kept.
-             * @default {}
-             */
+            /** @default {} */
             retention: components["schemas"]["Retention"];
             /**
-             * @description Who made the data and who may use them, for datasets that are handed on.
              * @default {
              *       "creators": [],
-             *       "description": "",
              *       "keywords": []
              *     }
              */
             dataset: components["schemas"]["Dataset"];
         };
-        /**
-         * Factor
-         * @description A factor of the design. The clips are every combination of the factors' levels.
-         */
         Factor: {
-            /**
-             * Name
-             * @description Name of the factor's column in the ratings CSV and in the analysis; no other column may have it.
-             */
             name: string;
-            /**
-             * Label
-             * @description What tables, figures and reports call the factor.
-             */
             label: string;
-            /**
-             * Between
-             * @description On: each participant sees one level, groups take turns, and the analysis compares participants. Off:
-             *     everybody sees every level.
-             * @default false
-             */
+            /** @default false */
             between: boolean;
-            /**
-             * Random
-             * @description On: the levels stand for more like them, such as faces or voices: the analysis of variance averages
-             *     over them, and the mixed models have them as random items, so that results hold for others. Off: the
-             *     levels are compared with one another.
-             * @default false
-             */
+            /** @default false */
             random: boolean;
-            /**
-             * Per Participant
-             * @description How many of a random factor's levels a participant sees, each level equally often over participants,
-             *     give or take one; left out, all of them.
-             */
             per_participant: number | null;
-            /**
-             * Character
-             * @description Characters (names, or paths of folders) that each make a level, named after it without its version;
-             *     written instead of `levels`, and read as these: a declaration that was read has the levels and no list.
-             * @default []
-             */
+            /** @default [] */
             character: string[];
-            /**
-             * Levels
-             * @description In the order of tables and contrasts. In the list of cells the last factor's change fastest.
-             */
             levels: components["schemas"]["Level"][];
         };
-        /**
-         * FactorOut
-         * @description A factor and its levels.
-         */
         FactorOut: {
-            /** Name */
             name: string;
-            /** Label */
             label: string;
-            /** Levels */
             levels: components["schemas"]["LevelOut"][];
         };
-        /**
-         * ForgottenPassword
-         * @description Whose password is forgotten: the name to sign in with, or the address of mail.
-         */
         ForgottenPassword: {
-            /** Name */
             name: string;
         };
-        /**
-         * Form
-         * @description One page of questions, shown before the first or after the last block.
-         */
         Form: {
-            /**
-             * Name
-             * @description Key of the form's answers in the runs CSV; [[screening]] names it as `form`.
-             */
             name: string;
             /**
-             * When
-             * @description Shown after the consent, before the trials, or after the last trial.
              * @default before
              * @enum {string}
              */
             when: "before" | "after";
-            /**
-             * Title
-             * @description Heading of the page.
-             */
             title: {
                 [key: string]: string;
             };
-            /**
-             * Fields
-             * @description The questions, in order.
-             */
             fields: (components["schemas"]["TextField"] | components["schemas"]["NumberField"] | components["schemas"]["ChoiceField"] | components["schemas"]["MultipleChoiceField"] | components["schemas"]["LikertField"])[];
         };
-        /**
-         * FormAnswers
-         * @description Answers by field name.
-         */
         FormAnswers: {
-            /** Answers */
             answers: {
                 [key: string]: unknown;
             };
         };
-        /**
-         * FrameLog
-         * @description What was drawn of one clip of a view.
-         */
         FrameLog: {
-            /**
-             * Role
-             * @enum {string}
-             */
+            /** @enum {string} */
             role: "shown" | "left" | "right" | "first" | "second" | "reference";
-            /** Clip Sha256 */
             clip_sha256: string;
-            /**
-             * Drawn
-             * @description Index and time in ms since the view's start key of every drawn frame.
-             */
             drawn: [
                 number,
                 number
             ][];
         };
-        /**
-         * FunnelStep
-         * @description How many runs came at least this far.
-         */
         FunnelStep: {
-            /** Stage */
             stage: string;
-            /** Runs */
             runs: number;
         };
-        /**
-         * Gates
-         * @description What the device must offer before a run begins.
-         */
         Gates: {
-            /** Minimum Width Px */
             minimum_width_px: number;
-            /** Minimum Height Px */
             minimum_height_px: number;
-            /** Allow Touch */
             allow_touch: boolean;
-            /** Full Screen */
             full_screen: boolean;
-            /**
-             * Calibrate
-             * @enum {string}
-             */
+            /** @enum {string} */
             calibrate: "required" | "optional" | "off";
-            /** Viewing Distance */
             viewing_distance: boolean;
-            /** Inter Ocular Mm */
             inter_ocular_mm: number;
         };
-        /**
-         * GrantOut
-         * @description Rights on a study that were granted to an account, beside those of its role in the workspace.
-         */
         GrantOut: {
-            /** Account */
             account: string;
-            /** Rights */
             rights: ("view" | "run" | "edit" | "export" | "own")[];
         };
-        /**
-         * GroupCount
-         * @description How many took part in one group.
-         */
         GroupCount: {
-            /** Name */
             name: string;
-            /** Quota */
             quota: number | null;
-            /** Complete */
             complete: number;
-            /** Active */
             active: number;
         };
-        /**
-         * Groups
-         * @description How participants come into groups: one for each combination of levels of the factors `between` them.
-         *
-         *     A group is named by its levels in factor order, joined by slashes. A place in a group that is given up, or
-         *     screened out, goes to the next participant of that group.
-         */
         Groups: {
-            /**
-             * By
-             * @description `turn`: groups take turns. `link`: each link is for a group. `form:question`: the answer to a required
-             *     choice of a form before the trials decides.
-             * @default turn
-             */
+            /** @default turn */
             by: string;
-            /**
-             * Quotas
-             * @description Participants a group takes, by its name; a group without a quota takes any number. Pilot and live runs
-             *     are counted apart, those of simulated people and previews not at all.
-             */
             quotas: {
                 [key: string]: number;
             };
-            /**
-             * Answers
-             * @description Group of each answer, where answers (the values of the options) are not named as the groups are.
-             */
             answers: {
                 [key: string]: string;
             };
         };
-        /**
-         * Health
-         * @description A short word.
-         */
         Health: {
-            /** Status */
             status: string;
         };
-        /**
-         * HeldReport
-         * @description A report that was made while the person's data were there.
-         */
         HeldReport: {
-            /** Report */
             report: string;
-            /** Finished At */
             finished_at: string | null;
         };
-        /**
-         * InTurn
-         * @description Every participant gets all pairs, or the next `pairs_per_person` of one order drawn for the study.
-         */
         InTurn: {
             /**
-             * @description Names this way of dealing. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             by: "turn";
         };
-        /**
-         * IncompleteBlocks
-         * @description Each participant sees a few of the clips and compares each of them with each other.
-         *
-         *     The blocks are those of a balanced incomplete design: over a whole round of it every pair is compared
-         *     equally often, and every clip is in as many blocks as any other.
-         */
         IncompleteBlocks: {
             /**
-             * @description Names this way of dealing. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             by: "bibd";
-            /**
-             * Clips Per Block
-             * @description Clips in a block; all pairs of them are compared. Where no design has them, near sizes are named.
-             */
             clips_per_block: number;
-            /**
-             * Blocks Per Person
-             * @description Blocks of one participant.
-             * @default 1
-             */
+            /** @default 1 */
             blocks_per_person: number;
         };
-        /**
-         * Interaction
-         * @description How the participant acted between two answers, summed up on the page; no trace is sent.
-         *
-         *     A press is a key or pointer button going down and up again, or an activation without one.
-         */
         Interaction: {
-            /** Presses */
             presses: number;
-            /**
-             * Trusted
-             * @description Presses that the browser made from input, not a script.
-             */
             trusted: number;
-            /**
-             * Press Ms
-             * @description Median time from down to up; null where no press had both.
-             */
             press_ms?: number | null;
-            /**
-             * Moves
-             * @description Pointer movements.
-             * @default 0
-             */
+            /** @default 0 */
             moves?: number;
         };
-        /**
-         * InvitationOut
-         * @description An invitation that has not been used.
-         */
         InvitationOut: {
-            /** Id */
             id: number;
-            /**
-             * Role
-             * @enum {string}
-             */
+            /** @enum {string} */
             role: "viewer" | "experimenter" | "owner";
-            /** Label */
             label: string;
-            /**
-             * Created At
-             * Format: date-time
-             */
+            /** Format: date-time */
             created_at: string;
-            /**
-             * Expires At
-             * Format: date-time
-             */
+            /** Format: date-time */
             expires_at: string;
         };
-        /**
-         * InvitationState
-         * @description What an invited person sees.
-         */
         InvitationState: {
-            /**
-             * Role
-             * @enum {string}
-             */
+            /** @enum {string} */
             role: "viewer" | "experimenter" | "owner";
-            /**
-             * Status
-             * @enum {string}
-             */
+            /** @enum {string} */
             status: "open" | "used" | "expired";
         };
-        /**
-         * JudgedEdit
-         * @description What saving an edited definition would do to the answers that are stored.
-         */
         JudgedEdit: {
-            /** Changes */
             changes: components["schemas"]["ChangeOut"][];
-            /**
-             * Series
-             * @description Data series that answers to the edited definition would be of.
-             */
             series: number;
-            /** Present Series */
             present_series: number;
-            /**
-             * Runs
-             * @description Runs of the present series, previews aside.
-             */
             runs: number;
-            /**
-             * Begins Series
-             * @description A new data series begins, and there are runs it is kept apart from.
-             */
             begins_series: boolean;
         };
-        /**
-         * KeyDifference
-         * @description One key of the declaration that differs.
-         */
         KeyDifference: {
-            /** Path */
             path: string;
-            /**
-             * Effect
-             * @enum {string}
-             */
+            /** @enum {string} */
             effect: "wording" | "measured";
-            /**
-             * Pieces
-             * @description The old value with what went from it and came to it.
-             */
             pieces: components["schemas"]["Piece"][];
         };
-        /**
-         * LanguageChange
-         * @description The language the participant reads from now on.
-         */
         LanguageChange: {
-            /** Language */
             language: string;
         };
-        /**
-         * LeaveOut
-         * @description Whether one file of an upload is left out of what is made of it.
-         */
         LeaveOut: {
-            /** File */
             file: string;
-            /** Left Out */
             left_out: boolean;
         };
-        /**
-         * Level
-         * @description One level of a factor: its name in the data, its label in tables, and what it changes in clips.
-         */
         Level: {
-            /**
-             * Name
-             * @description Value in the factor's column of every export and part of the cell's name. Participants never see it.
-             */
             name: string;
-            /**
-             * Label
-             * @description What tables and figures call the level. Participants never see it.
-             */
             label: string;
-            /**
-             * @description What clips of this level change of [render]. Levels that change nothing give the same clips.
-             * @default {}
-             */
+            /** @default {} */
             render: components["schemas"]["RenderOverrides"];
         };
-        /**
-         * LevelChoices
-         * @description A level of a factor in comparisons with cells of another level.
-         */
         LevelChoices: {
-            /** Factor */
             factor: string;
-            /** Level */
             level: string;
-            /** N */
             n: number;
-            /**
-             * Share
-             * @description Share in which the level was chosen, ties as half.
-             */
             share: number | null;
         };
-        /**
-         * LevelOut
-         * @description A level of a factor.
-         */
         LevelOut: {
-            /** Name */
             name: string;
-            /** Label */
             label: string;
         };
-        /**
-         * LevelsPattern
-         * @description A pattern that file names follow, such as `{character}_{speed}_{exemplar}.mp4`.
-         */
         LevelsPattern: {
-            /** Pattern */
             pattern: string;
         };
-        /**
-         * LevelsTable
-         * @description A CSV with one row a clip: column `file`, then one column a factor; `exemplar` is optional.
-         */
         LevelsTable: {
-            /** Csv */
             csv: string;
         };
-        /**
-         * LikertField
-         * @description A rating from 1 to `points` with labelled ends.
-         */
         LikertField: {
-            /**
-             * Name
-             * @description Key of the answer in the runs CSV's `forms`; [[screening]] names it as `field`.
-             */
             name: string;
-            /**
-             * Label
-             * @description The question, in every language.
-             */
             label: {
                 [key: string]: string;
             };
-            /**
-             * Help
-             * @description Smaller text under the question.
-             */
             help: {
                 [key: string]: string;
             } | null;
-            /**
-             * Required
-             * @description Whether the form can be sent only once this is answered.
-             * @default false
-             */
+            /** @default false */
             required: boolean;
             /**
-             * @description Names this type of field. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             type: "likert";
-            /**
-             * Points
-             * @description Number of points; the answer is a whole number from 1.
-             * @default 7
-             */
+            /** @default 7 */
             points: number;
-            /**
-             * Low
-             * @description Label of the lowest point.
-             */
             low: {
                 [key: string]: string;
             };
-            /**
-             * High
-             * @description Label of the highest point.
-             */
             high: {
                 [key: string]: string;
             };
         };
-        /**
-         * LinkOut
-         * @description A link into a study.
-         */
         LinkOut: {
-            /** Id */
             id: string;
-            /** Kind */
             kind: string;
-            /** Label */
             label: string;
-            /**
-             * Group Name
-             * @description Group of who comes by it; empty where links decide none.
-             */
             group_name: string;
-            /** Url */
             url: string;
-            /** Quota */
             quota: number | null;
-            /** Expires At */
             expires_at: string | null;
-            /**
-             * Created At
-             * Format: date-time
-             */
+            /** Format: date-time */
             created_at: string;
-            /** Runs */
             runs: number;
-            /** Complete */
             complete: number;
-            /** Recruiter */
             recruiter: {
                 [key: string]: unknown;
             } | null;
         };
-        /**
-         * LinkPage
-         * @description Links in the order they were made.
-         */
         LinkPage: {
-            /** Links */
             links: components["schemas"]["LinkOut"][];
-            /** Total */
             total: number;
-            /**
-             * Next
-             * @description Ask again with `after` = this; null at the end.
-             */
             next: string | null;
         };
-        /**
-         * LinkState
-         * @description Where a link leads, and whether it is open.
-         */
         LinkState: {
             study: components["schemas"]["LinkedStudy"];
-            /**
-             * Status
-             * @enum {string}
-             */
+            /** @enum {string} */
             status: "open" | "closed" | "expired" | "full" | "paused" | "used";
-            /**
-             * Kind
-             * @enum {string}
-             */
+            /** @enum {string} */
             kind: "general" | "personal" | "preview";
-            /**
-             * Resumable
-             * @description A run of this personal link is under way and can be taken up again.
-             */
             resumable: boolean;
-            /**
-             * Screens Devices
-             * @description A closed gate ends the visit as screened out.
-             */
             screens_devices: boolean;
-            /**
-             * Way Back
-             * @description The recruiter's address for who takes no part, its {address parameters} not filled in.
-             */
             way_back: string | null;
             gates: components["schemas"]["Gates"];
         };
-        /**
-         * LinkedStudy
-         * @description What a visitor may know of a study before the run begins.
-         */
         LinkedStudy: {
-            /** Name */
             name: string;
-            /**
-             * Title
-             * @description What participants read, in the study's first language.
-             */
             title: string;
-            /**
-             * Titles
-             * @description The same in every language of the study.
-             */
             titles: {
                 [key: string]: string;
             };
-            /** Languages */
             languages: string[];
-            /** Background */
             background: string;
-            /** Expected Minutes */
             expected_minutes: number;
         };
-        /**
-         * LoginOut
-         * @description A way by which the own account is signed in to.
-         */
         LoginOut: {
-            /** Id */
             id: number;
-            /**
-             * Provider
-             * @description Name of the provider, as declared on this server.
-             */
             provider: string;
-            /** Issuer */
             issuer: string;
-            /** Label */
             label: string;
-            /**
-             * Created At
-             * Format: date-time
-             */
+            /** Format: date-time */
             created_at: string;
-            /** Last Used At */
             last_used_at: string | null;
         };
-        /**
-         * Margin
-         * @description The means of one factor, of two crossed factors, or of all (the cells).
-         */
         Margin: {
-            /** Factors */
             factors: string[];
-            /** Means */
             means: components["schemas"]["Mean"][];
         };
-        /**
-         * Me
-         * @description Who is signed in here; `account` is null where nobody is.
-         */
         Me: {
             account: components["schemas"]["AccountOut"] | null;
-            /**
-             * Workspaces
-             * @description Where the account belongs.
-             * @default []
-             */
+            /** @default [] */
             workspaces?: components["schemas"]["MyWorkspace"][];
-            /**
-             * Accounts Exist
-             * @description False until the first owner has used the one-time link.
-             */
             accounts_exist: boolean;
         };
-        /**
-         * Mean
-         * @description A marginal or cell mean over participants.
-         */
         Mean: {
-            /** Levels */
             levels: {
                 [key: string]: string;
             };
-            /** Mean */
             mean: number;
-            /**
-             * Se Within
-             * @description Within-participant standard error (Cousineau-Morey).
-             */
             se_within: number | null;
-            /** Participants */
             participants: number;
         };
-        /**
-         * MeanTilt
-         * @description How far the threshold moves along the second factor: mean over people of their posterior means.
-         */
         MeanTilt: {
-            /** People */
             people: number;
-            /**
-             * Mean
-             * @description Change of the threshold per unit of the second factor's numbers.
-             */
             mean: number;
-            /**
-             * Sd
-             * @description Standard deviation over people.
-             */
             sd: number | null;
-            /**
-             * Low
-             * @description 95% t interval of the mean; null of one person.
-             */
             low: number | null;
-            /** High */
             high: number | null;
-            /**
-             * Mean Posterior Sd
-             * @description Posterior SD of a person's tilt on average.
-             */
             mean_posterior_sd: number;
         };
-        /**
-         * MemberOut
-         * @description Somebody who belongs to a workspace.
-         */
         MemberOut: {
-            /** Account */
             account: string;
-            /**
-             * Role
-             * @enum {string}
-             */
+            /** @enum {string} */
             role: "viewer" | "experimenter" | "owner";
-            /** Second Factor */
             second_factor: boolean;
-            /** Disabled */
             disabled: boolean;
         };
-        /**
-         * MethodsNumber
-         * @description A number of the paragraph and where it comes from.
-         */
         MethodsNumber: {
-            /** Name */
             name: string;
-            /** Value */
             value: number;
-            /**
-             * Source
-             * @description The query of the database that gives it.
-             */
             source: string;
         };
-        /**
-         * MethodsOut
-         * @description The paragraph and its numbers.
-         */
         MethodsOut: {
-            /**
-             * Origin
-             * @enum {string}
-             */
+            /** @enum {string} */
             origin: "participant" | "pilot" | "simulated";
-            /** Series */
             series: number;
-            /** Paragraph */
             paragraph: string;
-            /** Latex */
             latex: string;
-            /** Numbers */
             numbers: components["schemas"]["MethodsNumber"][];
         };
-        /**
-         * MonitorSnapshot
-         * @description Everything the monitor shows at one moment.
-         */
         MonitorSnapshot: {
-            /** Study */
             study: string;
-            /** Study Status */
             study_status: string;
-            /** Quota */
             quota: number | null;
-            /**
-             * Server Time
-             * Format: date-time
-             */
+            /** Format: date-time */
             server_time: string;
-            /**
-             * Origin
-             * @description Whose runs are listed and counted.
-             * @enum {string}
-             */
+            /** @enum {string} */
             origin: "participant" | "preview" | "pilot" | "simulated";
-            /**
-             * Others
-             * @description Runs of other origins, previews left out.
-             */
             others: {
                 [key: string]: number;
             };
-            /** Complete */
             complete: number;
-            /** Active */
             active: number;
-            /** Dropped */
             dropped: number;
-            /** Screened Out */
             screened_out: number;
-            /** Withdrawn */
             withdrawn: number;
-            /** Refused Browsers */
             refused_browsers: number;
-            /**
-             * Groups
-             * @description Groups of participants; empty where there is one only.
-             */
             groups: components["schemas"]["GroupCount"][];
-            /** Funnel */
             funnel: components["schemas"]["FunnelStep"][];
-            /**
-             * Expected Finish
-             * @description When the quota will be full at the pace of the last day; null where it cannot be said.
-             */
             expected_finish: string | null;
-            /**
-             * Total
-             * @description Runs of this origin.
-             */
             total: number;
-            /**
-             * Runs
-             * @description The latest, in the order they began; not more than 500.
-             */
             runs: components["schemas"]["MonitoredRun"][];
         };
-        /**
-         * MonitoredRun
-         * @description One visit in the monitor's table.
-         */
         MonitoredRun: {
-            /** Run */
             run: string;
-            /** Participant */
             participant: string;
-            /** Phase */
             phase: string;
-            /** Origin */
             origin: string;
-            /** Status */
             status: string;
-            /** Stage */
             stage: string;
-            /**
-             * Presence
-             * @description here: seen within a minute; away: active but silent; dropped: silent beyond the lease.
-             * @enum {string}
-             */
+            /** @enum {string} */
             presence: "here" | "away" | "dropped" | "finished";
-            /**
-             * Started At
-             * Format: date-time
-             */
+            /** Format: date-time */
             started_at: string;
-            /**
-             * Last Seen At
-             * Format: date-time
-             */
+            /** Format: date-time */
             last_seen_at: string;
-            /** Answered */
             answered: number;
-            /** Trials */
             trials: number;
-            /** Uncertain */
             uncertain: number;
-            /** Flagged */
             flagged: number;
-            /** Failed */
             failed: number;
-            /** Excluded */
             excluded: boolean;
-            /**
-             * Evidence Verdict
-             * @description Whether the answers are likely a person's; null while the run goes on.
-             */
             evidence_verdict: ("likely" | "unclear" | "unlikely" | "not_judged") | null;
-            /**
-             * Heat
-             * @description One letter a trial: . open, g good, u uncertain, f flagged, x failed.
-             */
             heat: string;
         };
-        /**
-         * MotionChecks
-         * @description Short clips between the trials in which a digit, a direction or a shape is defined by motion alone.
-         *
-         *     Each is asked as a trial of its own, stored with kind `check` and never analysed.
-         */
         MotionChecks: {
-            /**
-             * Per Block
-             * @description Checks in each block, at random places but never first.
-             * @default 0
-             */
+            /** @default 0 */
             per_block: number;
             /**
-             * Kinds
-             * @description Kinds of check: `digit`, `direction` and `shape` of random dots; `first_blink` (a full blink and a half
-             *     one) and `first_eye` in the study's own look, which two pictures in their order give away.
              * @default [
              *       "digit"
              *     ]
              */
             kinds: ("digit" | "direction" | "shape" | "first_blink" | "first_eye")[];
-            /**
-             * Difficulty
-             * @description From 0 to 1: the share of dots that do not follow (half of them at 1); how alike the two blinks are,
-             *     or how close the two eyes.
-             * @default 0.3
-             */
+            /** @default 0.3 */
             difficulty: number;
-            /**
-             * Contrast
-             * @description Contrast of the dots against the page's background, from above 0 to 1.
-             * @default 0.6
-             */
+            /** @default 0.6 */
             contrast: number;
-            /**
-             * Seconds
-             * @description Length of a check's clip.
-             * @default 2.4
-             */
+            /** @default 2.4 */
             seconds: number;
-            /**
-             * Clips
-             * @description How many check clips are made. Nobody sees one twice; the more there are, the less a list of
-             *     their answers is worth.
-             * @default 24
-             */
+            /** @default 24 */
             clips: number;
-            /** @description The way around for people who cannot see such clips; without it they can only guess. */
             other_way: components["schemas"]["OtherWay"] | null;
-            /**
-             * Wording
-             * @description Question and answers of kinds of check, in place of the program's own, which has those of the page.
-             * @default []
-             */
+            /** @default [] */
             wording: components["schemas"]["CheckWording"][];
         };
-        /**
-         * MoveStudy
-         * @description Where a study shall belong.
-         */
         MoveStudy: {
-            /** Workspace */
             workspace: string;
         };
-        /**
-         * MultipleChoiceField
-         * @description Any of several answers.
-         */
         MultipleChoiceField: {
-            /**
-             * Name
-             * @description Key of the answer in the runs CSV's `forms`; [[screening]] names it as `field`.
-             */
             name: string;
-            /**
-             * Label
-             * @description The question, in every language.
-             */
             label: {
                 [key: string]: string;
             };
-            /**
-             * Help
-             * @description Smaller text under the question.
-             */
             help: {
                 [key: string]: string;
             } | null;
-            /**
-             * Required
-             * @description Whether the form can be sent only once this is answered.
-             * @default false
-             */
+            /** @default false */
             required: boolean;
             /**
-             * @description Names this type of field. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             type: "multiple_choice";
-            /**
-             * Options
-             * @description The answers, in the order in which they are listed; any number of them may be chosen.
-             */
             options: components["schemas"]["Option"][];
         };
-        /**
-         * MyWorkspace
-         * @description A workspace one belongs to, and as what.
-         */
         MyWorkspace: {
-            /** Name */
             name: string;
-            /** Title */
             title: string;
-            /**
-             * Role
-             * @enum {string}
-             */
+            /** @enum {string} */
             role: "viewer" | "experimenter" | "owner";
-            /**
-             * Second Factor Needed
-             * @description Its studies stay closed until the account signs in with a second factor.
-             */
             second_factor_needed: boolean;
         };
-        /**
-         * NewAccount
-         * @description The account an invited person makes.
-         */
         NewAccount: {
-            /** Name */
             name: string;
-            /** Password */
             password: string;
         };
-        /**
-         * NewAddress
-         * @description An address of mail for the own account, with the present password.
-         */
         NewAddress: {
-            /** Address */
             address: string;
-            /** Password */
             password: string;
         };
-        /**
-         * NewCapsule
-         * @description What a capsule is to hold.
-         */
         NewCapsule: {
             /**
-             * Origin
              * @default participant
              * @enum {string}
              */
             origin?: "participant" | "pilot" | "simulated";
-            /**
-             * Series
-             * @description Its data, definition, clips and report alone. Where none is given it holds the data of every series, and all else of the active version.
-             */
             series?: number | null;
-            /**
-             * Clips
-             * @description Put the clips in; their hashes are in it always.
-             * @default true
-             */
+            /** @default true */
             clips?: boolean;
-            /**
-             * Sensitivity
-             * @description With the models of the report that take long.
-             * @default true
-             */
+            /** @default true */
             sensitivity?: boolean;
         };
-        /**
-         * NewInvitation
-         * @description Whom to invite, as what on the server, and where the account will belong as what.
-         *
-         *     Without a workspace it is the default one, and without a role in it the role on the server.
-         */
         NewInvitation: {
-            /**
-             * Role
-             * @enum {string}
-             */
+            /** @enum {string} */
             role: "viewer" | "experimenter" | "owner";
-            /** Workspace */
             workspace?: string | null;
-            /** Workspace Role */
             workspace_role?: ("viewer" | "experimenter" | "owner") | null;
-            /**
-             * Label
-             * @default
-             */
+            /** @default  */
             label?: string;
         };
-        /**
-         * NewInvitationOut
-         * @description A fresh invitation; `url` is shown this once.
-         */
         NewInvitationOut: {
-            /** Id */
             id: number;
-            /**
-             * Role
-             * @enum {string}
-             */
+            /** @enum {string} */
             role: "viewer" | "experimenter" | "owner";
-            /** Label */
             label: string;
-            /**
-             * Created At
-             * Format: date-time
-             */
+            /** Format: date-time */
             created_at: string;
-            /**
-             * Expires At
-             * Format: date-time
-             */
+            /** Format: date-time */
             expires_at: string;
-            /** Url */
             url: string;
         };
-        /**
-         * NewLinks
-         * @description One general or preview link, or many personal ones: by their labels, or `count` numbered ones.
-         */
         NewLinks: {
-            /**
-             * Kind
-             * @enum {string}
-             */
+            /** @enum {string} */
             kind: "general" | "personal" | "preview";
-            /**
-             * Label
-             * @default
-             */
+            /** @default  */
             label?: string;
-            /**
-             * Group
-             * @description Group of who comes by it, where links decide.
-             * @default
-             */
+            /** @default  */
             group?: string;
-            /**
-             * Labels
-             * @default []
-             */
+            /** @default [] */
             labels?: string[];
-            /**
-             * Count
-             * @default 1
-             */
+            /** @default 1 */
             count?: number;
-            /** Quota */
             quota?: number | null;
-            /** Days */
             days?: number | null;
             recruiter?: components["schemas"]["Recruiter"] | null;
         };
-        /**
-         * NewPassword
-         * @description The link's token and the password to be.
-         */
         NewPassword: {
-            /** Token */
             token: string;
-            /** Password */
             password: string;
         };
-        /**
-         * NewRehearsal
-         * @description How many people are simulated; the same seed gives the same people.
-         */
         NewRehearsal: {
-            /**
-             * Participants
-             * @default 8
-             */
+            /** @default 8 */
             participants?: number;
-            /**
-             * Seed
-             * @default 1
-             */
+            /** @default 1 */
             seed?: number;
         };
-        /**
-         * NewReport
-         * @description Which data to analyse.
-         */
         NewReport: {
             /**
-             * Origin
              * @default participant
              * @enum {string}
              */
             origin?: "participant" | "pilot" | "simulated";
-            /**
-             * Series
-             * @description Data series; that of the active version where none is given.
-             */
             series?: number | null;
-            /**
-             * Sensitivity
-             * @default true
-             */
+            /** @default true */
             sensitivity?: boolean;
         };
-        /**
-         * NewSeal
-         * @description What is sealed with the plan.
-         */
         NewSeal: {
-            /**
-             * Power
-             * @description What `analysis power --json` wrote.
-             */
             power?: {
                 [key: string]: unknown;
             } | null;
         };
-        /**
-         * NewStudy
-         * @description A study from a shipped experiment, from a definition, or from uploaded clips.
-         */
         NewStudy: {
-            /** Name */
             name: string;
-            /** Shipped */
             shipped?: string | null;
-            /** Toml */
             toml?: string | null;
-            /** Upload */
             upload?: string | null;
-            /** Levels */
             levels?: components["schemas"]["LevelsTable"] | components["schemas"]["LevelsPattern"] | null;
             own_clips?: components["schemas"]["OwnClips"] | null;
-            /**
-             * Workspace
-             * @description Needed where the account may make studies in several workspaces.
-             */
             workspace?: string | null;
         };
-        /**
-         * NewToken
-         * @description An API token: its name, what it may do, and for how many days.
-         */
         NewToken: {
-            /** Name */
             name: string;
-            /** Scopes */
             scopes: ("read" | "personal" | "write" | "export")[];
-            /**
-             * Days
-             * @default 365
-             */
+            /** @default 365 */
             days?: number | null;
         };
-        /**
-         * NewTokenOut
-         * @description A fresh API token; `token` is shown this once.
-         */
         NewTokenOut: {
-            /** Id */
             id: number;
-            /** Name */
             name: string;
-            /** Scopes */
             scopes: ("read" | "personal" | "write" | "export")[];
-            /**
-             * Created At
-             * Format: date-time
-             */
+            /** Format: date-time */
             created_at: string;
-            /** Last Used At */
             last_used_at: string | null;
-            /** Expires At */
             expires_at: string | null;
-            /** Token */
             token: string;
         };
-        /**
-         * NewVersion
-         * @description A changed definition; it becomes a new version.
-         */
         NewVersion: {
-            /**
-             * Revision
-             * @description The revision this edit started from.
-             */
             revision: number;
-            /** Toml */
             toml: string;
-            /**
-             * Note
-             * @default
-             */
+            /** @default  */
             note?: string;
-            /**
-             * Upload
-             * @description Clips to add, or to put in the place of others.
-             */
             upload?: string | null;
-            /** Levels */
             levels?: components["schemas"]["LevelsTable"] | components["schemas"]["LevelsPattern"] | null;
         };
-        /**
-         * NewWorkspace
-         * @description A workspace: its name in addresses, and the title people read.
-         */
         NewWorkspace: {
-            /** Name */
             name: string;
-            /** Title */
             title: string;
         };
-        /**
-         * NextTrials
-         * @description What an answer changes of the trials to come, in a study whose answers decide what is shown.
-         */
         NextTrials: {
-            /**
-             * Trials
-             * @description The next trials of each series, as chosen from all answers.
-             */
             trials: components["schemas"]["TrialInfo"][];
-            /**
-             * Closed
-             * @description Trials that need no answer, since their series has ended.
-             */
             closed: number[];
         };
-        /**
-         * NumberField
-         * @description A whole number within limits, such as an age in years.
-         */
         NumberField: {
-            /**
-             * Name
-             * @description Key of the answer in the runs CSV's `forms`; [[screening]] names it as `field`.
-             */
             name: string;
-            /**
-             * Label
-             * @description The question, in every language.
-             */
             label: {
                 [key: string]: string;
             };
-            /**
-             * Help
-             * @description Smaller text under the question.
-             */
             help: {
                 [key: string]: string;
             } | null;
-            /**
-             * Required
-             * @description Whether the form can be sent only once this is answered.
-             * @default false
-             */
+            /** @default false */
             required: boolean;
             /**
-             * @description Names this type of field. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             type: "number";
-            /**
-             * Minimum
-             * @description Smallest answer taken.
-             * @default 0
-             */
+            /** @default 0 */
             minimum: number;
-            /**
-             * Maximum
-             * @description Largest answer taken.
-             * @default 1000000
-             */
+            /** @default 1000000 */
             maximum: number;
         };
-        /**
-         * OneAfterTheOther
-         * @description Two clips in the same place, the second `gap_ms` of plain background after the first.
-         */
         OneAfterTheOther: {
             /**
-             * @description Names this arrangement. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             arrangement: "one_after_the_other";
-            /**
-             * Gap Ms
-             * @description Plain background between the two clips, in ms.
-             */
             gap_ms: number;
         };
-        /**
-         * Option
-         * @description One answer of a choice field; `value` is what is stored.
-         */
         Option: {
-            /**
-             * Value
-             * @description What is stored and exported, whatever language was read.
-             */
             value: string;
-            /**
-             * Label
-             * @description What the participant reads.
-             */
             label: {
                 [key: string]: string;
             };
         };
-        /**
-         * OtherResults
-         * @description Of a kind of trial without a summary.
-         */
         OtherResults: {
-            /** Study */
             study: string;
-            /** Origin */
             origin: string;
-            /** Series */
             series: number;
-            /**
-             * Counted At
-             * Format: date-time
-             */
+            /** Format: date-time */
             counted_at: string;
-            /** Participants */
             participants: number;
-            /**
-             * Ratings
-             * @description Answers of any kind that count.
-             */
             ratings: number;
-            /** Response Times */
             response_times: components["schemas"]["TimeBin"][];
             playback: components["schemas"]["Playback"];
             /**
@@ -5918,110 +3356,49 @@ export interface components {
              * @enum {string}
              */
             kind: "other";
-            /** Note */
             note: string;
         };
-        /**
-         * OtherWay
-         * @description What somebody does who cannot see a motion check. Who takes it is at most `unclear`.
-         */
         OtherWay: {
-            /**
-             * Label
-             * @description The button that leads to it, offered before the clip and beside the answers.
-             */
             label: {
                 [key: string]: string;
             };
-            /**
-             * Text
-             * @description Markdown of the page behind the button; its button goes on with the study.
-             */
             text: {
                 [key: string]: string;
             };
         };
-        /**
-         * OwnAddress
-         * @description Where a link for a new password goes; null where no address is confirmed.
-         */
         OwnAddress: {
-            /** Address */
             address: string | null;
         };
-        /**
-         * OwnClips
-         * @description What to ask about one's own clips, where no definition is given.
-         *
-         *     The template says what participants do; `low` and `high` are for rating and sliders alone.
-         */
         OwnClips: {
             /**
-             * Template
              * @default rating
              * @enum {string}
              */
             template?: "rating" | "slider" | "sliders" | "acr" | "dcr" | "pairs" | "just_noticeable";
-            /** Title */
             title: string;
-            /**
-             * Question
-             * @default How natural was this clip?
-             */
+            /** @default How natural was this clip? */
             question?: string;
-            /**
-             * Low
-             * @default very unnatural
-             */
+            /** @default very unnatural */
             low?: string;
-            /**
-             * High
-             * @default very natural
-             */
+            /** @default very natural */
             high?: string;
         };
-        /**
-         * PairChoices
-         * @description What was chosen between two cells, sides and exemplars taken together.
-         */
         PairChoices: {
-            /** First */
             first: string;
-            /** Second */
             second: string;
-            /** N */
             n: number;
-            /** First Chosen */
             first_chosen: number;
-            /** Second Chosen */
             second_chosen: number;
-            /** Ties */
             ties: number;
         };
-        /**
-         * PairResults
-         * @description Paired comparisons.
-         */
         PairResults: {
-            /** Study */
             study: string;
-            /** Origin */
             origin: string;
-            /** Series */
             series: number;
-            /**
-             * Counted At
-             * Format: date-time
-             */
+            /** Format: date-time */
             counted_at: string;
-            /** Participants */
             participants: number;
-            /**
-             * Ratings
-             * @description Answers of any kind that count.
-             */
             ratings: number;
-            /** Response Times */
             response_times: components["schemas"]["TimeBin"][];
             playback: components["schemas"]["Playback"];
             /**
@@ -6029,255 +3406,101 @@ export interface components {
              * @enum {string}
              */
             kind: "paired_comparison";
-            /** Pairs */
             pairs: components["schemas"]["PairChoices"][];
-            /** Levels */
             levels: components["schemas"]["LevelChoices"][];
-            /**
-             * Left
-             * @description Answers for the clip on the left, or the first.
-             */
             left: number;
-            /** Right */
             right: number;
-            /** Ties */
             ties: number;
         };
-        /**
-         * PairedComparison
-         * @description Which of two clips? Shown at once or in turn, with a tie where one is declared.
-         *
-         *     A mouse that has not moved since its last press chooses nothing until `pointer_delay_ms` have passed.
-         */
         PairedComparison: {
             /**
-             * @description Names this kind of trial. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "paired_comparison";
-            /**
-             * Expected Seconds
-             * @description Expected length of a trial in seconds, for the length of a visit.
-             * @default 8
-             */
+            /** @default 8 */
             expected_seconds: number;
-            /**
-             * Question
-             * @description What is asked of the two clips, in every language.
-             */
             question: {
                 [key: string]: string;
             };
-            /**
-             * Presentation
-             * @description How the two clips are shown; there is no default.
-             */
             presentation: components["schemas"]["SideBySide"] | components["schemas"]["Stacked"] | components["schemas"]["OneAfterTheOther"];
-            /**
-             * Pairs
-             * @description Which clips are compared.
-             */
             pairs: components["schemas"]["AllPairs"] | components["schemas"]["WithinFactor"] | components["schemas"]["DeclaredPairs"];
             /**
-             * Dealing
-             * @description Who compares which of the pairs: in turn, in balanced incomplete blocks, or the most telling next.
              * @default {
              *       "by": "turn"
              *     }
              */
             dealing: components["schemas"]["InTurn"] | components["schemas"]["IncompleteBlocks"] | components["schemas"]["Active"];
-            /** @description Allows the answer that neither is chosen. */
             ties: components["schemas"]["Ties"] | null;
-            /** @description A clip shown before each pair. */
             reference: components["schemas"]["Reference"] | null;
-            /**
-             * Pointer Delay Ms
-             * @description Time, in ms, for which a mouse that has not moved since its last press chooses nothing.
-             * @default 1500
-             */
+            /** @default 1500 */
             pointer_delay_ms: number;
-            /**
-             * Pairs Per Person
-             * @description Comparisons of one participant in a block, dealt in turn from all pairs; where not given, all.
-             */
             pairs_per_person: number | null;
         };
-        /**
-         * Period
-         * @description One declared period of a study.
-         */
         Period: {
-            /**
-             * What
-             * @description Who took part; unfinished visits as a whole; every visit as a whole.
-             * @enum {string}
-             */
+            /** @enum {string} */
             what: "identifiers" | "unfinished" | "answers";
-            /**
-             * Days
-             * @description After a visit's last sign of life; of the version that new runs use.
-             */
             days: number;
         };
-        /**
-         * Piece
-         * @description Words of a text that stayed, went or came.
-         */
         Piece: {
-            /**
-             * Kind
-             * @enum {string}
-             */
+            /** @enum {string} */
             kind: "same" | "gone" | "new";
-            /** Text */
             text: string;
         };
-        /**
-         * Playback
-         * @description How the clips were shown.
-         */
         Playback: {
-            /** Verdicts */
             verdicts: {
                 [key: string]: number;
             };
-            /** Methods */
             methods: {
                 [key: string]: number;
             };
-            /** Rules */
             rules: {
                 [key: string]: number;
             };
-            /**
-             * Key To First Frame Ms
-             * @description Plays per bin of 10 ms, from 0; the last bin is open.
-             */
             key_to_first_frame_ms: number[];
         };
-        /**
-         * PlaybackLog
-         * @description What the page measured while the clip played; null where it could not.
-         */
         PlaybackLog: {
-            /**
-             * Method
-             * @enum {string}
-             */
+            /** @enum {string} */
             method: "webcodecs" | "video" | "none";
-            /** Clip Sha256 */
             clip_sha256?: string | null;
-            /** @description Of each clip, by its role, where a trial shows several. */
             clips?: components["schemas"]["ShownClips"] | null;
-            /** Key To First Frame Ms */
             key_to_first_frame_ms?: number | null;
-            /** Frames Drawn */
             frames_drawn?: number | null;
-            /** Frames Late */
             frames_late?: number | null;
-            /** Frames Missing */
             frames_missing?: number | null;
-            /** Longest Gap Ms */
             longest_gap_ms?: number | null;
-            /**
-             * Clock Gap Ms
-             * @description Longest time between two callbacks of the animation clock.
-             */
             clock_gap_ms?: number | null;
-            /**
-             * Clock Late Ms
-             * @description Longest time by which a callback ran after its refresh.
-             */
             clock_late_ms?: number | null;
-            /** Stalls */
             stalls?: number | null;
-            /**
-             * Focus Lost
-             * @description How often focus was lost.
-             */
             focus_lost?: number | null;
-            /**
-             * Disturbances
-             * @description How often each of [playback.disturbances] disturbed the views.
-             */
             disturbances?: {
                 [key: string]: number;
             } | null;
-            /** Refresh Rate Hz */
             refresh_rate_hz?: number | null;
-            /** Device Pixel Ratio */
             device_pixel_ratio?: number | null;
-            /**
-             * Drawn
-             * @description Index and time in ms since the start key of every drawn frame, view after view.
-             */
             drawn?: [
                 number,
                 number
             ][] | null;
         };
-        /**
-         * PlaybackRules
-         * @description When a play is uncertain, flagged or failed. Counts are frames of the clip, times are milliseconds.
-         *
-         *     A play breaking a `failed_*` limit is failed (its clip is offered again at the end of the block), one
-         *     breaking a `flagged_*` limit is flagged. One whose animation clock ran more unevenly than
-         *     `uncertain_unevenness_ms` is uncertain: all frames were drawn, and one may not have reached the screen.
-         *     What a frame may be late and is still shown comes on top: 0.9 of the refreshes for which it stays beyond
-         *     one, or of what the only one leaves; it is never more than 0.9 of the time for which it stays. Any other
-         *     play is good.
-         */
         PlaybackRules: {
-            /**
-             * Flagged Missing Frames
-             * @description Frames of the clip never drawn, more than which flag a play.
-             * @default 0
-             */
+            /** @default 0 */
             flagged_missing_frames: number;
-            /**
-             * Failed Missing Frames
-             * @description Frames of the clip never drawn, more than which fail a play.
-             * @default 3
-             */
+            /** @default 3 */
             failed_missing_frames: number;
-            /**
-             * Flagged Late Frames
-             * @description Frames drawn more than one refresh after their time, more than which flag a play.
-             * @default 2
-             */
+            /** @default 2 */
             flagged_late_frames: number;
-            /**
-             * Flagged Longest Gap Ms
-             * @description Longest time between two drawn frames, in ms, over which a play is flagged.
-             * @default 70
-             */
+            /** @default 70 */
             flagged_longest_gap_ms: number;
-            /**
-             * Failed Longest Gap Ms
-             * @description Longest time between two drawn frames, in ms, over which a play is failed.
-             * @default 250
-             */
+            /** @default 250 */
             failed_longest_gap_ms: number;
-            /**
-             * Uncertain Unevenness Ms
-             * @description Unevenness of the page's animation clock, in ms, over which a play is uncertain.
-             * @default 3
-             */
+            /** @default 3 */
             uncertain_unevenness_ms: number;
-            /**
-             * Fail On Focus Lost
-             * @description Whether a play fails where the page lost focus or visibility during it; else it is flagged.
-             * @default true
-             */
+            /** @default true */
             fail_on_focus_lost: boolean;
-            /**
-             * Flag Video Fallback
-             * @description Whether a play by the video element, which reports frames less exactly, is flagged.
-             * @default true
-             */
+            /** @default true */
             flag_video_fallback: boolean;
             /**
-             * @description What disturbances of a view do to its play.
              * @default {
              *       "full_screen_left": "flag",
              *       "window_too_small": "flag",
@@ -6288,1118 +3511,412 @@ export interface components {
              *     }
              */
             disturbances: components["schemas"]["Disturbances"];
-            /**
-             * Max Repeats
-             * @description How often a clip whose play failed is offered again, at the end of the block.
-             * @default 1
-             */
+            /** @default 1 */
             max_repeats: number;
         };
-        /**
-         * Points
-         * @description The points of a rating scale: whole numbers from `minimum` to `maximum`, 2 to 11 of them.
-         *
-         *     Either the two ends are labelled (`low`, `high`) or every point (`labels`).
-         */
         Points: {
             /**
-             * @description Names this type of scale; it is meant where none is named. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             type: "points";
-            /**
-             * Name
-             * @description Names the scale in the data (column `scale`); each of several needs its own.
-             * @default rating
-             */
+            /** @default rating */
             name: string;
-            /**
-             * Question
-             * @description What is asked, in every language.
-             */
             question: {
                 [key: string]: string;
             };
-            /**
-             * Reverse
-             * @description Whether a high answer means little of what is measured; the data keep the answer as it was given.
-             * @default false
-             */
+            /** @default false */
             reverse: boolean;
-            /**
-             * Not Applicable
-             * @description Label of an answer beside the scale, such as `cannot say`; it is stored without a number.
-             */
             not_applicable: {
                 [key: string]: string;
             } | null;
-            /**
-             * Minimum
-             * @description Lowest point of the scale, a whole number.
-             * @default 1
-             */
+            /** @default 1 */
             minimum: number;
-            /**
-             * Maximum
-             * @description Highest point; with the lowest it makes 2 to 11 points.
-             * @default 7
-             */
+            /** @default 7 */
             maximum: number;
-            /**
-             * Low
-             * @description Label of the lowest point.
-             */
             low: {
                 [key: string]: string;
             } | null;
-            /**
-             * High
-             * @description Label of the highest point.
-             */
             high: {
                 [key: string]: string;
             } | null;
-            /**
-             * Labels
-             * @description Labels of all points from the lowest, instead of `low` and `high`.
-             * @default []
-             */
+            /** @default [] */
             labels: {
                 [key: string]: string;
             }[];
         };
-        /**
-         * Power
-         * @description What `analysis plan` says of the design, and what was assumed for it.
-         */
         Power: {
-            /** Assumed */
             assumed: string;
-            /** Command */
             command: string;
-            /** N */
             n: number[];
-            /** Effects */
             effects: string[];
-            /**
-             * Power
-             * @description A list an effect, a value each number of participants.
-             */
             power: number[][];
-            /** Text */
             text: string;
         };
-        /**
-         * Practice
-         * @description Practice trials before the first block; their clips are drawn over all cells by the run's seed.
-         */
         Practice: {
-            /**
-             * Trials
-             * @description How many practice trials there are. They are stored with kind `practice` and never analysed.
-             * @default 4
-             */
+            /** @default 4 */
             trials: number;
         };
-        /**
-         * ProblemOut
-         * @description One thing wrong in a definition.
-         */
         ProblemOut: {
-            /** Line */
             line: number | null;
-            /** Path */
             path: string;
-            /** Message */
             message: string;
         };
-        /**
-         * ProviderOut
-         * @description A service that one can sign in with.
-         */
         ProviderOut: {
-            /** Id */
             id: string;
-            /** Label */
             label: string;
         };
-        /**
-         * Range
-         * @description Numbers at even distances, ends included.
-         */
         Range: {
-            /**
-             * Lowest
-             * @description Lowest number.
-             */
             lowest: number;
-            /**
-             * Highest
-             * @description Highest number.
-             */
             highest: number;
-            /**
-             * Steps
-             * @description How many numbers, both ends included.
-             * @default 31
-             */
+            /** @default 31 */
             steps: number;
         };
-        /**
-         * RatingAnswer
-         * @description The answers to one clip by the name of their scale; a [trial.scale] is called `rating`.
-         */
         RatingAnswer: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "clip_rating";
-            /** Answers */
             answers: {
                 [key: string]: components["schemas"]["ScaleAnswer"];
             };
-            /**
-             * Reference Gap Ms
-             * @description From the reference's last frame to the rated clip's first as they were drawn, where there is one.
-             */
             reference_gap_ms?: number | null;
         };
-        /**
-         * RatingEvidence
-         * @description What a rating brings along to show how it came about.
-         */
         RatingEvidence: {
-            /** Batch */
             batch: string;
-            /** Ticket */
             ticket: string;
-            /**
-             * Digest
-             * @description HMAC-SHA-256, with the ticket as key, of the SHA-512 of each clip of the trial, joined.
-             */
             digest?: string | null;
             interaction?: components["schemas"]["Interaction"] | null;
         };
-        /**
-         * RatingIn
-         * @description One play of one trial with its answer, whose `kind` is that of the study's trials.
-         *
-         *     Pages of before send a rating as `response`, a whole number or null.
-         */
         RatingIn: {
-            /** Trial Index */
             trial_index: number;
-            /**
-             * Play
-             * @default 1
-             */
+            /** @default 1 */
             play?: number;
-            /** Answer */
             answer: components["schemas"]["RatingAnswer"] | components["schemas"]["ComparisonAnswer"] | components["schemas"]["ThresholdAnswer"] | components["schemas"]["ContinuousAnswer"] | components["schemas"]["CheckAnswer"];
-            /**
-             * Rt
-             * @description From the clip's last frame to the answer, ms.
-             */
             rt?: number | null;
-            /** Rt From First Frame */
             rt_from_first_frame?: number | null;
-            /**
-             * Time Elapsed
-             * @description From the run's start to the answer, ms.
-             */
             time_elapsed?: number | null;
-            /**
-             * Changes
-             * @default 0
-             */
+            /** @default 0 */
             changes?: number;
-            /** Comment */
             comment?: string | null;
-            /** Answered At Client */
             answered_at_client?: string | null;
             playback: components["schemas"]["PlaybackLog"];
             evidence?: components["schemas"]["RatingEvidence"] | null;
         };
-        /**
-         * RatingReference
-         * @description The clip shown before each rated one, as in degradation category rating (ITU-T P.910).
-         *
-         *     Either the rated clip with another `level` of one `factor`, or the clip of one `cell` with the exemplar of
-         *     the rated clip.
-         */
         RatingReference: {
-            /**
-             * Factor
-             * @description The factor in whose level the reference differs from the rated clip; all other levels and the exemplar
-             *     are those of the rated clip.
-             */
             factor: string | null;
-            /**
-             * Level
-             * @description The reference's level of that factor.
-             */
             level: string | null;
-            /**
-             * Cell
-             * @description Label of the reference's cell, instead of `factor` and `level`: its level names in factor order, joined
-             *     by slashes. Levels between participants are the participant's own.
-             */
             cell: string | null;
-            /**
-             * Label
-             * @description What the page says below the reference while it runs, in every language.
-             */
             label: {
                 [key: string]: string;
             };
-            /**
-             * Gap Ms
-             * @description Plain background between the reference and the rated clip, in ms.
-             * @default 2000
-             */
+            /** @default 2000 */
             gap_ms: number;
-            /**
-             * Rate Itself
-             * @description Whether the reference is also rated against itself (P.910's hidden reference); else its cells are not
-             *     rated.
-             * @default false
-             */
+            /** @default false */
             rate_itself: boolean;
         };
-        /**
-         * RatingSaved
-         * @description The answer to a rating.
-         */
         RatingSaved: {
             receipt: components["schemas"]["Receipt"];
-            /** @description Where answers decide what is shown next; left out where they do not. */
             next?: components["schemas"]["NextTrials"] | null;
         };
-        /**
-         * Receipt
-         * @description The rating is on disk.
-         */
         Receipt: {
-            /** Rating Id */
             rating_id: string;
-            /**
-             * Saved At
-             * Format: date-time
-             */
+            /** Format: date-time */
             saved_at: string;
-            /**
-             * Verdict
-             * @enum {string}
-             */
+            /** @enum {string} */
             verdict: "good" | "uncertain" | "flagged" | "failed";
-            /**
-             * Rule
-             * @description The rule that gave the verdict, empty where good.
-             */
             rule: string;
-            /**
-             * Again
-             * @description Show the clip again at the end of its block, as the next play.
-             */
             again: boolean;
-            /**
-             * Remaining
-             * @description Trials of the run that still need an answer.
-             */
             remaining: number;
-            /**
-             * Status
-             * @description Of the run: screened_out where this answer ended it.
-             * @enum {string}
-             */
+            /** @enum {string} */
             status: "active" | "complete" | "screened_out" | "withdrawn";
-            /** @description To be shown before the next trial; left out where there is none. */
             warning?: components["schemas"]["WarningShown"] | null;
         };
-        /**
-         * Received
-         * @description The server has it.
-         */
         Received: {
-            /** Received */
             received: number;
         };
-        /**
-         * RecordedProfile
-         * @description One recorded blink at 300 fps: of one eye, or of both on common samples.
-         */
         RecordedProfile: {
-            /** Profile Id */
             profile_id: string;
-            /** Recording */
             recording: string;
-            /** Person */
             person: string;
-            /**
-             * Eye
-             * @description left, right, both (`closure` is the left eye's), or empty where unknown.
-             */
             eye: string;
-            /** Down Frames */
             down_frames: number;
-            /** Up Frames */
             up_frames: number;
-            /** Amplitude */
             amplitude: number;
-            /** Minimum Index */
             minimum_index: number;
-            /** Source */
             source: string;
-            /** Licence */
             licence: string;
-            /**
-             * Closure
-             * @description Closure per frame at `fps`: 0 open, 1 closed.
-             */
             closure: number[];
-            /**
-             * Closure Other
-             * @description The right eye's where `eye` is both; else empty.
-             */
             closure_other: number[];
         };
-        /**
-         * RecoveryCodes
-         * @description Codes shown once; each signs in once without the app.
-         */
         RecoveryCodes: {
-            /** Codes */
             codes: string[];
         };
-        /**
-         * Recruiter
-         * @description How a recruiter sends participants and takes them back; see the module for each key.
-         */
         Recruiter: {
             /**
-             * Kind
              * @default generic
              * @enum {string}
              */
             kind?: "prolific" | "sona" | "mturk" | "generic";
-            /**
-             * Id Parameter
-             * @default
-             */
+            /** @default  */
             id_parameter?: string;
-            /**
-             * Redirect Url
-             * @default
-             */
+            /** @default  */
             redirect_url?: string;
-            /**
-             * Redirect Declined
-             * @default
-             */
+            /** @default  */
             redirect_declined?: string;
-            /**
-             * Redirect Screened Out
-             * @default
-             */
+            /** @default  */
             redirect_screened_out?: string;
-            /**
-             * Code Complete
-             * @default
-             */
+            /** @default  */
             code_complete?: string;
-            /**
-             * Code Failed Check
-             * @default
-             */
+            /** @default  */
             code_failed_check?: string;
-            /**
-             * Code Screened Out
-             * @default
-             */
+            /** @default  */
             code_screened_out?: string;
-            /**
-             * Signature Parameter
-             * @default
-             */
+            /** @default  */
             signature_parameter?: string;
-            /**
-             * Secret Name
-             * @default
-             */
+            /** @default  */
             secret_name?: string;
         };
-        /**
-         * Reference
-         * @description A clip shown before each pair, as in degradation category rating: the cell, the pair's exemplar.
-         */
         Reference: {
-            /**
-             * Cell
-             * @description Label of its cell; the exemplar is that of the pair, and levels between participants are the
-             *     participant's own.
-             */
             cell: string;
-            /**
-             * Label
-             * @description What the page says below it while it runs, in every language.
-             */
             label: {
                 [key: string]: string;
             };
-            /**
-             * Gap Ms
-             * @description Plain background after it, in ms.
-             * @default 500
-             */
+            /** @default 500 */
             gap_ms: number;
         };
-        /**
-         * RehearsalOut
-         * @description A rehearsal that waits, goes on, is done or has failed (then `message` says why).
-         */
         RehearsalOut: {
-            /** Id */
             id: string;
-            /**
-             * Status
-             * @enum {string}
-             */
+            /** @enum {string} */
             status: "queued" | "running" | "done" | "failed" | "cancelled";
-            /** Progress */
             progress: number;
-            /** Message */
             message: string;
-            /** Version */
             version: number;
-            /** Participants */
             participants: number;
-            /**
-             * Created At
-             * Format: date-time
-             */
+            /** Format: date-time */
             created_at: string;
         };
-        /**
-         * RehearsalResult
-         * @description What the rehearsal showed.
-         */
         RehearsalResult: {
-            /** Participants */
             participants: number;
-            /** Complete */
             complete: number;
-            /** Answers */
             answers: number;
-            /**
-             * Expected Minutes
-             * @description Declared seconds a trial times trials.
-             */
             expected_minutes: number;
-            /**
-             * People
-             * @description The first few.
-             */
             people: components["schemas"]["RehearsedPerson"][];
-            /** Columns */
             columns: components["schemas"]["RehearsedColumn"][];
-            /**
-             * Report
-             * @description Files of the report; empty where `report_problem` says why.
-             */
             report: string[];
-            /** Report Problem */
             report_problem: string;
             power: components["schemas"]["Power"] | null;
-            /** Power Problem */
             power_problem: string;
         };
-        /**
-         * RehearsedColumn
-         * @description A column of the data, with a value that a simulated person left.
-         */
         RehearsedColumn: {
-            /** Table */
             table: string;
-            /** Name */
             name: string;
-            /** Type */
             type: string;
-            /** Meaning */
             meaning: string;
-            /** Example */
             example: string;
         };
-        /**
-         * RehearsedPerson
-         * @description In which order one simulated person saw what.
-         */
         RehearsedPerson: {
-            /** Number */
             number: number;
-            /** Group */
             group: string;
-            /** Status */
             status: string;
-            /**
-             * Minutes
-             * @description Clips and answers; no forms, breaks or texts.
-             */
             minutes: number;
-            /** Trials */
             trials: components["schemas"]["RehearsedTrial"][];
         };
-        /**
-         * RehearsedTrial
-         * @description One trial in a simulated person's order.
-         */
         RehearsedTrial: {
-            /** Trial Index */
             trial_index: number;
-            /** Kind */
             kind: string;
-            /** Block */
             block: string;
-            /** Clips */
             clips: string[];
         };
-        /**
-         * RenderOverrides
-         * @description What a level changes of [render]; a key left out stays as it is there.
-         */
         RenderOverrides: {
-            /**
-             * Character
-             * @description As [render] `character`, for clips of this level.
-             */
             character: string | null;
-            /**
-             * Profile
-             * @description As [render] `profile`, for clips of this level.
-             */
             profile: string | null;
-            /**
-             * Duration Frames
-             * @description As [render] `duration_frames`, for clips of this level.
-             */
             duration_frames: number | null;
-            /**
-             * Duration Frames Fps
-             * @description As [render] `duration_frames_fps`, for clips of this level.
-             */
             duration_frames_fps: number | null;
-            /**
-             * Duration Ms
-             * @description As [render] `duration_ms`, for clips of this level.
-             */
             duration_ms: number | null;
-            /**
-             * Amplitude
-             * @description As [render] `amplitude`, for clips of this level.
-             */
             amplitude: ("full" | "natural") | null;
-            /**
-             * Motion Blur
-             * @description As [render] `motion_blur`, for clips of this level.
-             */
             motion_blur: boolean | null;
-            /**
-             * Lower Lid
-             * @description As [render] `lower_lid`, for clips of this level.
-             */
             lower_lid: ("both" | "vertical" | "horizontal" | "none") | null;
-            /**
-             * Lower Lid Gain
-             * @description As [render] `lower_lid_gain`, for clips of this level.
-             */
             lower_lid_gain: number | null;
-            /**
-             * Brow Mm
-             * @description As [render] `brow_mm`, for clips of this level.
-             */
             brow_mm: number | null;
-            /**
-             * Cheek Mm
-             * @description As [render] `cheek_mm`, for clips of this level.
-             */
             cheek_mm: number | null;
-            /**
-             * Squint Mm
-             * @description As [render] `squint_mm`, for clips of this level.
-             */
             squint_mm: number | null;
-            /**
-             * Gaze Mm
-             * @description As [render] `gaze_mm`, for clips of this level.
-             */
             gaze_mm: number | null;
-            /**
-             * Eyes
-             * @description As [render] `eyes`, for clips of this level.
-             */
             eyes: ("alike" | "separate") | null;
-            /**
-             * Performance
-             * @description As [render] `performance`, for clips of this level.
-             */
             performance: ("uniform" | "intervals" | "events" | "none") | null;
-            /**
-             * Seconds
-             * @description As [render] `seconds`, for clips of this level.
-             */
             seconds: number | null;
-            /**
-             * State
-             * @description As [render] `state`, for clips of this level.
-             */
             state: ("rest" | "reading" | "screen" | "speaking" | "listening") | null;
-            /**
-             * Blinks Per Minute
-             * @description As [render] `blinks_per_minute`, for clips of this level.
-             */
             blinks_per_minute: number | null;
-            /**
-             * Events S
-             * @description As [render] `events_s`, for clips of this level.
-             */
             events_s: number[] | null;
-            /**
-             * Event
-             * @description As [render] `event`, for clips of this level.
-             */
             event: ("utterance_start" | "utterance_end" | "pause" | "turn_end") | null;
-            /**
-             * Speech
-             * @description As [render] `speech`, for clips of this level.
-             */
             speech: string | null;
-            /**
-             * Fps
-             * @description As [render] `fps`, for clips of this level.
-             */
             fps: number | null;
         };
-        /**
-         * RenderSettings
-         * @description Everything the clip builder needs for one cell.
-         */
         RenderSettings: {
-            /**
-             * Character
-             * @description A shipped character (`stimuli character list`: `alder@6`, `cartoon`), or the path of a folder of
-             *     your own; a list of them is short for a last factor `character` with a level each. Left out, it is the
-             *     retired `photorealistic`, so that old declarations keep their meaning.
-             * @default photorealistic
-             */
+            /** @default photorealistic */
             character: string;
-            /**
-             * Profile
-             * @description Blink profile: recorded (`real`), of the PCA model (`model`), a textbook curve (`SL`, `AL`, `SL_ease`,
-             *     `AL_ease`: symmetric or asymmetric, linear or eased), or a CSV file of closure (0 open, 1 closed).
-             * @default real
-             */
+            /** @default real */
             profile: string;
-            /**
-             * Duration Frames
-             * @description Length of the blink, in frames at `duration_frames_fps`, whatever rate the clip has; left out (and
-             *     `duration_ms` too), blinks keep their recorded length.
-             */
             duration_frames: number | null;
-            /**
-             * Duration Frames Fps
-             * @description Rate at which `duration_frames` counts, in frames per second.
-             * @default 30
-             */
+            /** @default 30 */
             duration_frames_fps: number;
-            /**
-             * Duration Ms
-             * @description Length of the blink in milliseconds, instead of `duration_frames`.
-             */
             duration_ms: number | null;
             /**
-             * Amplitude
-             * @description `full` (FC) closes the eye fully, to closure 1; `natural` (NC) keeps the closure that was measured.
              * @default full
              * @enum {string}
              */
             amplitude: "full" | "natural";
-            /**
-             * Motion Blur
-             * @description Mean of the 300 fps samples of an output frame in linear light (MB), or one sample of it (NB).
-             * @default true
-             */
+            /** @default true */
             motion_blur: boolean;
             /**
-             * Lower Lid
-             * @description Which recorded signals move the lower lid.
              * @default none
              * @enum {string}
              */
             lower_lid: "both" | "vertical" | "horizontal" | "none";
-            /**
-             * Lower Lid Gain
-             * @description Size of the lower lid's motion relative to what was recorded; 0 holds it still. A clip that asks for
-             *     more than its character was baked for (1 mm up, 5 mm towards the nose) is refused.
-             * @default 1
-             */
+            /** @default 1 */
             lower_lid_gain: number;
-            /**
-             * Brow Mm
-             * @description How far the brows sink and draw together while the eye shuts, in mm at closure 1, in proportion to it;
-             *     0 holds them still. Left out, as the character was drawn or baked (`cartoon` 0.45, baked faces 0).
-             */
             brow_mm: number | null;
-            /**
-             * Cheek Mm
-             * @description How far the cheeks rise while the eye shuts, in mm at closure 1; as `brow_mm`.
-             */
             cheek_mm: number | null;
-            /**
-             * Squint Mm
-             * @description How far the skin below the eye draws up and towards the nose while it shuts, in mm at closure 1; as
-             *     `brow_mm`. The margin of the lower lid is `lower_lid`'s.
-             */
             squint_mm: number | null;
-            /**
-             * Gaze Mm
-             * @description How far the iris turns down, and half as far towards the nose, under the closing lid, in mm at closure
-             *     1 (0.2 is one degree); as `brow_mm`.
-             */
             gaze_mm: number | null;
             /**
-             * Eyes
-             * @description One signal drives both eyes, or the left and the right recording an eye each.
              * @default alike
              * @enum {string}
              */
             eyes: "alike" | "separate";
-            /**
-             * Performance
-             * @description Shows a performance of the blink engine for `seconds` instead of a single blink. What times its blinks:
-             *     a timer whose intervals lie evenly between half and one and a half times their mean (`uniform`), the
-             *     engine's fitted intervals (`intervals`), these and the events of `events_s` or `speech` (`events`), or
-             *     nothing, the eyes staying open (`none`). Blink n of an exemplar looks the same whatever times it. The keys
-             *     `profile` and of the blink's length are for single blinks.
-             */
             performance: ("uniform" | "intervals" | "events" | "none") | null;
-            /**
-             * Seconds
-             * @description Length of a performance, in seconds.
-             * @default 20
-             */
+            /** @default 20 */
             seconds: number;
             /**
-             * State
-             * @description What the person of a performance does, which sets the mean blink rate (docs/blink-engine.md).
              * @default listening
              * @enum {string}
              */
             state: "rest" | "reading" | "screen" | "speaking" | "listening";
-            /**
-             * Blinks Per Minute
-             * @description Mean blink rate of a performance; left out, that published for its state.
-             */
             blinks_per_minute: number | null;
-            /**
-             * Events S
-             * @description Moments that blinks answer where `performance` is `events`, in seconds from the clip's start.
-             * @default []
-             */
+            /** @default [] */
             events_s: number[];
             /**
-             * Event
-             * @description What happens at the moments of `events_s`.
              * @default turn_end
              * @enum {string}
              */
             event: "utterance_start" | "utterance_end" | "pause" | "turn_end";
-            /**
-             * Speech
-             * @description A recording with sound or subtitles (.vtt, .srt) beside the TOML whose pauses and turns blinks answer,
-             *     where `performance` is `events`; the person speaks then, and is in `state` between turns.
-             * @default
-             */
+            /** @default  */
             speech: string;
-            /**
-             * Fps
-             * @description Frame rate of the clip, in frames per second.
-             * @default 30
-             */
+            /** @default 30 */
             fps: number;
-            /**
-             * Width Px
-             * @description Width of the clip, in pixels.
-             * @default 960
-             */
+            /** @default 960 */
             width_px: number;
-            /**
-             * Height Px
-             * @description Height of the clip, in pixels.
-             * @default 360
-             */
+            /** @default 360 */
             height_px: number;
         };
-        /**
-         * Replay
-         * @description A run that can be played back, and what its trials looked like.
-         */
         Replay: {
-            /** Run */
             run: string;
-            /** Participant */
             participant: string;
-            /** Origin */
             origin: string;
-            /** Language */
             language: string;
-            /** Erased */
             erased: boolean;
-            /** Trial */
             trial: components["schemas"]["ShownClipRating"] | components["schemas"]["ShownPairedComparison"] | components["schemas"]["ShownThreshold"] | components["schemas"]["ShownContinuousRating"];
             display: components["schemas"]["Display"];
-            /** Trials */
             trials: components["schemas"]["ReplayableTrial"][];
         };
-        /**
-         * ReplayableTrial
-         * @description One line of the list of trials.
-         */
         ReplayableTrial: {
-            /** Trial Index */
             trial_index: number;
-            /** Kind */
             kind: string;
-            /** Block */
             block: number;
-            /** Block Label */
             block_label: string;
-            /** Clips */
             clips: components["schemas"]["ClipInRole"][];
-            /** Plays */
             plays: number;
-            /** Views */
             views: number;
-            /**
-             * Verdict
-             * @description Of the last play; null without an answer.
-             */
             verdict: string | null;
         };
-        /**
-         * ReplayedClip
-         * @description A clip of a trial, with what gives its size on the participant's screen.
-         */
         ReplayedClip: {
-            /** Clip Sha256 */
             clip_sha256: string;
-            /** Clip Url */
             clip_url: string;
-            /** Cell */
             cell: string;
-            /** Exemplar */
             exemplar: number;
-            /** Frames */
             frames: number;
-            /** Fps */
             fps: number;
-            /** Width Px */
             width_px: number;
-            /** Height Px */
             height_px: number;
-            /** Width Mm */
             width_mm: number | null;
-            /** Inter Ocular Px */
             inter_ocular_px: number | null;
         };
-        /**
-         * ReplayedEvent
-         * @description Something that happened around a trial, by the participant's clock.
-         */
         ReplayedEvent: {
-            /** Type */
             type: string;
-            /**
-             * At Client
-             * Format: date-time
-             */
+            /** Format: date-time */
             at_client: string;
-            /** Data */
             data: {
                 [key: string]: unknown;
             };
         };
-        /**
-         * ReplayedPlay
-         * @description One play of a trial: its views, its answer and the verdict; no answer where the page never sent one.
-         */
         ReplayedPlay: {
-            /** Play */
             play: number;
-            /**
-             * Px Per Mm
-             * @description CSS pixels per mm by the calibration that was in force.
-             */
             px_per_mm: number | null;
-            /** Views */
             views: components["schemas"]["ReplayedView"][];
-            /**
-             * Answer
-             * @description As its kind of trial stores it.
-             */
             answer: {
                 [key: string]: unknown;
             } | null;
-            /**
-             * Rt
-             * @description From the clip's last frame to the answer, ms.
-             */
             rt: number | null;
-            /** Rt From First Frame */
             rt_from_first_frame: number | null;
-            /** Answered At Client */
             answered_at_client: string | null;
-            /** Comment */
             comment: string | null;
-            /** Method */
             method: string | null;
-            /** Verdict */
             verdict: string | null;
-            /** Verdict Rule */
             verdict_rule: string;
-            /** Refresh Rate Hz */
             refresh_rate_hz: number | null;
-            /** Device Pixel Ratio */
             device_pixel_ratio: number | null;
         };
-        /**
-         * ReplayedTrial
-         * @description One trial with all its plays.
-         */
         ReplayedTrial: {
-            /** Trial Index */
             trial_index: number;
-            /**
-             * Clips
-             * @description Every clip that a view names or the trial was assigned.
-             */
             clips: components["schemas"]["ReplayedClip"][];
-            /** Expected Response */
             expected_response: number | null;
-            /** Plays */
             plays: components["schemas"]["ReplayedPlay"][];
-            /** Events */
             events: components["schemas"]["ReplayedEvent"][];
         };
-        /**
-         * ReplayedView
-         * @description One view: what each clip's log says was drawn when, in ms since the view's start key.
-         */
         ReplayedView: {
-            /** Number */
             number: number;
-            /**
-             * From Answer
-             * @description True where the run is older than the ledger of views: rebuilt from the answer's log.
-             */
             from_answer: boolean;
-            /** Started At Client */
             started_at_client: string | null;
-            /** Ended At Client */
             ended_at_client: string | null;
-            /**
-             * Outcome
-             * @description Null where the view was left open, or is rebuilt.
-             */
             outcome: ("shown" | "interrupted") | null;
-            /**
-             * Screen
-             * @description Window and screen at the view's start.
-             */
             screen: {
                 [key: string]: unknown;
             };
-            /** Showings */
             showings: components["schemas"]["ViewShowing"][] | null;
-            /** Clips */
             clips: components["schemas"]["FrameLog"][];
-            /**
-             * Disturbances
-             * @description How often each disturbed this view.
-             */
             disturbances: {
                 [key: string]: number;
             };
         };
-        /**
-         * ReportOut
-         * @description A report that waits, runs, is done or has failed (then `message` says why).
-         */
         ReportOut: {
-            /** Id */
             id: string;
-            /**
-             * Status
-             * @enum {string}
-             */
+            /** @enum {string} */
             status: "queued" | "running" | "done" | "failed" | "cancelled";
-            /** Progress */
             progress: number;
-            /** Message */
             message: string;
-            /** Origin */
             origin: string;
-            /** Series */
             series: number | null;
-            /**
-             * Created At
-             * Format: date-time
-             */
+            /** Format: date-time */
             created_at: string;
-            /** Finished At */
             finished_at: string | null;
-            /** Files */
             files: string[];
         };
-        /**
-         * ResultScale
-         * @description A scale as declared; answers are shown as they were chosen, reverse-keyed or not.
-         */
         ResultScale: {
-            /** Name */
             name: string;
-            /** Type */
             type: string;
-            /** Minimum */
             minimum: number;
-            /** Maximum */
             maximum: number;
-            /** Reverse */
             reverse: boolean;
         };
-        /**
-         * Results
-         * @description Ratings of single clips.
-         */
         Results: {
-            /** Study */
             study: string;
-            /** Origin */
             origin: string;
-            /** Series */
             series: number;
-            /**
-             * Counted At
-             * Format: date-time
-             */
+            /** Format: date-time */
             counted_at: string;
-            /** Participants */
             participants: number;
-            /**
-             * Ratings
-             * @description Answers of any kind that count.
-             */
             ratings: number;
-            /** Response Times */
             response_times: components["schemas"]["TimeBin"][];
             playback: components["schemas"]["Playback"];
             /**
@@ -7407,817 +3924,309 @@ export interface components {
              * @enum {string}
              */
             kind: "clip_rating";
-            /**
-             * Scales
-             * @description Every scale of the study, in order.
-             */
             scales: components["schemas"]["ResultScale"][];
-            /** @description The one whose answers these are. */
             scale: components["schemas"]["ResultScale"];
-            /**
-             * Bins
-             * @description Lowest answer of each count: the scale's points, or equal parts of a slider.
-             */
             bins: number[];
-            /** Margins */
             margins: components["schemas"]["Margin"][];
-            /** Cells */
             cells: components["schemas"]["CellResult"][];
-            /** Clips */
             clips: components["schemas"]["ClipResult"][];
         };
-        /**
-         * Retention
-         * @description How long data of persons are kept, in days after a visit's last sign of life.
-         *
-         *     Then the server erases them by itself, within the hour.
-         *
-         *     A visit keeps to what was declared when it began, or to what is declared since where that is shorter. A
-         *     period without a number is without an end.
-         */
         Retention: {
-            /**
-             * Identifiers Days
-             * @description Days after which it is erased who took part: recruiters' ids, what else the address said, completion
-             *     codes and labels of personal links. Answers stay, under the pseudonym.
-             */
             identifiers_days: number | null;
-            /**
-             * Unfinished Days
-             * @description Days after which visits that were not completed are erased, answers and all.
-             */
             unfinished_days: number | null;
-            /**
-             * Answers Days
-             * @description Days after which every visit is erased, answers and all; a row without content stays for the counts.
-             */
             answers_days: number | null;
         };
-        /**
-         * RetentionPreview
-         * @description What would be erased at this moment, and when something is due next.
-         */
         RetentionPreview: {
-            /** Study */
             study: string;
-            /**
-             * Periods
-             * @description As the version declares them that new runs use.
-             */
             periods: components["schemas"]["Period"][];
-            /**
-             * Identifiers
-             * @description Visits whose identifiers are due.
-             */
             identifiers: number;
-            /**
-             * Visits
-             * @description Visits that are due as a whole.
-             */
             visits: number;
-            /**
-             * Next At
-             * @description When more is due; null where nothing is on its way.
-             */
             next_at: string | null;
         };
-        /**
-         * RunIdentity
-         * @description Who a participant is to the recruiter.
-         */
         RunIdentity: {
-            /** Run */
             run: string;
-            /**
-             * Participant
-             * @description The study's pseudonym.
-             */
             participant: string;
-            /**
-             * Identifier
-             * @description The recruiter's id; empty where the address named nobody.
-             */
             identifier: string;
-            /**
-             * Parameters
-             * @description Of the address by which the participant came.
-             */
             parameters: {
                 [key: string]: unknown;
             };
-            /**
-             * Link
-             * @description Label of the link.
-             */
             link: string;
         };
-        /**
-         * RunPage
-         * @description Runs, the latest first.
-         */
         RunPage: {
-            /** Runs */
             runs: components["schemas"]["RunSummary"][];
-            /**
-             * Total
-             * @description How many runs fit, on all pages.
-             */
             total: number;
-            /**
-             * Next
-             * @description Ask again with `before` = this; null at the end.
-             */
             next: string | null;
         };
-        /**
-         * RunStart
-         * @description Begin (or take up) a run. The same client_id gets the same run, however often it asks.
-         */
         RunStart: {
-            /** Language */
             language: string;
-            /**
-             * Client Id
-             * Format: uuid
-             */
+            /** Format: uuid */
             client_id: string;
-            /**
-             * Evidence
-             * @description The page brings evidence with each answer.
-             * @default false
-             */
+            /** @default false */
             evidence?: boolean;
-            /**
-             * View Tickets
-             * @description It brings a ticket with each view, too.
-             * @default false
-             */
+            /** @default false */
             view_tickets?: boolean;
-            /**
-             * Query
-             * @description Parameters of the address, such as PROLIFIC_PID.
-             */
             query?: {
                 [key: string]: string;
             };
-            /** Device */
             device?: {
                 [key: string]: unknown;
             };
-            /**
-             * Resume Code
-             * @description Code that the page has shown: takes up that visit in this browser.
-             */
             resume_code?: string | null;
-            /**
-             * Anew
-             * @description Begin a visit though one under the same recruiter's id is open in another browser.
-             * @default false
-             */
+            /** @default false */
             anew?: boolean;
         };
-        /**
-         * RunStarted
-         * @description The token that stands for the run from now on.
-         */
         RunStarted: {
-            /** Run Token */
             run_token: string;
-            /** Run Id */
             run_id: string;
-            /** Resumed */
             resumed: boolean;
         };
-        /**
-         * RunState
-         * @description Everything the page needs to begin or to go on.
-         */
         RunState: {
-            /** Run Id */
             run_id: string;
-            /**
-             * Status
-             * @enum {string}
-             */
+            /** @enum {string} */
             status: "active" | "complete" | "screened_out" | "withdrawn";
-            /**
-             * Stage
-             * @enum {string}
-             */
+            /** @enum {string} */
             stage: "consent" | "forms_before" | "calibration" | "instructions" | "practice" | "trials" | "forms_after" | "debrief" | "done";
-            /**
-             * Origin
-             * @description Where the run's answers come from; given at its start.
-             * @enum {string}
-             */
+            /** @enum {string} */
             origin: "participant" | "preview" | "pilot" | "simulated";
-            /** Language */
             language: string;
-            /** Languages */
             languages: string[];
-            /** @description Markdown of the run's language, by page. */
             texts: components["schemas"]["Texts"];
-            /** Forms */
             forms: components["schemas"]["Form"][];
-            /** Trial */
             trial: components["schemas"]["ShownClipRating"] | components["schemas"]["ShownPairedComparison"] | components["schemas"]["ShownThreshold"] | components["schemas"]["ShownContinuousRating"];
             display: components["schemas"]["Display"];
             playback: components["schemas"]["PlaybackRules"];
-            /** Break Seconds Min */
             break_seconds_min: number;
-            /** Consented At */
             consented_at: string | null;
             calibration: components["schemas"]["CalibrationState"] | null;
-            /** Answered Forms */
             answered_forms: string[];
-            /**
-             * Awaits Group
-             * @description There are no trials yet: an answer of a form decides the group.
-             */
             awaits_group: boolean;
-            /** Blocks */
             blocks: components["schemas"]["BlockInfo"][];
-            /** Trials */
             trials: components["schemas"]["TrialInfo"][];
-            /** @description Words of the motion checks; null where there are none. */
             checks?: components["schemas"]["ShownChecks"] | null;
-            /** Elapsed Ms Before */
             elapsed_ms_before: number;
-            /** Completion Code */
             completion_code: string | null;
-            /**
-             * Resumable Until
-             * @description Until when a reloaded page may go on without asking; null where it must ask.
-             */
             resumable_until: string | null;
-            /**
-             * Resume Code
-             * @description By it the visit is taken up on another device; null where the link itself does that.
-             */
             resume_code: string | null;
-            /**
-             * Server Time
-             * Format: date-time
-             */
+            /** Format: date-time */
             server_time: string;
-            /** @description Leave to answer, a ticket for each play of each trial. */
             tickets: components["schemas"]["Tickets"] | null;
-            /** @description One that no page has shown yet. */
             warning?: components["schemas"]["WarningShown"] | null;
         };
-        /**
-         * RunSummary
-         * @description One line of the participants page.
-         */
         RunSummary: {
-            /** Run */
             run: string;
-            /** Participant */
             participant: string;
-            /** Phase */
             phase: string;
-            /** Origin */
             origin: string;
-            /** Status */
             status: string;
-            /** Stage */
             stage: string;
-            /** Language */
             language: string;
-            /**
-             * Started At
-             * Format: date-time
-             */
+            /** Format: date-time */
             started_at: string;
-            /**
-             * Last Seen At
-             * Format: date-time
-             */
+            /** Format: date-time */
             last_seen_at: string;
-            /** Completed At */
             completed_at: string | null;
-            /**
-             * Minutes
-             * @description From start to end, or to the last sign of life.
-             */
             minutes: number;
-            /** Trials */
             trials: number;
-            /** Answered */
             answered: number;
-            /**
-             * Not Good
-             * @description Plays that were flagged or failed.
-             */
             not_good: number;
-            /** Excluded */
             excluded: boolean;
-            /** Exclusion Reason */
             exclusion_reason: string | null;
-            /** Erased At */
             erased_at: string | null;
-            /** Version */
             version: number;
-            /** Link */
             link: string;
         };
-        /**
-         * Saved
-         * @description The server has it.
-         */
         Saved: {
-            /**
-             * Saved At
-             * Format: date-time
-             */
+            /** Format: date-time */
             saved_at: string;
-            /**
-             * Stage
-             * @enum {string}
-             */
+            /** @enum {string} */
             stage: "consent" | "forms_before" | "calibration" | "instructions" | "practice" | "trials" | "forms_after" | "debrief" | "done";
-            /**
-             * Status
-             * @enum {string}
-             */
+            /** @enum {string} */
             status: "active" | "complete" | "screened_out" | "withdrawn";
-            /** @description The run anew, where this answer decided its group and with it its trials. */
             run?: components["schemas"]["RunState"] | null;
         };
-        /**
-         * ScaleAnswer
-         * @description The answer on one scale; neither a number nor `not_applicable` where the clip could not be shown.
-         */
         ScaleAnswer: {
-            /** Response */
             response: number | null;
-            /**
-             * Not Applicable
-             * @default false
-             */
+            /** @default false */
             not_applicable?: boolean;
-            /**
-             * Rt
-             * @description From the clip's last frame to this answer, in ms; where there is one scale it is that of the trial.
-             */
             rt?: number | null;
         };
-        /**
-         * ScreenAttention
-         * @description Screen out as soon as more than `more_than` attention checks were answered otherwise than asked.
-         */
         ScreenAttention: {
             /**
-             * @description Names this rule. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             rule: "attention_checks_failed";
-            /**
-             * More Than
-             * @description Failed checks that are still allowed; 0 ends the run at the first.
-             * @default 0
-             */
+            /** @default 0 */
             more_than: number;
         };
-        /**
-         * ScreenDevice
-         * @description Screen out where browser, screen or window cannot show the clips as [display] asks.
-         *
-         *     Without this rule the page explains what is missing, and the link stays open for another device.
-         */
         ScreenDevice: {
             /**
-             * @description Names this rule. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             rule: "device";
         };
-        /**
-         * ScreenFormAnswer
-         * @description Screen out by an answer: one of `refused`, or a number under `below` or over `above`.
-         *
-         *     The run ends as soon as the form is sent. A question left open screens nobody out: make it required.
-         */
         ScreenFormAnswer: {
             /**
-             * @description Names this rule. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             rule: "form_answer";
-            /**
-             * Form
-             * @description Name of the form.
-             */
             form: string;
-            /**
-             * Field
-             * @description Name of the question in it.
-             */
             field: string;
-            /**
-             * Refused
-             * @description Values of options that end the run; for questions with options.
-             * @default []
-             */
+            /** @default [] */
             refused: string[];
-            /**
-             * Below
-             * @description A number smaller than this ends the run; for numbers and ratings.
-             */
             below: number | null;
-            /**
-             * Above
-             * @description A number larger than this ends the run; for numbers and ratings.
-             */
             above: number | null;
         };
-        /**
-         * ScreenOut
-         * @description Why the browser or the screen will not do.
-         */
         ScreenOut: {
-            /** Reason */
             reason: string;
-            /** Data */
             data?: {
                 [key: string]: unknown;
             };
         };
-        /**
-         * SealOut
-         * @description Whether the plan of the active version's data series is sealed, and since when.
-         */
         SealOut: {
-            /** Sealed At */
             sealed_at: string | null;
-            /** Sha256 */
             sha256: string | null;
-            /** Version */
             version: number | null;
-            /**
-             * Power
-             * @description Whether power was sealed with it.
-             */
             power: boolean;
-            /**
-             * Participants
-             * @description Who has begun in this series: after the first nothing is sealed.
-             */
             participants: number;
         };
-        /**
-         * SecondFactorCode
-         * @description The code of the authenticator app, or a recovery code.
-         */
         SecondFactorCode: {
-            /** Code */
             code: string;
         };
-        /**
-         * SecondFactorSetup
-         * @description What an authenticator app needs.
-         */
         SecondFactorSetup: {
-            /** Secret */
             secret: string;
-            /** Uri */
             uri: string;
-            /** Qr Svg */
             qr_svg: string;
         };
-        /**
-         * SecondStimulus
-         * @description A second factor that changes from trial to trial: series then move over the grid of both.
-         *
-         *     The threshold along the first factor is taken to be a straight line over the numbers of the second.
-         */
         SecondStimulus: {
-            /**
-             * Factor
-             * @description The factor. Its levels with those of the first are the stimuli.
-             */
             factor: string;
-            /**
-             * Values
-             * @description The number of each level; may be left out where the levels are named by their numbers.
-             */
             values: {
                 [key: string]: number;
             };
         };
-        /**
-         * SeenClip
-         * @description One clip of a view with its drawn frames.
-         */
         SeenClip: {
-            /**
-             * Role
-             * @enum {string}
-             */
+            /** @enum {string} */
             role: "shown" | "left" | "right" | "first" | "second" | "reference";
-            /** Clip Sha256 */
             clip_sha256: string;
-            /**
-             * Drawn
-             * @description Index and time in ms since the view's start of every drawn frame.
-             */
             drawn: [
                 number,
                 number
             ][];
         };
-        /**
-         * Series
-         * @description One adaptive series: a level of every factor but those of the stimulus.
-         */
         Series: {
-            /**
-             * Name
-             * @description Name of the series in the data.
-             */
             name: string;
-            /**
-             * Levels
-             * @description A level of every other factor of the design.
-             */
             levels: {
                 [key: string]: string;
             };
         };
-        /**
-         * SeriesOut
-         * @description Versions of a study that measure the same; only their answers may be pooled.
-         */
         SeriesOut: {
-            /** Number */
             number: number;
-            /** Name */
             name: string;
-            /** Versions */
             versions: number[];
-            /**
-             * Runs
-             * @description Runs by origin, previews left out.
-             */
             runs: {
                 [key: string]: number;
             };
         };
-        /**
-         * SeriesPosition
-         * @description Where a trial stands in an adaptive series, and how much of it the choice of its clip knew.
-         */
         SeriesPosition: {
-            /**
-             * Number
-             * @description Which series, from 0.
-             */
             number: number;
-            /**
-             * Position
-             * @description Position in the series, from 1.
-             */
             position: number;
-            /**
-             * Known
-             * @description Answers of the series that the choice rests on; sent back with the answer.
-             */
             known: number;
         };
-        /**
-         * SeriesResult
-         * @description One adaptive series, over the people who are not excluded.
-         */
         SeriesResult: {
-            /** Name */
             name: string;
-            /**
-             * Levels
-             * @description Level of each factor but that of the stimulus.
-             */
             levels: {
                 [key: string]: string;
             };
-            /**
-             * People
-             * @description Runs with an estimate.
-             */
             people: number;
-            /** Answers */
             answers: number;
-            /**
-             * Mean
-             * @description Mean of the people's latest thresholds.
-             */
             mean: number | null;
-            /**
-             * Sd
-             * @description Standard deviation of them.
-             */
             sd: number | null;
-            /**
-             * Mean Posterior Sd
-             * @description Posterior SD of an estimate on average.
-             */
             mean_posterior_sd: number | null;
-            /** Stimuli */
             stimuli: components["schemas"]["StimulusAnswers"][];
-            /**
-             * Thresholds
-             * @description The people's latest thresholds, ascending.
-             */
             thresholds: number[];
-            /** @description Where series move over two factors and have answers. */
             tilt: components["schemas"]["MeanTilt"] | null;
         };
-        /**
-         * Session
-         * @description What happens when a participant comes back.
-         */
         Session: {
             /**
-             * Resume
-             * @description Coming back goes on at the next trial, begins a new run (the old one is withdrawn), or is refused.
              * @default resume
              * @enum {string}
              */
             resume: "resume" | "restart" | "block";
-            /**
-             * Maximum Age Hours
-             * @description Hours after its start at which a run can no longer be taken up again.
-             * @default 72
-             */
+            /** @default 72 */
             maximum_age_hours: number;
-            /**
-             * Lease Minutes
-             * @description Minutes without a sign of life after which an unfinished run's place (quota, counterbalancing slot)
-             *     goes to somebody else. What it answered stays.
-             * @default 120
-             */
+            /** @default 120 */
             lease_minutes: number;
         };
-        /**
-         * SessionOut
-         * @description A signed-in browser.
-         */
         SessionOut: {
-            /** Id */
             id: number;
-            /** Current */
             current: boolean;
-            /** User Agent */
             user_agent: string;
-            /**
-             * Created At
-             * Format: date-time
-             */
+            /** Format: date-time */
             created_at: string;
-            /**
-             * Last Seen At
-             * Format: date-time
-             */
+            /** Format: date-time */
             last_seen_at: string;
-            /**
-             * Expires At
-             * Format: date-time
-             */
+            /** Format: date-time */
             expires_at: string;
         };
-        /**
-         * SetGrant
-         * @description The rights an account shall have on a study beside those of its role; an empty list takes them back.
-         */
         SetGrant: {
-            /** Rights */
             rights: ("view" | "run" | "edit" | "export" | "own")[];
         };
-        /**
-         * SetMember
-         * @description The role somebody shall have in a workspace.
-         */
         SetMember: {
-            /**
-             * Role
-             * @enum {string}
-             */
+            /** @enum {string} */
             role: "viewer" | "experimenter" | "owner";
         };
-        /**
-         * ShippedExperiment
-         * @description An experiment that comes with the program.
-         */
         ShippedExperiment: {
-            /** Name */
             name: string;
-            /** Title */
             title: string;
-            /** Toml */
             toml: string;
-            /**
-             * Demonstration
-             * @description True for those that are none of the paper's experiments.
-             */
             demonstration: boolean;
-            /**
-             * Clips Ready
-             * @description True where `stimuli build` has made its clips on this server.
-             */
             clips_ready: boolean;
-            /**
-             * Build
-             * @description The command that builds its clips where this server looks for them.
-             */
             build: string;
         };
-        /**
-         * ShownAnswer
-         * @description One of the two answers: its name in the data and its label.
-         */
         ShownAnswer: {
-            /**
-             * Response
-             * @enum {string}
-             */
+            /** @enum {string} */
             response: "yes" | "no" | "first" | "second";
-            /** Label */
             label: {
                 [key: string]: string;
             };
         };
-        /**
-         * ShownCheck
-         * @description What is asked about the clips of one kind of motion check; answers are numbered from 1.
-         */
         ShownCheck: {
-            /** Question */
             question: string;
-            /** Choices */
             choices: string[];
         };
-        /**
-         * ShownChecks
-         * @description The motion checks of a study as the page gets them, in the run's language.
-         */
         ShownChecks: {
-            /** By Kind */
             by_kind: {
                 [key: string]: components["schemas"]["ShownCheck"];
             };
             other_way: components["schemas"]["ShownOtherWay"] | null;
         };
-        /**
-         * ShownClip
-         * @description One of several clips of a trial; the log of drawn frames is that of all, since one clock draws them.
-         */
         ShownClip: {
-            /** Clip Sha256 */
             clip_sha256: string;
-            /** Frames Drawn */
             frames_drawn: number;
-            /** Frames Missing */
             frames_missing: number;
         };
-        /**
-         * ShownClipRating
-         * @description The declared single-clip rating as the page gets it.
-         */
         ShownClipRating: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "clip_rating";
-            /** Scales */
             scales: (components["schemas"]["Points"] | components["schemas"]["Slider"])[];
-            /**
-             * Arrangement
-             * @enum {string}
-             */
+            /** @enum {string} */
             arrangement: "one_screen" | "one_after_the_other";
             check_scale: components["schemas"]["Points"];
-            /** Views */
             views: number;
             reference: components["schemas"]["ShownRatingReference"] | null;
-            /**
-             * Start
-             * @enum {string}
-             */
+            /** @enum {string} */
             start: "key" | "fixation";
-            /** Fixation Ms */
             fixation_ms: number;
-            /** Pointer Delay Ms */
             pointer_delay_ms: number;
-            /** Confirm */
             confirm: boolean;
-            /** Comment */
             comment: boolean;
-            /** Expected Seconds */
             expected_seconds: number;
         };
-        /**
-         * ShownClips
-         * @description The clips of a trial by their roles; those that its kind does not show are left out.
-         */
         ShownClips: {
             shown?: components["schemas"]["ShownClip"] | null;
             left?: components["schemas"]["ShownClip"] | null;
@@ -8226,780 +4235,313 @@ export interface components {
             second?: components["schemas"]["ShownClip"] | null;
             reference?: components["schemas"]["ShownClip"] | null;
         };
-        /**
-         * ShownContinuousRating
-         * @description The declared continuous rating as the page gets it.
-         */
         ShownContinuousRating: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "continuous_rating";
-            /** Question */
             question: {
                 [key: string]: string;
             };
-            /** Low */
             low: {
                 [key: string]: string;
             };
-            /** High */
             high: {
                 [key: string]: string;
             };
-            /** Minimum */
             minimum: number;
-            /** Maximum */
             maximum: number;
-            /**
-             * Input
-             * @enum {string}
-             */
+            /** @enum {string} */
             input: "slider" | "keys";
-            /** Seconds Across */
             seconds_across: number;
-            /** Sample Hz */
             sample_hz: number;
-            /** Pointer Delay Ms */
             pointer_delay_ms: number;
             check_scale: components["schemas"]["Points"];
-            /** Expected Seconds */
             expected_seconds: number;
         };
-        /**
-         * ShownOtherWay
-         * @description The way around motion checks: its button, and the Markdown behind it.
-         */
         ShownOtherWay: {
-            /** Label */
             label: string;
-            /** Text */
             text: string;
         };
-        /**
-         * ShownPairedComparison
-         * @description The declared paired comparison as the page gets it: nothing of which pairs there are.
-         */
         ShownPairedComparison: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "paired_comparison";
-            /** Question */
             question: {
                 [key: string]: string;
             };
-            /** Presentation */
             presentation: components["schemas"]["SideBySide"] | components["schemas"]["Stacked"] | components["schemas"]["OneAfterTheOther"];
-            /** Tie */
             tie: {
                 [key: string]: string;
             } | null;
             reference: components["schemas"]["ShownReference"] | null;
-            /** Pointer Delay Ms */
             pointer_delay_ms: number;
-            /** Expected Seconds */
             expected_seconds: number;
         };
-        /**
-         * ShownRatingReference
-         * @description The label of the reference, and how long the canvas stays plain after it; not which clip it is.
-         */
         ShownRatingReference: {
-            /** Label */
             label: {
                 [key: string]: string;
             };
-            /** Gap Ms */
             gap_ms: number;
         };
-        /**
-         * ShownReference
-         * @description The label of the reference clip, and how long the canvas stays plain after it; not which clip it is.
-         */
         ShownReference: {
-            /** Label */
             label: {
                 [key: string]: string;
             };
-            /** Gap Ms */
             gap_ms: number;
         };
-        /**
-         * ShownThreshold
-         * @description The declared threshold as the page gets it: nothing of stimuli, series or function.
-         */
         ShownThreshold: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "threshold";
-            /** Question */
             question: {
                 [key: string]: string;
             };
-            /** Answers */
             answers: [
                 components["schemas"]["ShownAnswer"],
                 components["schemas"]["ShownAnswer"]
             ];
-            /** Gap Ms */
             gap_ms: number;
-            /** Ahead */
             ahead: number;
-            /** Pointer Delay Ms */
             pointer_delay_ms: number;
-            /** Expected Seconds */
             expected_seconds: number;
         };
-        /**
-         * SideBySide
-         * @description Two clips beside one another on one canvas, drawn by one clock.
-         *
-         *     `if_too_narrow` says what happens on a screen where the two do not fit at actual size: they are stacked,
-         *     or the participant is asked for a larger window. Which of them was shown is stored with each answer.
-         */
         SideBySide: {
             /**
-             * @description Names this arrangement. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             arrangement: "side_by_side";
-            /**
-             * Gap Mm
-             * @description Plain background between the two clips, in mm.
-             * @default 8
-             */
+            /** @default 8 */
             gap_mm: number;
-            /**
-             * If Too Narrow
-             * @description Where two clips do not fit beside one another: stack them, or ask for a larger window.
-             * @enum {string}
-             */
+            /** @enum {string} */
             if_too_narrow: "stack" | "refuse";
         };
-        /**
-         * SignIn
-         * @description Name and password, and where a second factor is set up its code or a recovery code.
-         */
         SignIn: {
-            /** Name */
             name: string;
-            /** Password */
             password: string;
-            /** Code */
             code?: string | null;
         };
-        /**
-         * Signing
-         * @description The study's secret for signed addresses, and how the recruiter's side signs with it.
-         */
         Signing: {
-            /**
-             * Declared
-             * @description The recruiter declares that addresses are signed.
-             */
             declared: boolean;
-            /**
-             * Parameter
-             * @description Address parameter of the signature.
-             */
             parameter: string;
-            /**
-             * Secret Name
-             * @description Another name makes another secret.
-             */
             secret_name: string;
-            /**
-             * Secret
-             * @description 64 hexadecimal digits; who has it can sign for anybody.
-             */
             secret: string;
-            /**
-             * Identifier
-             * @description A participant's id, as an example.
-             */
             identifier: string;
-            /**
-             * Signature
-             * @description HMAC-SHA-256 of that id, with the secret as key.
-             */
             signature: string;
-            /**
-             * Query
-             * @description What is added to the link after `?` for that participant, percent-encoded.
-             */
             query: string;
-            /**
-             * Python
-             * @description The same signature in Python.
-             */
             python: string;
-            /**
-             * Shell
-             * @description The same signature by OpenSSL.
-             */
             shell: string;
         };
-        /**
-         * Slider
-         * @description A slider from `minimum` to `maximum`. It has no handle, hence no answer, before it is first touched.
-         */
         Slider: {
             /**
-             * @description Names this type of scale. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             type: "slider";
-            /**
-             * Name
-             * @description Names the scale in the data (column `scale`); each of several needs its own.
-             * @default rating
-             */
+            /** @default rating */
             name: string;
-            /**
-             * Question
-             * @description What is asked, in every language.
-             */
             question: {
                 [key: string]: string;
             };
-            /**
-             * Reverse
-             * @description Whether a high answer means little of what is measured; the data keep the answer as it was given.
-             * @default false
-             */
+            /** @default false */
             reverse: boolean;
-            /**
-             * Not Applicable
-             * @description Label of an answer beside the scale, such as `cannot say`; it is stored without a number.
-             */
             not_applicable: {
                 [key: string]: string;
             } | null;
-            /**
-             * Minimum
-             * @description The number at its left end (right, where a language is read so).
-             * @default 0
-             */
+            /** @default 0 */
             minimum: number;
-            /**
-             * Maximum
-             * @description The number at its other end.
-             * @default 100
-             */
+            /** @default 100 */
             maximum: number;
-            /**
-             * Step
-             * @description Difference of neighbouring answers; the range is a whole number of steps.
-             * @default 1
-             */
+            /** @default 1 */
             step: number;
-            /**
-             * Low
-             * @description Label of the low end.
-             */
             low: {
                 [key: string]: string;
             };
-            /**
-             * High
-             * @description Label of the high end.
-             */
             high: {
                 [key: string]: string;
             };
-            /**
-             * Show Value
-             * @description Whether the number is shown while the slider is moved.
-             * @default false
-             */
+            /** @default false */
             show_value: boolean;
         };
-        /**
-         * SourceVideo
-         * @description The original of a converted clip, and what the conversion did.
-         *
-         *     Attributes
-         *     ----------
-         *     file : str
-         *         The name it came with.
-         *     sha256 : str
-         *         Of its bytes, which are kept.
-         *     bytes : int
-         *         Length of the file.
-         *     container, codec, pixel_format : str
-         *         As FFmpeg calls them.
-         *     colour_range : str
-         *         Of the original; clips are always of limited range.
-         *     width_px, height_px : int
-         *         Of its stored pictures, before they were turned.
-         *     fps : float
-         *         Frames per second; of a variable rate, the inverse of the median time between frames.
-         *     variable_rate : bool
-         *         True where its frames do not follow one another at equal times.
-         *     frames : int
-         *         Frames of the original.
-         *     changes : tuple of str
-         *         What was done, in words, in the order in which it was done.
-         *     encoded_again : bool
-         *         False where its pictures were copied as they were.
-         *     frame_map : tuple of int
-         *         For each frame of the clip the frame of the original that it shows, both from 0; empty where each
-         *         shows its own.
-         *     lowest_psnr_db : float or None
-         *         Of the clip's worst frame: peak signal-to-noise ratio of the luminance, between what went into the
-         *         encoder and what comes out of it; None where no pixel differs or nothing was encoded again.
-         *     encoder : str
-         *         What encoded it; empty where nothing was encoded again.
-         */
         SourceVideo: {
-            /** File */
             file: string;
-            /** Sha256 */
             sha256: string;
-            /** Bytes */
             bytes: number;
-            /** Container */
             container: string;
-            /** Codec */
             codec: string;
-            /** Pixel Format */
             pixel_format: string;
-            /**
-             * Colour Range
-             * @enum {string}
-             */
+            /** @enum {string} */
             colour_range: "limited" | "full" | "not said";
-            /** Width Px */
             width_px: number;
-            /** Height Px */
             height_px: number;
-            /** Fps */
             fps: number;
-            /** Variable Rate */
             variable_rate: boolean;
-            /** Frames */
             frames: number;
-            /** Changes */
             changes: string[];
-            /** Encoded Again */
             encoded_again: boolean;
-            /**
-             * Frame Map
-             * @default []
-             */
+            /** @default [] */
             frame_map: number[];
-            /** Lowest Psnr Db */
             lowest_psnr_db: number | null;
-            /**
-             * Encoder
-             * @default
-             */
+            /** @default  */
             encoder: string;
         };
-        /**
-         * Stacked
-         * @description Two clips one above the other on one canvas, drawn by one clock.
-         */
         Stacked: {
             /**
-             * @description Names this arrangement. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             arrangement: "stacked";
-            /**
-             * Gap Mm
-             * @description Plain background between the two clips, in mm.
-             * @default 8
-             */
+            /** @default 8 */
             gap_mm: number;
         };
-        /**
-         * StageChange
-         * @description Where the participant is.
-         */
         StageChange: {
-            /**
-             * Stage
-             * @enum {string}
-             */
+            /** @enum {string} */
             stage: "consent" | "forms_before" | "calibration" | "instructions" | "practice" | "trials" | "forms_after" | "debrief" | "done";
         };
-        /**
-         * Stimulus
-         * @description The factor along which each series looks for its threshold.
-         */
         Stimulus: {
-            /**
-             * Factor
-             * @description The factor. Its levels are the stimuli that were rendered, and a series moves between them.
-             */
             factor: string;
-            /**
-             * Values
-             * @description The number of each level; may be left out where the levels are named by their numbers.
-             */
             values: {
                 [key: string]: number;
             };
-            /** @description A second factor along which series move too. */
             second: components["schemas"]["SecondStimulus"] | null;
         };
-        /**
-         * StimulusAnswers
-         * @description The answers that counted at one stimulus of a series.
-         */
         StimulusAnswers: {
-            /**
-             * Value
-             * @description The stimulus as a number.
-             */
             value: number;
-            /**
-             * Second
-             * @description Its number along the second factor, where there is one.
-             */
             second: number | null;
-            /** N */
             n: number;
-            /**
-             * Positive
-             * @description Yes, or the interval of the stimulus.
-             */
             positive: number;
         };
-        /**
-         * Stop
-         * @description When a series ends: after `trials`, earlier once its estimate is as certain as `sd` and `entropy` say.
-         *
-         *     Where both are given, both must be reached.
-         */
         Stop: {
-            /**
-             * Trials
-             * @description Most trials of a series. Needed: an estimate need never become as certain as is asked.
-             */
             trials: number | null;
-            /**
-             * At Least
-             * @description Answers that a series has before its certainty can end it.
-             * @default 10
-             */
+            /** @default 10 */
             at_least: number;
-            /**
-             * Sd
-             * @description Standard deviation of the threshold's posterior at which a series ends, in the stimulus's unit. With a
-             *     second factor the threshold is that at the middle of its numbers, and `entropy` regards the tilt too.
-             */
             sd: number | null;
-            /**
-             * Entropy
-             * @description Entropy of the posterior over all parameters at which a series ends, in bits.
-             */
             entropy: number | null;
         };
-        /**
-         * Strips
-         * @description Picture strips, one a character: frames of one size, one below the other.
-         */
         Strips: {
-            /** Width Px */
             width_px: number;
-            /** Height Px */
             height_px: number;
-            /**
-             * Closures
-             * @description Closure of each frame, ascending: 0 open, 1 shut.
-             */
             closures: number[];
-            /**
-             * Characters
-             * @description Their pictures are at …/strips/NAME.webp.
-             */
             characters: string[];
         };
-        /**
-         * StudyDetail
-         * @description A study with its declaration.
-         */
         StudyDetail: {
             summary: components["schemas"]["StudySummary"];
             design: components["schemas"]["DesignOut"];
             definition: components["schemas"]["Experiment"];
-            /** Toml */
             toml: string;
-            /** Definition Sha256 */
             definition_sha256: string;
-            /** Versions */
             versions: components["schemas"]["VersionOut"][];
-            /** Series */
             series: components["schemas"]["SeriesOut"][];
-            /** Recruiter */
             recruiter: {
                 [key: string]: unknown;
             } | null;
         };
-        /**
-         * StudySummary
-         * @description One line of the list of studies.
-         */
         StudySummary: {
-            /** Name */
             name: string;
-            /** Title */
             title: string;
-            /**
-             * Status
-             * @enum {string}
-             */
+            /** @enum {string} */
             status: "draft" | "pilot" | "live" | "closed";
-            /** Paused */
             paused: boolean;
-            /** Quota */
             quota: number | null;
-            /** Version */
             version: number;
-            /** Revision */
             revision: number;
-            /** Complete */
             complete: number;
-            /** Active */
             active: number;
-            /**
-             * Created At
-             * Format: date-time
-             */
+            /** Format: date-time */
             created_at: string;
-            /** Archived At */
             archived_at: string | null;
-            /**
-             * Workspace
-             * @description Name of the workspace it belongs to.
-             */
             workspace: string;
-            /**
-             * Rights
-             * @description What the account that asks may do with it.
-             */
             rights: ("view" | "run" | "edit" | "export" | "own")[];
         };
-        /**
-         * TextField
-         * @description Free text.
-         */
         TextField: {
-            /**
-             * Name
-             * @description Key of the answer in the runs CSV's `forms`; [[screening]] names it as `field`.
-             */
             name: string;
-            /**
-             * Label
-             * @description The question, in every language.
-             */
             label: {
                 [key: string]: string;
             };
-            /**
-             * Help
-             * @description Smaller text under the question.
-             */
             help: {
                 [key: string]: string;
             } | null;
-            /**
-             * Required
-             * @description Whether the form can be sent only once this is answered.
-             * @default false
-             */
+            /** @default false */
             required: boolean;
             /**
-             * @description Names this type of field. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             type: "text";
-            /**
-             * Max Length
-             * @description Longest answer, in characters.
-             * @default 500
-             */
+            /** @default 500 */
             max_length: number;
         };
-        /**
-         * Texts
-         * @description The pages of one language, in Markdown. `screened_out` stands in for a few words of the page's own.
-         */
         Texts: {
-            /**
-             * Consent
-             * @description First page. Nothing is stored of the participant before they agree to it.
-             */
             consent: string;
-            /**
-             * Instructions
-             * @description Page before practice: what is seen, what is asked, which keys answer.
-             */
             instructions: string;
-            /**
-             * Debrief
-             * @description Last page: what the study is about. Shown after the last answer only.
-             */
             debrief: string;
-            /**
-             * Practice
-             * @description Page before the practice trials; empty shows how many there are, and that they do not count.
-             * @default
-             */
+            /** @default  */
             practice: string;
-            /**
-             * Block Break
-             * @description Page between blocks; empty shows a few words of the page's own.
-             * @default
-             */
+            /** @default  */
             block_break: string;
-            /**
-             * Screened Out
-             * @description Page of a participant whom a [[screening]] rule ends; empty shows a few words of the page's own.
-             * @default
-             */
+            /** @default  */
             screened_out: string;
         };
-        /**
-         * Threshold
-         * @description Adaptive series by QUEST+: each answer decides which of the rendered stimuli is shown next.
-         *
-         *     A mouse that has not moved since its last press chooses nothing until `pointer_delay_ms` have passed.
-         */
         Threshold: {
             /**
-             * @description Names this kind of trial. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "threshold";
-            /**
-             * Expected Seconds
-             * @description Expected length of a trial in seconds, for the length of a visit.
-             * @default 5
-             */
+            /** @default 5 */
             expected_seconds: number;
-            /**
-             * Question
-             * @description What is asked after the clip or clips, in every language.
-             */
             question: {
                 [key: string]: string;
             };
-            /**
-             * Task
-             * @description One clip and yes or no, or two clips and which of them.
-             */
             task: components["schemas"]["YesNo"] | components["schemas"]["TwoInterval"];
-            /** @description What changes from trial to trial. */
             stimulus: components["schemas"]["Stimulus"];
-            /**
-             * Series
-             * @description The series, run interleaved; where none is given, one a combination of the other factors' levels.
-             * @default []
-             */
+            /** @default [] */
             series: components["schemas"]["Series"][];
             /**
-             * Function
-             * @description Shape assumed for the psychometric function. The Weibull needs stimuli above 0.
              * @default normal
              * @enum {string}
              */
             function: "normal" | "weibull";
             /**
-             * Direction
-             * @description Whether yes (or right) becomes likelier with the stimulus's number, or less likely.
              * @default rising
              * @enum {string}
              */
             direction: "rising" | "falling";
-            /**
-             * Lapse
-             * @description Assumed share of wrong answers to what is plain to see: 1 minus the function's upper end.
-             * @default 0.02
-             */
+            /** @default 0.02 */
             lapse: number;
-            /**
-             * @description Thresholds considered; where not given, from the lowest stimulus to the highest. With a second factor
-             *     they are those at the middle of its numbers.
-             */
             thresholds: components["schemas"]["Range"] | null;
-            /**
-             * @description With a second factor, the considered changes of the threshold per unit of its numbers; where not given,
-             *     as steep as a threshold that crosses all stimuli of the first, either way.
-             */
             tilts: components["schemas"]["Range"] | null;
-            /**
-             * @description Considered SDs of the normal function (in the stimulus's unit), or slopes of the Weibull; where not
-             *     given, a twentieth to a half of the stimuli's range, or 1 to 10.
-             */
             spreads: components["schemas"]["Range"] | null;
-            /** @description When a series ends. */
             stop: components["schemas"]["Stop"];
-            /**
-             * Ahead
-             * @description Trials of a series that a page without connection may show before the server has the answers to
-             *     earlier ones. Such trials are marked in the data.
-             * @default 3
-             */
+            /** @default 3 */
             ahead: number;
-            /**
-             * Pointer Delay Ms
-             * @description Time, in ms, for which a mouse that has not moved since its last press chooses nothing.
-             * @default 1500
-             */
+            /** @default 1500 */
             pointer_delay_ms: number;
         };
-        /**
-         * ThresholdAnswer
-         * @description The answer; None where the clips could not be shown.
-         */
         ThresholdAnswer: {
             /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             kind: "threshold";
-            /** Chosen */
             chosen: ("yes" | "no" | "first" | "second") | null;
-            /**
-             * Known
-             * @description How many answers of the series the server's choice of this stimulus rested on, as it said.
-             * @default 0
-             */
+            /** @default 0 */
             known?: number;
         };
-        /**
-         * ThresholdResults
-         * @description Adaptive series.
-         */
         ThresholdResults: {
-            /** Study */
             study: string;
-            /** Origin */
             origin: string;
-            /** Series */
             series: number;
-            /**
-             * Counted At
-             * Format: date-time
-             */
+            /** Format: date-time */
             counted_at: string;
-            /** Participants */
             participants: number;
-            /**
-             * Ratings
-             * @description Answers of any kind that count.
-             */
             ratings: number;
-            /** Response Times */
             response_times: components["schemas"]["TimeBin"][];
             playback: components["schemas"]["Playback"];
             /**
@@ -9007,300 +4549,126 @@ export interface components {
              * @enum {string}
              */
             kind: "threshold";
-            /**
-             * Factor
-             * @description The factor along which series move.
-             */
             factor: string;
-            /**
-             * Second Factor
-             * @description The second factor, where series move over two.
-             */
             second_factor: string | null;
-            /**
-             * Second Middle
-             * @description Its number at which thresholds are told.
-             */
             second_middle: number | null;
-            /** Two Interval */
             two_interval: boolean;
-            /** Series Results */
             series_results: components["schemas"]["SeriesResult"][];
         };
-        /**
-         * Tickets
-         * @description A sealed batch of tickets, with every trial's tickets: by trial index, then by play from 1 on.
-         */
         Tickets: {
-            /** Batch */
             batch: string;
-            /** By Trial */
             by_trial: string[][];
         };
-        /**
-         * Ties
-         * @description The answer that neither clip is chosen, and its label.
-         */
         Ties: {
-            /**
-             * Label
-             * @description Label of this answer, in every language.
-             */
             label: {
                 [key: string]: string;
             };
         };
-        /**
-         * TimeBin
-         * @description Answers within 250 ms from `start_ms` after the clip's end.
-         */
         TimeBin: {
-            /** Start Ms */
             start_ms: number;
-            /** Answers */
             answers: number;
         };
-        /**
-         * Timeline
-         * @description One run, complete.
-         */
         Timeline: {
             summary: components["schemas"]["RunSummary"];
-            /** Device */
             device: {
                 [key: string]: unknown;
             };
-            /** Consented At */
             consented_at: string | null;
-            /** Trials */
             trials: components["schemas"]["TimelineTrial"][];
-            /** Events */
             events: components["schemas"]["TimelineEvent"][];
-            /** Forms */
             forms: components["schemas"]["TimelineForm"][];
-            /** Calibrations */
             calibrations: components["schemas"]["TimelineCalibration"][];
         };
-        /**
-         * TimelineCalibration
-         * @description One size calibration.
-         */
         TimelineCalibration: {
-            /** Px Per Mm */
             px_per_mm: number;
-            /** Method */
             method: string;
-            /** Viewing Distance Mm */
             viewing_distance_mm: number | null;
-            /** Zoom */
             zoom: number;
-            /**
-             * Saved At
-             * Format: date-time
-             */
+            /** Format: date-time */
             saved_at: string;
-            /** Occasion */
             occasion: string;
-            /** Repeats */
             repeats: number | null;
-            /** Spread Percent */
             spread_percent: number | null;
-            /** Ruler Check */
             ruler_check: string | null;
-            /** Distance Method */
             distance_method: string | null;
-            /** Distance Spread Mm */
             distance_spread_mm: number | null;
-            /** Distance Typed Mm */
             distance_typed_mm: number | null;
-            /** Recheck Percent */
             recheck_percent: number | null;
         };
-        /**
-         * TimelineEvent
-         * @description Something that happened around the trials.
-         */
         TimelineEvent: {
-            /** Type */
             type: string;
-            /** At Client */
             at_client: string | null;
-            /**
-             * Received At
-             * Format: date-time
-             */
+            /** Format: date-time */
             received_at: string;
-            /** Data */
             data: {
                 [key: string]: unknown;
             };
         };
-        /**
-         * TimelineForm
-         * @description The answers of one form.
-         */
         TimelineForm: {
-            /** Form */
             form: string;
-            /** Answers */
             answers: {
                 [key: string]: unknown;
             };
-            /**
-             * Saved At
-             * Format: date-time
-             */
+            /** Format: date-time */
             saved_at: string;
         };
-        /**
-         * TimelineTrial
-         * @description One play of one trial with its answer and what was shown.
-         */
         TimelineTrial: {
-            /** Trial Index */
             trial_index: number;
-            /** Kind */
             kind: string;
-            /** Block */
             block: number;
-            /** Cell */
             cell: string | null;
-            /** Exemplar */
             exemplar: number | null;
-            /** Clip Sha256 */
             clip_sha256: string | null;
-            /** Play */
             play: number;
-            /**
-             * Answer
-             * @description As its kind of trial stores it.
-             */
             answer: {
                 [key: string]: unknown;
             };
-            /**
-             * Response
-             * @description The answer on the scale, of kinds that have one.
-             */
             response: number | null;
-            /** Expected Response */
             expected_response: number | null;
-            /** Rt */
             rt: number | null;
-            /** Comment */
             comment: string | null;
-            /** Method */
             method: string;
-            /** Verdict */
             verdict: string;
-            /** Verdict Rule */
             verdict_rule: string;
-            /** Key To First Frame Ms */
             key_to_first_frame_ms: number | null;
-            /** Frames Drawn */
             frames_drawn: number | null;
-            /** Frames Late */
             frames_late: number | null;
-            /** Frames Missing */
             frames_missing: number | null;
-            /** Longest Gap Ms */
             longest_gap_ms: number | null;
-            /** Focus Lost */
             focus_lost: boolean | null;
-            /** Drawn */
             drawn: number[][] | null;
-            /**
-             * Saved At
-             * Format: date-time
-             */
+            /** Format: date-time */
             saved_at: string;
         };
-        /**
-         * TokenOut
-         * @description An API token without its secret.
-         */
         TokenOut: {
-            /** Id */
             id: number;
-            /** Name */
             name: string;
-            /** Scopes */
             scopes: ("read" | "personal" | "write" | "export")[];
-            /**
-             * Created At
-             * Format: date-time
-             */
+            /** Format: date-time */
             created_at: string;
-            /** Last Used At */
             last_used_at: string | null;
-            /** Expires At */
             expires_at: string | null;
         };
-        /**
-         * TraceCell
-         * @description The mean trace of one cell over people, each person's plays averaged before.
-         */
         TraceCell: {
-            /** Cell */
             cell: string;
-            /** People */
             people: number;
-            /** Traces */
             traces: number;
-            /**
-             * Left Out
-             * @description Traces of another sampling rate than the cell's first.
-             */
             left_out: number;
-            /**
-             * Times S
-             * @description Seconds in the clip of each point.
-             */
             times_s: number[];
-            /** Mean */
             mean: number[];
-            /**
-             * Low
-             * @description 95% t interval over people; null of one person.
-             */
             low: number[] | null;
-            /** High */
             high: number[] | null;
-            /**
-             * Level
-             * @description Mean over the whole trace.
-             */
             level: number;
-            /**
-             * Blinks S
-             * @description Of each clip of the cell, when its blinks begin.
-             */
             blinks_s: number[][];
         };
-        /**
-         * TraceResults
-         * @description Continuous ratings.
-         */
         TraceResults: {
-            /** Study */
             study: string;
-            /** Origin */
             origin: string;
-            /** Series */
             series: number;
-            /**
-             * Counted At
-             * Format: date-time
-             */
+            /** Format: date-time */
             counted_at: string;
-            /** Participants */
             participants: number;
-            /**
-             * Ratings
-             * @description Answers of any kind that count.
-             */
             ratings: number;
-            /** Response Times */
             response_times: components["schemas"]["TimeBin"][];
             playback: components["schemas"]["Playback"];
             /**
@@ -9308,670 +4676,270 @@ export interface components {
              * @enum {string}
              */
             kind: "continuous_rating";
-            /** Minimum */
             minimum: number;
-            /** Maximum */
             maximum: number;
-            /** Cells */
             cells: components["schemas"]["TraceCell"][];
         };
-        /**
-         * TrialClip
-         * @description One clip of a trial, and the role in which it is shown; it is at `/clips/{clip_sha256}.mp4`.
-         *
-         *     Every clip of a trial is shown at the size of the first, which stands with the trial.
-         */
         TrialClip: {
-            /**
-             * Role
-             * @enum {string}
-             */
+            /** @enum {string} */
             role: "shown" | "left" | "right" | "first" | "second" | "reference";
-            /** Clip Sha256 */
             clip_sha256: string;
-            /** Frames */
             frames: number;
-            /** Fps */
             fps: number;
         };
-        /**
-         * TrialDeclaration
-         * @description What every kind declares; each adds its own keys, and a constant as its `kind`.
-         */
         TrialDeclaration: {
-            /**
-             * Kind
-             * @description Kind of trial.
-             */
             kind: string;
-            /**
-             * Expected Seconds
-             * @description Seconds a trial takes on average, from which the length of a visit is reckoned.
-             * @default 6
-             */
+            /** @default 6 */
             expected_seconds: number;
         };
-        /**
-         * TrialInfo
-         * @description One trial as the page needs it; nothing tells the participant which cell it is.
-         */
         TrialInfo: {
-            /** Trial Index */
             trial_index: number;
-            /**
-             * Kind
-             * @enum {string}
-             */
+            /** @enum {string} */
             kind: "practice" | "main" | "attention" | "check";
-            /** Block */
             block: number;
-            /** Clip Sha256 */
             clip_sha256: string | null;
-            /** Frames */
             frames: number | null;
-            /** Fps */
             fps: number | null;
-            /** Width Px */
             width_px: number | null;
-            /** Height Px */
             height_px: number | null;
-            /** Width Mm */
             width_mm: number | null;
-            /** Inter Ocular Px */
             inter_ocular_px: number | null;
-            /**
-             * Clips
-             * @description Every clip, in the order of its places.
-             */
             clips: components["schemas"]["TrialClip"][];
-            /**
-             * Prompt
-             * @description Markdown of an attention check.
-             */
             prompt: string | null;
-            /**
-             * Check
-             * @description What kind of motion check it is; its answer is told nobody.
-             */
             check?: ("digit" | "direction" | "shape" | "first_blink" | "first_eye") | null;
-            /** Plays Done */
             plays_done: number;
-            /** Plays Wanted */
             plays_wanted: number;
-            /** Answered */
             answered: boolean;
-            /**
-             * Views Begun
-             * @description The highest number of a view of this trial; 0 where it has none.
-             */
             views_begun: number;
-            /**
-             * Views
-             * @description Views that still wait for the answer of their play.
-             */
             views: components["schemas"]["ViewState"][];
-            /** @description Of trials that answers decide on. */
             series?: components["schemas"]["SeriesPosition"] | null;
         };
-        /**
-         * TwoInterval
-         * @description Two clips in turn, the stimulus and the standard in either order: in which of them was it?
-         */
         TwoInterval: {
             /**
-             * @description Names this task. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             asks: "two_interval";
-            /**
-             * Standard
-             * @description Level of the stimulus factor that every stimulus is shown against; it is not a stimulus itself.
-             */
             standard: string;
-            /**
-             * Standard Second
-             * @description Level of the second factor that the standard has; where not given, that of the stimulus beside it.
-             */
             standard_second: string | null;
-            /**
-             * First
-             * @description Label of the answer that names the first clip.
-             */
             first: {
                 [key: string]: string;
             };
-            /**
-             * Second
-             * @description Label of the answer that names the second clip.
-             */
             second: {
                 [key: string]: string;
             };
-            /**
-             * Gap Ms
-             * @description Plain background between the two clips, in ms.
-             * @default 500
-             */
+            /** @default 500 */
             gap_ms: number;
         };
-        /**
-         * Unsupported
-         * @description A browser or screen that failed a gate before a run began.
-         */
         Unsupported: {
-            /** Link Token */
             link_token: string;
-            /** Reason */
             reason: string;
-            /** Data */
             data?: {
                 [key: string]: unknown;
             };
         };
-        /**
-         * UploadOut
-         * @description An upload waiting to become a study; it is deleted after a day.
-         */
         UploadOut: {
-            /** Id */
             id: string;
-            /** Files */
             files: components["schemas"]["UploadedFile"][];
-            /**
-             * Waiting
-             * @description Files that are still looked into, or converted.
-             */
             waiting: number;
-            /**
-             * Fps
-             * @description Frames per second asked for; null: each clip its own.
-             */
             fps: number | null;
-            /** Has Manifest */
             has_manifest: boolean;
-            /**
-             * Left Out
-             * @description Names of the files that are set aside; they can be put back.
-             */
             left_out: string[];
-            /**
-             * Tables
-             * @description Names of CSV files in the upload.
-             */
             tables: string[];
-            /** Suggested Pattern */
             suggested_pattern: string | null;
         };
-        /**
-         * UploadProgress
-         * @description How far an upload has been looked into and converted.
-         */
         UploadProgress: {
-            /** Files */
             files: number;
-            /** Waiting */
             waiting: number;
-            /** Refused */
             refused: number;
-            /**
-             * Left Out
-             * @description Files that are set aside; they are none of `files`.
-             */
             left_out: number;
         };
-        /**
-         * UploadedFile
-         * @description One file of an upload: what it is, or why it cannot be used.
-         */
         UploadedFile: {
-            /** Name */
             name: string;
-            /** Bytes */
             bytes: number;
-            /**
-             * State
-             * @description Waiting: it is still looked into, or converted.
-             * @enum {string}
-             */
+            /** @enum {string} */
             state: "waiting" | "ready" | "refused";
-            /**
-             * Sha256
-             * @description Of the clip.
-             */
             sha256?: string | null;
-            /** Fps */
             fps?: number | null;
-            /** Frames */
             frames?: number | null;
-            /** Width Px */
             width_px?: number | null;
-            /** Height Px */
             height_px?: number | null;
-            /**
-             * Problem
-             * @description Why it cannot be used, and what to do.
-             */
             problem?: string | null;
-            /**
-             * Same As
-             * @description An earlier file with the same bytes.
-             */
             same_as?: string | null;
-            /** @description What the clip was converted from; null where the file is shown as it came. */
             source?: components["schemas"]["SourceVideo"] | null;
         };
-        /**
-         * VersionOut
-         * @description A version of a study.
-         */
         VersionOut: {
-            /** Number */
             number: number;
-            /** Experiment */
             experiment: string;
-            /** Definition Sha256 */
             definition_sha256: string;
-            /** Series */
             series: number;
-            /** Note */
             note: string;
-            /**
-             * Created At
-             * Format: date-time
-             */
+            /** Format: date-time */
             created_at: string;
-            /**
-             * Runs
-             * @default 0
-             */
+            /** @default 0 */
             runs?: number;
         };
-        /**
-         * ViewEvidence
-         * @description What a view brings along: the ticket of its play, with the batch that it is of.
-         */
         ViewEvidence: {
-            /** Batch */
             batch: string;
-            /** Ticket */
             ticket: string;
         };
-        /**
-         * ViewIn
-         * @description One view; sent without an end when it begins, with one when it has ended.
-         */
         ViewIn: {
-            /**
-             * Id
-             * Format: uuid
-             */
+            /** Format: uuid */
             id: string;
-            /** Trial Index */
             trial_index: number;
-            /**
-             * Number
-             * @description Of the trial's views, from 1.
-             */
             number: number;
-            /**
-             * Play
-             * @description The play that it is part of; an older page has one view a play.
-             */
             play?: number | null;
-            /**
-             * Started At Client
-             * Format: date-time
-             */
+            /** Format: date-time */
             started_at_client: string;
-            /** Ended At Client */
             ended_at_client?: string | null;
-            /** Screen */
             screen?: {
                 [key: string]: unknown;
             };
-            /**
-             * Clips
-             * @default []
-             */
+            /** @default [] */
             clips?: components["schemas"]["SeenClip"][];
-            /**
-             * Outcome
-             * @description How it ended: shown to its end, or broken off by a reload or a crash.
-             */
             outcome?: ("shown" | "interrupted") | null;
-            /** Showings */
             showings?: components["schemas"]["ViewShowing"][] | null;
-            /**
-             * Disturbances
-             * @default {}
-             */
+            /** @default {} */
             disturbances?: {
                 [key: string]: number;
             };
-            /** @description The ticket of its play; an older page has none for views. */
             evidence?: components["schemas"]["ViewEvidence"] | null;
         };
-        /**
-         * ViewShowing
-         * @description What was measured of one clip of a view, or of several at once; its frames are with the clips.
-         *
-         *     With it another page, or another device, can ask for the answer without a second view.
-         */
         ViewShowing: {
-            /** Roles */
             roles: ("shown" | "left" | "right" | "first" | "second" | "reference")[];
-            /**
-             * Method
-             * @enum {string}
-             */
+            /** @enum {string} */
             method: "webcodecs" | "video";
-            /** Frames */
             frames: number;
-            /** Fps */
             fps: number;
-            /**
-             * Ended Ms
-             * @description From the view's start key to the clip's end.
-             */
             ended_ms: number;
-            /** Stalls */
             stalls: number;
-            /** Clock Gap Ms */
             clock_gap_ms: number | null;
-            /** Clock Late Ms */
             clock_late_ms: number | null;
-            /** Focus Lost */
             focus_lost: number;
-            /**
-             * Visible Share
-             * @description Smallest share of the clip inside the window.
-             */
             visible_share?: number | null;
-            /**
-             * Refresh Ms
-             * @description Median time between refreshes during the clip.
-             */
             refresh_ms?: number | null;
         };
-        /**
-         * ViewState
-         * @description A view of a trial that still waits for its answer, as the page gets it back.
-         */
         ViewState: {
-            /** Id */
             id: string;
-            /** Number */
             number: number;
-            /** Play */
             play: number;
-            /**
-             * Started At Client
-             * Format: date-time
-             */
+            /** Format: date-time */
             started_at_client: string;
-            /** Ended */
             ended: boolean;
-            /** Outcome */
             outcome: ("shown" | "interrupted") | null;
-            /** Showings */
             showings: components["schemas"]["ViewShowing"][] | null;
-            /** Clips */
             clips: components["schemas"]["SeenClip"][];
-            /** Disturbances */
             disturbances: {
                 [key: string]: number;
             };
         };
-        /**
-         * ViewsIn
-         * @description Up to 100 views; what the server already has is left as it is.
-         */
         ViewsIn: {
-            /** Views */
             views: components["schemas"]["ViewIn"][];
         };
-        /**
-         * ViewsSaved
-         * @description How many were new, how many were completed.
-         */
         ViewsSaved: {
-            /** Begun */
             begun: number;
-            /** Completed */
             completed: number;
-            /**
-             * Saved At
-             * Format: date-time
-             */
+            /** Format: date-time */
             saved_at: string;
         };
-        /**
-         * WarnFast
-         * @description Warn whose median response time in the last `answers` main trials lies below `below_ms`.
-         */
         WarnFast: {
-            /**
-             * Answers
-             * @description Answers of which the median is taken.
-             * @default 10
-             */
+            /** @default 10 */
             answers: number;
-            /**
-             * Text
-             * @description Markdown of the warning, in every language.
-             */
             text: {
                 [key: string]: string;
             };
             /**
-             * @description Names this rule. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             rule: "fast_answers";
-            /**
-             * Below Ms
-             * @description Median response time, in ms from the clip's end, under which the warning comes.
-             * @default 250
-             */
+            /** @default 250 */
             below_ms: number;
         };
-        /**
-         * WarnPattern
-         * @description Warn whose last `answers` main trials repeat two to `longest` answers over and over.
-         */
         WarnPattern: {
-            /**
-             * Answers
-             * @description Answers in a row that follow the pattern.
-             * @default 20
-             */
+            /** @default 20 */
             answers: number;
-            /**
-             * Text
-             * @description Markdown of the warning, in every language.
-             */
             text: {
                 [key: string]: string;
             };
             /**
-             * @description Names this rule. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             rule: "repeated_pattern";
-            /**
-             * Longest
-             * @description Length of the longest pattern looked for; 1, 2, 3, 1, 2, 3 has length 3.
-             * @default 4
-             */
+            /** @default 4 */
             longest: number;
         };
-        /**
-         * WarnSameAnswer
-         * @description Warn who gives one and the same answer in `answers` main trials in a row.
-         */
         WarnSameAnswer: {
-            /**
-             * Answers
-             * @description Equal answers in a row. With two answers to choose from, twenty come by chance in 1 of 5,000 visits of
-             *     100 trials.
-             * @default 20
-             */
+            /** @default 20 */
             answers: number;
-            /**
-             * Text
-             * @description Markdown of the warning, in every language.
-             */
             text: {
                 [key: string]: string;
             };
             /**
-             * @description Names this rule. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             rule: "same_answer";
         };
-        /**
-         * WarningShown
-         * @description A kind word to who answers without care; the page shows it before the next trial.
-         */
         WarningShown: {
-            /**
-             * Rule
-             * @description The rule of [[warnings.rules]] that the latest answers break.
-             */
             rule: string;
-            /**
-             * Number
-             * @description Which warning of this run it is, from 1.
-             */
             number: number;
-            /**
-             * Maximum
-             * @description How many there are.
-             */
             maximum: number;
-            /**
-             * Text
-             * @description Markdown, in the participant's language.
-             */
             text: string;
         };
-        /**
-         * Warnings
-         * @description Warnings while the run goes on. After a warning was shown, only answers after it count for another.
-         */
         Warnings: {
-            /**
-             * Rules
-             * @description What is warned of; without rules nobody is warned.
-             * @default []
-             */
+            /** @default [] */
             rules: (components["schemas"]["WarnSameAnswer"] | components["schemas"]["WarnPattern"] | components["schemas"]["WarnFast"])[];
-            /**
-             * Maximum
-             * @description Warnings that a participant gets.
-             * @default 2
-             */
+            /** @default 2 */
             maximum: number;
             /**
-             * Then
-             * @description What a lapse after the last warning does: it ends the run as screened out, or nothing more happens.
              * @default end
              * @enum {string}
              */
             then: "end" | "go_on";
             /**
-             * Code
-             * @description Which of the recruiter's codes a run gets that ended so; that of screened out where there is no other.
-             *     Never the code of a complete run.
              * @default failed_check
              * @enum {string}
              */
             code: "failed_check" | "screened_out";
-            /**
-             * End Text
-             * @description What stands above the last page of a run that ended so, in every language.
-             */
             end_text: {
                 [key: string]: string;
             };
         };
-        /**
-         * WaysIn
-         * @description How one can sign in here, besides by name and password.
-         */
         WaysIn: {
-            /** Providers */
             providers: components["schemas"]["ProviderOut"][];
-            /**
-             * Resets By Mail
-             * @description Whether forgotten passwords are reset by mail.
-             */
             resets_by_mail: boolean;
         };
-        /**
-         * WithinFactor
-         * @description Clips that differ in the level of one factor only: other factors and the exemplar are the same.
-         */
         WithinFactor: {
             /**
-             * @description Names this choice of pairs. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             among: "within";
-            /**
-             * Factor
-             * @description The factor in whose level the two clips differ.
-             */
             factor: string;
         };
-        /**
-         * WorkspaceOut
-         * @description A workspace, and the role of the account that asks; null where it is no member.
-         */
         WorkspaceOut: {
-            /** Name */
             name: string;
-            /** Title */
             title: string;
-            /** Second Factor Required */
             second_factor_required: boolean;
-            /** Role */
             role: ("viewer" | "experimenter" | "owner") | null;
-            /** Members */
             members: number;
-            /** Studies */
             studies: number;
         };
-        /**
-         * YesNo
-         * @description One clip, and whether something was seen in it.
-         */
         YesNo: {
             /**
-             * @description Names this task. (enum property replaced by openapi-typescript)
+             * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
             asks: "yes_no";
-            /**
-             * Yes
-             * @description Label of the answer that becomes likelier along the function.
-             */
             yes: {
                 [key: string]: string;
             };
-            /**
-             * No
-             * @description Label of the other answer.
-             */
             no: {
                 [key: string]: string;
             };
-            /**
-             * Guess
-             * @description Assumed share of yes where there is nothing to be seen: the function's lower end.
-             * @default 0.02
-             */
+            /** @default 0.02 */
             guess: number;
         };
     };
@@ -10283,7 +5251,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description OK */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -10292,7 +5259,6 @@ export interface operations {
                     "application/json": components["schemas"]["RatingSaved"];
                 };
             };
-            /** @description Successful Response */
             201: {
                 headers: {
                     [name: string]: unknown;
@@ -10301,7 +5267,6 @@ export interface operations {
                     "application/json": components["schemas"]["RatingSaved"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -10310,7 +5275,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -10334,7 +5298,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -10343,7 +5306,6 @@ export interface operations {
                     "application/json": components["schemas"]["ViewsSaved"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -10352,7 +5314,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -10374,7 +5335,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -10383,7 +5343,6 @@ export interface operations {
                     "application/json": components["schemas"]["LinkState"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -10392,7 +5351,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -10418,7 +5376,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description OK */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -10427,7 +5384,6 @@ export interface operations {
                     "application/json": components["schemas"]["RunStarted"];
                 };
             };
-            /** @description Successful Response */
             201: {
                 headers: {
                     [name: string]: unknown;
@@ -10436,7 +5392,6 @@ export interface operations {
                     "application/json": components["schemas"]["RunStarted"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -10445,7 +5400,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -10469,7 +5423,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             202: {
                 headers: {
                     [name: string]: unknown;
@@ -10478,7 +5431,6 @@ export interface operations {
                     "application/json": components["schemas"]["Received"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -10487,7 +5439,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -10507,7 +5458,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -10516,7 +5466,6 @@ export interface operations {
                     "application/json": components["schemas"]["RunState"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -10525,7 +5474,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -10549,7 +5497,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -10558,7 +5505,6 @@ export interface operations {
                     "application/json": components["schemas"]["Saved"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -10567,7 +5513,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -10591,7 +5536,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -10600,7 +5544,6 @@ export interface operations {
                     "application/json": components["schemas"]["Saved"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -10609,7 +5552,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -10635,7 +5577,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -10644,7 +5585,6 @@ export interface operations {
                     "application/json": components["schemas"]["Saved"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -10653,7 +5593,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -10679,7 +5618,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -10688,7 +5626,6 @@ export interface operations {
                     "application/json": components["schemas"]["Saved"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -10697,7 +5634,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -10721,7 +5657,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -10730,7 +5665,6 @@ export interface operations {
                     "application/json": components["schemas"]["Saved"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -10739,7 +5673,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -10763,7 +5696,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -10772,7 +5704,6 @@ export interface operations {
                     "application/json": components["schemas"]["Saved"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -10781,7 +5712,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -10805,7 +5735,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -10814,7 +5743,6 @@ export interface operations {
                     "application/json": components["schemas"]["Received"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -10823,7 +5751,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -10843,7 +5770,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -10852,7 +5778,6 @@ export interface operations {
                     "application/json": components["schemas"]["Completion"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -10861,7 +5786,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -10885,7 +5809,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -10894,7 +5817,6 @@ export interface operations {
                     "application/json": components["schemas"]["Saved"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -10903,7 +5825,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -10923,7 +5844,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -10932,7 +5852,6 @@ export interface operations {
                     "application/json": components["schemas"]["Saved"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -10941,7 +5860,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -10967,7 +5885,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -10976,28 +5893,24 @@ export interface operations {
                     "video/mp4": string;
                 };
             };
-            /** @description The part asked for by Range */
             206: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The copy the client has is right */
             304: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The clip is to be fetched from the object store */
             307: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -11006,7 +5919,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -11026,7 +5938,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -11035,7 +5946,6 @@ export interface operations {
                     "application/json": components["schemas"]["Health"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -11044,7 +5954,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -11064,7 +5973,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -11073,7 +5981,6 @@ export interface operations {
                     "application/json": components["schemas"]["Health"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -11082,7 +5989,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -11091,7 +5997,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -11111,7 +6016,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -11120,7 +6024,6 @@ export interface operations {
                     "application/json": components["schemas"]["BackupsOut"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -11129,7 +6032,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -11149,7 +6051,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -11158,7 +6059,6 @@ export interface operations {
                     "application/json": components["schemas"]["Me"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -11167,7 +6067,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -11191,7 +6090,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -11200,7 +6098,6 @@ export interface operations {
                     "application/json": components["schemas"]["Me"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -11209,7 +6106,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -11229,14 +6125,12 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             204: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -11245,7 +6139,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -11267,7 +6160,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -11276,7 +6168,6 @@ export interface operations {
                     "application/json": components["schemas"]["InvitationState"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -11285,7 +6176,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -11311,7 +6201,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             201: {
                 headers: {
                     [name: string]: unknown;
@@ -11320,7 +6209,6 @@ export interface operations {
                     "application/json": components["schemas"]["Me"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -11329,7 +6217,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -11349,7 +6236,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -11358,7 +6244,6 @@ export interface operations {
                     "application/json": components["schemas"]["SessionOut"][];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -11367,7 +6252,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -11389,14 +6273,12 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             204: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -11405,7 +6287,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -11429,14 +6310,12 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             204: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -11445,7 +6324,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -11469,7 +6347,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -11478,7 +6355,6 @@ export interface operations {
                     "application/json": components["schemas"]["RecoveryCodes"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -11487,7 +6363,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -11507,7 +6382,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -11516,7 +6390,6 @@ export interface operations {
                     "application/json": components["schemas"]["SecondFactorSetup"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -11525,7 +6398,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -11549,14 +6421,12 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             204: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -11565,7 +6435,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -11585,7 +6454,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -11594,7 +6462,6 @@ export interface operations {
                     "application/json": components["schemas"]["TokenOut"][];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -11603,7 +6470,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -11627,7 +6493,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             201: {
                 headers: {
                     [name: string]: unknown;
@@ -11636,7 +6501,6 @@ export interface operations {
                     "application/json": components["schemas"]["NewTokenOut"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -11645,7 +6509,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -11667,14 +6530,12 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             204: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -11683,7 +6544,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -11703,7 +6563,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -11712,7 +6571,6 @@ export interface operations {
                     "application/json": components["schemas"]["WaysIn"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -11721,7 +6579,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -11747,7 +6604,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -11756,7 +6612,6 @@ export interface operations {
                     "application/json": components["schemas"]["Elsewhere"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -11765,7 +6620,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -11788,7 +6642,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -11797,7 +6650,6 @@ export interface operations {
                     "application/json": components["schemas"]["Elsewhere"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -11806,7 +6658,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -11832,7 +6683,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -11841,7 +6691,6 @@ export interface operations {
                     "application/json": components["schemas"]["Elsewhere"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -11850,7 +6699,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -11876,14 +6724,12 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             303: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -11892,7 +6738,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -11916,7 +6761,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -11925,7 +6769,6 @@ export interface operations {
                     "application/json": components["schemas"]["BeginSignIn"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -11934,7 +6777,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -11960,14 +6802,12 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             204: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -11976,7 +6816,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -11996,7 +6835,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -12005,7 +6843,6 @@ export interface operations {
                     "application/json": components["schemas"]["LoginOut"][];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -12014,7 +6851,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -12036,14 +6872,12 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             204: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -12052,7 +6886,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -12076,7 +6909,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             202: {
                 headers: {
                     [name: string]: unknown;
@@ -12085,7 +6917,6 @@ export interface operations {
                     "application/json": unknown;
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -12094,7 +6925,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -12118,14 +6948,12 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             204: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -12134,7 +6962,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -12154,7 +6981,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -12163,7 +6989,6 @@ export interface operations {
                     "application/json": components["schemas"]["OwnAddress"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -12172,7 +6997,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -12196,7 +7020,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             202: {
                 headers: {
                     [name: string]: unknown;
@@ -12205,7 +7028,6 @@ export interface operations {
                     "application/json": unknown;
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -12214,7 +7036,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -12238,14 +7059,12 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             204: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -12254,7 +7073,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -12278,14 +7096,12 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             204: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -12294,7 +7110,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -12314,7 +7129,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -12323,7 +7137,6 @@ export interface operations {
                     "application/json": components["schemas"]["AccountOut"][];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -12332,7 +7145,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -12358,7 +7170,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -12367,7 +7178,6 @@ export interface operations {
                     "application/json": components["schemas"]["AccountOut"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -12376,7 +7186,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -12396,7 +7205,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -12405,7 +7213,6 @@ export interface operations {
                     "application/json": components["schemas"]["InvitationOut"][];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -12414,7 +7221,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -12438,7 +7244,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             201: {
                 headers: {
                     [name: string]: unknown;
@@ -12447,7 +7252,6 @@ export interface operations {
                     "application/json": components["schemas"]["NewInvitationOut"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -12456,7 +7260,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -12478,14 +7281,12 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             204: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -12494,7 +7295,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -12517,7 +7317,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -12526,7 +7325,6 @@ export interface operations {
                     "application/json": components["schemas"]["AuditOut"][];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -12535,7 +7333,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -12555,7 +7352,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -12564,7 +7360,6 @@ export interface operations {
                     "application/json": components["schemas"]["WorkspaceOut"][];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -12573,7 +7368,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -12597,7 +7391,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             201: {
                 headers: {
                     [name: string]: unknown;
@@ -12606,7 +7399,6 @@ export interface operations {
                     "application/json": components["schemas"]["WorkspaceOut"][];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -12615,7 +7407,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -12641,14 +7432,12 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             204: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -12657,7 +7446,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -12679,14 +7467,12 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             204: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -12695,7 +7481,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -12717,7 +7502,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -12726,7 +7510,6 @@ export interface operations {
                     "application/json": components["schemas"]["MemberOut"][];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -12735,7 +7518,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -12762,14 +7544,12 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             204: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -12778,7 +7558,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -12801,14 +7580,12 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             204: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -12817,7 +7594,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -12839,7 +7615,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -12848,7 +7623,6 @@ export interface operations {
                     "application/json": components["schemas"]["GrantOut"][];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -12857,7 +7631,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -12884,14 +7657,12 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             204: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -12900,7 +7671,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -12926,14 +7696,12 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             204: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -12942,7 +7710,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -12962,7 +7729,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -12971,7 +7737,6 @@ export interface operations {
                     "application/json": components["schemas"]["ShippedExperiment"][];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -12980,7 +7745,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -13004,7 +7768,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -13013,7 +7776,6 @@ export interface operations {
                     "application/json": components["schemas"]["Checked"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -13022,7 +7784,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -13046,7 +7807,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -13055,7 +7815,6 @@ export interface operations {
                     "application/json": components["schemas"]["EditedDefinition"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -13064,7 +7823,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -13084,7 +7842,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -13093,7 +7850,6 @@ export interface operations {
                     "application/json": components["schemas"]["StudySummary"][];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -13102,7 +7858,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -13126,7 +7881,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             201: {
                 headers: {
                     [name: string]: unknown;
@@ -13135,7 +7889,6 @@ export interface operations {
                     "application/json": components["schemas"]["StudyDetail"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -13144,7 +7897,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -13166,7 +7918,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -13175,7 +7926,6 @@ export interface operations {
                     "application/json": components["schemas"]["StudyDetail"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -13184,7 +7934,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -13206,14 +7955,12 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             204: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -13222,7 +7969,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -13248,7 +7994,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             201: {
                 headers: {
                     [name: string]: unknown;
@@ -13257,7 +8002,6 @@ export interface operations {
                     "application/json": components["schemas"]["StudyDetail"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -13266,7 +8010,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -13292,7 +8035,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -13301,7 +8043,6 @@ export interface operations {
                     "application/json": components["schemas"]["JudgedEdit"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -13310,7 +8051,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -13333,7 +8073,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -13342,7 +8081,6 @@ export interface operations {
                     "text/plain": string;
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -13351,7 +8089,6 @@ export interface operations {
                     "text/plain": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -13377,7 +8114,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -13386,7 +8122,6 @@ export interface operations {
                     "application/json": components["schemas"]["StudyDetail"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -13395,7 +8130,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -13421,7 +8155,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -13430,7 +8163,6 @@ export interface operations {
                     "application/json": components["schemas"]["StudyDetail"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -13439,7 +8171,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -13461,7 +8192,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -13470,7 +8200,6 @@ export interface operations {
                     "application/json": components["schemas"]["ClipOut"][];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -13479,7 +8208,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -13503,7 +8231,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             201: {
                 headers: {
                     [name: string]: unknown;
@@ -13512,7 +8239,6 @@ export interface operations {
                     "application/json": components["schemas"]["UploadOut"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -13521,7 +8247,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -13547,7 +8272,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -13556,7 +8280,6 @@ export interface operations {
                     "application/json": components["schemas"]["UploadProgress"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -13565,7 +8288,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -13587,7 +8309,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -13596,7 +8317,6 @@ export interface operations {
                     "application/json": components["schemas"]["UploadOut"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -13605,7 +8325,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -13627,7 +8346,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -13636,7 +8354,6 @@ export interface operations {
                     "application/json": components["schemas"]["UploadProgress"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -13645,7 +8362,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -13671,7 +8387,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -13680,7 +8395,6 @@ export interface operations {
                     "application/json": components["schemas"]["UploadProgress"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -13689,7 +8403,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -13715,7 +8428,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -13724,7 +8436,6 @@ export interface operations {
                     "application/json": components["schemas"]["UploadProgress"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -13733,7 +8444,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -13756,14 +8466,12 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -13772,7 +8480,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -13795,7 +8502,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -13804,7 +8510,6 @@ export interface operations {
                     "text/plain": string;
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -13813,7 +8518,6 @@ export interface operations {
                     "text/plain": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -13839,7 +8543,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             201: {
                 headers: {
                     [name: string]: unknown;
@@ -13848,7 +8551,6 @@ export interface operations {
                     "application/json": components["schemas"]["StudyDetail"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -13857,7 +8559,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -13883,7 +8584,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -13892,7 +8592,6 @@ export interface operations {
                     "application/json": components["schemas"]["StudyDetail"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -13901,7 +8600,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -13917,7 +8615,6 @@ export interface operations {
             query: {
                 old: number;
                 new: number;
-                /** @description The study that `old` is a version of. */
                 other?: string | null;
             };
             header?: never;
@@ -13928,7 +8625,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -13937,7 +8633,6 @@ export interface operations {
                     "application/json": components["schemas"]["Comparison"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -13946,7 +8641,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -13971,7 +8665,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -13980,7 +8673,6 @@ export interface operations {
                     "application/json": components["schemas"]["LinkPage"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -13989,7 +8681,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -14015,7 +8706,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             201: {
                 headers: {
                     [name: string]: unknown;
@@ -14024,7 +8714,6 @@ export interface operations {
                     "application/json": components["schemas"]["LinkOut"][];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -14033,7 +8722,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -14058,7 +8746,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -14067,7 +8754,6 @@ export interface operations {
                     "application/json": components["schemas"]["Signing"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -14076,7 +8762,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -14098,14 +8783,12 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -14114,7 +8797,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -14137,14 +8819,12 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             204: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -14153,7 +8833,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -14177,7 +8856,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -14186,7 +8864,6 @@ export interface operations {
                     "application/json": components["schemas"]["MonitorSnapshot"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -14195,7 +8872,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -14219,14 +8895,12 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -14235,7 +8909,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -14263,7 +8936,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -14272,14 +8944,12 @@ export interface operations {
                     "application/json": components["schemas"]["Results"] | components["schemas"]["PairResults"] | components["schemas"]["ThresholdResults"] | components["schemas"]["TraceResults"] | components["schemas"]["OtherResults"];
                 };
             };
-            /** @description Nothing has changed. */
             304: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -14288,7 +8958,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -14303,7 +8972,6 @@ export interface operations {
         parameters: {
             query?: {
                 show?: "everybody" | "complete" | "not_complete" | "excluded" | "pilot" | "simulated";
-                /** @description Part of participant or run. */
                 search?: string;
                 before?: string | null;
                 limit?: number;
@@ -14316,7 +8984,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -14325,7 +8992,6 @@ export interface operations {
                     "application/json": components["schemas"]["RunPage"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -14334,7 +9000,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -14357,7 +9022,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -14366,7 +9030,6 @@ export interface operations {
                     "application/json": components["schemas"]["Timeline"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -14375,7 +9038,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -14398,7 +9060,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -14407,7 +9068,6 @@ export interface operations {
                     "application/json": components["schemas"]["RunIdentity"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -14416,7 +9076,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -14443,14 +9102,12 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             204: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -14459,7 +9116,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -14482,14 +9138,12 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             204: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -14498,7 +9152,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -14525,7 +9178,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -14534,7 +9186,6 @@ export interface operations {
                     "application/json": components["schemas"]["Erased"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -14543,7 +9194,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -14566,7 +9216,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -14575,7 +9224,6 @@ export interface operations {
                     "application/json": components["schemas"]["Replay"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -14584,7 +9232,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -14608,7 +9255,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -14617,7 +9263,6 @@ export interface operations {
                     "application/json": components["schemas"]["ReplayedTrial"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -14626,7 +9271,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -14649,14 +9293,12 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -14665,7 +9307,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -14687,7 +9328,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -14696,7 +9336,6 @@ export interface operations {
                     "application/json": components["schemas"]["RetentionPreview"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -14705,7 +9344,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -14727,7 +9365,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -14736,7 +9373,6 @@ export interface operations {
                     "application/json": components["schemas"]["SealOut"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -14745,7 +9381,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -14771,7 +9406,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             201: {
                 headers: {
                     [name: string]: unknown;
@@ -14780,7 +9414,6 @@ export interface operations {
                     "application/json": components["schemas"]["SealOut"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -14789,7 +9422,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -14812,14 +9444,12 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -14828,7 +9458,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -14842,10 +9471,8 @@ export interface operations {
     download_ratings: {
         parameters: {
             query?: {
-                /** @description Begin with a byte order mark, and make cells text that a spreadsheet would run. */
                 excel?: boolean;
                 origin?: "participant" | "pilot" | "simulated" | "all";
-                /** @description Data of one data series; without it of all, told apart by a column. */
                 series?: number | null;
             };
             header?: never;
@@ -14856,14 +9483,12 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -14872,7 +9497,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -14886,10 +9510,8 @@ export interface operations {
     download_wide: {
         parameters: {
             query?: {
-                /** @description Begin with a byte order mark, and make cells text that a spreadsheet would run. */
                 excel?: boolean;
                 origin?: "participant" | "pilot" | "simulated" | "all";
-                /** @description Data of one data series; without it of all, told apart by a column. */
                 series?: number | null;
             };
             header?: never;
@@ -14900,14 +9522,12 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -14916,7 +9536,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -14930,10 +9549,8 @@ export interface operations {
     download_runs: {
         parameters: {
             query?: {
-                /** @description Begin with a byte order mark, and make cells text that a spreadsheet would run. */
                 excel?: boolean;
                 origin?: "participant" | "pilot" | "simulated" | "all";
-                /** @description Data of one data series; without it of all, told apart by a column. */
                 series?: number | null;
             };
             header?: never;
@@ -14944,14 +9561,12 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -14960,7 +9575,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -14983,14 +9597,12 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -14999,7 +9611,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -15014,7 +9625,6 @@ export interface operations {
         parameters: {
             query?: {
                 origin?: "participant" | "pilot" | "simulated" | "all";
-                /** @description Data of one data series; without it of all, told apart by a column. */
                 series?: number | null;
             };
             header?: never;
@@ -15025,14 +9635,12 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -15041,7 +9649,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -15056,7 +9663,6 @@ export interface operations {
         parameters: {
             query?: {
                 origin?: "participant" | "pilot" | "simulated" | "all";
-                /** @description Data of one data series; without it of all, told apart by a column. */
                 series?: number | null;
             };
             header?: never;
@@ -15067,14 +9673,12 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -15083,7 +9687,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -15105,14 +9708,12 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -15121,7 +9722,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -15143,14 +9743,12 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -15159,7 +9757,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -15174,7 +9771,6 @@ export interface operations {
         parameters: {
             query?: {
                 origin?: "participant" | "pilot" | "simulated" | "all";
-                /** @description Data of one data series; without it of all, told apart by a column. */
                 series?: number | null;
             };
             header?: never;
@@ -15187,14 +9783,12 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -15203,7 +9797,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -15225,7 +9818,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -15234,7 +9826,6 @@ export interface operations {
                     "application/json": components["schemas"]["ReportOut"][];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -15243,7 +9834,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -15269,7 +9859,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             202: {
                 headers: {
                     [name: string]: unknown;
@@ -15278,7 +9867,6 @@ export interface operations {
                     "application/json": components["schemas"]["ReportOut"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -15287,7 +9875,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -15313,14 +9900,12 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -15329,7 +9914,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -15351,7 +9935,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -15360,7 +9943,6 @@ export interface operations {
                     "application/json": components["schemas"]["RehearsalOut"] | null;
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -15369,7 +9951,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -15395,7 +9976,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             202: {
                 headers: {
                     [name: string]: unknown;
@@ -15404,7 +9984,6 @@ export interface operations {
                     "application/json": components["schemas"]["RehearsalOut"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -15413,7 +9992,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -15436,7 +10014,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -15445,7 +10022,6 @@ export interface operations {
                     "application/json": components["schemas"]["RehearsalResult"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -15454,7 +10030,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -15477,14 +10052,12 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             204: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -15493,7 +10066,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -15517,14 +10089,12 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -15533,7 +10103,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -15555,7 +10124,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -15564,7 +10132,6 @@ export interface operations {
                     "application/json": components["schemas"]["CapsuleOut"][];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -15573,7 +10140,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -15599,7 +10165,6 @@ export interface operations {
             };
         };
         responses: {
-            /** @description Successful Response */
             202: {
                 headers: {
                     [name: string]: unknown;
@@ -15608,7 +10173,6 @@ export interface operations {
                     "application/json": components["schemas"]["CapsuleOut"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -15617,7 +10181,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -15640,14 +10203,12 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -15656,7 +10217,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -15679,14 +10239,12 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             204: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -15695,7 +10253,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -15720,7 +10277,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -15729,7 +10285,6 @@ export interface operations {
                     "application/json": components["schemas"]["MethodsOut"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -15738,7 +10293,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -15763,14 +10317,12 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -15779,7 +10331,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -15799,7 +10350,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -15808,7 +10358,6 @@ export interface operations {
                     "application/json": components["schemas"]["BlinkLibrary"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -15817,7 +10366,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -15837,7 +10385,6 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
@@ -15846,7 +10393,6 @@ export interface operations {
                     "application/json": components["schemas"]["Strips"];
                 };
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -15855,7 +10401,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
@@ -15877,14 +10422,12 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Successful Response */
             200: {
                 headers: {
                     [name: string]: unknown;
                 };
                 content?: never;
             };
-            /** @description The request's content is not acceptable */
             422: {
                 headers: {
                     [name: string]: unknown;
@@ -15893,7 +10436,6 @@ export interface operations {
                     "application/json": components["schemas"]["ErrorBody"];
                 };
             };
-            /** @description Refused */
             "4XX": {
                 headers: {
                     [name: string]: unknown;
