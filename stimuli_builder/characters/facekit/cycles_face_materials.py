@@ -1,6 +1,5 @@
 """Shaders of a face from the face kit, in cm. Runs in Blender's own Python: see cycles_face_worker.py."""
 
-import math
 from typing import Any
 
 import bpy
@@ -30,7 +29,6 @@ def materials(settings: dict[str, Any]) -> dict[str, Any]:
         "eye": eye(colour, height),
         "film": film(settings["lights"]),
         "tear": tear(settings["lights"]),
-        "flesh": flesh(look),
         "spectacles": spectacles(),
         "lash": hair("lash", [min(0.004, c * 0.12) for c in look["hair"]], 0.25, (0.55, 1.9)),
         "brow": hair("brow", look["hair"], 0.33, (0.7, 1.45)),
@@ -103,20 +101,6 @@ def eye(colour: Any, height: Any) -> Any:
     n.put(n.math("MULTIPLY", n.attribute("sclera"), 0.35), shader.inputs["Subsurface Weight"])
     shader.inputs["Subsurface Radius"].default_value = (1.0, 0.7, 0.5)
     shader.inputs["Subsurface Scale"].default_value = 0.07
-    return n.surface(shader)
-
-
-def flesh(look: dict[str, Any]) -> Any:
-    """The nasal corner's moist flesh."""
-    n = Nodes("flesh")
-    dark = math.exp(-0.25 * look["melanin"])
-    shader = n.add("BsdfPrincipled", Roughness=0.5, Coat_Weight=0.25, Coat_Roughness=0.25)
-    shader.inputs["Base Color"].default_value = (0.62 * dark, 0.23 * dark, 0.19 * dark, 1)
-    shader.inputs["Subsurface Weight"].default_value = 0.8
-    shader.inputs["Subsurface Radius"].default_value = (1.0, 0.35, 0.25)
-    shader.inputs["Subsurface Scale"].default_value = 0.08
-    wrinkles = n.noise(n.add("TexCoord").outputs["Object"], 14.0, 3)
-    n.put(n.add("Bump", Strength=0.5, Distance=0.02, Height=wrinkles).outputs[0], shader.inputs["Normal"])
     return n.surface(shader)
 
 

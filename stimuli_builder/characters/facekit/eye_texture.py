@@ -1,5 +1,7 @@
 """Iris and sclera: albedo and relative height on the azimuthal equidistant plane of the eyeball."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
@@ -12,6 +14,27 @@ from stimuli_builder.characters.facekit.sphere import IRIS_CM, smooth
 GLOBE_CM = 1.5
 WHITE = (0.61, 0.56, 0.52)
 VEINS = 60
+
+
+@dataclass(frozen=True)
+class White:
+    """The eye's white of one person.
+
+    Attributes
+    ----------
+    lightness : float
+        Share of `WHITE`.
+    redness : float
+        Depth of its vessels and of what it reddens towards the corners, over the usual.
+    """
+
+    lightness: float = 1.0
+    redness: float = 1.0
+
+
+DARK_WHITE = White(0.84, 1.25)
+"""With dark skin, which a camera gives more light, a white of the usual lightness shone by itself."""
+
 DRIFT, DRIFT_CM = 0.006, 0.07
 """How far fibres wander on their way outwards: standard deviation at the rim, turns, and its scale, cm.
 
@@ -49,7 +72,7 @@ class _Plane:
 
 
 def eye_maps(
-    iris: Iris, seed: int, redness: float = 1.0, size: int = 1400
+    iris: Iris, seed: int, sclera: White = White(), size: int = 1400
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """(size, size, 3) linear albedo and (size, size) height in 0-1, lowest row first."""
     plane = _Plane(size, np.random.default_rng([seed, 7]))
@@ -59,10 +82,10 @@ def eye_maps(
     broad = plane.polar(8, 2, 3, across)
     coloured = _iris_colour(plane, iris, (fibres, bundles, broad), across)
     veins = _veins(plane)
-    white = _sclera_colour(plane, veins, redness)
+    white = sclera.lightness * _sclera_colour(plane, veins, sclera.redness)
     limbus = IRIS_CM + 0.01
-    blend = smooth(limbus - 0.07, limbus + 0.055, plane.r + 0.008 * broad)[..., None]
-    ring = (1 - 0.28 * np.exp(-(((plane.r - limbus - 0.01) / 0.06) ** 2)))[..., None]
+    blend = smooth(limbus - 0.08, limbus + 0.075, plane.r + 0.010 * broad)[..., None]
+    ring = (1 - 0.14 * np.exp(-(((plane.r - limbus - 0.01) / 0.06) ** 2)))[..., None]
     albedo = coloured * (1 - blend) + white * blend * ring
     stroma = (plane.r < limbus) & (plane.r > pupil)
     height = np.where(
@@ -102,7 +125,7 @@ def _iris_colour(plane: _Plane, iris: Iris, noises: tuple[Array, Array, Array], 
 def _sclera_colour(plane: _Plane, veins: Array, redness: float) -> Array:
     mottle = 0.05 * plane.noise(0.15) + 0.035 * plane.noise(0.03) + 0.05 * plane.noise(0.4)
     white = np.array(WHITE) * (1 + mottle)[..., None]
-    aside = np.clip((np.abs(plane.x) - 0.60) / 0.6, 0, 1.3) ** 1.2 * 0.8
+    aside = np.clip((np.abs(plane.x) - 0.60) / 0.6, 0, 1.3) ** 1.2 * 0.55
     pink = (aside + np.clip((np.abs(plane.y) - 0.6) / 0.5, 0, 1) * 0.5) * redness
     pink = pink * np.clip(1 + 0.35 * plane.noise(0.12), 0.2, 2)
     yellow = np.clip((np.abs(plane.x) - 0.5) / 0.5, 0, 1) * np.clip(1 + 0.4 * plane.noise(0.25), 0, 2)
@@ -127,7 +150,7 @@ def _veins(plane: _Plane) -> Array:
             int(plane.rng.integers(25, 65)),
             0,
         )
-    soft = 2.4 * gaussian_filter(ink, 0.8) + 3.0 * gaussian_filter(ink, 2.2)
+    soft = 3.2 * gaussian_filter(ink, 0.8) + 2.2 * gaussian_filter(ink, 2.2)
     return np.asarray(np.clip(soft, 0, 1.0) * np.clip(0.55 + 0.5 * plane.noise(0.25), 0, 1))
 
 

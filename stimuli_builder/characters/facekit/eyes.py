@@ -1,4 +1,4 @@
-"""Eyeballs, the wet film over them, tear line and caruncle of one side, as meshes of quads; lengths in cm."""
+"""Eyeballs, the wet film over them and the tear line of one side, as meshes of quads; lengths in cm."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -13,8 +13,8 @@ from stimuli_builder.characters.facekit.sphere import IRIS_CM, smooth, spherical
 
 TEXTURE_LIMIT = 1.25
 """Radians from the gaze axis at the edge of the eye's texture."""
-_SHADE_REACH_CM = (0.26, 0.07)
-_SHADE_DEPTH = (0.52, 0.42)
+_SHADE_REACH_CM = (0.34, 0.10)
+_SHADE_DEPTH = (0.60, 0.42)
 _FLUSHED_CM = (0.16, 0.36)
 """Distances from the nasal corner between which the eye's white turns from the corner's pink to its own."""
 
@@ -133,33 +133,3 @@ def tube(line: Array, radius: Array, sectors: int = 10) -> Mesh:
     around = np.cos(turn) * first[:, None] + np.sin(turn) * second[:, None]
     vertices = line[:, None] + radius[:, None, None] * around
     return Mesh(vertices.reshape(-1, 3), _tube_quads(len(line) - 1, sectors))
-
-
-def caruncle(path: BlinkPath, posed: Array, side: int) -> Mesh:
-    """The pink flesh of the nasal corner and the fold beside it, in the corner of the posed vertices."""
-    tip = nasal_tip(path, posed, side, EDGE_LOOP)
-    corner = nasal_tip(path, posed, side, EDGE_LOOP + 1)
-    tilt = -side * 0.5
-    # So wide that the lids' edges bound them, and sunk in: what ended within the corner looked like a bead.
-    main = _ellipsoid(tip + np.array([side * 0.13, -0.02, -0.097]), (0.42, 0.25, 0.115), tilt)
-    fold = _ellipsoid(tip + np.array([side * 0.30, -0.02, -0.115]), (0.17, 0.14, 0.08), tilt)
-    filling = _ellipsoid(corner + np.array([side * 0.09, -0.01, -0.085]), (0.15, 0.075, 0.055), tilt)
-    meshes = [main, fold, filling]
-    starts = np.cumsum([0, *[len(mesh.vertices) for mesh in meshes[:-1]]])
-    quads = np.concatenate([mesh.quads + start for mesh, start in zip(meshes, starts, strict=True)])
-    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), quads)
-
-
-def _ellipsoid(centre: Array, size: tuple[float, float, float], tilt: float) -> Mesh:
-    rings, sectors = 24, 40
-    polar, turn = np.meshgrid(
-        np.linspace(1e-3, np.pi - 1e-3, rings + 1),
-        np.linspace(0, 2 * np.pi, sectors, endpoint=False),
-        indexing="ij",
-    )
-    unit = np.stack([np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), np.cos(polar)], -1).reshape(
-        -1, 3
-    )
-    x, y, z = (unit * np.array(size)).T
-    turned = np.stack([x * np.cos(tilt) + z * np.sin(tilt), y, z * np.cos(tilt) - x * np.sin(tilt)], -1)
-    return Mesh(centre + turned, _tube_quads(rings, sectors))

@@ -15,6 +15,11 @@ from stimuli_builder.characters.facekit.sphere import smooth
 LASH_POINTS, BROW_POINTS = 12, 8
 CLUMPS = {True: [0.28, 0.32, 0.26, 0.14], False: [0.60, 0.28, 0.09, 0.03]}
 """Shares of clumps of one to four lashes of upper and lower lids: lower ones in even bundles look planted."""
+DROOP_DEGREES = 25.0
+"""How far the upper lashes hang down half way, beyond what their lid turns.
+
+There they point at the camera, and seen from their tips all of them are one dark line along the lid.
+"""
 _EDGE_POINTS = 200
 LEFT_BROW, RIGHT_BROW = slice(22, 27), slice(21, 16, -1)
 
@@ -61,8 +66,8 @@ class Lashes:
         self.path, self.side, self.upper = path, side, upper
         self.row = _draw_row(hair, upper, np.random.default_rng([seed, side + 5, int(upper)]))
 
-    def at(self, vertices: Array) -> Strands:
-        """The strands on the edge of the posed coarse vertices."""
+    def at(self, vertices: Array, stroke: float) -> Strands:
+        """The strands on the edge of the posed coarse vertices, the lid at a stroke."""
         row, globe = self.row, self.path.globes[self.side]
         line = edge_line(self.path, vertices, self.side, LASH_LOOP, self.upper)
         number = row.along_lid * (len(line) - 1)
@@ -72,9 +77,17 @@ class Lashes:
         radial /= np.linalg.norm(radial, axis=1, keepdims=True)
         tangent = np.stack([np.zeros(len(root)), -radial[:, 2], radial[:, 1]], -1) * (1 if self.upper else -1)
         tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+        if self.upper:
+            radial, tangent = _turned(radial, tangent, DROOP_DEGREES * np.sin(np.pi * stroke))
         first = root - 0.03 * radial + row.lift[:, None] * tangent
         points = _grown(first, radial, tangent, row, self.side)
         return Strands(_clumped(points, row.leader), row.radius)
+
+
+def _turned(radial: Array, tangent: Array, degrees: float) -> tuple[Array, Array]:
+    """Both axes of each root turned towards the tangent."""
+    cos, sin = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return cos * radial + sin * tangent, cos * tangent - sin * radial
 
 
 def _grown(first: Array, radial: Array, tangent: Array, row: _LashRow, side: int) -> Array:

@@ -1,23 +1,28 @@
 """What stands out of the lids' skin or goes into it: folds, furrows, bags, flesh, grain."""
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from stimuli_builder.characters.facekit.blink_path import BlinkPath, nasal_tip
+from stimuli_builder.characters.facekit.blink_path import BlinkPath
 from stimuli_builder.characters.facekit.field_noise import value_noise
 from stimuli_builder.characters.facekit.identity import Identity
 from stimuli_builder.characters.facekit.kit import Array
 from stimuli_builder.characters.facekit.lid_coordinates import LID_MIDDLE, LidCoordinates
-from stimuli_builder.characters.facekit.lid_loops import SIDES
+from stimuli_builder.characters.facekit.lid_loops import SIDES, chains
 from stimuli_builder.characters.facekit.sphere import smooth
 
-FLESH_LOOPS, FLESH_CM, FLESH_RISE_CM = (2, 3, 4, 5), (0.04, 0.12), 0.045
-"""Loops whose nasal ends are flesh, how far it reaches beside them, and how far it stands out of their fold.
+FLESH_LOOPS, FLESH_ENDS, FLESH_CM = (0, 1, 2, 3, 4, 5), (2, 5), (0.03, 0.09)
+"""Loops whose nasal ends are flesh, vertices of it on each one's upper and lower half, and how far it reaches
+beside them.
 
-The lids' edges end short of the fold between them, and skin there looked like a pit behind a blunt corner.
+The lids' edges end blunt and short of the fold between them: what lies there is the kit's own caruncle, and
+with a skin's colour it was a pale hook about the white.
 """
+MOUND_RISE_CM, MOUND_CM = 0.05, 0.10
+"""How far the caruncle stands out of the fold, and its radius."""
 
 
 class LidRelief:
@@ -29,14 +34,16 @@ class LidRelief:
         Where each vertex lies on the lids.
     flat : float64 array (n, 3)
         Vertices of the shut lids, on which the grain is drawn, cm.
-    flesh : float64 array (n,)
-        1 on the flesh of the nasal corners, 0 beyond it.
+    flesh : CornerFlesh
+        The flesh of the nasal corners.
     identity : Identity
         Whose folds, age and seed.
     """
 
-    def __init__(self, coordinates: LidCoordinates, flat: Array, flesh: Array, identity: Identity) -> None:
-        self.coordinates, self.flesh = coordinates, flesh
+    def __init__(
+        self, coordinates: LidCoordinates, flat: Array, flesh: "CornerFlesh", identity: Identity
+    ) -> None:
+        self.coordinates, self.flesh, self._mound = coordinates, flesh.share, flesh.mound
         self._flat, self._lids, self._seed = flat, identity.lids, identity.seed
         self._years = age_depth(identity.skin.age)
 
@@ -57,7 +64,7 @@ class LidRelief:
         """(n,) cm along the normal, at each vertex's stroke: folds, the nasal corner's flesh, grain."""
         at, surface, opened = self.coordinates, self._waves[2], 1 - stroke
         grain = 0.0020 * surface * smooth(3.5, 6.0, at.loop)
-        mound = FLESH_RISE_CM * opened * self.flesh * (1 + 0.5 * surface)
+        mound = MOUND_RISE_CM * opened * self._mound * (1 + 0.5 * surface)
         return np.asarray(self._upper_folds(stroke) + self._lower_folds() + grain + mound)
 
     def _upper_folds(self, stroke: Array) -> Array:
@@ -91,15 +98,43 @@ class LidRelief:
         return np.asarray(bag * below)
 
 
-def corner_flesh(path: BlinkPath, rest: Array) -> Array:
-    """(n,) 1 in the folds where the lids' edges meet at the nose, 0 from `FLESH_CM[1]` beside them."""
-    here = []
+@dataclass(frozen=True, eq=False)
+class CornerFlesh:
+    """The flesh between the lids' edges at the nose.
+
+    Attributes
+    ----------
+    share : float64 array (n,)
+        1 on it, 0 from `FLESH_CM[1]` beside it.
+    mound : float64 array (n,)
+        Height of the caruncle over its highest, before relief.
+    """
+
+    share: Array
+    mound: Array
+
+
+def corner_flesh(path: BlinkPath, rest: Array) -> CornerFlesh:
+    """The flesh of both nasal corners, at each of the (n, 3) resting vertices."""
+    upper, lower = FLESH_ENDS
+    here, middles = [], []
     for side in SIDES:
-        tips = np.stack([nasal_tip(path, path.rest, side, loop) for loop in FLESH_LOOPS])
-        share = np.linspace(0, len(tips) - 1, 30)
-        here.append(np.stack([np.interp(share, np.arange(len(tips)), tips[:, k]) for k in range(3)], -1))
+        halves = [chains(path.kit, path.loops[side][k], side) for k in FLESH_LOOPS]
+        ends = np.stack([path.rest[np.concatenate([u[upper - 1 : 0 : -1], v[:lower]])] for u, v in halves])
+        here.append(_between(_between(ends).swapaxes(0, 1)).reshape(-1, 3))
+        middles.append(here[-1].mean(axis=0))
     away, _ = cKDTree(np.concatenate(here)).query(rest)
-    return smooth(FLESH_CM[1], FLESH_CM[0], away)
+    share = smooth(FLESH_CM[1], FLESH_CM[0], away)
+    from_middle, _ = cKDTree(np.stack(middles)).query(rest)
+    return CornerFlesh(share, share * np.exp(-((from_middle / MOUND_CM) ** 2)))
+
+
+def _between(points: Array) -> Array:
+    """(4 n - 3, ...) points with three more between each and the next."""
+    at = np.linspace(0, len(points) - 1, 4 * len(points) - 3)
+    low = np.minimum(at.astype(np.int64), len(points) - 2)
+    share = (at - low).reshape(-1, *[1] * (points.ndim - 1))
+    return np.asarray(points[low] + share * (points[low + 1] - points[low]))
 
 
 def age_depth(age: float) -> float:

@@ -31,9 +31,9 @@ CORNER_CM, CORNER_BLOOD = 0.30, 0.28
 """Reach and added blood of a nasal corner's duller skin: lit and smooth, its fold shone as a white dot."""
 LID_VESSELS = 0.10
 """Optical depth of blood in vessels that shine through the upper lid, the thinnest skin there is."""
-FLESH_BLOOD, FLESH_PALER, FLESH_WET = 0.5, 0.6, 0.3
+FLESH_BLOOD, FLESH_PALER, FLESH_WET = 0.38, 0.5, 0.2
 """The flesh of a nasal corner against the skin about it: blood more, share of melanin (of light skin;
-of dark skin down to half of it) and roughness less."""
+of dark skin less) and roughness less."""
 NOSE, CHIN, BRIDGE, NOSTRILS, LIPS = 30, 8, 27, (31, 35), slice(48, 60)
 """Numbers of Multi-PIE landmarks."""
 
@@ -63,7 +63,7 @@ class Pigments:
         lips = self._lips()
         wet, fine, coordinates = self._lid_values()
         lid, corner, flesh = self._upper_lid(), self._nasal_corner(), self.skin.relief.flesh
-        paler = FLESH_PALER * (1 + self.contrast) / 2
+        paler = FLESH_PALER * self.contrast
         melanin = self._varied_melanin(lips, wet, lid) * (1 - paler * flesh)
         haemoglobin = self._varied_haemoglobin(lips, wet, lid, corner) + FLESH_BLOOD * flesh
         rough = self._roughness(lips) + LID_ROUGH * np.maximum(lid, corner) - FLESH_WET * flesh

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from stimuli_builder.characters.facekit.blink_path import BlinkPath
-from stimuli_builder.characters.facekit.eye_texture import eye_maps
-from stimuli_builder.characters.facekit.eyes import Mesh, caruncle, eyeball, tear_line, wet_film
+from stimuli_builder.characters.facekit.eye_texture import DARK_WHITE, White, eye_maps
+from stimuli_builder.characters.facekit.eyes import Mesh, eyeball, tear_line, wet_film
 from stimuli_builder.characters.facekit.framing import FRAMINGS, Box, Framing, View
 from stimuli_builder.characters.facekit.hair import Brow, Lashes, Strands
 from stimuli_builder.characters.facekit.identity import Identity
@@ -105,10 +105,9 @@ class FaceScene:
                 Part(f"eye_{name}", "eye", eyeball(self.path, coarse, side, stroke)),
                 Part(f"film_{name}", "film", wet_film(self.path, side, stroke)),
                 Part(f"tear_{name}", "tear", tear_line(self.path, coarse, side, stroke)),
-                Part(f"flesh_{name}", "flesh", caruncle(self.path, self._opened, side)),
                 Part(f"brow_{name}", "brow", self._brows[side].at(posed)),
             ]
-        return parts + [Part(name, "lash", row.at(coarse)) for name, row in self._lashes]
+        return parts + [Part(name, "lash", row.at(coarse, strokes[row.side])) for name, row in self._lashes]
 
     def strokes_of(self, pose: LidPose) -> dict[int, float]:
         """The stroke of each side's lid."""
@@ -120,11 +119,6 @@ class FaceScene:
 
     def _coarse(self, pose: LidPose) -> Array:
         return self.path.at(self.strokes_of(pose), self._lower_cm(pose))
-
-    @cached_property
-    def _opened(self) -> Array:
-        """Coarse vertices of the open eyes; the flesh of the corners stays where it is then."""
-        return self._coarse(OPEN)
 
     def _lower_cm(self, pose: LidPose) -> tuple[float, float]:
         return pose.vertical_mm / self.view.mm_per_cm, pose.horizontal_mm / self.view.mm_per_cm
@@ -157,7 +151,8 @@ class FaceScene:
         """Write the eye's maps: `colour` linear albedo, `height` in 0-1; lowest row first."""
         dark = self.identity.skin.melanin > 0.9
         size = round(TEXTURE_SHARE * self.view.size_px[0])
-        colour, height = eye_maps(self.identity.iris, self.identity.seed + 3, 1.25 if dark else 1.0, size)
+        white = DARK_WHITE if dark else White()
+        colour, height = eye_maps(self.identity.iris, self.identity.seed + 3, white, size)
         np.savez(file, colour=colour, height=height)
 
     @cached_property
