@@ -73,7 +73,7 @@ class Atlas:
 
     def base_linear(self) -> NDArray[np.float32]:
         """(height, width, 3) linear light of the whole open-eye frame."""
-        return srgb_to_linear(self._decode(self.declaration.base, self.size_px, "base frame"))
+        return srgb_to_linear(self._picture_or_frame(self.declaration.base, self.size_px, "base frame"))
 
     def level_srgb(self, index: int) -> NDArray[np.uint8]:
         """(h, w, 3) sRGB code values of one level's crop."""

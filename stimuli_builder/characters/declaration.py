@@ -87,7 +87,7 @@ class LowerLid(_Declared):
             raise ValueError("lower_lid.poses must hold the resting pose (vertical_mm 0, horizontal_mm 0)")
         if any(matte.frame is not None for matte in self.mattes):
             raise ValueError(
-                "lower_lid.mattes must be pictures; only levels and poses may be frames of a video"
+                "lower_lid.mattes must be pictures; only base, levels and poses may be frames of a video"
             )
         _require_ascending([matte.closure for matte in self.mattes], "lower_lid.mattes")
         return self
@@ -108,7 +108,7 @@ class Declaration(_Declared):
     inter_ocular_mm: float = Field(gt=0)
     opening_mm: float = Field(gt=0)
     crop: tuple[int, int, int, int]
-    base: Picture
+    base: PictureOrFrame
     levels: tuple[Level, ...] = Field(min_length=2)
     lower_lid: LowerLid | None = None
     provenance: dict[str, Any] = Field(default_factory=dict)

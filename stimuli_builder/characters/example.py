@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from stimuli_builder.characters.declaration import Declaration, Level, LowerLid, LowerLidPose
+from stimuli_builder.characters.declaration import Declaration, Level, LowerLid, LowerLidPose, PictureOrFrame
 from stimuli_builder.characters.writing import write_declaration, write_picture
 
 WIDTH, HEIGHT = 48, 24
@@ -53,7 +53,7 @@ def write_example_character(folder: Path, lower_lid: bool = True) -> Path:
         inter_ocular_mm=16.0,
         opening_mm=8.0,
         crop=CROP,
-        base=write_picture(folder, "open.webp", frame),
+        base=PictureOrFrame(**write_picture(folder, "open.webp", frame).model_dump()),
         levels=tuple(levels),
         lower_lid=layer,
         provenance={"command": "tests", "versions": {"numpy": "2"}, "samples": 3},

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stimuli_builder.characters.colour import linear_to_srgb, srgb_to_linear
-from stimuli_builder.characters.declaration import Declaration, Level, LowerLid, LowerLidPose
+from stimuli_builder.characters.declaration import Declaration, Level, LowerLid, LowerLidPose, PictureOrFrame
 from stimuli_builder.characters.facekit.development import photographed, to_8_bit
 from stimuli_builder.characters.facekit.framing import INTER_OCULAR_MM, Box, bounding_box
 from stimuli_builder.characters.facekit.inbetween import flow_mix
@@ -33,7 +33,7 @@ STUDIO_EV = 0.15
 STEADY_CODE = 0.03
 """A change of this share of white is movement; one far below it is a change of light on still skin."""
 STEADY_PX = 1.5
-LEVELS_FILE, POSES_FILE = "levels.mkv", "lower_lid.mkv"
+LEVELS_FILE, POSES_FILE, STILL_FILE = "levels.mkv", "lower_lid.mkv", "open.mkv"
 NOTICE_FILE = Path(__file__).with_name("ICT-FaceKit-LICENSE.txt")
 """Goes beside every character rendered from the kit's geometry, as its licence asks."""
 Picture = NDArray[np.uint8]
@@ -85,6 +85,7 @@ class Assembly:
         """Write the character, its declaration last."""
         closures, pictures = zip(*self.levels(count), strict=True)
         video = write_level_video(folder, LEVELS_FILE, pictures)
+        still = write_level_video(folder, STILL_FILE, [to_8_bit(self._still)])
         view = self._scene.view
         declaration = Declaration(
             name=name,
@@ -95,7 +96,7 @@ class Assembly:
             inter_ocular_mm=INTER_OCULAR_MM,
             opening_mm=round(self._scene.opening_mm, 2),
             crop=self.crop,
-            base=write_picture(folder, "open.webp", to_8_bit(self._still)),
+            base=PictureOrFrame(frame=0, **still.model_dump()),
             levels=tuple(
                 Level(closure=closure, file=video.file, sha256=video.sha256, frame=number)
                 for number, closure in enumerate(closures)

@@ -7,7 +7,7 @@ import pytest
 
 from experiments.errors import InputError
 from stimuli_builder.characters.atlas import load_atlas
-from stimuli_builder.characters.colour import srgb_to_linear
+from stimuli_builder.characters.colour import linear_to_srgb, srgb_to_linear
 from stimuli_builder.characters.declaration import Declaration, Level, read_declaration
 from stimuli_builder.characters.example import CLOSURES, CROP, draw_crop
 from stimuli_builder.characters.facekit.development import psnr_db
@@ -130,6 +130,18 @@ def test_a_frame_beyond_the_video_is_refused(in_video: Path) -> None:
     write_declaration(in_video, Declaration.model_validate(declared))
     with pytest.raises(InputError, match=r"holds 4 of 40 x 16 px, the declaration asks for frame 9"):
         load_atlas(in_video).check_files()
+
+
+def test_a_base_kept_as_a_video_of_one_frame(in_video: Path) -> None:
+    atlas = load_atlas(in_video)
+    frame = linear_to_srgb(atlas.base_linear())
+    still = write_level_video(in_video, "open.mkv", [frame])
+    declared = read_declaration(in_video).model_dump() | {"base": {**still.model_dump(), "frame": 0}}
+    write_declaration(in_video, Declaration.model_validate(declared))
+    kept = load_atlas(in_video)
+    kept.check_files()
+    assert psnr_db(linear_to_srgb(kept.base_linear()), frame) > 44
+    assert kept.fingerprint() != atlas.fingerprint()
 
 
 def test_mattes_are_pictures(tiny_character: Path) -> None:

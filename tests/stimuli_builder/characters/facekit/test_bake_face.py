@@ -149,16 +149,6 @@ def test_lids_boxes_hold_the_eyes_and_all_lashes(scene: FaceScene) -> None:
             assert ((at > low - 1) & (at < high + 1)).all()
 
 
-@pytest.mark.parametrize("closure", [0.25, 0.5, 1.0])
-def test_flesh_of_the_nasal_corners_stays_where_it_is(scene: FaceScene, closure: float) -> None:
-    """Moved with the lids it came 1 mm forward half shut, and stood before the eye like an egg."""
-    opened, pose = (
-        [part.shape.vertices for part in scene.shapes(LidPose(at)) if part.material == "flesh"]
-        for at in (0.0, closure)
-    )
-    np.testing.assert_array_equal(opened, pose)
-
-
 def test_no_iris_is_the_others_copy(scene: FaceScene) -> None:
     eyes = {part.name: part.shape for part in scene.parts(LidPose(0.0)) if part.name.startswith("eye_")}
     left, right = (eyes[f"eye_{side}"].uv for side in ("left", "right"))

@@ -18,7 +18,7 @@ def path(kit: FaceKit) -> BlinkPath:
 def seen(path: BlinkPath, stroke: float) -> np.ndarray:
     """(n, 2) way in the picture from root to tip of one eye's upper lashes, cm; y points upwards."""
     lashes = Lashes(path, identity_of_seed(4).hair, 1, True, 4)
-    points = lashes.at(path.at({1: stroke, -1: stroke})).points
+    points = lashes.at(path.at({1: stroke, -1: stroke}), stroke).points
     return np.asarray(points[:, -1, :2] - points[:, 0, :2])
 
 
@@ -28,6 +28,13 @@ def test_a_shut_lids_lashes_hang_down_as_long_as_they_stood(path: BlinkPath) -> 
     assert np.mean(shut[:, 1] < 0) > 0.9
     # Curled by 88 degrees they were 0.83 times as long, and a seventh of them pointed up.
     assert np.median(np.linalg.norm(shut, axis=1)) > 0.95 * np.median(np.linalg.norm(opened, axis=1))
+
+
+def test_lashes_hang_before_a_half_shut_eye(path: BlinkPath) -> None:
+    """Pointed at the camera, all of them together were one dark line along the lid."""
+    half = seen(path, 0.5)
+    assert np.mean(half[:, 1] < 0) > 0.9
+    assert np.median(np.linalg.norm(half, axis=1)) > 0.5 * np.median(np.linalg.norm(seen(path, 0.0), axis=1))
 
 
 def test_more_of_the_lower_lashes_stand_alone(path: BlinkPath) -> None:
