@@ -10,6 +10,7 @@ const MAX_STARTS = 6;
 interface Waiting {
   resolve: (message: FromWorker) => void;
   reject: (error: Error) => void;
+  limit?: ReturnType<typeof setTimeout>;
 }
 
 /** A page laid out anew while a clip's first frames are drawn takes their place on the way to the screen. */
@@ -37,7 +38,7 @@ export class WorkerPlayer implements ClipPlayer {
   readonly method = "webcodecs";
   readonly element = document.createElement("canvas");
   private readonly prepared = new Map<string, Promise<Prepared>>();
-  private readonly waiting = new Map<string, Waiting>();
+  private readonly waiting = new Map<string, Set<Waiting>>();
 
   constructor(
     private readonly worker: Worker,
@@ -57,8 +58,7 @@ export class WorkerPlayer implements ClipPlayer {
     // The page keeps its own copy for a second view, so the bytes are copied and not handed over.
     this.tell({ type: "prepare", sha256, bytes, fps });
     const result = asked.then((message) => message as FromWorker & { type: "prepared" });
-    result.catch(() => this.prepared.delete(sha256));
-    this.prepared.set(sha256, result);
+    this.keep(sha256, result);
     return result;
   }
 
@@ -66,8 +66,7 @@ export class WorkerPlayer implements ClipPlayer {
     const asked = this.ask(`prepared ${name}`, DECODE_LIMIT_MS);
     this.tell({ type: "compose", sha256: name, parts: [...parts], width, height });
     const result = asked.then((message) => message as FromWorker & { type: "prepared" });
-    result.catch(() => this.prepared.delete(name));
-    this.prepared.set(name, result);
+    this.keep(name, result);
     return result;
   }
 
@@ -95,19 +94,32 @@ export class WorkerPlayer implements ClipPlayer {
     this.tell({ type: "release", sha256 });
   }
 
+  private keep(name: string, result: Promise<Prepared>): void {
+    this.prepared.set(name, result);
+    result.catch(() => this.prepared.get(name) === result && this.prepared.delete(name));
+  }
+
   private ask(name: string, limit_ms: number): Promise<FromWorker> {
     return new Promise((resolve, reject) => {
-      this.waiting.set(name, { resolve, reject });
+      const asked: Waiting = { resolve, reject };
+      // A clip released and prepared anew is asked for twice by one name: each has a limit of its own.
+      this.waiting.set(name, (this.waiting.get(name) ?? new Set()).add(asked));
       if (limit_ms === Infinity) return;
-      setTimeout(() => this.settle(name, new ClipBroken(`no answer in ${limit_ms} ms`)), limit_ms);
+      asked.limit = setTimeout(() => {
+        this.waiting.get(name)?.delete(asked);
+        reject(new ClipBroken(`no answer in ${limit_ms} ms`));
+      }, limit_ms);
     });
   }
 
   private settle(name: string, outcome: FromWorker | Error): void {
-    const waiting = this.waiting.get(name);
+    const all = this.waiting.get(name) ?? [];
     this.waiting.delete(name);
-    if (outcome instanceof Error) waiting?.reject(outcome);
-    else waiting?.resolve(outcome);
+    for (const asked of all) {
+      clearTimeout(asked.limit);
+      if (outcome instanceof Error) asked.reject(outcome);
+      else asked.resolve(outcome);
+    }
   }
 
   private arrived(message: FromWorker): void {
