@@ -53,7 +53,7 @@ class DefinitionError(InputError):
     def __init__(self, source: str, problems: Sequence[Problem], number: int | None = None) -> None:
         self.problems = tuple(problems)
         others = (number or len(problems)) - 1
-        more = f" (and {others} more)" if others else ""
+        more = f" (and {others} more problem{'s' if others > 1 else ''})" if others else ""
         super().__init__(f"{source}: {problems[0]}{more}")
 
 

@@ -42,7 +42,10 @@ def upgrade() -> None:
 
 @app.command("status")
 def status() -> None:
-    """Say which revision the database has, and which this program expects."""
+    """Say which revision the database has, and which this program expects.
+
+    Example: server database status
+    """
     database = open_database(Settings())
     revision, expected = current_revision(database), newest_revision()
     database.close()

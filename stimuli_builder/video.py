@@ -19,6 +19,8 @@ Picture = NDArray[np.uint8]
 
 BATCH_FRAMES = 8
 WAITING_BATCHES = 6
+PICTURE_FORMATS = ("_pipe", "image2")
+"""How FFmpeg's names of what reads single pictures end."""
 LUMA_FIRST = ("yuv4", "yuvj4", "nv12", "nv21", "gray8", "yuva4")
 
 
@@ -60,8 +62,11 @@ def opened(path: Path) -> Iterator[tuple[Any, Any]]:
     try:
         container = av.open(str(path))
     except (av.error.FFmpegError, ValueError) as error:
-        raise InputError(f"{path}: not a video that can be read ({reason(error)})") from error
+        empty = "; the file is empty" if not path.stat().st_size else ""
+        raise InputError(f"{path}: not a video that can be read ({reason(error)}){empty}") from error
     with container:
+        if container.format.name.endswith(PICTURE_FORMATS):
+            raise InputError(f"{path}: expected a video, this is a single picture")
         if not container.streams.video:
             raise InputError(f"{path}: expected a video stream, the file has none")
         stream = container.streams.video[0]

@@ -96,7 +96,9 @@ def load_database(
                     f"{query.name} has no ratings of experiment '{experiment.name}' in a study '{study}'; "
                     "give the definition that this study has, and its name as `server study list` shows it"
                 )
-            raise NoRatingsError(f"experiment '{experiment.name}' has no ratings yet in {query.name}")
+            raise NoRatingsError(
+                f"experiment '{experiment.name}' has no ratings yet in {query.name}; practice does not count"
+            )
         rows, chosen = _of_one_study(rows, experiment.name, study, query.name)
         return StudyAnswers(rows, query.name, chosen, query.first_seen() if _runs_again(rows) else {})
     finally:

@@ -70,7 +70,10 @@ def fit(
     plot: Annotated[Path | None, typer.Option(help="Figure of the model (PNG, SVG, PDF).")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the new blinks in the figure.", min=0)] = 1,
 ) -> None:
-    """Fit the model to recorded profiles and tell how much of their variance it keeps."""
+    """Fit the model to recorded profiles and tell how much of their variance it keeps.
+
+    Example: stimuli model fit blinks.profiles.csv --out model.json --plot model.png
+    """
     from stimuli_builder.blinks.model_run import fit_model
 
     fit_model(profiles or [], out, components, eyes, plot, seed)
@@ -88,7 +91,10 @@ def sample(
     pca: PcaOption = False,
     plot: Annotated[Path | None, typer.Option(help="The new blinks as a figure.")] = None,
 ) -> None:
-    """Make new blinks that close as recorded ones do, or by the PCA model (--pca, --model)."""
+    """Make new blinks that close as recorded ones do, or by the PCA model (--pca, --model).
+
+    Example: stimuli model sample --count 20 --duration 9 --seed 1 --out new.csv
+    """
     from stimuli_builder.blinks.model_run import sample_blinks
 
     sample_blinks(out, count, duration, seed, model, plot, full_closure=full_closure, pca=pca)
@@ -99,7 +105,10 @@ def textbook(
     duration: Annotated[float, typer.Option(help="Length in frames at 30 fps.")] = 9.0,
     plot: Annotated[Path | None, typer.Option(help="Figure: the four curves beside a model blink.")] = None,
 ) -> None:
-    """Write the four textbook curves of one length: linear and ease-in/ease-out, symmetric and asymmetric."""
+    """Write the four textbook curves of one length: linear and ease-in/ease-out, symmetric and asymmetric.
+
+    Example: stimuli model textbook --duration 12 --out textbook.csv
+    """
     from stimuli_builder.blinks.model_run import textbook_blinks
 
     textbook_blinks(out, duration, plot)
@@ -136,7 +145,10 @@ def export(
     left: Annotated[str, typer.Option(help="Name of the left eye's shape or attribute.")] = "eyeBlinkLeft",
     right: Annotated[str, typer.Option(help="Name of the right eye's.")] = "eyeBlinkRight",
 ) -> None:
-    """Export blinks as an animation curve: from the model, from the library, or from a table of profiles."""
+    """Export blinks as an animation curve: from the model, from the library, or from a table of profiles.
+
+    Example: stimuli model export --format blender --fps 30 --seed 1 --out blink.py
+    """
     from stimuli_builder.blinks.model_run import ExportJob, export_curve
 
     export_curve(

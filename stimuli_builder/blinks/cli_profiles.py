@@ -36,7 +36,10 @@ def _list_by_default(context: typer.Context) -> None:
 
 
 def list_profiles() -> None:
-    """List the shipped profiles."""
+    """List the shipped profiles.
+
+    Example: stimuli profiles list
+    """
     from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.table import Table
@@ -60,7 +63,10 @@ def list_profiles() -> None:
 def plot_profiles(
     figure: Annotated[Path, typer.Argument(help="Figure to write (PNG, SVG, PDF).")],
 ) -> None:
-    """Draw the library: aligned blinks with their mean, durations, amplitudes; a row a recording."""
+    """Draw the library: aligned blinks with their mean, durations, amplitudes; a row a recording.
+
+    Example: stimuli profiles plot library.png
+    """
     from stimuli_builder.blinks.library import load_library
     from stimuli_builder.blinks.plots import aligned_figure, save_figure
 
@@ -80,7 +86,10 @@ def build_library(
     ] = None,
     components: Annotated[int, typer.Option(help="Components of the model.")] = 5,
 ) -> None:
-    """Measure the library anew: profiles.csv, closures.csv and the model fitted to them, model.json."""
+    """Measure the library anew: profiles.csv, closures.csv and the model fitted to them, model.json.
+
+    Example: stimuli profiles build --data recordings --out library
+    """
     from experiments.errors import InputError
     from stimuli_builder.blinks.library.build import recorded_profiles, write_model, write_profiles
     from stimuli_builder.blinks.library.recordings import LIBRARY_FOLDER, RECORDINGS_FILE, read_recordings

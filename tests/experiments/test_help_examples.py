@@ -52,6 +52,13 @@ def test_every_example_can_be_pasted(program, monkeypatch):
     assert seen > 10
 
 
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_every_command_has_an_example(program):
+    """A group's own line lists its commands."""
+    alone = ((path, command) for path, command in commands(program) if not hasattr(command, "commands"))
+    assert [path for path, command in alone if "Example" not in (command.help or "")] == []
+
+
 def is_example(paragraph, program):
     return bool(re.match(rf" +{program} ", paragraph.strip("\n"))) and "\n" not in paragraph.strip()
 

@@ -67,6 +67,21 @@ def studied(request, tmp_path_factory) -> tuple[Path, Experiment, dict[str, Any]
     return path, study, told.numbers
 
 
+def test_without_a_rating_that_counts_the_script_says_so(tmp_path: Path) -> None:
+    study = design("both")
+    path = answers("both", study, tmp_path)
+    lines = path.read_text(encoding="utf-8").replace(",main,", ",practice,")
+    path.write_text(lines, encoding="utf-8")
+    target = path.with_suffix(".py")
+    target.write_text(script(study, "py", path.name), encoding="utf-8")
+    done = subprocess.run([sys.executable, str(target)], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1].endswith(
+        f"{path.name}: no answer to a main trial is left by runs that count: nothing to analyse yet"
+    )
+    assert "Traceback" not in done.stderr
+
+
 def pairs_of(numbers: dict[str, Any]) -> list[dict[str, Any]]:
     return [pair for pair in numbers["pairwise"] if ":" not in pair["effect"]]
 

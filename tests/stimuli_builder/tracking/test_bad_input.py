@@ -4,6 +4,7 @@ import json
 from fractions import Fraction
 
 import av
+import cv2
 import numpy as np
 import pytest
 
@@ -74,6 +75,10 @@ def test_missing_unreadable_and_soundless_videos(refused, tmp_path):
     empty = tmp_path / "empty.mp4"
     empty.write_bytes(b"")
     assert "not a video that can be read" in refused(empty)
+    assert "; the file is empty" in refused(empty)
+    picture = tmp_path / "picture.png"
+    cv2.imwrite(str(picture), np.zeros((24, 32, 3), np.uint8))
+    assert "picture.png: expected a video, this is a single picture" in refused(picture)
 
 
 def test_a_file_cut_off_before_its_index(refused, recording, tmp_path):
