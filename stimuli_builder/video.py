@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from queue import Full, Queue
 from threading import Event, Thread
@@ -20,7 +21,7 @@ Picture = NDArray[np.uint8]
 BATCH_FRAMES = 8
 WAITING_BATCHES = 6
 PICTURE_FORMATS = ("_pipe", "image2")
-"""How FFmpeg's names of what reads single pictures end."""
+"""How FFmpeg's names of what reads pictures end, single ones and those that follow one another in a file."""
 LUMA_FIRST = ("yuv4", "yuvj4", "nv12", "nv21", "gray8", "yuva4")
 
 
@@ -65,13 +66,19 @@ def opened(path: Path) -> Iterator[tuple[Any, Any]]:
         empty = "; the file is empty" if not path.stat().st_size else ""
         raise InputError(f"{path}: not a video that can be read ({reason(error)}){empty}") from error
     with container:
-        if container.format.name.endswith(PICTURE_FORMATS):
+        if container.format.name.endswith(PICTURE_FORMATS) and _packets(path, 2) < 2:
             raise InputError(f"{path}: expected a video, this is a single picture")
         if not container.streams.video:
             raise InputError(f"{path}: expected a video stream, the file has none")
         stream = container.streams.video[0]
         stream.thread_type = "AUTO"
         yield container, stream
+
+
+def _packets(path: Path, limit: int) -> int:
+    """How many pictures the first video stream holds, counted up to a limit."""
+    with av.open(str(path)) as container:
+        return sum(1 for _ in islice((packet for packet in container.demux(video=0) if packet.size), limit))
 
 
 def grey(frame: Any) -> Picture:

@@ -14,6 +14,7 @@ from stimuli_builder.checks.masks import LATTICE, digit, placed, shape
 from stimuli_builder.checks.own_look import first_blink, first_eye
 from stimuli_builder.clips.curves import ClipCurve
 from stimuli_builder.clips.encode import encode_clip, encoder_signature
+from stimuli_builder.clips.frames import FramePainter
 from stimuli_builder.clips.jobs import Look
 from stimuli_builder.clips.seeds import generator
 
@@ -127,9 +128,6 @@ class CheckJob:
                 yield picture
 
     def _own_look(self, look: Look) -> Iterator[Planes]:
-        # Loads the compiled kernels, which a build without such checks leaves to its workers.
-        from stimuli_builder.clips.frames import FramePainter
-
         painter = FramePainter(look.levels())
         # Blurred always: only the means of whole frames are the same in the reverse order.
         return painter.frames(self.curve, look.fps, blur=True)

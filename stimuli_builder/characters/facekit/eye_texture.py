@@ -14,27 +14,6 @@ from stimuli_builder.characters.facekit.sphere import IRIS_CM, smooth
 GLOBE_CM = 1.5
 WHITE = (0.61, 0.56, 0.52)
 VEINS = 60
-
-
-@dataclass(frozen=True)
-class White:
-    """The eye's white of one person.
-
-    Attributes
-    ----------
-    lightness : float
-        Share of `WHITE`.
-    redness : float
-        Depth of its vessels and of what it reddens towards the corners, over the usual.
-    """
-
-    lightness: float = 1.0
-    redness: float = 1.0
-
-
-DARK_WHITE = White(0.84, 1.25)
-"""With dark skin, which a camera gives more light, a white of the usual lightness shone by itself."""
-
 DRIFT, DRIFT_CM = 0.006, 0.07
 """How far fibres wander on their way outwards: standard deviation at the rim, turns, and its scale, cm.
 
@@ -69,6 +48,26 @@ class _Plane:
             grid = self.rng.normal(size=(rows + 3, columns))
             total += 0.62**k * _lookup(grid, out * rows, (turn + self.drift * across) * columns)
         return np.asarray(total / total[self.r < IRIS_CM].std())
+
+
+@dataclass(frozen=True)
+class White:
+    """The eye's white of one person.
+
+    Attributes
+    ----------
+    lightness : float
+        Share of `WHITE`.
+    redness : float
+        Depth of its vessels and of what it reddens towards the corners, over the usual.
+    """
+
+    lightness: float = 1.0
+    redness: float = 1.0
+
+
+DARK_WHITE = White(0.84, 1.25)
+"""With dark skin, which a camera gives more light, a white of the usual lightness shone by itself."""
 
 
 def eye_maps(

@@ -19,10 +19,10 @@ FLESH_LOOPS, FLESH_ENDS, FLESH_CM = (0, 1, 2, 3, 4, 5), (2, 5), (0.03, 0.09)
 beside them.
 
 The lids' edges end blunt and short of the fold between them: what lies there is the kit's own caruncle, and
-with a skin's colour it was a pale hook about the white.
+with a skin's colour it was a pale hook about the white. The lower half's margin begins at its sixth vertex.
 """
 MOUND_RISE_CM, MOUND_CM = 0.05, 0.10
-"""How far the caruncle stands out of the fold, and its radius."""
+"""How far the caruncle stands out of the fold, and where it has fallen to 1/e of that."""
 
 
 class LidRelief:
@@ -107,7 +107,7 @@ class CornerFlesh:
     share : float64 array (n,)
         1 on it, 0 from `FLESH_CM[1]` beside it.
     mound : float64 array (n,)
-        Height of the caruncle over its highest, before relief.
+        Share (0-1) of `MOUND_RISE_CM` that the caruncle has, before the skin's grain.
     """
 
     share: Array

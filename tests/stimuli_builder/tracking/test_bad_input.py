@@ -10,6 +10,7 @@ import pytest
 
 from stimuli_builder.tracking.labels import load_labels
 from stimuli_builder.tracking.model_file import save_model
+from stimuli_builder.video import opened
 from stimuli_builder.video_scan import scan_video
 from stimuli_builder.video_writer import VideoWriter
 
@@ -79,6 +80,14 @@ def test_missing_unreadable_and_soundless_videos(refused, tmp_path):
     picture = tmp_path / "picture.png"
     cv2.imwrite(str(picture), np.zeros((24, 32, 3), np.uint8))
     assert "picture.png: expected a video, this is a single picture" in refused(picture)
+
+
+def test_pictures_that_follow_one_another_in_a_file_are_a_video(tmp_path):
+    stream = tmp_path / "camera.mjpeg"
+    jpeg = cv2.imencode(".jpg", np.zeros((24, 32, 3), np.uint8))[1].tobytes()
+    stream.write_bytes(jpeg * 20)
+    with opened(stream) as (container, _):
+        assert sum(1 for _ in container.decode(video=0)) == 20
 
 
 def test_a_file_cut_off_before_its_index(refused, recording, tmp_path):

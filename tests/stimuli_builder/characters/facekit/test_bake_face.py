@@ -139,7 +139,7 @@ def test_lids_have_boxes_and_samples_of_their_own(kit: FaceKit, scene: FaceScene
 
 
 def test_lids_boxes_hold_the_eyes_and_all_lashes(scene: FaceScene) -> None:
-    for closure in (0.0, 0.5, 1.0):
+    for closure in (0.0, 0.5, 0.75, 0.9, 0.95, 1.0):
         for part in scene.shapes(LidPose(closure)):
             if part.material != "lash":
                 continue

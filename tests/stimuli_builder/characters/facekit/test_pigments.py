@@ -9,6 +9,7 @@ from stimuli_builder.characters.facekit.framing import FRAMINGS
 from stimuli_builder.characters.facekit.identity import identity_of_seed
 from stimuli_builder.characters.facekit.kit import FaceKit
 from stimuli_builder.characters.facekit.lid_coordinates import LID_MIDDLE
+from stimuli_builder.characters.facekit.lid_loops import chains
 from stimuli_builder.characters.facekit.lid_relief import MOUND_RISE_CM
 from stimuli_builder.characters.facekit.lid_skin import FaceSkin, face_part, lid_skin, normals
 from stimuli_builder.characters.facekit.pigments import Pigments
@@ -145,6 +146,10 @@ def test_flesh_reaches_to_the_lids_edges(skin: FaceSkin) -> None:
             at = nasal_tip(skin.path, skin.path.rest, side, edge)
             near = np.linalg.norm(skin.rest - at, axis=1) < 0.03
             assert skin.relief.flesh[near].min() > 0.9, (side, edge)
+        for loop in (0, 2, 4):
+            margin = chains(skin.path.kit, skin.path.loops[side][loop], side)[1][4]
+            near = np.linalg.norm(skin.rest - skin.path.rest[margin], axis=1) < 0.02
+            assert skin.relief.flesh[near].min() > 0.9, (side, loop)
 
 
 def test_fine_grain_ends_where_skin_turns_away(kit: FaceKit, skin: FaceSkin) -> None:
