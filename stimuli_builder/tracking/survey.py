@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import InputError
-from stimuli_builder.tracking.covers import covered_frames, textures_of
+from stimuli_builder.tracking.covers import covered_frames
 from stimuli_builder.tracking.detector.detection import Detection
 from stimuli_builder.tracking.detector.mesh import open_detector
 from stimuli_builder.tracking.detector.one_face import one_face
@@ -69,7 +69,7 @@ def survey(info: VideoInfo, *, one_eye: bool, advance: Callable[[int], None] | N
     InputError
         Too few frames show a face, or what was found is no face.
     """
-    seen, textures = _looked(info, one_eye, advance)
+    seen = _looked(info, one_eye, advance)
     several = sum(len(faces) > 1 for faces in seen.values())
     of_face = {n: one for n, one in one_face(seen).items() if _inside(one.points, info)}
     eyes_seen = {n: one.points for n, one in of_face.items()}
@@ -81,29 +81,26 @@ def survey(info: VideoInfo, *, one_eye: bool, advance: Callable[[int], None] | N
     _require_upright(info, eyes_seen, labels)
     _require_face(info, labels, len(seen), one_eye)
     unseen = frozenset(seen.keys() - labels.keys())
-    covers = {} if one_eye else covered_frames(info, {n: textures[of_face[n]] for n in labels}, FEWEST)
+    covers = covered_frames(info.path, {n: of_face[n].spreads for n in labels}, FEWEST)
     open_to_view = {n: points for n, points in labels.items() if n not in covers}
     return Survey(open_to_view, len(seen), several, unseen, covers)
 
 
 def _looked(
     info: VideoInfo, one_eye: bool, advance: Callable[[int], None] | None
-) -> tuple[dict[int, list[Detection]], dict[Detection, Values]]:
-    """What a detector sees at each look, and of faces what their eyes look like."""
+) -> dict[int, list[Detection]]:
+    """What a detector sees at each look."""
     step = max(1, -(-info.frame_count // LOOKED_AT))
     seen: dict[int, list[Detection]] = {}
-    textures: dict[Detection, Values] = {}
     with open_detector(one_eye=one_eye, first=_first(info, step) if one_eye else ()) as detector:
         pictures = frames(info.path, read=_every(step))
         for number, picture in enumerate(islice(pictures, info.frame_count)):
             if not picture.size:
                 continue
             seen[number] = detector.detect(picture)
-            if not one_eye:
-                textures.update((one, textures_of(picture, one.points)) for one in seen[number])
             if advance is not None:
                 advance(number)
-    return seen, textures
+    return seen
 
 
 def _first(info: VideoInfo, step: int) -> list[Picture]:

@@ -25,11 +25,14 @@ class Detection:
         Centre and four points of each iris's edge.
     box : float64 array (4,)
         Least x and y, then greatest x and y, of the face; of the eye in a close-up.
+    spreads : tuple of float
+        Of each eye, its `contour_spread`.
     """
 
     points: Points
     iris: Points
     box: Points
+    spreads: tuple[float, ...] = ()
 
     @property
     def area_px2(self) -> float:
@@ -57,6 +60,28 @@ def eye_points(upper: Points, lower: Points) -> Points:
     return np.concatenate(
         [upper[:1], along(upper, UPPER_SHARES), upper[-1:], along(lower, LOWER_SHARES)], axis=0
     )
+
+
+def contour_spread(contours: Points, width: float) -> float:
+    """How far an eye's contour moves with the region that it is read in, as part of the eye's width.
+
+    An eye, open or shut, stays where it is. Where there is none a network draws one all the same, in the
+    middle of whatever region it is shown.
+
+    Parameters
+    ----------
+    contours : float64 array (views, k, 2)
+        The same points as read in several regions, in pixels of the picture.
+    width : float
+        Of the eye, in pixels.
+
+    Returns
+    -------
+    float
+        Root mean square distance of the points from their means.
+    """
+    away = contours - contours.mean(0)
+    return float(np.sqrt((away**2).sum(-1).mean()) / width)
 
 
 def along(curve: Points, shares: Sequence[float]) -> Points:

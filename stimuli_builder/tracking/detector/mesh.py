@@ -2,12 +2,12 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from experiments.errors import InputError
-from stimuli_builder.tracking.detector.detection import Detection, LidDetector, eye_points
+from stimuli_builder.tracking.detector.detection import Detection, LidDetector, contour_spread, eye_points
 from stimuli_builder.tracking.detector.mesh_client import MeshClient, detector_environment
 from stimuli_builder.tracking.shapes import Points, eye_axis, widths
 from stimuli_builder.video import Picture
@@ -26,10 +26,41 @@ SIDE_OF_WIDTH = 2.9
 """Side of the region in which a close-up's eye is read, in widths of the eye as found."""
 VIEWS = tuple((dy, turn) for dy in (-0.24, -0.16, -0.08) for turn in (-10, 0, 10))
 """The eye is read in all of these and the mean is taken: shift down in its widths, turn in degrees."""
+FACE_VIEWS = ((-0.2, 1.0), (0.2, 1.0), (0.0, 0.8), (0.0, 1.25))
+"""A face's eye is read in these besides, to tell whether one is there: shift along it in widths, and size.
+Those of another size tell an eye of which a half is covered too."""
 JITTERED = 4
 """Pictures in which the regions tried are jittered."""
 LAID_ON = 9
 """Pictures over which the region is laid on the eye."""
+
+
+class Region(NamedTuple):
+    """A square that the iris network sees: middle and side in pixels, mirrored or not, turn in degrees."""
+
+    x: float
+    y: float
+    side: float
+    flip: bool
+    turn: float = 0.0
+
+    def views(self, width: float) -> "list[Region]":
+        """The regions about this one in which an eye of such a width in pixels is read."""
+        return [Region(self.x, self.y + dy * width, self.side, self.flip, turn) for dy, turn in VIEWS]
+
+
+def views_of(eye: Points, *, flip: bool) -> list[Region]:
+    """The regions in which a face's eye (9, 2) is read; the iris network knows one side's eyes."""
+    along, _, width = eye_axis(eye)
+    turn = float(np.degrees(np.arctan2(along[1], along[0])))
+    middles = [(eye[0] + eye[5]) / 2 + shift * width * along for shift, _ in FACE_VIEWS]
+    sides = [SIDE_OF_WIDTH * width * size for _, size in FACE_VIEWS]
+    return [Region(float(x), float(y), side, flip, turn) for (x, y), side in zip(middles, sides, strict=True)]
+
+
+def contours_of(eyes: Sequence[Any]) -> Points:
+    """What the iris network answers with, as contours (eyes, 16, 2)."""
+    return np.array([[*upper, *lower[1:-1]] for upper, lower, _ in eyes])
 
 
 class FaceMesh:
@@ -47,28 +78,22 @@ class FaceMesh:
             eyes = [eye_points(np.array(upper), np.array(lower)) for upper, lower, _ in face["eyes"]]
             if min(eye_axis(eye)[2] for eye in eyes) >= LEAST_EYE_PX:
                 iris = np.array([iris for _, _, iris in face["eyes"]])
-                eyes_of_faces.append(Detection(np.concatenate(eyes), iris, np.array(face["box"])))
+                box, spreads = np.array(face["box"]), self._spreads(picture, eyes)
+                eyes_of_faces.append(Detection(np.concatenate(eyes), iris, box, spreads))
         return sorted(eyes_of_faces, key=lambda one: one.area_px2, reverse=True)
+
+    def _spreads(self, picture: Picture, eyes: Sequence[Points]) -> tuple[float, ...]:
+        """Each eye's `contour_spread`."""
+        views = [view for number, eye in enumerate(eyes) for view in views_of(eye, flip=number == 1)]
+        seen = self._client.ask("eye", picture, regions=views)["eyes"]
+        contours = contours_of(seen).reshape(len(eyes), len(FACE_VIEWS), -1, 2)
+        return tuple(contour_spread(one, eye_axis(eye)[2]) for one, eye in zip(contours, eyes, strict=True))
 
 
 def spread_out(pictures: Sequence[Picture], count: int) -> list[Picture]:
     """So many of the pictures, or all where they are fewer, from the first to the last and evenly apart."""
     chosen = np.linspace(0, len(pictures) - 1, min(count, len(pictures))).round()
     return [pictures[int(number)] for number in chosen]
-
-
-class Region(NamedTuple):
-    """A square that the iris network sees: middle and side in pixels, mirrored or not, turn in degrees."""
-
-    x: float
-    y: float
-    side: float
-    flip: bool
-    turn: float = 0.0
-
-    def views(self, width: float) -> "list[Region]":
-        """The regions about this one in which an eye of such a width in pixels is read."""
-        return [Region(self.x, self.y + dy * width, self.side, self.flip, turn) for dy, turn in VIEWS]
 
 
 class CloseUp:
@@ -142,22 +167,23 @@ class CloseUp:
             for upper, lower, _ in answers
         ]
 
-    def _points(self, picture: Picture) -> tuple[Points, Points]:
-        """Nine points and the iris's five, the mean of all views."""
+    def _points(self, picture: Picture) -> tuple[Points, Points, float]:
+        """Nine points and the iris's five, the mean of all views, and the `contour_spread`."""
         eyes = self._client.ask("eye", picture, regions=self._views)["eyes"]
+        spread = contour_spread(contours_of(eyes), self._views[0].side / SIDE_OF_WIDTH)
         up, low, iris = (np.mean([eye[part] for eye in eyes], axis=0) for part in range(3))
         # One-eye files begin at the image-left canthus, whichever that is.
         if up[0, 0] > up[-1, 0]:
             up, low = up[::-1], low[::-1]
-        return eye_points(up, low[::-1]), iris
+        return eye_points(up, low[::-1]), iris, spread
 
     def detect(self, picture: Picture) -> list[Detection]:
         """Return the eye in the regions found before."""
         if not self._views:
             return []
-        points, iris = self._points(picture)
+        points, iris, spread = self._points(picture)
         box = np.concatenate([points.min(0), points.max(0)])
-        return [Detection(points, iris[None], box)]
+        return [Detection(points, iris[None], box, (spread,))]
 
 
 @contextmanager
