@@ -6,7 +6,6 @@ from itertools import count, islice
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.errors import InputError
 from stimuli_builder.tracking.covers import covered_frames
@@ -16,8 +15,6 @@ from stimuli_builder.tracking.detector.one_face import one_face
 from stimuli_builder.tracking.shapes import EYE_POINTS, Points
 from stimuli_builder.tracking.tracker import UNSEEN
 from stimuli_builder.video import Picture, VideoInfo, frames, rgb
-
-Values = NDArray[np.float64]
 
 NOTHING: Picture = np.empty((0, 0, 3), np.uint8)
 LOOKED_AT = 400
