@@ -3,7 +3,7 @@
 Examples:
   python tools/screenshots_clips.py                            all characters, into docs/images
 
-  python tools/screenshots_clips.py /tmp/sheets alder@6 hazel@4   two characters, elsewhere
+  python tools/screenshots_clips.py /tmp/sheets alder@7 hazel@4   two characters, elsewhere
 """
 
 import argparse
@@ -37,11 +37,11 @@ from stimuli_builder.clips.motion_blur import frame_weights  # noqa: E402
 
 SIZE = (960, 360)
 CLOSURES = (0.0, 0.25, 0.5, 0.75, 1.0)
-MOVED, LOWERED = "hazel@4", "alder@6"
+MOVED, LOWERED = "hazel@4", "alder@7"
 """Whose brow, cheek, squint and gaze are shown moved, and whose lower lid: one face each, for its size."""
 FACES_IN_A_ROW = 6
-QUALITY = 88
-"""Of WebP: a third of a JPEG's size that looks alike. Every picture stays in the history of a clone."""
+QUALITY = 80
+"""Of WebP: a quarter of a JPEG's size that looks alike. Every picture stays in the history of a clone."""
 Rgb = NDArray[np.uint8]
 
 

@@ -22,7 +22,7 @@ levels = [
 name = "character"
 label = "Character"
 levels = [
-    { name = "photorealistic", label = "A", render = { character = "alder@6" } },
+    { name = "photorealistic", label = "A", render = { character = "alder@7" } },
     { name = "cartoon", label = "B", render = { character = "cartoon" } },
 ]
 """

@@ -20,6 +20,7 @@ OPENING_MM = {
     "alder@3": 10.07,
     "alder@4": 10.07,
     "alder@5": 10.07,
+    "alder@6": 10.07,
     "birch": 9.66,
     "birch@3": 9.66,
     "birch@4": 9.66,
