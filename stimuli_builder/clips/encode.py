@@ -1,7 +1,10 @@
 """Planes to H.264 in MP4: the same planes give the same bytes on the same machine."""
 
+import ctypes
+import sys
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -11,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import InputError
-from stimuli_builder.clips.encoder_memory import encoder_memory
 
 CRF = 12
 PRESET = "faster"
@@ -20,6 +22,8 @@ X264 = (
     "colorprim=bt709:transfer=bt709:colormatrix=bt709:range=tv:log-level=error"
 )
 BT709, LIMITED_RANGE = 1, 1
+M_PERTURB, ZEROES = -6, 255
+"""Of glibc's mallopt: every block of memory is filled with the complement of this byte when it is taken."""
 _ALONE = f"{X264.replace('keyint=infinite', 'keyint=1')}:aq-mode=0:mbtree=0"
 
 
@@ -56,7 +60,7 @@ def encode_clip(
     try:
         with tempfile.TemporaryDirectory(prefix="palpebra-clip-") as folder:
             path = Path(folder) / "clip.mp4"
-            with encoder_memory():
+            with _zeroed_memory():
                 _write(path, frames, size_px, fps, alone_qp)
             return path.read_bytes()
     except OSError as error:
@@ -64,6 +68,24 @@ def encode_clip(
             f"the clip cannot be written in {tempfile.gettempdir()} ({error.strerror}); make room there or "
             "set TMPDIR"
         ) from error
+
+
+@contextmanager
+def _zeroed_memory() -> Iterator[None]:
+    """Memory is zero when it is taken: vector code of libx264's macroblock tree reads some that it never set.
+
+    In a fresh process that memory is zero nearly always, so that bytes differed in one clip of some hundreds.
+    Other C libraries than glibc have no such switch.
+    """
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None) if sys.platform == "linux" else None
+    if mallopt is None:
+        yield
+        return
+    mallopt(M_PERTURB, ZEROES)
+    try:
+        yield
+    finally:
+        mallopt(M_PERTURB, 0)
 
 
 def _write(

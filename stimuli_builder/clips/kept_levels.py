@@ -6,7 +6,6 @@ from pathlib import Path
 import cv2
 
 from stimuli_builder.clips.characters import find_character
-from stimuli_builder.clips.encoder_memory import give_back
 from stimuli_builder.clips.face_movement.amounts import AS_BAKED, Movement
 from stimuli_builder.clips.face_movement.warp import moved_levels
 from stimuli_builder.clips.levels import LevelSet
@@ -31,6 +30,5 @@ def kept_levels(
     cv2.setNumThreads(1)
     if size_px[0] > ROOMY_WIDTH_PX:
         kept_levels.cache_clear()
-        give_back()
     shown = find_character(character, beside)
     return moved_levels(shown.levels(size_px), shown.geometry, movement)
