@@ -15,6 +15,7 @@ from tests.analysis.ratings_file import rows_of, simulate, write_export
 
 EXP3 = load_experiment("exp3")
 SCALE_AND_PLAY = {"scale": "rating", "synthetic": 1}
+NOTHING_LEFT = "no answer to a main trial is left by runs that count: nothing to analyse yet"
 
 
 @pytest.fixture(scope="module")
@@ -67,6 +68,21 @@ def test_the_r_script_gives_our_own_f(answers: Path) -> None:
     assert float(found[1]) == pytest.approx(own_f(answers), abs=0.006)
     assert "contrast" in said
     assert "Linear mixed model" in said
+
+
+@pytest.mark.parametrize("name", ["exp1", "pairs-demo", "sliders-demo", "threshold-demo", "plane-demo"])
+def test_a_script_says_that_there_is_nothing_to_analyse(name: str, tmp_path: Path) -> None:
+    columns = "participant,run,kind,excluded,trial_index,play,scale,response,winner,counts,correct"
+    (tmp_path / "data.csv").write_text(
+        f"{columns}\nP1,1,practice,0,0,1,rating,3,left,0,1\n", encoding="utf-8"
+    )
+    target = tmp_path / "script.py"
+    target.write_text(script(declared(name), "py", "data.csv"), encoding="utf-8")
+    done = subprocess.run([sys.executable, str(target)], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1].endswith("data.csv: " + NOTHING_LEFT)
+    assert "Traceback" not in done.stderr
+    assert NOTHING_LEFT in script(declared(name), "R", "data.csv")
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
