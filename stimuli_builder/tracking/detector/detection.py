@@ -32,7 +32,7 @@ class Detection:
     points: Points
     iris: Points
     box: Points
-    spreads: tuple[float, ...] = ()
+    spreads: tuple[float, ...]
 
     @property
     def area_px2(self) -> float:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -58,6 +59,17 @@ def views_of(eye: Points, *, flip: bool) -> list[Region]:
     return [Region(float(x), float(y), side, flip, turn) for (x, y), side in zip(middles, sides, strict=True)]
 
 
+def _about(picture: Picture, views: Sequence[Region]) -> tuple[Picture, list[Region]]:
+    """The part of a picture that views see, a side wide about each, and the views in it."""
+    at, side = np.array([[view.y, view.x] for view in views]), max(view.side for view in views)
+    last = np.array(picture.shape[:2]) - 1
+    # At least a pixel, where a face's eyes are thought beyond the picture.
+    top, left = np.clip((at.min(0) - side).astype(np.int64), 0, last).tolist()
+    bottom, right = np.clip((at.max(0) + side).astype(np.int64), 0, last).tolist()
+    part = np.ascontiguousarray(picture[top : bottom + 1, left : right + 1])
+    return part, [view._replace(x=view.x - left, y=view.y - top) for view in views]
+
+
 def contours_of(eyes: Sequence[Any]) -> Points:
     """What the iris network answers with, as contours (eyes, 16, 2)."""
     return np.array([[*upper, *lower[1:-1]] for upper, lower, _ in eyes])
@@ -73,19 +85,24 @@ class FaceMesh:
 
     def detect(self, picture: Picture) -> list[Detection]:
         """Return the eyes of the faces whose eyes are 10 px wide or more, the largest face first."""
+        faces = self.faces(picture)
+        return [replace(one, spreads=self._spreads(picture, one.points.reshape(2, -1, 2))) for one in faces]
+
+    def faces(self, picture: Picture) -> list[Detection]:
+        """The same without the eyes' `spreads`, which take longest."""
         eyes_of_faces = []
         for face in self._client.ask("faces", picture)["faces"]:
             eyes = [eye_points(np.array(upper), np.array(lower)) for upper, lower, _ in face["eyes"]]
             if min(eye_axis(eye)[2] for eye in eyes) >= LEAST_EYE_PX:
                 iris = np.array([iris for _, _, iris in face["eyes"]])
-                box, spreads = np.array(face["box"]), self._spreads(picture, eyes)
-                eyes_of_faces.append(Detection(np.concatenate(eyes), iris, box, spreads))
+                eyes_of_faces.append(Detection(np.concatenate(eyes), iris, np.array(face["box"]), ()))
         return sorted(eyes_of_faces, key=lambda one: one.area_px2, reverse=True)
 
-    def _spreads(self, picture: Picture, eyes: Sequence[Points]) -> tuple[float, ...]:
-        """Each eye's `contour_spread`."""
+    def _spreads(self, picture: Picture, eyes: Points) -> tuple[float, ...]:
+        """Each eye's `contour_spread`; `eyes` is (2, 9, 2)."""
         views = [view for number, eye in enumerate(eyes) for view in views_of(eye, flip=number == 1)]
-        seen = self._client.ask("eye", picture, regions=views)["eyes"]
+        part, within = _about(picture, views)
+        seen = self._client.ask("eye", part, regions=within)["eyes"]
         contours = contours_of(seen).reshape(len(eyes), len(FACE_VIEWS), -1, 2)
         return tuple(contour_spread(one, eye_axis(eye)[2]) for one, eye in zip(contours, eyes, strict=True))
 
@@ -220,7 +237,7 @@ def _shows_a_face(mesh: FaceMesh, picture: Picture) -> bool:
 
     In the iris and lashes of a close-up the mesh sees small faces, somewhere else in the mirror image.
     """
-    seen, mirrored = mesh.detect(picture), mesh.detect(np.ascontiguousarray(picture[:, ::-1]))
+    seen, mirrored = mesh.faces(picture), mesh.faces(np.ascontiguousarray(picture[:, ::-1]))
     if not seen or not mirrored:
         return False
     one = seen[0].points.reshape(2, -1, 2)

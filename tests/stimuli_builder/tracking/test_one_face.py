@@ -10,7 +10,7 @@ from stimuli_builder.tracking.detector.one_face import one_face
 def at(x, side):
     """A face of that side about (x, 100)."""
     box = np.array([x - side / 2, 100 - side / 2, x + side / 2, 100 + side / 2])
-    return Detection(np.zeros((18, 2)), np.zeros((2, 5, 2)), box)
+    return Detection(np.zeros((18, 2)), np.zeros((2, 5, 2)), box, (0.0, 0.0))
 
 
 def middles(chosen):
@@ -100,6 +100,6 @@ def test_a_lone_face_of_like_size_is_kept_after_a_gap_and_a_cut():
 
 
 def test_a_close_up_whose_box_gets_flat_in_a_blink_is_kept_whole():
-    flat = Detection(np.zeros((9, 2)), np.zeros((1, 5, 2)), np.array([200.0, 95.0, 400.0, 105.0]))
+    flat = Detection(np.zeros((9, 2)), np.zeros((1, 5, 2)), np.array([200.0, 95.0, 400.0, 105.0]), (0.0,))
     seen = {n: [flat if 4 <= n < 7 else at(300, 200)] for n in range(12)}
     assert sorted(one_face(seen)) == list(range(12))
