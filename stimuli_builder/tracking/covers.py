@@ -35,7 +35,6 @@ def covered_frames(path: Path, spreads: Mapping[int, Sequence[float]], fewest: i
         Of the video, for the message.
     spreads : dict of int to sequence of float
         Frame that shows eyes -> `contour_spread` of each, as part of its width.
-
     fewest : int
         Frames without a cover that are needed.
 

@@ -41,9 +41,7 @@ def test_every_example_can_be_pasted(program, monkeypatch):
             for line in printed.replace("\\\n", " ").splitlines()[1:]
             if f"{program} " in line and line.startswith("    ")
         ]
-        text = command.help or ""
-        examples = [one.strip().partition(" # ")[0] for one in text.split("\n\n") if is_example(one, program)]
-        examples += re.findall(r"^Example: (.+)$", inspect.cleandoc(text), re.MULTILINE)
+        examples = examples_of(command.help or "", program)
         for example in examples:
             assert any(" ".join(shlex.split(example)) == line.partition(" # ")[0] for line in joined), example
         seen += len(examples)
@@ -56,13 +54,13 @@ def test_every_example_can_be_pasted(program, monkeypatch):
 def test_every_command_has_an_example(program):
     """A group's own line lists its commands."""
     alone = ((path, command) for path, command in commands(program) if not hasattr(command, "commands"))
-    assert [path for path, command in alone if not has_example(command.help or "", program)] == []
+    assert [path for path, command in alone if not examples_of(command.help or "", program)] == []
 
 
-def has_example(text, program):
-    return any(is_example(one, program) for one in text.split("\n\n")) or bool(
-        re.search(r"^Example: ", inspect.cleandoc(text), re.MULTILINE)
-    )
+def examples_of(text, program):
+    """The lines that a command's help gives to be pasted."""
+    examples = [one.strip().partition(" # ")[0] for one in text.split("\n\n") if is_example(one, program)]
+    return examples + re.findall(r"^Example: (.+)$", inspect.cleandoc(text), re.MULTILINE)
 
 
 def is_example(paragraph, program):

@@ -21,6 +21,14 @@ function playerOf(worker: SilentWorker): WorkerPlayer {
   return new WorkerPlayer(worker as unknown as Worker, "#777777", false);
 }
 
+/** The clip is prepared, three seconds after it was asked for. */
+async function isPreparedLate(player: WorkerPlayer, worker: SilentWorker): Promise<void> {
+  const asked = player.prepare(CLIP, new ArrayBuffer(8), 30);
+  vi.advanceTimersByTime(3000);
+  worker.answer(prepared(CLIP));
+  await expect(asked).resolves.toMatchObject({ frames: 45 });
+}
+
 describe("what the page waits for from its worker", () => {
   beforeEach(() => {
     vi.useFakeTimers();
@@ -39,10 +47,7 @@ describe("what the page waits for from its worker", () => {
     await first;
     player.release(CLIP);
     vi.advanceTimersByTime(LIMIT_MS - 1000);
-    const second = player.prepare(CLIP, new ArrayBuffer(8), 30);
-    vi.advanceTimersByTime(3000);
-    worker.answer(prepared(CLIP));
-    await expect(second).resolves.toMatchObject({ frames: 45 });
+    await isPreparedLate(player, worker);
   });
 
   it("does the same where the clip was given up before it was prepared", async () => {
@@ -51,10 +56,7 @@ describe("what the page waits for from its worker", () => {
     void player.prepare(CLIP, new ArrayBuffer(8), 30).catch(() => {});
     vi.advanceTimersByTime(LIMIT_MS - 1000);
     player.release(CLIP);
-    const second = player.prepare(CLIP, new ArrayBuffer(8), 30);
-    vi.advanceTimersByTime(3000);
-    worker.answer(prepared(CLIP));
-    await expect(second).resolves.toMatchObject({ frames: 45 });
+    await isPreparedLate(player, worker);
   });
 
   it("says that a worker which never answers did not", async () => {
