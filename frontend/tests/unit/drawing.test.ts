@@ -4,8 +4,10 @@ import type { FromWorker, ToWorker } from "../../src/participant/playback/protoc
 const FRAMES = 5;
 const REFRESH_MS = 1000 / 60;
 const SHA256 = "a".repeat(64);
+const closed = vi.fn();
 vi.mock("../../src/participant/playback/decode", () => ({
-  decodeClip: () => Promise.resolve({ bitmaps: Array.from({ length: FRAMES }, (_, index) => ({ index })), fps: 60, width: 8, height: 4 }),
+  decodeClip: () =>
+    Promise.resolve({ bitmaps: Array.from({ length: FRAMES }, (_, index) => ({ index, close: closed })), fps: 60, width: 8, height: 4 }),
 }));
 
 /** What the worker is to a browser: refreshes come when the test says so, and each painting is noted. */
@@ -49,10 +51,10 @@ async function workerIn(browser: string): Promise<FakeScope> {
   vi.resetModules();
   await import("../../src/participant/playback/worker");
   scope.tell({ type: "canvas", canvas: scope.canvas(), background: "#808080", sync_patch: false });
-  scope.tell({ type: "prepare", sha256: SHA256, bytes: new ArrayBuffer(1), fps: 60 });
+  scope.tell({ type: "prepare", request: 1, sha256: SHA256, bytes: new ArrayBuffer(1), fps: 60 });
   await vi.waitFor(() => expect(scope.messages.at(-1)?.type).toBe("prepared"));
   scope.tell({ type: "warm" });
-  scope.tell({ type: "play", sha256: SHA256, refresh_ms: REFRESH_MS, fixation_ms: 0 });
+  scope.tell({ type: "play", request: 2, sha256: SHA256, refresh_ms: REFRESH_MS, fixation_ms: 0 });
   return scope;
 }
 
@@ -112,5 +114,26 @@ describe("the way to the screen", () => {
     expect(played.drawn.map(([index]) => index)).toEqual([0, 1, 2, 3, 4]);
     played.drawn.forEach(([index, at_ms]) => expect(at_ms - began).toBeCloseTo((6 + index) * REFRESH_MS, 3));
     expect([played.clock_late_ms, played.clock_gap_ms]).toEqual([expect.closeTo(late_ms, 3), expect.closeTo(REFRESH_MS, 3)]);
+  });
+});
+
+describe("a clip that is given up", () => {
+  const prepare = (request: number): ToWorker => ({ type: "prepare", request, sha256: SHA256, bytes: new ArrayBuffer(1), fps: 60 });
+
+  it("keeps no picture where it was given up before it was decoded, and is there where it is asked for again", async () => {
+    vi.useFakeTimers({ toFake: ["setTimeout", "performance"] });
+    const scope = await workerIn("Chrome");
+    closed.mockClear();
+    scope.tell({ type: "release", sha256: SHA256 });
+    expect(closed).toHaveBeenCalledTimes(FRAMES);
+    scope.tell(prepare(3));
+    scope.tell({ type: "release", sha256: SHA256 });
+    scope.tell(prepare(4));
+    await vi.waitFor(() => expect(scope.messages.at(-1)).toMatchObject({ type: "prepared", request: 4 }));
+    expect(closed).toHaveBeenCalledTimes(2 * FRAMES);
+    scope.tell({ type: "release", sha256: SHA256 });
+    expect(closed).toHaveBeenCalledTimes(3 * FRAMES);
+    vi.useRealTimers();
+    vi.unstubAllGlobals();
   });
 });

@@ -1,5 +1,5 @@
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
-import type { FromWorker } from "../../src/participant/playback/protocol";
+import type { FromWorker, ToWorker } from "../../src/participant/playback/protocol";
 import { WorkerPlayer } from "../../src/participant/playback/worker-player";
 
 const CLIP = "a".repeat(64);
@@ -9,13 +9,18 @@ const LIMIT_MS = 20_000;
 class SilentWorker {
   onmessage: ((event: { data: FromWorker }) => void) | null = null;
   onerror: ((event: ErrorEvent) => void) | null = null;
-  postMessage(): void {}
-  answer(data: FromWorker): void {
-    this.onmessage?.({ data });
+  readonly requests: number[] = [];
+  postMessage(message: ToWorker): void {
+    if ("request" in message) this.requests.push(message.request);
+  }
+  /** Answer the newest request, or one before it. */
+  answer(of: (request: number) => FromWorker, back = 0): void {
+    this.onmessage?.({ data: of(this.requests.at(-1 - back) ?? 0) });
   }
 }
 
-const prepared = (sha256: string): FromWorker => ({ type: "prepared", sha256, width: 640, height: 480, frames: 45, fps: 30 });
+const prepared = (request: number): FromWorker => ({ type: "prepared", request, width: 640, height: 480, frames: 45, fps: 30 });
+const failed = (request: number): FromWorker => ({ type: "failed", request, reason: "not a video" });
 
 function playerOf(worker: SilentWorker): WorkerPlayer {
   return new WorkerPlayer(worker as unknown as Worker, "#777777", false);
@@ -25,7 +30,7 @@ function playerOf(worker: SilentWorker): WorkerPlayer {
 async function isPreparedLate(player: WorkerPlayer, worker: SilentWorker): Promise<void> {
   const asked = player.prepare(CLIP, new ArrayBuffer(8), 30);
   vi.advanceTimersByTime(3000);
-  worker.answer(prepared(CLIP));
+  worker.answer(prepared);
   await expect(asked).resolves.toMatchObject({ frames: 45 });
 }
 
@@ -43,7 +48,7 @@ describe("what the page waits for from its worker", () => {
     const worker = new SilentWorker();
     const player = playerOf(worker);
     const first = player.prepare(CLIP, new ArrayBuffer(8), 30);
-    worker.answer(prepared(CLIP));
+    worker.answer(prepared);
     await first;
     player.release(CLIP);
     vi.advanceTimersByTime(LIMIT_MS - 1000);
@@ -57,6 +62,31 @@ describe("what the page waits for from its worker", () => {
     vi.advanceTimersByTime(LIMIT_MS - 1000);
     player.release(CLIP);
     await isPreparedLate(player, worker);
+  });
+
+  it("takes no late answer to a clip given up for one to the clip prepared anew", async () => {
+    const worker = new SilentWorker();
+    const player = playerOf(worker);
+    const given_up = expect(player.prepare(CLIP, new ArrayBuffer(8), 30)).rejects.toThrow("not a video");
+    player.release(CLIP);
+    const again = player.prepare(CLIP, new ArrayBuffer(8), 30);
+    worker.answer(failed, 1);
+    await given_up;
+    worker.answer(prepared);
+    await expect(again).resolves.toMatchObject({ frames: 45 });
+  });
+
+  it("hears of a worker that breaks before a clip is asked to be shown", async () => {
+    vi.stubGlobal("requestAnimationFrame", () => 0);
+    const worker = new SilentWorker();
+    const player = playerOf(worker);
+    const asked = player.prepare(CLIP, new ArrayBuffer(8), 30);
+    worker.answer(prepared);
+    await asked;
+    const shown = expect(player.play(CLIP, { refresh_ms: 16, fixation_ms: 0 })).rejects.toThrow("out of memory");
+    await Promise.resolve();
+    worker.onerror?.({ message: "out of memory" } as ErrorEvent);
+    await shown;
   });
 
   it("says that a worker which never answers did not", async () => {

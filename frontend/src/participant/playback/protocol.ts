@@ -3,11 +3,15 @@
 import type { Part } from "./player";
 import type { Evenness } from "./refresh-clock";
 
-export type ToWorker =
-  | { type: "canvas"; canvas: OffscreenCanvas; background: string; sync_patch: boolean }
+/** What the worker answers, under the number that the page gave. */
+export type Request =
   | { type: "prepare"; sha256: string; bytes: ArrayBuffer; fps: number | null }
   | { type: "play"; sha256: string; refresh_ms: number; fixation_ms: number }
-  | { type: "compose"; sha256: string; parts: Part[]; width: number; height: number }
+  | { type: "compose"; sha256: string; parts: Part[]; width: number; height: number };
+
+export type ToWorker =
+  | (Request & { request: number })
+  | { type: "canvas"; canvas: OffscreenCanvas; background: string; sync_patch: boolean }
   | { type: "warm" }
   | { type: "blank"; width: number; height: number }
   | { type: "release"; sha256: string };
@@ -18,11 +22,11 @@ export interface Started {
 }
 
 export type FromWorker =
-  | { type: "prepared"; sha256: string; frames: number; width: number; height: number; fps: number }
-  | { type: "failed"; sha256: string; reason: string }
+  | { type: "prepared"; request: number; frames: number; width: number; height: number; fps: number }
+  | { type: "failed"; request: number; reason: string }
   | ({
       type: "played";
-      sha256: string;
+      request: number;
       drawn: [index: number, at_ms: number][];
       frames: number;
       fps: number;

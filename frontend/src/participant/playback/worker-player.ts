@@ -1,7 +1,7 @@
 /** The page's side of the worker: asks, and turns its messages into promises. */
 import { backoff } from "../outbox/backoff";
 import { ClipBroken, type ClipPlayer, type Part, type PlayOptions, type Prepared, type ShownClip } from "./player";
-import type { FromWorker, ToWorker } from "./protocol";
+import type { FromWorker, Request, ToWorker } from "./protocol";
 
 const DECODE_LIMIT_MS = 20_000;
 const START_LIMIT_MS = 20_000;
@@ -10,7 +10,7 @@ const MAX_STARTS = 6;
 interface Waiting {
   resolve: (message: FromWorker) => void;
   reject: (error: Error) => void;
-  limit?: ReturnType<typeof setTimeout>;
+  limit: ReturnType<typeof setTimeout> | undefined;
 }
 
 /** A page laid out anew while a clip's first frames are drawn takes their place on the way to the screen. */
@@ -38,7 +38,9 @@ export class WorkerPlayer implements ClipPlayer {
   readonly method = "webcodecs";
   readonly element = document.createElement("canvas");
   private readonly prepared = new Map<string, Promise<Prepared>>();
-  private readonly waiting = new Map<string, Set<Waiting>>();
+  /** By request: a clip that is released and prepared anew is asked for twice, and an old answer may be on its way. */
+  private readonly waiting = new Map<number, Waiting>();
+  private requests = 0;
 
   constructor(
     private readonly worker: Worker,
@@ -54,20 +56,12 @@ export class WorkerPlayer implements ClipPlayer {
   prepare(sha256: string, bytes: ArrayBuffer, fps: number | null): Promise<Prepared> {
     const known = this.prepared.get(sha256);
     if (known) return known;
-    const asked = this.ask(`prepared ${sha256}`, DECODE_LIMIT_MS);
     // The page keeps its own copy for a second view, so the bytes are copied and not handed over.
-    this.tell({ type: "prepare", sha256, bytes, fps });
-    const result = asked.then((message) => message as FromWorker & { type: "prepared" });
-    this.keep(sha256, result);
-    return result;
+    return this.keep(sha256, this.ask({ type: "prepare", sha256, bytes, fps }, DECODE_LIMIT_MS));
   }
 
   compose(name: string, parts: readonly Part[], width: number, height: number): Promise<Prepared> {
-    const asked = this.ask(`prepared ${name}`, DECODE_LIMIT_MS);
-    this.tell({ type: "compose", sha256: name, parts: [...parts], width, height });
-    const result = asked.then((message) => message as FromWorker & { type: "prepared" });
-    this.keep(name, result);
-    return result;
+    return this.keep(name, this.ask({ type: "compose", sha256: name, parts: [...parts], width, height }, DECODE_LIMIT_MS));
   }
 
   blank(sha256: string): void {
@@ -79,11 +73,9 @@ export class WorkerPlayer implements ClipPlayer {
 
   async play(sha256: string, { ready, ...options }: PlayOptions): Promise<ShownClip> {
     const { frames, fps } = (await this.prepared.get(sha256)) ?? { frames: 0, fps: 30 };
-    // A hidden page gets no refreshes: it then ends when it is looked at again, and the gap says so.
-    const asked = this.ask(`played ${sha256}`, Infinity);
     this.tell({ type: "warm" });
-    await Promise.all([layoutShown(), ready]);
-    this.tell({ type: "play", sha256, ...options });
+    // A hidden page gets no refreshes: it then ends when it is looked at again, and the gap says so.
+    const asked = this.ask({ type: "play", sha256, ...options }, null, Promise.all([layoutShown(), ready]));
     const message = (await asked) as FromWorker & { type: "played" };
     const { drawn, ended_at_ms, clock_gap_ms, clock_late_ms, refresh_ms } = message;
     return { method: "webcodecs", drawn, ended_at_ms, clock_gap_ms, clock_late_ms, refresh_ms, stalls: 0, frames, fps };
@@ -94,41 +86,41 @@ export class WorkerPlayer implements ClipPlayer {
     this.tell({ type: "release", sha256 });
   }
 
-  private keep(name: string, result: Promise<Prepared>): void {
+  private keep(name: string, asked: Promise<FromWorker>): Promise<Prepared> {
+    const result = asked.then((message) => message as FromWorker & { type: "prepared" });
     this.prepared.set(name, result);
     result.catch(() => this.prepared.get(name) === result && this.prepared.delete(name));
+    return result;
   }
 
-  private ask(name: string, limit_ms: number): Promise<FromWorker> {
-    return new Promise((resolve, reject) => {
-      const asked: Waiting = { resolve, reject };
-      // A clip released and prepared anew is asked for twice by one name: each has a limit of its own.
-      this.waiting.set(name, (this.waiting.get(name) ?? new Set()).add(asked));
-      if (limit_ms === Infinity) return;
-      asked.limit = setTimeout(() => {
-        this.waiting.get(name)?.delete(asked);
-        reject(new ClipBroken(`no answer in ${limit_ms} ms`));
-      }, limit_ms);
+  /** Ask once `after` is over; a worker that breaks before is heard too. */
+  private ask(asked: Request, limit_ms: number | null, after?: Promise<unknown>): Promise<FromWorker> {
+    const request = ++this.requests;
+    const answer = new Promise<FromWorker>((resolve, reject) => {
+      const tooLate = (): void => this.settle(request, new ClipBroken(`no answer in ${limit_ms} ms`));
+      const limit = limit_ms === null ? undefined : setTimeout(tooLate, limit_ms);
+      this.waiting.set(request, { resolve, reject, limit });
     });
+    const tell = (): void => this.tell({ ...asked, request });
+    if (after) after.then(tell, (error: unknown) => this.settle(request, error instanceof Error ? error : new ClipBroken(String(error))));
+    else tell();
+    return answer;
   }
 
-  private settle(name: string, outcome: FromWorker | Error): void {
-    const all = this.waiting.get(name) ?? [];
-    this.waiting.delete(name);
-    for (const asked of all) {
-      clearTimeout(asked.limit);
-      if (outcome instanceof Error) asked.reject(outcome);
-      else asked.resolve(outcome);
-    }
+  private settle(request: number, outcome: FromWorker | Error): void {
+    const asked = this.waiting.get(request);
+    this.waiting.delete(request);
+    clearTimeout(asked?.limit);
+    if (outcome instanceof Error) asked?.reject(outcome);
+    else asked?.resolve(outcome);
   }
 
   private arrived(message: FromWorker): void {
-    if (message.type !== "failed") return this.settle(`${message.type} ${message.sha256}`, message);
-    for (const step of ["prepared", "played"]) this.settle(`${step} ${message.sha256}`, new ClipBroken(message.reason));
+    this.settle(message.request, message.type === "failed" ? new ClipBroken(message.reason) : message);
   }
 
   private broken(reason: string): void {
-    for (const name of [...this.waiting.keys()]) this.settle(name, new ClipBroken(reason));
+    for (const request of [...this.waiting.keys()]) this.settle(request, new ClipBroken(reason));
   }
 
   private tell(message: ToWorker, transfer: Transferable[] = []): void {

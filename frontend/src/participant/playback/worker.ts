@@ -29,41 +29,51 @@ const putOff = (run: () => void): unknown => (draw_after_ms ? setTimeout(run, dr
 const clock = new RefreshClock((callback) => scope.requestAnimationFrame(callback), absoluteNow, performance.timeOrigin, putOff);
 
 const clips = new Map<string, SingleClip | Composed>();
+/** The newest request to prepare each clip that was not released since. */
+const newest = new Map<string, number>();
 let context: OffscreenCanvasRenderingContext2D | null = null;
 let background = "#808080";
 let mark: typeof drawSyncPatch | null = null;
 
-async function prepare(sha256: string, bytes: ArrayBuffer, declared_fps: number | null): Promise<void> {
+async function prepare(request: number, sha256: string, bytes: ArrayBuffer, declared_fps: number | null): Promise<void> {
+  newest.set(sha256, request);
   try {
     const clip = clips.get(sha256) ?? (await decodeClip(bytes, declared_fps));
-    clips.set(sha256, clip);
     const { fps, width, height } = clip;
-    scope.postMessage({ type: "prepared", sha256, frames: framesOf(clip), width, height, fps });
+    const frames = framesOf(clip);
+    if (newest.get(sha256) === request) clips.set(sha256, clip);
+    else close(clip);
+    scope.postMessage({ type: "prepared", request, frames, width, height, fps });
   } catch (error) {
-    failed(sha256, error);
+    failed(request, error);
   }
 }
 
-function failed(sha256: string, reason: unknown): void {
-  scope.postMessage({ type: "failed", sha256, reason: String(reason) });
+function failed(request: number, reason: unknown): void {
+  scope.postMessage({ type: "failed", request, reason: String(reason) });
 }
 
 /** Put decoded clips on one canvas, under a name of their own. */
-function compose(name: string, parts: readonly Part[], width: number, height: number): void {
+function compose(request: number, name: string, parts: readonly Part[], width: number, height: number): void {
   try {
     const composed = composition(parts, (sha256) => clips.get(sha256), width, height);
     clips.set(name, composed);
-    scope.postMessage({ type: "prepared", sha256: name, frames: framesOf(composed), width, height, fps: composed.fps });
+    scope.postMessage({ type: "prepared", request, frames: framesOf(composed), width, height, fps: composed.fps });
   } catch (error) {
-    failed(name, error);
+    failed(request, error);
   }
 }
 
 function release(sha256: string): void {
   const clip = clips.get(sha256);
-  if (clip && "bitmaps" in clip) clip.bitmaps.forEach((bitmap) => bitmap.close());
-  else if (clip && "close" in clip) clip.close();
+  if (clip) close(clip);
   clips.delete(sha256);
+  newest.delete(sha256);
+}
+
+function close(clip: SingleClip | Composed): void {
+  if ("bitmaps" in clip) clip.bitmaps.forEach((bitmap) => bitmap.close());
+  else if ("close" in clip) clip.close();
 }
 
 function blank(): void {
@@ -93,23 +103,23 @@ function warm(): void {
   clock.start(blank);
 }
 
-function play(sha256: string, refresh_ms: number, fixation_ms: number): void {
+function play(request: number, sha256: string, refresh_ms: number, fixation_ms: number): void {
   const clip = clips.get(sha256);
-  if (!clip || !context) return failed(sha256, "expected a prepared clip and a canvas");
-  const start = (): void => begin(sha256, clip, refresh_ms, fixation_ms);
+  if (!clip || !context) return failed(request, "expected a prepared clip and a canvas");
+  const start = (): void => begin(request, clip, refresh_ms, fixation_ms);
   const streams = streamsOf(clip);
   if (streams.length === 0) return start();
-  Promise.all(streams.map((stream) => stream.rewind())).then(start, (error: unknown) => stopBroken(sha256, error));
+  Promise.all(streams.map((stream) => stream.rewind())).then(start, (error: unknown) => stopBroken(request, error));
 }
 
 /** The surround again, and the reason to the page. */
-function stopBroken(sha256: string, reason: unknown): void {
+function stopBroken(request: number, reason: unknown): void {
   clock.stop();
   blank();
-  failed(sha256, reason);
+  failed(request, reason);
 }
 
-function begin(sha256: string, clip: SingleClip | Composed, refresh_ms: number, fixation_ms: number): void {
+function begin(request: number, clip: SingleClip | Composed, refresh_ms: number, fixation_ms: number): void {
   const until = absoluteNow() + fixation_ms;
   draw_after_ms = Math.floor(DRAWS_AFTER * refresh_ms);
   const waited = new EvennessMeter();
@@ -124,14 +134,14 @@ function begin(sha256: string, clip: SingleClip | Composed, refresh_ms: number, 
       const true_ms = trueRefresh(waited.read().refresh_ms, refresh_ms);
       if (rest === REST_REFRESHES) draw_after_ms = Math.floor(DRAWS_AFTER * true_ms);
       if (rest-- > 0) return;
-      const show = showing(sha256, clip, true_ms);
+      const show = showing(request, clip, true_ms);
       clock.start(show);
       show(refresh_at_ms, ran_at_ms);
     }
   });
 }
 
-function showing(sha256: string, clip: SingleClip | Composed, refresh_ms: number): Job {
+function showing(request: number, clip: SingleClip | Composed, refresh_ms: number): Job {
   const streams = streamsOf(clip);
   const schedule = new FrameSchedule(framesOf(clip), 1000 / clip.fps, refresh_ms);
   const evenness = new EvennessMeter();
@@ -139,12 +149,12 @@ function showing(sha256: string, clip: SingleClip | Composed, refresh_ms: number
   return (refresh_at_ms, ran_at_ms) => {
     evenness.add(refresh_at_ms, ran_at_ms);
     const broken = streams.find(({ problem }) => problem);
-    if (broken) return stopBroken(sha256, broken.problem);
+    if (broken) return stopBroken(request, broken.problem);
     if (schedule.isOver(refresh_at_ms)) {
       clock.stop();
       blank();
       const figures = { frames: framesOf(clip), fps: clip.fps, ended_at_ms: absoluteNow(), ...evenness.read() };
-      scope.postMessage({ type: "played", sha256, drawn, ...figures });
+      scope.postMessage({ type: "played", request, drawn, ...figures });
       // Ready for another view before it is asked for.
       for (const stream of streams) stream.rewind().catch(() => {});
       return;
@@ -171,11 +181,11 @@ scope.onmessage = ({ data }) => {
     context = data.canvas.getContext("2d", { alpha: false });
     blank();
     if (data.sync_patch) void loadSyncPatch();
-  } else if (data.type === "prepare") void prepare(data.sha256, data.bytes, data.fps);
+  } else if (data.type === "prepare") void prepare(data.request, data.sha256, data.bytes, data.fps);
   else if (data.type === "release") release(data.sha256);
   else if (data.type === "blank") resize(data.width, data.height);
-  else if (data.type === "compose") compose(data.sha256, data.parts, data.width, data.height);
+  else if (data.type === "compose") compose(data.request, data.sha256, data.parts, data.width, data.height);
   else if (data.type === "warm") warm();
-  else play(data.sha256, data.refresh_ms, data.fixation_ms);
+  else play(data.request, data.sha256, data.refresh_ms, data.fixation_ms);
 };
 scope.postMessage({ type: "started" });
