@@ -1,6 +1,8 @@
-"""A progress bar on stderr with frames/s and remaining time; silent where stderr is no terminal."""
+"""Progress bars on stderr; silent where stderr is no terminal."""
 
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from rich.console import Console
 from rich.progress import (
@@ -10,6 +12,7 @@ from rich.progress import (
     ProgressColumn,
     Task,
     TextColumn,
+    TimeElapsedColumn,
     TimeRemainingColumn,
 )
 from rich.text import Text
@@ -35,3 +38,12 @@ def frame_progress() -> Progress:
         console=Console(stderr=True),
         disable=not sys.stderr.isatty(),
     )
+
+
+@contextmanager
+def step_progress(description: str, total: int) -> Iterator[Callable[[], None]]:
+    """Progress of a job of a few long steps; call what is yielded after each."""
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), disable=not sys.stderr.isatty()) as progress:
+        task = progress.add_task(description, total=total)
+        yield lambda: progress.advance(task)

@@ -1,6 +1,6 @@
 """How exact a track is: against labels of frames left out of training, and against known truth."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 from pathlib import Path
@@ -56,6 +56,7 @@ def cross_validate(
     folds: int,
     *,
     refine: bool = False,
+    advance: Callable[[], None] | None = None,
 ) -> list[HeldOut]:
     """Train on all folds but one and fit the labelled frames of that one, for every fold.
 
@@ -67,6 +68,8 @@ def cross_validate(
         Frame k of the ascending labelled frames is in fold k modulo `folds`.
     refine : bool, optional
         Refine the labels of the training frames of each fold, without sight of the frames left out.
+    advance : callable, optional
+        Called after each fold.
     """
     frames = sorted(points)
     folds = min(folds, len(frames))
@@ -81,6 +84,8 @@ def cross_validate(
         finder = Finder(Fitter(model))
         for frame in out:
             results.append(_held_out(model, finder, frame, fold, pictures[frame], points[frame]))
+        if advance is not None:
+            advance()
     return sorted(results, key=lambda result: result.frame)
 
 

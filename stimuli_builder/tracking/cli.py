@@ -164,8 +164,9 @@ def train(
     """
     from experiments.errors import InputError
     from experiments.files import check_targets
+    from stimuli_builder.progress import step_progress
     from stimuli_builder.tracking.cli_track import report_modes
-    from stimuli_builder.tracking.learn import learn, open_video
+    from stimuli_builder.tracking.learn import learn, open_video, training_steps
     from stimuli_builder.tracking.model_file import save_model
 
     if labels is None:
@@ -173,7 +174,8 @@ def train(
     check_targets([out], [video, labels])
     info = open_video(video, accept_variable_rate)
     options = _options(shape_variance, appearance_variance, coupled_variance, paper_modes, base_pixels)
-    lesson = learn(info, labels, options, one_eye=one_eye, folds=folds, refine=refine)
+    with step_progress("training", training_steps(folds, refine)) as advance:
+        lesson = learn(info, labels, options, one_eye=one_eye, folds=folds, refine=refine, advance=advance)
     report_modes(lesson)
     _report_folds(lesson)
     if out is not None:

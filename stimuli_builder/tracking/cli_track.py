@@ -10,10 +10,10 @@ from experiments.counted import counted
 from experiments.errors import InputError
 from experiments.files import check_targets, temporary_beside
 from stimuli_builder.blinks.plots import check_figure_name
-from stimuli_builder.progress import frame_progress
+from stimuli_builder.progress import frame_progress, step_progress
 from stimuli_builder.tracking.labelfree import label_free_lesson
 from stimuli_builder.tracking.labels import Labels, load_labels
-from stimuli_builder.tracking.learn import Lesson, learn, open_video
+from stimuli_builder.tracking.learn import Lesson, learn, open_video, training_steps
 from stimuli_builder.tracking.model import CoupledModel
 from stimuli_builder.tracking.model_file import load_model
 from stimuli_builder.tracking.outcome import TrackSummary
@@ -144,7 +144,16 @@ def _check(job: TrackJob) -> None:
 def _model(job: TrackJob, info: VideoInfo) -> tuple[CoupledModel, Mapping[int, Points | str]]:
     """A model from labels, from a file, or from what the detector sees; then with its detections."""
     if job.labels is not None:
-        lesson = learn(info, job.labels, job.options, one_eye=job.one_eye, folds=job.folds, refine=job.refine)
+        with step_progress("training", training_steps(job.folds, job.refine)) as advance:
+            lesson = learn(
+                info,
+                job.labels,
+                job.options,
+                one_eye=job.one_eye,
+                folds=job.folds,
+                refine=job.refine,
+                advance=advance,
+            )
         report_modes(lesson)
         return lesson.model, {}
     if job.model is None:
@@ -167,7 +176,10 @@ def _label_free(job: TrackJob, info: VideoInfo) -> tuple[CoupledModel, Mapping[i
         else ""
     )
     print(f"{line}{more}; training on them", flush=True)
-    lesson = label_free_lesson(info, seen, job.options, one_eye=job.one_eye, by_hand=by_hand)
+    with step_progress("training", training_steps()) as advance:
+        lesson = label_free_lesson(
+            info, seen, job.options, one_eye=job.one_eye, by_hand=by_hand, advance=advance
+        )
     report_modes(lesson)
     return lesson.model, seen.hints
 

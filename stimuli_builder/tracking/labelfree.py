@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from experiments.errors import InputError
 from stimuli_builder.tracking.labels import Labels, save_labels
-from stimuli_builder.tracking.learn import Lesson, lesson_from
+from stimuli_builder.tracking.learn import Advance, Lesson, lesson_from
 from stimuli_builder.tracking.shapes import (
     EYE_POINTS,
     Points,
@@ -101,10 +101,12 @@ def label_free_lesson(
     one_eye: bool,
     by_hand: Labels | None = None,
     refine: bool | None = None,
+    advance: Advance = None,
 ) -> Lesson:
     """Train the model on the most varied of the detections; frames labelled by hand win.
 
     Twelve frames by hand or more train alone: a person and a detector mean slightly different points.
+    `advance` is called after each of `training_steps`.
     """
     good = plausible(seen.points)
     hand = {} if by_hand is None else by_hand.frames
@@ -112,7 +114,7 @@ def label_free_lesson(
     chosen = {n: good[n] for n in most_varied(good, min(room, len(good)))} if room else {}
     markers = default_markers(1 if one_eye else 2) if by_hand is None else by_hand.markers
     labels = Labels(Path("detections"), info.size_px, markers, dict(sorted((chosen | hand).items())))
-    lesson = lesson_from(info, labels, options, refine=refine)
+    lesson = lesson_from(info, labels, options, refine=refine, advance=advance)
     if len(hand) >= ENOUGH_BY_HAND:
         return lesson
     width = np.mean([widths(points) for points in labels.frames.values()])

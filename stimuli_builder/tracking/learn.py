@@ -1,5 +1,6 @@
 """From a video and its label file to a model that knows how well it fits frames it has not seen."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,6 +16,8 @@ from stimuli_builder.video import VideoInfo, read_frames
 from stimuli_builder.video_scan import scan_before_damage, scan_video
 
 WORTH_REFINING = 0.96
+FOLDS = 5
+Advance = Callable[[], None] | None
 
 
 @dataclass(frozen=True)
@@ -45,8 +48,9 @@ def learn(
     options: TrainingOptions,
     *,
     one_eye: bool,
-    folds: int = 5,
+    folds: int = FOLDS,
     refine: bool | None = None,
+    advance: Advance = None,
 ) -> Lesson:
     """Train on the labelled frames of a video.
 
@@ -55,22 +59,35 @@ def learn(
     refine : bool, optional
         Make labels consistent with the pictures first; None does so where frames left out of training then
         come clearly nearer to their labels. Accuracy is always reported against the labels as given.
+    advance : callable, optional
+        Called after each of `training_steps`.
     """
     labels = load_labels(labels_path, info.size_px, info.frame_count)
     _check_eyes(labels, one_eye)
-    return lesson_from(info, labels, options, folds=folds, refine=refine)
+    return lesson_from(info, labels, options, folds=folds, refine=refine, advance=advance)
+
+
+def training_steps(folds: int = FOLDS, refine: bool | None = None) -> int:
+    """Steps of a training: each fold, again with refined labels where both are compared, and the whole."""
+    return folds * (2 if refine is None else 1) + 1
 
 
 def lesson_from(
-    info: VideoInfo, labels: Labels, options: TrainingOptions, *, folds: int = 5, refine: bool | None = None
+    info: VideoInfo,
+    labels: Labels,
+    options: TrainingOptions,
+    *,
+    folds: int = FOLDS,
+    refine: bool | None = None,
+    advance: Advance = None,
 ) -> Lesson:
     """Train on labels that are at hand, a person's or a detector's; see `learn`."""
     pictures = read_frames(info, list(labels.frames))
     given = (pictures, labels.frames, labels.markers, options)
-    held_out = cross_validate(*given, folds, refine=bool(refine))
+    held_out = cross_validate(*given, folds, refine=bool(refine), advance=advance)
     refined = bool(refine)
     if refine is None:
-        trial = cross_validate(*given, folds, refine=True)
+        trial = cross_validate(*given, folds, refine=True, advance=advance)
         if _typical(trial) < WORTH_REFINING * _typical(held_out):
             held_out, refined = trial, True
     points = refined_labels(*given) if refined else labels.frames
@@ -78,6 +95,8 @@ def lesson_from(
     model = train(
         [pictures[f] for f in frames], np.array([points[f] for f in frames]), labels.markers, options
     )
+    if advance is not None:
+        advance()
     believed = with_errors(model, held_out, residual_limits(held_out, labels.eyes))
     return Lesson(believed, labels, held_out, refined)
 

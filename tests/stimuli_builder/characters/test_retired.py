@@ -21,11 +21,13 @@ OPENING_MM = {
     "alder@4": 10.07,
     "alder@5": 10.07,
     "alder@6": 10.07,
+    "alder-face": 10.07,
     "birch": 9.66,
     "birch@3": 9.66,
     "birch@4": 9.66,
     "cedar": 9.85,
     "cedar@3": 9.85,
+    "cedar-face": 9.85,
     "hazel": 10.91,
     "hazel@3": 10.91,
 }

@@ -8,7 +8,7 @@ import pytest
 
 from experiments.errors import InputError
 from stimuli_builder.tracking.labels import Labels
-from stimuli_builder.tracking.learn import lesson_from
+from stimuli_builder.tracking.learn import lesson_from, training_steps
 from stimuli_builder.tracking.shapes import default_markers
 from stimuli_builder.tracking.table import numbers, point_columns, track_rows
 from stimuli_builder.tracking.track import track_video
@@ -76,8 +76,12 @@ def test_one_eye_in_an_upright_picture_is_tracked(recording, tmp_path):
     labels = Labels(
         tmp_path / "l.json", (240, 384), default_markers(1), {n: eye[n] for n in range(0, 200, 16)}
     )
-    model = lesson_from(info, labels, TrainingOptions(), folds=2, refine=False).model
-    assert points_off(model, video, tmp_path / "t.csv", eye) < 0.7
+    steps = []
+    lesson = lesson_from(
+        info, labels, TrainingOptions(), folds=2, refine=False, advance=lambda: steps.append(1)
+    )
+    assert points_off(lesson.model, video, tmp_path / "t.csv", eye) < 0.7
+    assert len(steps) == training_steps(2, False) == 3
 
 
 def test_a_wrong_rotation_in_the_head_is_one_line_and_no_track(lesson, recording, tmp_path):
