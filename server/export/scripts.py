@@ -11,12 +11,15 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from experiments.definition import Experiment
 from experiments.design import rated_levels
+from experiments.rules import DropFailedPlays, DropSlowTrials, ExcludeIncomplete
 from experiments.trials import KINDS
 from experiments.trials.scales import scales_of
 
 ScriptLanguage = Literal["R", "py"]
 LANGUAGES: tuple[ScriptLanguage, ...] = ("R", "py")
 """By the ending of their files. A view without a template of its own gets one that reads its rows."""
+APPLIED = (ExcludeIncomplete, DropFailedPlays, DropSlowTrials)
+"""Rules that a row's own columns decide: scripts apply them. The others look at whole runs."""
 
 
 def script(
@@ -42,15 +45,16 @@ def script(
         }
         for factor in experiment.factors
     ]
-    rules = [rule.rule.replace("_", " ") for rule in experiment.exclusions]
+    rules = [rule.rule.replace("_", " ") for rule in experiment.exclusions if not isinstance(rule, APPLIED)]
     values: dict[str, Any] = {
         "title": " ".join(experiment.title.split()),
         "data": data,
         "factors": factors,
         "analysed": [f for f in factors if len(f["levels"]) > 1 and _in_plan(experiment, f, column)],
         "scales": scales_of(experiment),
+        "applied": [rule for rule in experiment.exclusions if isinstance(rule, APPLIED)],
         "rules": rules,
-        "unapplied": f"note: nobody is left out by the declared exclusions ({'; '.join(rules)}): "
+        "unapplied": f"note: nobody is left out by these declared exclusions ({'; '.join(rules)}): "
         "list the runs that `analysis run` names, in this script",
         "view": KINDS[experiment.trial.kind].view.name,
     }

@@ -10,6 +10,7 @@ import pytest
 
 from experiments.definition import Experiment
 from experiments.load import load_experiment
+from experiments.rules import DropFailedPlays, DropSlowTrials, ExcludeIncomplete
 from server.export.scripts import LANGUAGES, script
 from tests.analysis.ratings_file import rows_of, simulate, write_export
 
@@ -32,13 +33,13 @@ def run(command: list[str]) -> str:
     return done.stdout
 
 
-def own_f(answers: Path) -> float:
+def own_f(answers: Path, study: Experiment = EXP3) -> float:
     """F of the first effect by this repository's own analysis of the same file."""
     from analysis.plans.plan import plan_of
     from analysis.plans.study import study_contents
     from analysis.read.study_answers import load_csv
 
-    contents = study_contents(EXP3, load_csv(answers, EXP3, plan_of("clip_rating").reading))
+    contents = study_contents(study, load_csv(answers, study, plan_of("clip_rating").reading))
     return float(contents.numbers["effects"][0]["univariate"]["f_value"])
 
 
@@ -50,6 +51,26 @@ def test_the_python_script_gives_our_own_f(answers: Path) -> None:
     line = next(line for line in said.splitlines() if line.startswith("0  lower_lid"))
     found = float(line.split()[4])
     assert found == pytest.approx(own_f(answers), abs=5e-4)
+
+
+def test_the_python_script_leaves_out_what_its_rows_tell(tmp_path: Path) -> None:
+    rules = (ExcludeIncomplete(), DropFailedPlays(), DropSlowTrials(above_ms=9000))
+    study = EXP3.model_copy(update={"exclusions": rules})
+    rows = [row | SCALE_AND_PLAY for row in rows_of(study, simulate(study, 9))]
+    unfinished = rows[0]["run"]
+    for number, row in enumerate(rows):
+        row["run_status"] = "abandoned" if row["run"] == unfinished else "complete"
+        row["verdict"] = "failed" if number % 7 == 0 else "good"
+        row["rt"] = 9001 if number % 11 == 0 else 700
+        if row["run"] == unfinished or number % 7 == 0 or number % 11 == 0:
+            row["response"] = 7
+    path = write_export(tmp_path / "rules.csv", study, rows)
+    target = path.with_suffix(".py")
+    target.write_text(script(study, "py", path.name), encoding="utf-8")
+    said = run([sys.executable, "-W", "ignore", str(target)])
+    assert "8 participants" in said
+    line = next(line for line in said.splitlines() if line.startswith("0  lower_lid"))
+    assert float(line.split()[4]) == pytest.approx(own_f(path, study), abs=5e-4)
 
 
 def test_the_r_script_gives_our_own_f(answers: Path) -> None:
@@ -72,9 +93,9 @@ def test_the_r_script_gives_our_own_f(answers: Path) -> None:
 
 @pytest.mark.parametrize("name", ["exp1", "pairs-demo", "sliders-demo", "threshold-demo", "plane-demo"])
 def test_a_script_says_that_there_is_nothing_to_analyse(name: str, tmp_path: Path) -> None:
-    columns = "participant,run,kind,excluded,trial_index,play,scale,response,winner,counts,correct"
+    columns = "participant,run,run_status,kind,excluded,trial_index,play,scale,response,winner,counts,correct"
     (tmp_path / "data.csv").write_text(
-        f"{columns}\nP1,1,practice,0,0,1,rating,3,left,0,1\n", encoding="utf-8"
+        f"{columns},verdict,rt\nP1,1,complete,practice,0,0,1,rating,3,left,0,1,good,700\n", encoding="utf-8"
     )
     target = tmp_path / "script.py"
     target.write_text(script(declared(name), "py", "data.csv"), encoding="utf-8")

@@ -15,7 +15,7 @@ from analysis.plans.study import study_contents
 from analysis.read.study_answers import load_csv
 from experiments.definition import Experiment
 from experiments.load import load_experiment
-from server.export.scripts import script
+from server.export.scripts import APPLIED, script
 from tests.analysis.ratings_file import Row, rows_of, simulate, write_export
 from tests.analysis.report.r_process import needed, run_together
 from tests.conftest import REPOSITORY
@@ -67,21 +67,6 @@ def studied(request, tmp_path_factory) -> tuple[Path, Experiment, dict[str, Any]
     return path, study, told.numbers
 
 
-def test_without_a_rating_that_counts_the_script_says_so(tmp_path: Path) -> None:
-    study = design("both")
-    path = answers("both", study, tmp_path)
-    lines = path.read_text(encoding="utf-8").replace(",main,", ",practice,")
-    path.write_text(lines, encoding="utf-8")
-    target = path.with_suffix(".py")
-    target.write_text(script(study, "py", path.name), encoding="utf-8")
-    done = subprocess.run([sys.executable, str(target)], capture_output=True, text=True, check=False)
-    assert done.returncode == 1
-    assert done.stderr.splitlines()[-1].endswith(
-        f"{path.name}: no answer to a main trial is left by runs that count: nothing to analyse yet"
-    )
-    assert "Traceback" not in done.stderr
-
-
 def pairs_of(numbers: dict[str, Any]) -> list[dict[str, Any]]:
     return [pair for pair in numbers["pairwise"] if ":" not in pair["effect"]]
 
@@ -94,8 +79,9 @@ def test_the_python_script_gives_our_own_tables(studied) -> None:
         [sys.executable, "-W", "error", str(target)], capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
-    # `analysis run` applies the declared exclusions, the script those that it is told.
-    assert ("note: nobody is left out by the declared exclusions" in done.stderr) == bool(study.exclusions)
+    # `analysis run` applies all declared exclusions, the script those that a row tells and those it is told.
+    of_runs = [rule for rule in study.exclusions if not isinstance(rule, APPLIED)]
+    assert ("note: nobody is left out by these declared exclusions" in done.stderr) == bool(of_runs)
     for effect in numbers["effects"]:
         ours = effect["univariate"]
         found = re.search(rf"^\d+ +{effect['effect']} +(.*)$", done.stdout, re.MULTILINE)
