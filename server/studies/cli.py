@@ -20,7 +20,7 @@ from server.clock import now
 from server.context import Services
 from server.models import Link, Study, StudyVersion
 from server.studies import repository
-from server.studies.importing import add_version, check_against_design, create_study, store_clips
+from server.studies.importing import add_version, check_against_design, create_study, notes_of, store_clips
 from server.studies.links import (
     LinkKind,
     LinkOptions,
@@ -82,10 +82,8 @@ def add(
                 version = add_version(session, study, text, declared, manifest, None)
                 said = f"version {version.number}, {len(manifest.clips)} clips ({new} new)"
             out.print(f"study {study.name}: {said}")
-            if manifest.definition_sha256 != version.definition_sha256:
-                out.print(
-                    "note: the clips were built with another wording of the declaration; their cells agree"
-                )
+            for note in notes_of(declared, manifest, version):
+                out.print(f"note: {note}", soft_wrap=True)
             if open_:
                 _set_status(session, study, "live")
                 for group, url in _urls(services, session, study):

@@ -1,5 +1,6 @@
 """Take a declared experiment and a folder of clips into the server: all of it, or nothing."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -106,6 +107,19 @@ def create_study(
     session.flush()
     record(session, identity, "study created", "study", name)
     return study
+
+
+def notes_of(declared: Experiment, manifest: Manifest, version: StudyVersion) -> Iterator[str]:
+    """What an experimenter may want to know of a study as it was taken in."""
+    if manifest.definition_sha256 != version.definition_sha256:
+        yield "the clips were built with another wording of the declaration; their cells agree"
+    sized = manifest.inter_ocular_px or any(clip.width_mm for clip in manifest.clips)
+    if declared.display.calibrate != "off" and not sized:
+        yield (
+            "no clip says how large it is to be shown, so they are shown pixel by pixel although "
+            f'participants measure their screens (calibrate = "{declared.display.calibrate}"); give clips a '
+            'width_mm in manifest.json, or declare calibrate = "off" in [display]'
+        )
 
 
 def add_version(

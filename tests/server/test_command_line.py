@@ -310,3 +310,18 @@ def test_the_first_account_can_be_invited_before_the_server_ever_ran(
     settings = Settings(data_folder=tmp_path / "data", database_url=empty_database_url, secret_key="k")
     called = run_server_command(settings, "admin", "link")
     assert (called.returncode, "/admin/invitation#" in called.stdout) == (0, True), called.stderr
+
+
+def test_clips_without_a_size_are_told_of_where_the_screen_is_measured(
+    settings: Settings, services: Services, sources: Path
+) -> None:
+    manifest = sources / "clips" / "manifest.json"
+    told = json.loads(manifest.read_text(encoding="utf-8")) | {"inter_ocular_px": None}
+    assert "no clip says" not in add(settings, sources, "--name", "sized").stdout
+    clips = [clip | {"width_mm": None} for clip in told["clips"]]
+    manifest.write_text(json.dumps(told | {"clips": clips}), encoding="utf-8")
+    said = add(settings, sources).stdout.replace("\n", " ")
+    assert "no clip says how large it is to be shown" in said
+    text = (sources / "short.toml").read_text(encoding="utf-8")
+    (sources / "short.toml").write_text(text + '\n[display]\ncalibrate = "off"\n', encoding="utf-8")
+    assert "no clip says" not in add(settings, sources, "--name", "as_it_is").stdout
