@@ -1,4 +1,4 @@
-"""Levels of `birch@5` as one video against single lossless pictures: size, loss, and time to read.
+"""Levels of `birch@6` as one video against single lossless pictures: size, loss, and time to read.
 
 They were encoded once before, by quantiser 20; a bake alone has levels before any encoding.
 
@@ -23,7 +23,7 @@ from stimuli_builder.characters.writing import write_picture
 @pytest.fixture(scope="module")
 def pictures(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[NDArray[np.uint8]], float, float]:
     """Every level, the megabytes they take as lossless pictures, and the processor-seconds to read those."""
-    atlas, folder = load_atlas(SHIPPED / "birch@5"), tmp_path_factory.mktemp("single")
+    atlas, folder = load_atlas(SHIPPED / "birch@6"), tmp_path_factory.mktemp("single")
     levels = [atlas.level_srgb(number) for number in range(len(atlas.closures))]
     files = [write_picture(folder, f"{number:03d}.webp", level) for number, level in enumerate(levels)]
     began = time.process_time()

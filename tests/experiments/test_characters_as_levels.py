@@ -11,7 +11,7 @@ from experiments.load import DefinitionError, parse_experiment
 from experiments.schema.canonical import definition_sha256
 from tests.helpers.faces import DEMO, HEAD, PROFILES, faces
 
-SHOWN = {"alder": "alder@7", "birch": "birch@5", "cedar": "cedar@4", "hazel": "hazel@4"}
+SHOWN = {"alder": "alder@7", "birch": "birch@6", "cedar": "cedar@4", "hazel": "hazel@4"}
 LIST = f"character = {json.dumps(list(SHOWN.values()))}"
 
 
@@ -61,7 +61,7 @@ def test_a_list_in_render_is_a_last_factor_that_all_see() -> None:
 
 
 def test_folders_give_levels_their_own_name_and_versions_are_dropped() -> None:
-    listed = '["faces/old-face", "birch@5", "faces/@mary", "ann@home", "ann@work"]'
+    listed = '["faces/old-face", "birch@6", "faces/@mary", "ann@home", "ann@work"]'
     experiment = as_factor(f"character = {listed}", "random = true")
     assert [(level.name, level.label) for level in experiment.factors[0].levels] == [
         ("old-face", "Old face"),
@@ -76,7 +76,7 @@ def test_folders_give_levels_their_own_name_and_versions_are_dropped() -> None:
 @pytest.mark.parametrize(
     ("listed", "message"),
     [
-        ('["alder", 3]', 'expected a list such as ["alder@7", "birch@5"], got the list ["alder", 3]'),
+        ('["alder", 3]', 'expected a list such as ["alder@7", "birch@6"], got the list ["alder", 3]'),
         ('["alder", ""]', "expected a list such as"),
         ("[]", "expected a list such as"),
         ('["..", "birch"]', "expected a list such as"),

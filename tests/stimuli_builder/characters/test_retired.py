@@ -25,6 +25,7 @@ OPENING_MM = {
     "birch": 9.66,
     "birch@3": 9.66,
     "birch@4": 9.66,
+    "birch@5": 9.66,
     "cedar": 9.85,
     "cedar@3": 9.85,
     "cedar-face": 9.85,
