@@ -316,6 +316,8 @@ def test_every_form_of_the_data_page_is_there_on_the_command_line(
     done = run_server_command(settings, "export", "short", "--format", form, "--out", str(out))
     assert done.returncode == 0, done.stderr
     assert out.read_bytes().startswith(begins)
+    told = "the dataset is the folder short/ in the zip: unpack it and give that to a validator"
+    assert (told in done.stdout.splitlines()) is (form == "psych-ds")
     unknown = run_server_command(settings, "export", "short", "--format", "jsn", "--out", str(out))
     assert unknown.returncode == 2
     assert "jsn" in unknown.stderr  # and the forms there are, in lines as wide as the terminal
