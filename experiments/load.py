@@ -57,6 +57,10 @@ class DefinitionError(InputError):
         super().__init__(f"{source}: {problems[0]}{more}")
 
 
+class UnknownExperimentError(InputError):
+    """A name that is neither a shipped experiment's nor the path of a file."""
+
+
 def load_experiment(name_or_path: str, *, has_data: bool = False) -> Experiment:
     """Load a shipped experiment by name, or the TOML file at a path; `has_data` as for `parse_experiment`."""
     path = locate(name_or_path)
@@ -82,7 +86,7 @@ def locate(name_or_path: str) -> Path:
     names = (*SHIPPED, *DEMOS)
     near = nearest(stem, names)
     hint = f"; did you mean '{near}'? Expected" if near else "; expected"
-    raise InputError(
+    raise UnknownExperimentError(
         f"no experiment '{name_or_path}'{hint} one of: {', '.join(names)}, or the path of a TOML file"
     )
 

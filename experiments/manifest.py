@@ -14,6 +14,10 @@ from experiments.source_video import SourceVideo
 from experiments.wrong_values import wrong_value
 
 MANIFEST_NAME = "manifest.json"
+MADE_ELSEWHERE = "clips made elsewhere"
+"""The note of a manifest that `stimuli manifest` wrote of somebody's own clips."""
+UPLOADED = "uploaded"
+"""In place of a program's version: of clips that came through the admin site."""
 Sha256 = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]
 FileName = Annotated[str, StringConstraints(pattern=r"^\w[^/\\\x00-\x1f\x7f]{0,150}$")]
 """A file's own name, in any script: a letter or digit first, no slash, at most 151 characters."""
@@ -127,6 +131,11 @@ class Manifest(Declaration):
         return (*self.clips, *self.checks)
 
     @property
+    def made_elsewhere(self) -> bool:
+        """Whether `stimuli manifest` wrote it of somebody's own clips."""
+        return MADE_ELSEWHERE in self.notes
+
+    @property
     def sources(self) -> tuple[SourceVideo, ...]:
         """The originals of clips that were converted."""
         return tuple(clip.source for clip in self.clips if clip.source is not None)
@@ -137,7 +146,8 @@ def read_manifest(folder: Path) -> Manifest:
     path = folder / MANIFEST_NAME
     if not path.is_file():
         raise InputError(
-            f"expected a {MANIFEST_NAME} in {folder}, found none; build the clips with `stimuli build`"
+            f"expected a {MANIFEST_NAME} in {folder}, found none; build the clips with `stimuli build`, or "
+            "write one for clips of your own with `stimuli manifest`"
         )
     try:
         return Manifest.model_validate(json.loads(path.read_text(encoding="utf-8")))

@@ -5,8 +5,9 @@ import io
 import re
 import unicodedata
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Sequence
-from itertools import count
+from collections.abc import Collection, Iterable, Sequence
+from itertools import count, islice, product
+from math import prod
 from pathlib import PurePosixPath
 
 from experiments.errors import InputError, did_you_mean
@@ -18,6 +19,7 @@ from experiments.trials import reserved_names
 Placed = dict[str, tuple[dict[str, str], int]]
 """File name -> (levels by factor, exemplar)."""
 FIRST_FIELD = "exemplar"
+MAX_CELLS_NAMED = 3
 
 
 def one_form(name: str) -> str:
@@ -107,11 +109,12 @@ def check_factorial(placed: Placed) -> None:
         raise InputError("expected at least one clip, got none")
     counts = Counter(tuple(levels.values()) for levels, _ in placed.values())
     known = levels_of(placed)
-    cells = 1
-    for levels in known.values():
-        cells *= len(levels)
+    cells = prod(map(len, known.values()))
     if len(counts) != cells:
-        raise InputError(f"expected clips in all {cells} cells of the design, got {len(counts)} of them")
+        raise InputError(
+            f"expected clips in all {cells} cells of the design, got {len(counts)} of them; "
+            f"{_without_clips(known, counts)}"
+        )
     largest, smallest = counts.most_common()[0], counts.most_common()[-1]
     if largest[1] != smallest[1]:
         raise InputError(
@@ -122,6 +125,14 @@ def check_factorial(placed: Placed) -> None:
         raise InputError(
             f"a factor cannot be called '{reserved[0]}', the name of a ratings column; rename it"
         )
+
+
+def _without_clips(known: dict[str, list[str]], present: Collection[tuple[str, ...]]) -> str:
+    # Taken one by one: levels by mistake, one a file, multiply to more cells than memory holds.
+    missing = (cell for cell in product(*known.values()) if cell not in present)
+    named = ["/".join(cell) for cell in islice(missing, MAX_CELLS_NAMED)]
+    others = prod(map(len, known.values())) - len(present) - len(named)
+    return f"none in {', '.join(named)}" + (f" and {others} more" if others else "")
 
 
 def levels_of(placed: Placed) -> dict[str, list[str]]:

@@ -2,7 +2,7 @@
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -16,6 +16,9 @@ from analysis.commands.output import (
     show,
 )
 from experiments.errors import InputError
+
+if TYPE_CHECKING:
+    from experiments.definition import Experiment
 
 
 class Origin(StrEnum):
@@ -122,14 +125,13 @@ def run(
     from analysis.read.runs_file import read_runs
     from analysis.read.study_answers import load_csv, load_database, stored_at
     from analysis.report.contents import held_against
-    from experiments.load import load_experiment
     from experiments.seal import read_clips_sha256, read_seal
 
     if database is not None and csv is not None:
         raise InputError("--database and --csv exclude each other; give one")
     if verify_with_r and not report:
         raise InputError("--verify-with-r needs the report; leave --no-report out")
-    declared = load_experiment(experiment, has_data=True)
+    declared = _declared(experiment)
     reading = plan_of(declared.trial.kind).reading
     folder = out or Path("out") / "analysis" / declared.name
     if report:
@@ -154,3 +156,16 @@ def run(
     if report:
         save_report(contents, folder, more=sensitivity, with_r=verify_with_r)
     show(contents)
+
+
+def _declared(name_or_path: str) -> "Experiment":
+    from experiments.load import UnknownExperimentError, load_experiment
+
+    try:
+        return load_experiment(name_or_path, has_data=True)
+    except UnknownExperimentError as error:
+        # A study has a name on the server too, by which its declaration cannot be read here.
+        raise InputError(
+            f"{error}; a study of a server is analysed by its TOML file, which is under "
+            "materials/ in the zip of `server export NAME --format psych-ds --out NAME.zip`"
+        ) from error

@@ -106,6 +106,11 @@ def export(
     if str(out_file) != "-":
         counted = "" if rows is None else f"{rows:,} row{'' if rows == 1 else 's'}, "
         out.print(f"{out_file}: {counted}{size:,} bytes" + (f"; analyse it with {beside}" if beside else ""))
+        if form == "psych-ds":
+            out.print(
+                f"the dataset is the folder {study}/ in the zip: unpack it and give that to a validator",
+                soft_wrap=True,
+            )
     others = {name: number for name, number in sorted(there.items()) if name != origin}
     if rows == 0 and form != "identities" and origin != "all" and others:
         named = ", ".join(f"{number} of origin {name}" for name, number in others.items())

@@ -9,6 +9,7 @@ from rich.table import Table
 from sqlalchemy.orm import Session
 
 from experiments.command_groups import command_group
+from experiments.definition import Experiment
 from experiments.errors import InputError, did_you_mean
 from experiments.load import locate
 from experiments.manifest import Manifest, read_manifest
@@ -51,7 +52,10 @@ def register(parent: typer.Typer) -> None:
 def add(
     experiment: Annotated[str, typer.Argument(help="exp1 to exp3, a demo, or a TOML file.")],
     clips: Annotated[
-        Path, typer.Option(help="Folder with manifest.json and its clips (see `stimuli build`).")
+        Path,
+        typer.Option(
+            help="Folder with manifest.json and its clips (`stimuli build`; for your own `stimuli manifest`)."
+        ),
     ],
     name: Annotated[str, typer.Option(help="Name on this server; the experiment's where not given.")] = "",
     open_: Annotated[bool, typer.Option("--open", help="Set it live and print its general link.")] = False,
@@ -64,10 +68,7 @@ def add(
     text = locate(experiment).read_text(encoding="utf-8")
     declared = planned_experiment(text, locate(experiment).name)
     manifest = read_manifest(clips)
-    if manifest.experiment != declared.name:
-        raise InputError(
-            f"the clips in {clips} were built for '{manifest.experiment}', not for '{declared.name}'"
-        )
+    _check_name(declared, manifest, clips)
     check_against_design(declared, manifest)
     with migrated_services() as services:
         new = store_clips(services.clips, manifest, clips)
@@ -89,6 +90,20 @@ def add(
                 for group, url in _urls(services, session, study):
                     to = f" of the group {group}" if group else ""
                     out.print(f"link for participants{to}, once the server runs: {url}", soft_wrap=True)
+
+
+def _check_name(declared: Experiment, manifest: Manifest, clips: Path) -> None:
+    """InputError where the clips are another experiment's."""
+    if manifest.experiment == declared.name:
+        return
+    if manifest.made_elsewhere:
+        raise InputError(
+            f"the manifest in {clips} is of '{manifest.experiment}', not of '{declared.name}'; write it "
+            "again with `stimuli manifest` and --experiment"
+        )
+    raise InputError(
+        f"the clips in {clips} were built for '{manifest.experiment}', not for '{declared.name}'"
+    )
 
 
 def _same_version(session: Session, study: Study, sha256: str, manifest: Manifest) -> StudyVersion | None:

@@ -10,7 +10,7 @@ from experiments import design
 from experiments.checks import CHECK_CELL
 from experiments.definition import Experiment
 from experiments.errors import InputError
-from experiments.manifest import CheckClip, Manifest, check_files, check_originals
+from experiments.manifest import UPLOADED, CheckClip, Manifest, check_files, check_originals
 from experiments.manifest import Clip as DesignClip
 from experiments.schema.canonical import definition_sha256
 from experiments.schema.upgrades import FORMAT
@@ -40,17 +40,29 @@ def check_against_design(experiment: Experiment, manifest: Manifest) -> None:
         cell, exemplar = missing[0]
         raise InputError(
             f"expected {len(declared)} clips, {len(missing)} are missing from the manifest, "
-            f"the first is {cell}, exemplar {exemplar}; build the clips with this definition"
+            f"the first is {cell}, exemplar {exemplar}; {_remedy(manifest)}"
         )
     if extra := sorted(set(built) - declared):
         cell, exemplar = extra[0]
         raise InputError(
             f"the manifest holds {len(extra)} clips that the definition does not declare, "
-            f"the first is {cell}, exemplar {exemplar}"
+            f"the first is {cell}, exemplar {exemplar}; {_remedy(manifest)}"
         )
     if len(built) != len(declared):
         raise InputError(f"expected each of {len(declared)} clips once, the manifest lists {len(built)}")
     _check_checks(experiment, manifest)
+
+
+def _remedy(manifest: Manifest) -> str:
+    """What makes the clips agree with the definition, by where they came from."""
+    if manifest.made_elsewhere:
+        return (
+            "correct the file names or the definition, then write the manifest again with `stimuli manifest` "
+            "and --experiment"
+        )
+    if manifest.program_version == UPLOADED:
+        return "upload those it declares, or correct the definition"
+    return "build the clips with this definition"
 
 
 def _check_checks(experiment: Experiment, manifest: Manifest) -> None:

@@ -8,7 +8,7 @@ import tomlkit
 from experiments import design
 from experiments.definition import Experiment
 from experiments.errors import InputError
-from experiments.manifest import Clip, Manifest
+from experiments.manifest import UPLOADED, Clip, Manifest
 from experiments.own_clips import Placed, check_factorial, levels_of
 from experiments.schema.canonical import definition_sha256
 from server.errors import Conflict
@@ -135,7 +135,7 @@ def manifest_of(experiment: Experiment, placed: Placed, folder: Path) -> Manifes
     return Manifest(
         experiment=experiment.name,
         definition_sha256=definition_sha256(experiment),
-        program_version="uploaded",
+        program_version=UPLOADED,
         seed=experiment.exemplars.seed,
         clips=tuple(clips),
     )

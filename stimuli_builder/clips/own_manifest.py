@@ -7,15 +7,15 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from experiments import design
 from experiments.definition import Experiment
 from experiments.errors import InputError
 from experiments.files import whole_file
-from experiments.manifest import MANIFEST_NAME, Clip, Manifest
+from experiments.manifest import MADE_ELSEWHERE, MANIFEST_NAME, Clip, Manifest
 from experiments.own_clips import Placed, check_factorial, check_names, one_form
 from experiments.schema.canonical import definition_sha256
 from stimuli_builder.characters.writing import write_bytes
 from stimuli_builder.clips.manifest_file import manifest_text, program_version
+from stimuli_builder.clips.own_declared import cell_of, check_against_declaration
 from video_conversion.prepare import prepare
 from video_conversion.prepared import VIDEO_ENDINGS, Prepared, clip_name
 from video_conversion.video_file import NotAClip
@@ -72,12 +72,11 @@ def write_own_manifest(
     InputError
         A video has no cell or cannot be a clip; nothing has been written then.
     """
-    check_factorial(placed)
-    factors = tuple(next(iter(placed.values()))[0])
     if experiment is not None:
-        _check_factors(factors, experiment)
-        factors = experiment.factor_names
-        _check_cells({(_cell(levels, factors), exemplar) for levels, exemplar in placed.values()}, experiment)
+        # First, since what is misspelt is told by what is declared; cells would only be said to lack clips.
+        check_against_declaration(placed, experiment)
+    check_factorial(placed)
+    factors = experiment.factor_names if experiment else tuple(next(iter(placed.values()))[0])
     with TemporaryDirectory(dir=folder, prefix=".clips-") as temporary:
         prepared = _prepared(folder, sorted(placed), Path(temporary), fps, report)
         manifest = Manifest(
@@ -85,7 +84,7 @@ def write_own_manifest(
             definition_sha256=definition_sha256(experiment) if experiment else NO_DEFINITION,
             program_version=program_version(),
             seed=experiment.exemplars.seed if experiment else 0,
-            notes=("clips made elsewhere",),
+            notes=(MADE_ELSEWHERE,),
             clips=tuple(_clip(record, *placed[record.name], factors) for record in prepared),
         )
         target = out or (folder / CONVERTED_FOLDER if manifest.sources else folder)
@@ -141,33 +140,10 @@ def _name_of(folder: Path) -> str:
     return re.sub(r"\W", "_", folder.resolve().name, flags=re.ASCII)[:40]
 
 
-def _check_factors(factors: tuple[str, ...], experiment: Experiment) -> None:
-    if set(factors) != set(experiment.factor_names):
-        raise InputError(
-            f"the clips have levels of {', '.join(factors)}; expected those of {experiment.name}: "
-            f"{', '.join(experiment.factor_names)}"
-        )
-
-
-def _check_cells(present: set[tuple[str, int]], experiment: Experiment) -> None:
-    declared = {(spec.cell, spec.exemplar) for spec in design.clips(experiment)}
-    for word, cells in (("is missing", declared - present), ("is not declared", present - declared)):
-        if cells:
-            cell, exemplar = min(cells)
-            raise InputError(
-                f"{len(declared)} clips are declared, {len(present)} are here: {cell}, exemplar {exemplar}, "
-                f"{word}; correct the names or the declaration"
-            )
-
-
-def _cell(levels: dict[str, str], factors: tuple[str, ...]) -> str:
-    return "/".join(levels[factor] for factor in factors)
-
-
 def _clip(record: Prepared, levels: dict[str, str], exemplar: int, factors: tuple[str, ...]) -> Clip:
     return Clip(
         levels={factor: levels[factor] for factor in factors},
-        cell=_cell(levels, factors),
+        cell=cell_of(levels, factors),
         exemplar=exemplar,
         file=one_form(clip_name(record.name)),
         sha256=record.sha256,

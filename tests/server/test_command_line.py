@@ -10,6 +10,7 @@ import pytest
 from pyrage.x25519 import Identity
 
 from experiments.load import parse_experiment
+from experiments.manifest import MADE_ELSEWHERE, UPLOADED
 from experiments.trials.clip_rating.columns import RATINGS
 from experiments.trials.clip_rating.declaration import SCALE_NAME
 from server.clock import now
@@ -169,6 +170,40 @@ def test_what_cannot_be_taken_in_is_refused_in_one_line(
         assert session.query(Study).count() == 0
 
 
+def edit_manifest(folder: Path, **changes: object) -> None:
+    path = folder / "clips" / "manifest.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | changes))
+
+
+@pytest.mark.parametrize(
+    ("changes", "remedy"),
+    [
+        ({}, "build the clips with this definition"),
+        ({"notes": [MADE_ELSEWHERE]}, "write the manifest again with `stimuli manifest` and --experiment"),
+        ({"program_version": UPLOADED}, "upload those it declares, or correct the definition"),
+    ],
+    ids=["built", "own", "uploaded"],
+)
+def test_what_to_do_of_missing_clips_is_said_by_where_they_came_from(
+    settings: Settings, services: Services, sources: Path, changes: dict[str, object], remedy: str
+) -> None:
+    drop_a_clip_from_the_manifest(sources)
+    edit_manifest(sources, **changes)
+    refused = add(settings, sources)
+    assert refused.returncode == 2
+    assert refused.stderr.endswith(f"{remedy}\n")
+
+
+def test_a_manifest_of_own_clips_that_is_of_another_study_is_written_again(
+    settings: Settings, services: Services, sources: Path
+) -> None:
+    edit_manifest(sources, experiment="clips")
+    assert "were built for 'clips', not for 'short'" in add(settings, sources).stderr
+    edit_manifest(sources, notes=[MADE_ELSEWHERE])
+    told = add(settings, sources).stderr
+    assert "is of 'clips', not of 'short'; write it again with `stimuli manifest` and --experiment" in told
+
+
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
@@ -281,6 +316,8 @@ def test_every_form_of_the_data_page_is_there_on_the_command_line(
     done = run_server_command(settings, "export", "short", "--format", form, "--out", str(out))
     assert done.returncode == 0, done.stderr
     assert out.read_bytes().startswith(begins)
+    told = "the dataset is the folder short/ in the zip: unpack it and give that to a validator"
+    assert (told in done.stdout.splitlines()) is (form == "psych-ds")
     unknown = run_server_command(settings, "export", "short", "--format", "jsn", "--out", str(out))
     assert unknown.returncode == 2
     assert "jsn" in unknown.stderr  # and the forms there are, in lines as wide as the terminal

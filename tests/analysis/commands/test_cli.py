@@ -70,6 +70,17 @@ def test_run_of_an_empty_export_exits_1(tmp_path) -> None:
     assert "has a header but no ratings yet" in result.stderr
 
 
+def test_a_study_of_a_server_is_analysed_by_its_file(monkeypatch, capsys) -> None:
+    monkeypatch.setattr("sys.argv", ["analysis", "run", "motion"])
+    with pytest.raises(SystemExit) as end:
+        run_command_line(app)
+    assert end.value.code == 2
+    told = capsys.readouterr().err
+    assert told.startswith("error: no experiment 'motion'")
+    assert "; a study of a server is analysed by its TOML file, which is under" in told
+    assert "materials/ in the zip of `server export NAME --format psych-ds --out NAME.zip`" in told
+
+
 def test_a_seed_below_zero_is_a_usage_error() -> None:
     result = call("synthesise", "exp3", "--seed", "-1", "--out", "ratings.csv")
     assert result.exit_code == 2

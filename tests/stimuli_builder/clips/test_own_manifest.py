@@ -86,7 +86,15 @@ def test_without_a_declaration_the_folder_names_the_set(monkeypatch: pytest.Monk
         (("--table", "none.csv"), "no file none.csv"),
         (
             ("--pattern", "{pace}_ä_{exemplar}.mp4", "--experiment", STUDY_FILE),
-            "expected those of robots: speed",
+            "factor 'pace' of the clips is not declared in robots; expected one of: speed",
+        ),
+        (
+            ("--pattern", "{spede}_ä_{exemplar}.mp4", "--experiment", STUDY_FILE),
+            "factor 'spede' of the clips is not declared in robots; did you mean 'speed'?",
+        ),
+        (
+            ("--pattern", "{speed}_{style}_{exemplar}.mp4", "--experiment", STUDY_FILE),
+            "factor 'style' of the clips is not declared in robots, which has speed; declare it, or leave",
         ),
     ],
 )
