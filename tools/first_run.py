@@ -9,6 +9,7 @@ import hashlib
 import os
 import subprocess
 import sys
+from collections.abc import Collection
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -33,12 +34,31 @@ def sources() -> str:
     return sha.hexdigest()
 
 
-def prepare(study: str, stamp_text: str) -> None:
-    """Build a study's clips and take it into the server; nothing where the stamp says `stamp_text`."""
+def studies_made() -> set[str]:
+    """Every study that the server's database has or had: one that was deleted on purpose is among them."""
+    from sqlalchemy import text
+
+    from server.db import open_database
+    from server.settings import Settings
+
+    database = open_database(Settings())
+    try:
+        with database.read() as session:
+            made = "SELECT target FROM audit_entries WHERE action = 'study created'"
+            return set(session.scalars(text(f"SELECT name FROM studies UNION {made}")))
+    finally:
+        database.close()
+
+
+def prepare(study: str, stamp_text: str, made: Collection[str]) -> None:
+    """Build a study's clips and take it into the server; nothing where the stamp says `stamp_text`.
+
+    The stamp lies with the clips, which may be older than the database or copied from another clone: a study
+    that is not among those `made` in this database is taken in all the same.
+    """
     folder = DATA / "stimuli" / study
     stamp = folder / ".first_run"
-    has_database = bool(os.environ.get("DATABASE_URL")) or (DATA / "palpebra.sqlite").is_file()
-    if has_database and stamp.is_file() and stamp.read_text() == stamp_text:
+    if study in made and stamp.is_file() and stamp.read_text() == stamp_text:
         return
     print(f"[clips] {study}: rendering those that are not there yet", flush=True)
     call("stimuli", "build", study, "--out", str(folder), "--quiet-when-current")
@@ -62,9 +82,9 @@ def main() -> None:
     os.environ["PALPEBRA_DATA_FOLDER"] = str(DATA)
     os.environ.setdefault("PALPEBRA_PUBLIC_URL", f"http://localhost:{port}")
     call("server", "database", "upgrade")
-    stamp_text = sources()
+    stamp_text, made = sources(), studies_made()
     for study in STUDIES:
-        prepare(study, stamp_text)
+        prepare(study, stamp_text, made)
     draw_strips(stamp_text)
     os.execv(BIN / "server", ["server", "run", "--port", port, "--welcome"])
 

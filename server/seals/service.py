@@ -4,6 +4,7 @@ from typing import Any
 
 from sqlalchemy.orm import Session
 
+from experiments.counted import counted
 from experiments.manifest import Manifest
 from experiments.schema.canonical import definition_sha256
 from experiments.seal import Seal, clips_sha256
@@ -42,7 +43,7 @@ def seal_plan(
         raise Conflict(f"The plan was sealed {sealed.sealed_at} already; a seal is never replaced.")
     if people := people_of_series(session, study, version.series):
         raise Conflict(
-            f"{people} participants have begun already: a plan is sealed before the first. "
+            f"Begun already by {counted(people, 'participant')}: a plan is sealed before the first. "
             "A report without a seal says nothing of deviations."
         )
     experiment, manifest = definition_of(version), Manifest.model_validate(version.manifest)

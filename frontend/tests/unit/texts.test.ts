@@ -37,6 +37,10 @@ describe("messages", () => {
       }
     },
   );
+  it.each(Object.entries(files))("of %s say no word twice in a row, but for French reflexives", (_path, messages) => {
+    const texts = Object.values(messages).flatMap((message) => (typeof message === "string" ? [message] : Object.values(message)));
+    expect(texts.filter((text) => /(?<!\p{L})(?!vous )(\p{L}+) \1(?!\p{L})/iu.test(text))).toEqual([]);
+  });
   it("take the form of the number that they count", async () => {
     await Promise.all(["en", "pl", "ar", "ja"].map(loadMessages));
     const said = (tag: string, count: number): string => translator(tag)("finishing_wait", { count });

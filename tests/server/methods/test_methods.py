@@ -70,6 +70,9 @@ def test_the_counts_are_those_of_the_runs(
         numbers[f"plays_{verdict}"] for verdict in ("good", "uncertain", "flagged", "failed")
     )
     assert "2 were completed" in answer["paragraph"]
+    assert "Every clip was drawn frame by frame" in answer["paragraph"]
+    assert "Automated answers: tickets" in answer["paragraph"]
+    assert "Nobody has completed" not in answer["paragraph"]
     assert "and 1 was left open" in answer["paragraph"]
     assert "attention checks failed" in answer["paragraph"]
     with services.database.read() as session:  # as somebody who doubts a number would
@@ -112,7 +115,8 @@ def test_a_report_adds_what_each_declared_rule_left_out(
 def test_nobody_has_taken_part_yet(viewer: Admin, study: StudyInDatabase) -> None:
     paragraph = viewer.get("/studies/short/methods").json()["paragraph"]
     assert "Visits begun: 0" in paragraph
-    assert "was not judged" in paragraph
+    assert "Nobody has completed a visit yet" in paragraph
+    assert not re.search("was drawn|plays|not judged|was calibrated", paragraph)
 
 
 def test_other_origins_and_series_are_not_counted(

@@ -40,7 +40,7 @@ def test_a_plan_is_sealed_once_before_the_first_participant(
 
 def test_after_the_first_participant_nothing_is_sealed(services: Services, participant: Participant) -> None:
     participant.agree()
-    with services.database.write() as session, pytest.raises(Conflict, match="1 participants have begun"):
+    with services.database.write() as session, pytest.raises(Conflict, match="already by 1 participant:"):
         seal_plan(session, find_study(session, "short", OPERATOR, "view"), None, None)
 
 

@@ -55,6 +55,22 @@ def test_plan_prints_the_recordings_shown_twice(
     assert printed.count("exemplar ") == max(0, 20 - len(load_library()))
 
 
+def test_plan_counts_one_of_a_thing_as_one(capsys: pytest.CaptureFixture[str]) -> None:
+    from experiments.load import load_experiment
+    from stimuli_builder.clips.plan import summary
+    from stimuli_builder.clips.plan_table import print_plan
+
+    plan = summary(load_experiment("exp3"))
+    ones = ("participants", "exemplars_per_cell", "unique_clips", "trials_per_participant", "practice_trials")
+    one_block = [plan["blocks"][0] | {"trials": 1}]
+    print_plan(plan | dict.fromkeys(ones, 1) | {"blocks": one_block, "expected_minutes": 1.2})
+    printed = capsys.readouterr().out
+    for words in ("(1 participant)", "4 cells x 1 exemplar = 1 unique clip\n", "1 trial per", "in 1 block: "):
+        assert words in printed
+    assert "(1 trial)" in printed
+    assert "1 practice trial; about 1 minute\n" in printed
+
+
 def test_build_with_preview(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],

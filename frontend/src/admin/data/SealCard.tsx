@@ -7,7 +7,7 @@ import { api, type Schemas, unwrap } from "../api";
 import { sealQuery, useMay } from "../queries";
 import { Answer } from "../ui/Answer";
 import { ConfirmButton } from "../ui/ConfirmButton";
-import { when } from "../ui/format";
+import { counted, when } from "../ui/format";
 import { useChange } from "../ui/useChange";
 import { notify } from "../ui/notify";
 
@@ -60,7 +60,7 @@ function Unsealed({ study, seal }: Props) {
     touches: [["study", study, "seal"]],
     done: "The plan is sealed.",
   });
-  if (seal.participants > 0) return <Text size="sm">Not sealed: {seal.participants} participants have begun already.</Text>;
+  if (seal.participants > 0) return <Text size="sm">Not sealed: begun already by {counted(seal.participants, "participant")}.</Text>;
   if (!mayChange) return <Text size="sm">Not sealed yet.</Text>;
   return (
     <Group align="end">

@@ -4,7 +4,7 @@ import { Card, List, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { api, type Schemas, unwrap } from "../api";
 import { Answer } from "../ui/Answer";
-import { when } from "../ui/format";
+import { counted, when } from "../ui/format";
 
 type Preview = Schemas["RetentionPreview"];
 
@@ -61,7 +61,7 @@ function Coming({ preview }: { preview: Preview }) {
   return (
     <Text size="sm" mt="xs">
       {due > 0 &&
-        `Within the hour the server erases ${String(preview.visits)} visits, and who took part in ${String(preview.identifiers)} more. `}
+        `Within the hour the server erases ${counted(preview.visits, "visit")}, and who took part in ${String(preview.identifiers)} more. `}
       {preview.next_at !== null && `The next is due ${when(preview.next_at)}.`}
     </Text>
   );

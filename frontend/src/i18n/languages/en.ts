@@ -214,7 +214,7 @@ export const messages = {
     "What you have done so far is kept. Load the page again; if this comes back, please write to the person who invited you: {detail}",
 
   resume_note:
-    "Resume code: {code}. Note it down: with it you can go on on another device, or if this browser forgets you. The link or your sign-up number alone is not enough, so that nobody else can take over your visit.",
+    "Resume code: {code}. Note it down: it lets you continue on another device, or if this browser forgets you. The link or your sign-up number alone is not enough, so that nobody else can take over your visit.",
   code_open: "I have a resume code",
   code_title: "Go on where you stopped",
   code_needed:
