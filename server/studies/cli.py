@@ -9,7 +9,6 @@ from rich.table import Table
 from sqlalchemy.orm import Session
 
 from experiments.command_groups import command_group
-from experiments.definition import Experiment
 from experiments.errors import InputError, did_you_mean
 from experiments.load import locate
 from experiments.manifest import Manifest, read_manifest
@@ -21,7 +20,14 @@ from server.clock import now
 from server.context import Services
 from server.models import Link, Study, StudyVersion
 from server.studies import repository
-from server.studies.importing import add_version, check_against_design, create_study, notes_of, store_clips
+from server.studies.importing import (
+    add_version,
+    check_against_design,
+    check_name,
+    create_study,
+    notes_of,
+    store_clips,
+)
 from server.studies.links import (
     LinkKind,
     LinkOptions,
@@ -68,7 +74,7 @@ def add(
     text = locate(experiment).read_text(encoding="utf-8")
     declared = planned_experiment(text, locate(experiment).name)
     manifest = read_manifest(clips)
-    _check_name(declared, manifest, clips)
+    check_name(declared, manifest, clips)
     check_against_design(declared, manifest)
     with migrated_services() as services:
         new = store_clips(services.clips, manifest, clips)
@@ -90,20 +96,6 @@ def add(
                 for group, url in _urls(services, session, study):
                     to = f" of the group {group}" if group else ""
                     out.print(f"link for participants{to}, once the server runs: {url}", soft_wrap=True)
-
-
-def _check_name(declared: Experiment, manifest: Manifest, clips: Path) -> None:
-    """InputError where the clips are another experiment's."""
-    if manifest.experiment == declared.name:
-        return
-    if manifest.made_elsewhere:
-        raise InputError(
-            f"the manifest in {clips} is of '{manifest.experiment}', not of '{declared.name}'; write it "
-            "again with `stimuli manifest` and --experiment"
-        )
-    raise InputError(
-        f"the clips in {clips} were built for '{manifest.experiment}', not for '{declared.name}'"
-    )
 
 
 def _same_version(session: Session, study: Study, sha256: str, manifest: Manifest) -> StudyVersion | None:

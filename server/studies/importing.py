@@ -32,6 +32,20 @@ class NameTaken(Conflict):
     code = "name_taken"
 
 
+def check_name(declared: Experiment, manifest: Manifest, clips: Path) -> None:
+    """InputError where the clips are another experiment's."""
+    if manifest.experiment == declared.name:
+        return
+    if manifest.made_elsewhere:
+        raise InputError(
+            f"the manifest in {clips} is of '{manifest.experiment}', not of '{declared.name}'; write it "
+            "again with `stimuli manifest` and --experiment"
+        )
+    raise InputError(
+        f"the clips in {clips} were built for '{manifest.experiment}', not for '{declared.name}'"
+    )
+
+
 def check_against_design(experiment: Experiment, manifest: Manifest) -> None:
     """InputError unless the manifest holds each clip of the design exactly once."""
     declared = {(spec.cell, spec.exemplar) for spec in design.clips(experiment)}
