@@ -164,6 +164,8 @@ def _declared(name_or_path: str) -> "Experiment":
     try:
         return load_experiment(name_or_path, has_data=True)
     except UnknownExperimentError as error:
+        if "/" in name_or_path or name_or_path.endswith(".toml"):
+            raise
         # A study has a name on the server too, by which its declaration cannot be read here.
         raise InputError(
             f"{error}; a study of a server is analysed by its TOML file, which is under "

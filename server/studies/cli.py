@@ -90,7 +90,7 @@ def add(
                 said = f"version {version.number}, {len(manifest.clips)} clips ({new} new)"
             out.print(f"study {study.name}: {said}")
             for note in notes_of(declared, manifest, version):
-                out.print(f"note: {note}", soft_wrap=True)
+                out.print(f"note: {note}", markup=False)
             if open_:
                 _set_status(session, study, "live")
                 for group, url in _urls(services, session, study):

@@ -168,12 +168,11 @@ class Tracker:
                 return self._accepted(best, "reinitialised", f"found again after {self._loss}")
             return self._accepted(best, "tracked", "")
         self._lose()
-        # What a detector says here and now explains more than what the loss began with.
-        self._loss = (
-            self._unseen or self._loss or fault or "no place in the picture resembles the labelled frames"
-        )
+        self._loss = self._loss or fault or "no place in the picture resembles the labelled frames"
         residual = _overall(best) if best is not None and best.iterations else None
-        return TrackedFrame("lost", self._loss, None, None, residual, best.iterations if best else 0)
+        # What a detector says here and now explains more than what the loss began with.
+        why = self._unseen or self._loss
+        return TrackedFrame("lost", why, None, None, residual, best.iterations if best else 0)
 
     def _lose(self) -> None:
         self._lost_frames += 1

@@ -359,6 +359,7 @@ def test_clips_without_a_size_are_told_of_where_the_screen_is_measured(
     manifest.write_text(json.dumps(told | {"clips": clips}), encoding="utf-8")
     said = add(settings, sources).stdout.replace("\n", " ")
     assert "no clip says how large it is to be shown" in said
+    assert 'declare calibrate = "off" in [display]' in said
     text = (sources / "short.toml").read_text(encoding="utf-8")
     (sources / "short.toml").write_text(text + '\n[display]\ncalibrate = "off"\n', encoding="utf-8")
     assert "no clip says" not in add(settings, sources, "--name", "as_it_is").stdout

@@ -118,10 +118,14 @@ describe("the way to the screen", () => {
 });
 
 describe("a clip that is given up", () => {
+  beforeEach(() => void vi.useFakeTimers({ toFake: ["setTimeout", "performance"] }));
+  afterEach(() => {
+    vi.useRealTimers();
+    vi.unstubAllGlobals();
+  });
   const prepare = (request: number): ToWorker => ({ type: "prepare", request, sha256: SHA256, bytes: new ArrayBuffer(1), fps: 60 });
 
   it("keeps no picture where it was given up before it was decoded, and is there where it is asked for again", async () => {
-    vi.useFakeTimers({ toFake: ["setTimeout", "performance"] });
     const scope = await workerIn("Chrome");
     closed.mockClear();
     scope.tell({ type: "release", sha256: SHA256 });
@@ -133,7 +137,5 @@ describe("a clip that is given up", () => {
     expect(closed).toHaveBeenCalledTimes(2 * FRAMES);
     scope.tell({ type: "release", sha256: SHA256 });
     expect(closed).toHaveBeenCalledTimes(3 * FRAMES);
-    vi.useRealTimers();
-    vi.unstubAllGlobals();
   });
 });

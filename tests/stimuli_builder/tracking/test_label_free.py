@@ -271,6 +271,21 @@ def test_a_fit_where_the_detector_sees_nothing_is_doubtful_until_it_sees_the_eye
     assert outcomes[8:] == [("tracked", "")] * 4
 
 
+def test_a_loss_has_the_detectors_word_of_it_as_long_as_that_holds(lesson, recording):
+    tracker, covered = Tracker(lesson.model), "left eye covered"
+    tracker.step(recording.pictures[0], recording.points[0])
+    noise = np.random.default_rng(4).integers(0, 256, recording.pictures[0].shape, np.uint8)
+    reasons = [tracker.step(noise).reason]
+    tracker.look(covered)
+    reasons += [tracker.step(noise).reason for _ in range(2)]
+    tracker.look(recording.points[0])
+    reasons.append(tracker.step(noise, recording.points[0]).reason)
+    assert covered not in reasons[0]
+    assert reasons == [reasons[0], covered, covered, reasons[0]]
+    again = tracker.step(recording.pictures[1], recording.points[1])
+    assert (again.status, again.reason) == ("reinitialised", f"found again after {reasons[0]}")
+
+
 def test_frames_in_which_no_face_is_seen_are_told_from_frames_not_looked_at(
     detector, shared_data, tmp_path, monkeypatch
 ):

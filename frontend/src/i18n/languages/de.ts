@@ -40,7 +40,7 @@ export const messages: Messages = {
   card_text:
     "Die Filme erscheinen in ihrer wirklichen Größe. Halten Sie eine Bankkarte (oder eine Karte dieser Größe) an den Bildschirm. Machen Sie das Bild genau so groß wie die Karte.",
   card_why:
-    "Warum: Bildschirme sind verschieden, und nur mit einer Karte zeigt Ihrer sie so groß. Von der Karte wird nichts gelesen oder gespeichert.",
+    "Warum: Bildschirme sind verschieden, und nur mit einer Karte zeigt Ihrer die Filme in dieser Größe. Von der Karte wird nichts gelesen oder gespeichert.",
   card_picture: "Eine Hand hält eine Bankkarte flach an den Bildschirm, auf die gezeichnete Karte.",
   size_round: "Messung {round} von {times}",
   size_again: "Noch einmal, von einer anderen Größe aus: Zwei Messungen zeigen, wie genau die Größe ist.",

@@ -40,7 +40,7 @@ export const messages = {
   card_title: "How large is your screen?",
   card_text:
     "The clips are shown at their real size. Hold a bank card (or any card of that size) against the screen. Make the picture exactly as large as the card.",
-  card_why: "Why: screens differ, and only by a card does yours show them at that size. Nothing of the card is read or stored.",
+  card_why: "Why: screens differ, and only by a card does yours show the clips at that size. Nothing of the card is read or stored.",
   card_picture: "A hand holds a bank card flat against the screen, over the drawn card.",
   size_round: "Measurement {round} of {times}",
   size_again: "Once more, from another size: two measurements tell how exact the size is.",

@@ -41,7 +41,7 @@ export const messages: Messages = {
   card_text:
     "Los vídeos se muestran a su tamaño real. Sujete una tarjeta bancaria (o cualquiera de ese tamaño) contra la pantalla. Haga la imagen exactamente tan grande como la tarjeta.",
   card_why:
-    "Por qué: las pantallas son distintas, y solo con una tarjeta la suya los muestra a ese tamaño. De la tarjeta no se lee ni se guarda nada.",
+    "Por qué: las pantallas son distintas, y solo con una tarjeta la suya muestra los vídeos a ese tamaño. De la tarjeta no se lee ni se guarda nada.",
   card_picture: "Una mano sujeta una tarjeta bancaria plana contra la pantalla, sobre la tarjeta dibujada.",
   size_round: "Medición {round} de {times}",
   size_again: "Una vez más, desde otro tamaño: dos mediciones muestran lo exacto que es el tamaño.",

@@ -46,7 +46,7 @@ export const messages: Messages = {
   card_text:
     "Les vidéos sont montrées à leur taille réelle. Tenez une carte bancaire (ou une carte de même format) contre l’écran. Donnez à l’image exactement la taille de la carte.",
   card_why:
-    "Pourquoi : les écrans diffèrent, et seule une carte permet au vôtre de les montrer à cette taille. Rien de la carte n’est lu ni enregistré.",
+    "Pourquoi : les écrans diffèrent, et seule une carte permet au vôtre de montrer les vidéos à cette taille. Rien de la carte n’est lu ni enregistré.",
   card_picture: "Une main tient une carte bancaire à plat contre l’écran, sur la carte dessinée.",
   size_round: "Mesure {round} sur {times}",
   size_again: "Encore une fois, à partir d’une autre taille : deux mesures montrent à quel point la taille est exacte.",

@@ -42,7 +42,7 @@ export const messages: Messages = {
   card_text:
     "I video sono mostrati nella loro grandezza reale. Tenga una carta bancaria (o una carta di quel formato) contro lo schermo. Renda l’immagine grande esattamente come la carta.",
   card_why:
-    "Perché: gli schermi sono diversi, e solo con una carta il Suo li mostra in quella grandezza. Della carta non si legge né si salva nulla.",
+    "Perché: gli schermi sono diversi, e solo con una carta il Suo mostra i video in quella grandezza. Della carta non si legge né si salva nulla.",
   card_picture: "Una mano tiene una carta bancaria piatta contro lo schermo, sopra la carta disegnata.",
   size_round: "Misura {round} di {times}",
   size_again: "Ancora una volta, da un’altra grandezza: due misure mostrano quanto è esatta la grandezza.",

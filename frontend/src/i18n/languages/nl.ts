@@ -39,7 +39,8 @@ export const messages: Messages = {
   card_title: "Hoe groot is uw scherm?",
   card_text:
     "De filmpjes worden op ware grootte getoond. Houd een bankpas (of een andere pas van die grootte) tegen het scherm. Maak de afbeelding precies zo groot als de pas.",
-  card_why: "Waarom: schermen verschillen, en alleen met een pas toont het uwe ze zo groot. Van de pas wordt niets gelezen of opgeslagen.",
+  card_why:
+    "Waarom: schermen verschillen, en alleen met een pas toont het uwe de filmpjes op die grootte. Van de pas wordt niets gelezen of opgeslagen.",
   card_picture: "Een hand houdt een bankpas plat tegen het scherm, op de getekende pas.",
   size_round: "Meting {round} van {times}",
   size_again: "Nog eens, vanaf een andere grootte: twee metingen laten zien hoe nauwkeurig de grootte is.",

@@ -45,7 +45,7 @@ export const messages: Messages = {
   card_title: "Jak duży jest ekran?",
   card_text:
     "Filmy są pokazywane w prawdziwej wielkości. Proszę przyłożyć kartę bankową (lub inną kartę tej wielkości) do ekranu i ustawić obrazek dokładnie tak duży jak karta.",
-  card_why: "Dlaczego: ekrany są różne i tylko z kartą ten pokaże je w tej wielkości. Z karty nic nie jest odczytywane ani zapisywane.",
+  card_why: "Dlaczego: ekrany są różne i tylko z kartą ten pokaże filmy w tej wielkości. Z karty nic nie jest odczytywane ani zapisywane.",
   card_picture: "Dłoń trzyma kartę bankową płasko przy ekranie, na narysowanej karcie.",
   size_round: "Pomiar {round} z {times}",
   size_again: "Jeszcze raz, od innej wielkości: dwa pomiary pokazują, jak dokładna jest wielkość.",

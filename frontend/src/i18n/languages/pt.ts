@@ -40,7 +40,7 @@ export const messages: Messages = {
   card_title: "Que tamanho tem o seu ecrã?",
   card_text:
     "Os vídeos são mostrados no tamanho real. Segure um cartão bancário (ou qualquer cartão desse tamanho) contra o ecrã. Ponha a imagem exatamente do tamanho do cartão.",
-  card_why: "Porquê: os ecrãs são diferentes, e só com um cartão o seu os mostra nesse tamanho. Nada do cartão é lido nem guardado.",
+  card_why: "Porquê: os ecrãs são diferentes, e só com um cartão o seu mostra os vídeos nesse tamanho. Nada do cartão é lido nem guardado.",
   card_picture: "Uma mão segura um cartão bancário encostado ao ecrã, sobre o cartão desenhado.",
   size_round: "Medição {round} de {times}",
   size_again: "Mais uma vez, a partir de outro tamanho: duas medições mostram quão exato é o tamanho.",

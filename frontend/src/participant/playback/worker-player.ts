@@ -102,7 +102,8 @@ export class WorkerPlayer implements ClipPlayer {
       this.waiting.set(request, { resolve, reject, limit });
     });
     const tell = (): void => this.tell({ ...asked, request });
-    if (after) after.then(tell, (error: unknown) => this.settle(request, error instanceof Error ? error : new ClipBroken(String(error))));
+    if (after)
+      after.then(tell).catch((error: unknown) => this.settle(request, error instanceof Error ? error : new ClipBroken(String(error))));
     else tell();
     return answer;
   }
