@@ -7,7 +7,7 @@ import { useState } from "react";
 import { api, type Schemas, unwrap } from "../api";
 import { useMay } from "../queries";
 import { Answer } from "../ui/Answer";
-import { when } from "../ui/format";
+import { counted, when } from "../ui/format";
 import { useChange } from "../ui/useChange";
 import { Columns, Order, PowerOfPlan, Report, Summary } from "./Shown";
 
@@ -83,7 +83,7 @@ function Latest({ study, rehearsal }: { study: string; rehearsal: Rehearsal }) {
     <Stack>
       <Group gap="sm" role="status" aria-label="Rehearsal">
         <Text size="sm">
-          {WORDS[status]}, version {rehearsal.version} with {rehearsal.participants} people, {when(rehearsal.created_at)}
+          {WORDS[status]}, version {rehearsal.version} with {counted(rehearsal.participants, "participant")}, {when(rehearsal.created_at)}
         </Text>
         {isUnderWay(rehearsal) && (
           <>

@@ -6,6 +6,7 @@ import type { Schemas } from "../api";
 import { ClipGrid } from "../clips/ClipGrid";
 import { clipsQuery, useMay } from "../queries";
 import { Answer } from "../ui/Answer";
+import { counted } from "../ui/format";
 import { AddClips } from "./AddClips";
 
 export function ClipsTab() {
@@ -33,7 +34,7 @@ function Clips({ study, clips }: { study: string; clips: Schemas["ClipOut"][] })
           onChange={setCell}
           w={340}
         />
-        <Text size="sm">{chosen.length} clips</Text>
+        <Text size="sm">{counted(chosen.length, "clip")}</Text>
       </Group>
       <ClipGrid key={cell} study={study} clips={chosen} />
     </Stack>

@@ -5,6 +5,7 @@ import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";
 import { api, type Schemas, unwrap } from "../api";
 import { Answer } from "../ui/Answer";
+import { counted } from "../ui/format";
 
 export function CompareVersions({ detail }: { detail: Schemas["StudyDetail"] }) {
   const study = detail.summary.name;
@@ -81,7 +82,7 @@ function Clips({ comparison }: { comparison: Schemas["Comparison"] }) {
   return (
     <div>
       <Text size="sm" fw={600}>
-        {comparison.clips_differing} clips differ, {comparison.clips_same} are the same
+        Differing: {counted(comparison.clips_differing, "clip")}; the same: {comparison.clips_same}
       </Text>
       <List size="sm">
         {comparison.clips.map((clip) => (

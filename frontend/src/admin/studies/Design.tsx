@@ -3,6 +3,7 @@
 import { Badge, Group, List, Stack, Table, Title } from "@mantine/core";
 import type { Schemas } from "../api";
 import { Figures } from "../ui/Figures";
+import { counted } from "../ui/format";
 
 export function Design({ design }: { design: Schemas["DesignOut"] }) {
   const figures: [string, string | number][] = [
@@ -51,7 +52,7 @@ export function Design({ design }: { design: Schemas["DesignOut"] }) {
       <Group gap={6}>
         {design.blocks.map((block, index) => (
           <Badge key={`${block.label}-${String(index)}`} variant="default">
-            {block.label}: {block.trials} trials
+            {block.label}: {counted(block.trials, "trial")}
           </Badge>
         ))}
       </Group>
