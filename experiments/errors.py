@@ -25,3 +25,8 @@ def did_you_mean(word: str, candidates: Iterable[str]) -> str:
     if near is not None:
         return f"; did you mean '{near}'?"
     return f"; expected one of: {', '.join(allowed)}" if allowed else ""
+
+
+def and_others(number: int) -> str:
+    """Return ` (and 2 more problems)`, to end a line that tells the first; nothing where it is alone."""
+    return f" (and {number} more problem{'s' if number > 1 else ''})" if number else ""

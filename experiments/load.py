@@ -11,7 +11,7 @@ from pydantic import BaseModel, ValidationError
 
 from experiments.definition import Experiment
 from experiments.definition.experiment import STORED
-from experiments.errors import InputError, did_you_mean, nearest
+from experiments.errors import InputError, and_others, did_you_mean, nearest
 from experiments.schema.keys import Key, is_tag
 from experiments.schema.upgrades import upgraded
 from experiments.toml_keys import MAX_DEPTH, has_endless_key
@@ -53,8 +53,7 @@ class DefinitionError(InputError):
     def __init__(self, source: str, problems: Sequence[Problem], number: int | None = None) -> None:
         self.problems = tuple(problems)
         others = (number or len(problems)) - 1
-        more = f" (and {others} more problem{'s' if others > 1 else ''})" if others else ""
-        super().__init__(f"{source}: {problems[0]}{more}")
+        super().__init__(f"{source}: {problems[0]}{and_others(others)}")
 
 
 class UnknownExperimentError(InputError):

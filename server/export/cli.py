@@ -108,8 +108,7 @@ def export(
         out.print(f"{out_file}: {counted}{size:,} bytes" + (f"; analyse it with {beside}" if beside else ""))
         if form == "psych-ds":
             out.print(
-                f"the dataset is the folder {study}/ in the zip: unpack it and give that to a validator",
-                soft_wrap=True,
+                f"the dataset is the folder {study}/ in the zip: unpack it and give that to a validator"
             )
     others = {name: number for name, number in sorted(there.items()) if name != origin}
     if rows == 0 and form != "identities" and origin != "all" and others:

@@ -118,18 +118,17 @@ def sentences(
         *_checks(experiment, counted),
         *_warnings(experiment),
         *_exclusions(experiment, rules),
-        *(_told_of_completed(experiment, counted) if counted["complete"].value else [NOBODY_COMPLETED]),
+        *_completed(experiment, counted),
     )
 
 
-NOBODY_COMPLETED = (
-    "Nobody has completed a visit yet: how clips were shown, and whether answers were given by people, is "
-    "told of completed visits."
-)
-
-
-def _told_of_completed(experiment: Experiment, counted: Mapping[str, Number]) -> list[str]:
-    return [*_display(experiment), *_evidence(counted)]
+def _completed(experiment: Experiment, counted: Mapping[str, Number]) -> list[str]:
+    if counted["complete"].value:
+        return [*_display(experiment), *_evidence(counted)]
+    return [
+        "Nobody has completed a visit yet: how clips were shown, and whether answers were given by people, "
+        "is told of completed visits."
+    ]
 
 
 def _origin(origin: str) -> list[str]:

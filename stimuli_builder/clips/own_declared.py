@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from experiments import design
 from experiments.definition import Experiment
-from experiments.errors import InputError, did_you_mean, nearest
+from experiments.errors import InputError, and_others, did_you_mean, nearest
 from experiments.own_clips import Placed
 
 
@@ -15,9 +15,7 @@ def check_against_declaration(placed: Placed, experiment: Experiment) -> None:
     """
     for check in (_factors, _levels):
         if problems := check(placed, experiment):
-            others = len(problems) - 1
-            more = f" (and {others} more problem{'s' if others > 1 else ''})" if others else ""
-            raise InputError(f"{problems[0]}{more}")
+            raise InputError(f"{problems[0]}{and_others(len(problems) - 1)}")
     _check_cells(placed, experiment)
 
 

@@ -19,6 +19,8 @@ from stimuli_builder.tracking.training import TrainingOptions, train
 from stimuli_builder.video import Picture
 
 Values = NDArray[np.float64]
+Advance = Callable[[], None] | None
+"""Called after each step of a training."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,7 @@ def cross_validate(
     folds: int,
     *,
     refine: bool = False,
-    advance: Callable[[], None] | None = None,
+    advance: Advance = None,
 ) -> list[HeldOut]:
     """Train on all folds but one and fit the labelled frames of that one, for every fold.
 

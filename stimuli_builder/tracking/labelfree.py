@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import InputError
+from stimuli_builder.tracking.accuracy import Advance
 from stimuli_builder.tracking.labels import Labels, save_labels
-from stimuli_builder.tracking.learn import Advance, Lesson, lesson_from
+from stimuli_builder.tracking.learn import Lesson, lesson_from
 from stimuli_builder.tracking.shapes import (
     EYE_POINTS,
     Points,

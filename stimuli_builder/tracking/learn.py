@@ -1,13 +1,18 @@
 """From a video and its label file to a model that knows how well it fits frames it has not seen."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from experiments.errors import InputError
-from stimuli_builder.tracking.accuracy import HeldOut, cross_validate, refined_labels, residual_limits
+from stimuli_builder.tracking.accuracy import (
+    Advance,
+    HeldOut,
+    cross_validate,
+    refined_labels,
+    residual_limits,
+)
 from stimuli_builder.tracking.certainty import with_errors
 from stimuli_builder.tracking.labels import Labels, load_labels
 from stimuli_builder.tracking.model import CoupledModel
@@ -17,7 +22,6 @@ from stimuli_builder.video_scan import scan_before_damage, scan_video
 
 WORTH_REFINING = 0.96
 FOLDS = 5
-Advance = Callable[[], None] | None
 
 
 @dataclass(frozen=True)
