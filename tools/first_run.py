@@ -9,7 +9,7 @@ import hashlib
 import os
 import subprocess
 import sys
-from collections.abc import Collection
+from collections.abc import Mapping
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -34,8 +34,8 @@ def sources() -> str:
     return sha.hexdigest()
 
 
-def studies_made() -> set[str]:
-    """Every study that the server's database has or had: one that was deleted on purpose is among them."""
+def studies_made() -> dict[str, bool]:
+    """Every study that the server's database has or had, and whether it is still there and not archived."""
     from sqlalchemy import text
 
     from server.db import open_database
@@ -44,25 +44,27 @@ def studies_made() -> set[str]:
     database = open_database(Settings())
     try:
         with database.read() as session:
-            made = "SELECT target FROM audit_entries WHERE action = 'study created'"
-            return set(session.scalars(text(f"SELECT name FROM studies UNION {made}")))
+            made = session.scalars(text("SELECT target FROM audit_entries WHERE action = 'study created'"))
+            in_use = session.execute(text("SELECT name, archived_at IS NULL FROM studies"))
+            return dict.fromkeys(made, False) | {name: bool(used) for name, used in in_use}
     finally:
         database.close()
 
 
-def prepare(study: str, stamp_text: str, made: Collection[str]) -> None:
+def prepare(study: str, stamp_text: str, made: Mapping[str, bool]) -> None:
     """Build a study's clips and take it into the server; nothing where the stamp says `stamp_text`.
 
     The stamp lies with the clips, which may be older than the database or copied from another clone: a study
-    that is not among those `made` in this database is taken in all the same.
+    that is not among those `made` in this database is taken in all the same, and set live. One that was
+    archived, deleted or closed on purpose stays so.
     """
     folder = DATA / "stimuli" / study
     stamp = folder / ".first_run"
-    if study in made and stamp.is_file() and stamp.read_text() == stamp_text:
+    if study in made and (not made[study] or (stamp.is_file() and stamp.read_text() == stamp_text)):
         return
     print(f"[clips] {study}: rendering those that are not there yet", flush=True)
     call("stimuli", "build", study, "--out", str(folder), "--quiet-when-current")
-    call("server", "study", "add", study, "--clips", str(folder), "--open")
+    call("server", "study", "add", study, "--clips", str(folder), *[] if study in made else ["--open"])
     stamp.write_text(stamp_text)
 
 

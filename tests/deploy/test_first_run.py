@@ -5,8 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from server.accounts.audit import record
+from experiments.load import locate
 from server.cli_common import migrated_services
+from server.clock import now
+from server.studies import repository
+from server.studies.importing import create_study
+from server.studies.planned import planned_experiment
 from tools import first_run
 
 
@@ -23,11 +27,13 @@ def added(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[str]:
     added: list[str] = []
 
     def call(*command: str) -> None:
-        if command[:3] == ("server", "study", "add"):
-            added.append(command[3])
         with migrated_services() as services, services.database.write() as session:
             if command[:3] == ("server", "study", "add"):
-                record(session, None, "study created", "study", command[3])
+                name = command[3]
+                added.append(f"{name} --open" if "--open" in command else name)
+                declared = planned_experiment(locate(name).read_text(encoding="utf-8"), locate(name).name)
+                if repository.study_called(session, name) is None:
+                    create_study(session, name, declared, None)
 
     monkeypatch.setattr(first_run, "call", call)
     monkeypatch.setattr(os, "execv", lambda *_: None)
@@ -36,9 +42,24 @@ def added(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[str]:
 
 def test_clips_without_a_database_become_studies_once(added: list[str], tmp_path: Path) -> None:
     first_run.main()
-    assert added == list(first_run.STUDIES)
+    assert added == [f"{study} --open" for study in first_run.STUDIES]
     first_run.main()
-    assert added == list(first_run.STUDIES)
+    assert len(added) == len(first_run.STUDIES)
     (tmp_path / "palpebra.sqlite").unlink()
     first_run.main()
-    assert added == 2 * list(first_run.STUDIES)
+    assert added == 2 * [f"{study} --open" for study in first_run.STUDIES]
+
+
+def test_what_was_archived_deleted_or_closed_stays_so_when_the_program_is_newer(
+    added: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first_run.main()
+    added.clear()
+    with migrated_services() as services, services.database.write() as session:
+        archived, deleted = (repository.study_called(session, name) for name in ("exp2", "exp3"))
+        assert archived is not None
+        archived.archived_at = now()
+        session.delete(deleted)
+    monkeypatch.setattr(first_run, "sources", lambda: "newer")
+    first_run.main()
+    assert added == ["exp1"]
