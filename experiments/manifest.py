@@ -164,13 +164,22 @@ def check_files(manifest: Manifest, folder: Path) -> None:
     for clip in manifest.files:
         path = folder / clip.file
         if not path.is_file():
-            raise InputError(f"clip {clip.file} ({place_of(clip)}) is missing from {folder}")
+            raise InputError(
+                f"clip {clip.file} ({place_of(clip)}) is missing from {folder}; {_remedy(manifest)}"
+            )
         digest = file_sha256(path)
         if digest != clip.sha256:
             raise InputError(
                 f"clip {clip.file}: expected sha256 {clip.sha256[:12]}..., got {digest[:12]}...; "
-                "the file was changed or damaged, build it again"
+                f"the file was changed or damaged; {_remedy(manifest)}"
             )
+
+
+def _remedy(manifest: Manifest) -> str:
+    """What brings back a clip, by where the clips came from."""
+    if manifest.made_elsewhere:
+        return "put the file back, or write the manifest again with `stimuli manifest`"
+    return "build the clips again with `stimuli build`"
 
 
 def check_originals(manifest: Manifest, folder: Path) -> None:

@@ -71,6 +71,9 @@ def test_a_manifest_is_written_by_the_names(monkeypatch: pytest.MonkeyPatch, cli
         ("10", 1, 4, 30.0), ("10", 2, 4, 30.0), ("2", 1, 4, 30.0), ("2", 2, 4, 30.0),
     ]  # fmt: skip
     assert manifest.experiment == load_experiment(str(study)).name
+    (clips / manifest.clips[0].file).unlink()
+    with pytest.raises(InputError, match="put the file back, or write the manifest again with `stimuli man"):
+        check_files(manifest, clips)
 
 
 def test_without_a_declaration_the_folder_names_the_set(monkeypatch: pytest.MonkeyPatch, clips: Path) -> None:
