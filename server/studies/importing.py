@@ -139,6 +139,11 @@ def notes_of(declared: Experiment, manifest: Manifest, version: StudyVersion) ->
     """What an experimenter may want to know of a study as it was taken in."""
     if manifest.definition_sha256 != version.definition_sha256:
         yield "the clips were built with another wording of the declaration; their cells agree"
+    yield from size_notes(declared, manifest)
+
+
+def size_notes(declared: Experiment, manifest: Manifest) -> Iterator[str]:
+    """What is to be said where participants measure their screens for clips that have no size."""
     sized = manifest.inter_ocular_px or any(clip.width_mm for clip in manifest.clips)
     if declared.display.calibrate != "off" and not sized:
         yield (

@@ -5,6 +5,7 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from experiments import design
+from experiments.manifest import Manifest
 from server.accounts.audit import record
 from server.accounts.identity import Identity
 from server.clips.address import clip_address
@@ -16,6 +17,7 @@ from server.studies import repository
 from server.studies.clip_schemas import ClipOut
 from server.studies.definitions import design_out
 from server.studies.edits import for_edit
+from server.studies.importing import size_notes
 from server.studies.lookup import (
     active_version,
     definition_of,
@@ -116,11 +118,13 @@ def detail(session: Session, name: str, identity: Identity) -> StudyDetail:
     study, rights = study_with_rights(session, name, identity, "view")
     version = active_version(session, study)
     experiment = definition_of(version)
+    planned = design_out(experiment)
+    notes = [*planned.notes, *size_notes(experiment, Manifest.model_validate(version.manifest))]
     return StudyDetail(
         summary=summary(
             study, repository.shown_runs_by_status(session, study), standing_on(session, study, rights)
         ),
-        design=design_out(experiment),
+        design=planned.model_copy(update={"notes": notes}),
         definition=experiment,
         toml=version.definition_toml,
         definition_sha256=version.definition_sha256,

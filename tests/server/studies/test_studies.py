@@ -1,4 +1,5 @@
 import io
+import json
 import re
 import tomllib
 import zipfile
@@ -266,6 +267,13 @@ def test_a_built_set_is_uploaded_with_its_definition(experimenter: Admin, tmp_pa
     assert found["has_manifest"]
     made = experimenter.send("POST", "/studies", {"name": "built", "upload": found["id"], "toml": SHORT})
     assert made.status_code == 201, made.text
+    assert "no clip says how large" not in str(made.json()["design"]["notes"])
+    told = json.loads(files["manifest.json"]) | {"inter_ocular_px": None}
+    told["clips"] = [clip | {"width_mm": None} for clip in told["clips"]]
+    unsized = zipped(files | {"manifest.json": json.dumps(told).encode()})
+    found = upload(experimenter, ("built.zip", unsized)).json()
+    made = experimenter.send("POST", "/studies", {"name": "unsized", "upload": found["id"], "toml": SHORT})
+    assert "no clip says how large it is to be shown" in str(made.json()["design"]["notes"])
 
 
 def test_a_damaged_clip_of_a_built_set_is_named(experimenter: Admin, tmp_path: Path) -> None:
