@@ -31,7 +31,7 @@ from stimuli_builder.characters.facekit.renderer import Renderer, Setup, Shot, l
 from stimuli_builder.characters.facekit.scene import FaceScene
 
 # Raise when geometry, textures, materials, lights, lens or a framing change: work of others is not resumed.
-RECIPES = {"eyes": 27, "face": 28}
+RECIPES = {"eyes": 29, "face": 30}
 NOTICE = "Rendered from ICT-FaceKit geometry, (c) 2020 USC Institute for Creative Technologies, MIT licence"
 
 

@@ -20,6 +20,11 @@ DROOP_DEGREES = 25.0
 
 There they point at the camera, and seen from their tips all of them are one dark line along the lid.
 """
+TEMPLE = (0.80, 1.05)
+"""Where along the upper lid its lashes become sparse, and where there would be none.
+
+As many and as long there as elsewhere, seen from the side they were an eyeliner's wing.
+"""
 _EDGE_POINTS = 200
 LEFT_BROW, RIGHT_BROW = slice(22, 27), slice(21, 16, -1)
 
@@ -111,15 +116,14 @@ def _clumped(points: Array, leader: Index) -> Array:
 
 
 def _draw_row(hair: Hair, upper: bool, rng: np.random.Generator) -> _LashRow:
-    count = round((135 if upper else 105) * hair.lashes)
-    low, high = (0.13, 0.985) if upper else (0.22, 0.97)
-    along_lid = np.sort(rng.uniform(low, high, count))
+    along_lid = _roots(round((135 if upper else 105) * hair.lashes), upper, rng)
+    count = len(along_lid)
     clump = np.repeat(np.arange(count), rng.choice([1, 2, 3, 4], count, p=CLUMPS[upper]))[:count]
     _, clump = np.unique(clump, return_inverse=True)
     groups = int(clump.max()) + 1 if count else 0
     longer, fanned, curled = (
         rng.normal(1, 0.10, groups),
-        rng.normal(0, 0.07, groups),
+        rng.normal(0, 0.12 if upper else 0.07, groups),
         rng.normal(1, 0.12, groups),
     )
     centre = np.bincount(clump, along_lid, groups) / np.maximum(np.bincount(clump, minlength=groups), 1)
@@ -127,17 +131,18 @@ def _draw_row(hair: Hair, upper: bool, rng: np.random.Generator) -> _LashRow:
     gather = centre[clump] - along_lid
     if upper:
         size = 0.58 + 0.24 * np.exp(-(((along_lid - 0.68) / 0.25) ** 2)) - 0.22 * smooth(0.3, 0.1, along_lid)
+        size = size - 0.26 * smooth(TEMPLE[0], 1.0, along_lid)
         size = size * longer[clump] * rng.normal(0.95, 0.14, count)
         fan = (
-            0.42 * middle
-            + 0.10 * middle * abs(middle)
+            0.36 * middle
+            + 0.05 * middle * abs(middle)
             + fanned[clump]
-            + rng.normal(0, 0.05, count)
+            + rng.normal(0, 0.05 + 0.16 * smooth(0.6, 1.0, along_lid), count)
             + gather * 3.0
         )
         start = np.full(count, 30.0)
         end = 30.0 - 64.0 * curled[clump] * rng.normal(1, 0.07, count)
-        radius = 0.0060 * rng.normal(1, 0.18, count)
+        radius = 0.0052 * rng.normal(1, 0.18, count)
     else:
         size = 0.24 + 0.12 * np.exp(-(((along_lid - 0.62) / 0.3) ** 2))
         size = size * longer[clump] * rng.normal(0.95, 0.26, count)
@@ -148,8 +153,15 @@ def _draw_row(hair: Hair, upper: bool, rng: np.random.Generator) -> _LashRow:
     leader = np.array(
         [np.flatnonzero(clump == g)[np.argmax(size[clump == g])] for g in range(groups)], np.int64
     )
-    lift = rng.uniform(-0.02, 0.02, count) if upper else rng.uniform(-0.045, 0.02, count)
+    lift = rng.uniform(-0.035, 0.03, count) if upper else rng.uniform(-0.045, 0.02, count)
     return _LashRow(along_lid, size, fan, start, end, np.clip(radius, 0.002, None), lift, leader[clump])
+
+
+def _roots(count: int, upper: bool, rng: np.random.Generator) -> Array:
+    """Sorted shares of the lid's length (0 nose, 1 temple) where a row's lashes stand, count or fewer."""
+    low, high = (0.13, 0.985) if upper else (0.22, 0.97)
+    along_lid = np.sort(rng.uniform(low, high, count))
+    return along_lid[rng.random(count) < smooth(TEMPLE[1], TEMPLE[0], along_lid)] if upper else along_lid
 
 
 class Brow:

@@ -21,6 +21,14 @@ beside them.
 The lids' edges end blunt and short of the fold between them: what lies there is the kit's own caruncle, and
 with a skin's colour it was a pale hook about the white. The lower half's margin begins at its sixth vertex.
 """
+FOLD_UNROLLS, FOLD_STRETCHED = (0.68, 1.0), (0.0, 0.35)
+"""Strokes in which the upper lid's fold unrolls, and in which the skin below it is drawn out of it.
+
+A fold that went in proportion to the stroke was gone at once: an aperture closed, no flap of skin. Out of the
+stretched skin it needs more depth and roll to be as dark as on the open lid, and is narrower.
+"""
+STRETCHED_DEPTH, STRETCHED_ROLL, STRETCHED_WIDTH = 0.8, 0.5, 0.10
+"""By how much: shares more, and mesh loops less."""
 MOUND_RISE_CM, MOUND_CM = 0.05, 0.10
 """How far the caruncle stands out of the fold, and where it has fallen to 1/e of that."""
 
@@ -75,12 +83,15 @@ class LidRelief:
         envelope = smooth(-0.85, -0.35, at.azimuth) * smooth(1.25, 0.75, at.azimuth) * at.upper
         height = lids.crease + wander * 0.6
         height = height - 0.9 * smooth(0.1, -0.8, at.azimuth) - 0.5 * smooth(0.5, 1.2, at.azimuth)
-        above, opened = at.loop - height, 1 - stroke
+        above, opened = at.loop - height, smooth(FOLD_UNROLLS[1], FOLD_UNROLLS[0], stroke)
+        stretched = opened * smooth(*FOLD_STRETCHED, stroke)
         # Of one depth from end to end it was a line drawn round the eye: it runs out, and is nowhere gone.
         uneven = np.clip(0.85 + 0.9 * wander - 0.35 * np.abs(at.azimuth - LID_MIDDLE), 0.35, 1.1)
-        width = 0.30 + 0.18 * opened
-        fold = -lids.depth * uneven * (0.026 + 0.026 * opened) * np.exp(-((above / width) ** 2))
-        fold += lids.depth * 0.030 * opened * np.exp(-(((above - 1.15) / 0.8) ** 2))
+        width = 0.30 + 0.18 * opened - STRETCHED_WIDTH * stretched
+        depth = (0.026 + 0.026 * opened) * (1 + STRETCHED_DEPTH * stretched)
+        roll = 0.030 * opened * (1 + STRETCHED_ROLL * stretched)
+        fold = -lids.depth * uneven * depth * np.exp(-((above / width) ** 2))
+        fold += lids.depth * roll * np.exp(-(((above - 1.15) / 0.8) ** 2))
         second = np.exp(-(((above - 1.5) / 0.22) ** 2)) * (0.4 + 0.6 * stroke)
         fold -= 0.012 * years * second * np.clip(0.5 + 1.2 * wander, 0, 1)
         furrows = np.exp(-((lines / 0.22) ** 2)) * smooth(3.6, 5.0, at.loop) * smooth(11.5, 8.5, at.loop)

@@ -45,3 +45,11 @@ def test_more_of_the_lower_lashes_stand_alone(path: BlinkPath) -> None:
         _, clump = np.unique(leaders, return_counts=True)
         alone[upper] = float(np.sum(clump == 1) / clump.sum())
     assert alone[False] > 0.3 > 2 * alone[True]
+
+
+def test_upper_lashes_become_sparse_and_short_towards_the_temple(path: BlinkPath) -> None:
+    """As dense and long there as elsewhere, seen from the side they were an eyeliner's wing."""
+    row = Lashes(path, identity_of_seed(4).hair, 1, True, 4).row
+    temple, middle = row.along_lid > 0.9, (row.along_lid > 0.6) & (row.along_lid < 0.8)
+    assert temple.sum() / 0.085 < 0.85 * middle.sum() / 0.2
+    assert np.median(row.size[temple]) < 0.75 * np.median(row.size[middle])

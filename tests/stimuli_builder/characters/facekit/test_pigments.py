@@ -80,6 +80,17 @@ def test_the_fold_runs_out_towards_the_corners(skin: FaceSkin) -> None:
     assert 0 < outer < 0.85 * middle
 
 
+def test_the_fold_stays_until_the_lid_is_nearly_shut(skin: FaceSkin) -> None:
+    """It went in proportion to the stroke: blind readers saw an aperture close, not a flap of skin."""
+    at = skin.coordinates
+    middle = (at.upper > 0.95) & (at.loop < 12) & (np.abs(at.azimuth - LID_MIDDLE) < 0.2)
+    opened, half, late, shut = (
+        np.percentile(-skin.relief.displacement(np.full(len(skin.rest), stroke))[middle], 99)
+        for stroke in (0.0, 0.5, 0.85, 1.0)
+    )
+    assert half > opened > late > 1.2 * shut > 0
+
+
 def test_the_upper_margin_is_the_darker_and_the_paler_in_blood(
     skin: FaceSkin, values: dict[str, Array]
 ) -> None:
