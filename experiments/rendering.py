@@ -43,7 +43,7 @@ class RenderSettings(Declaration):
     """Everything the clip builder needs for one cell."""
 
     character: str = "photorealistic"
-    """A shipped character (`stimuli character list`: `alder@7`, `cartoon`), or the path of a folder of
+    """A shipped character (`stimuli character list`: `alder@8`, `cartoon`), or the path of a folder of
     your own; a list of them is short for a last factor `character` with a level each. Left out, it is the
     retired `photorealistic`, so that old declarations keep their meaning."""
     profile: ProfileName = "real"

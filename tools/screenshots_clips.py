@@ -3,7 +3,7 @@
 Examples:
   python tools/screenshots_clips.py                            all characters, into docs/images
 
-  python tools/screenshots_clips.py /tmp/sheets alder@7 hazel@4   two characters, elsewhere
+  python tools/screenshots_clips.py /tmp/sheets alder@8 hazel@4   two characters, elsewhere
 """
 
 import argparse
@@ -37,7 +37,7 @@ from stimuli_builder.clips.motion_blur import frame_weights  # noqa: E402
 
 SIZE = (960, 360)
 CLOSURES = (0.0, 0.25, 0.5, 0.75, 1.0)
-MOVED, LOWERED = "hazel@4", "alder@7"
+MOVED, LOWERED = "hazel@4", "alder@8"
 """Whose brow, cheek, squint and gaze are shown moved, and whose lower lid: one face each, for its size."""
 FACES_IN_A_ROW = 6
 QUALITY = 80

@@ -36,7 +36,7 @@ def main() -> None:
     curve = performance_curve(SETTINGS, "", EXEMPLAR, SEED)
     print("blinks at", ", ".join(f"{one:.2f}" for one in curve.blinks_s), "s")
     starts = [int(FPS * curve.blinks_s[index]) for index in CHOSEN]
-    characters = [name for name in ("alder@7", "cartoon") if name in shipped_names()]
+    characters = [name for name in ("alder@8", "cartoon") if name in shipped_names()]
     painters = [FramePainter(find_character(name).levels(SIZE)) for name in characters]
     rows = []
     for start in starts:

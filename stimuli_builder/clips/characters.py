@@ -99,7 +99,7 @@ def character_folder(name: str, beside: Path | None = None) -> Path:
     if name in load_retired():
         raise InputError(
             f"character '{name}' does not ship any more: `stimuli character fetch {name}` brings it back for "
-            "studies that were made with it; a new study names another, say character = 'alder@7'"
+            "studies that were made with it; a new study names another, say character = 'alder@8'"
         )
     if folder.is_dir():
         raise InputError(f"{folder} is no character: it holds no character.toml (docs/own-character.md)")

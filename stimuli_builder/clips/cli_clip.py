@@ -21,7 +21,7 @@ or tabs, with decimal points or commas.
 
 Examples:
 
-  stimuli clip --profile real --character alder@7 --out blink.mp4
+  stimuli clip --profile real --character alder@8 --out blink.mp4
 
   stimuli clip --profile AL_ease --duration 9 --character cartoon --no-blur --out textbook.mp4
 

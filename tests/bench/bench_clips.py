@@ -43,7 +43,7 @@ def some_jobs() -> list:
     return [clip.job for clip in planned]
 
 
-@pytest.fixture(scope="module", params=["cartoon", "alder@7"])
+@pytest.fixture(scope="module", params=["cartoon", "alder@8"])
 def character(request: pytest.FixtureRequest) -> LevelSet:
     if request.param not in shipped_names():
         pytest.skip(f"{request.param} is not baked here")

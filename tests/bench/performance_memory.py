@@ -14,7 +14,7 @@ from stimuli_builder.clips.jobs import ClipJob, render
 from stimuli_builder.clips.performances import performance_curve
 
 LENGTHS_S = (5.0, 60.0)
-CHARACTERS = ("cartoon", "alder@7")
+CHARACTERS = ("cartoon", "alder@8")
 
 
 def peak_mb(character: str, seconds: float) -> float:

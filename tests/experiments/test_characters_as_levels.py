@@ -11,7 +11,7 @@ from experiments.load import DefinitionError, parse_experiment
 from experiments.schema.canonical import definition_sha256
 from tests.helpers.faces import DEMO, HEAD, PROFILES, faces
 
-SHOWN = {"alder": "alder@7", "birch": "birch@6", "cedar": "cedar@4", "hazel": "hazel@4"}
+SHOWN = {"alder": "alder@8", "birch": "birch@6", "cedar": "cedar@4", "hazel": "hazel@4"}
 LIST = f"character = {json.dumps(list(SHOWN.values()))}"
 
 
@@ -21,7 +21,7 @@ def as_factor(line: str, keys: str = "random = true\nper_participant = 2") -> Ex
 
 
 def in_render(value: str) -> Experiment:
-    text = f"{HEAD}[[factors]]{PROFILES}".replace('character = "alder@7"', f"character = {value}")
+    text = f"{HEAD}[[factors]]{PROFILES}".replace('character = "alder@8"', f"character = {value}")
     return parse_experiment(text.replace('own_per = ["face"]', 'own_per = ["character"]'))
 
 
@@ -76,7 +76,7 @@ def test_folders_give_levels_their_own_name_and_versions_are_dropped() -> None:
 @pytest.mark.parametrize(
     ("listed", "message"),
     [
-        ('["alder", 3]', 'expected a list such as ["alder@7", "birch@6"], got the list ["alder", 3]'),
+        ('["alder", 3]', 'expected a list such as ["alder@8", "birch@6"], got the list ["alder", 3]'),
         ('["alder", ""]', "expected a list such as"),
         ("[]", "expected a list such as"),
         ('["..", "birch"]', "expected a list such as"),
@@ -84,7 +84,7 @@ def test_folders_give_levels_their_own_name_and_versions_are_dropped() -> None:
         ('[".", "birch"]', "expected a list such as"),
         ('["alder", "alder"]', "'alder' stands twice"),
         ('["a/b", "c/b"]', "'b' stands twice"),
-        ('["alder@4", "alder@7"]', "'alder' stands twice"),
+        ('["alder@4", "alder@8"]', "'alder' stands twice"),
     ],
 )
 @pytest.mark.parametrize("make", [lambda listed: as_factor(f"character = {listed}"), in_render])
@@ -114,11 +114,11 @@ def test_levels_and_a_list_are_refused_together() -> None:
 def test_a_factor_that_is_called_character_is_not_added_twice() -> None:
     text = DEMO.replace('name = "face"', 'name = "character"').replace('own_per = ["face"]', "")
     with pytest.raises(DefinitionError, match="'character'"):
-        parse_experiment(text.replace('character = "alder@7"', 'character = ["alder", "birch"]'))
+        parse_experiment(text.replace('character = "alder@8"', 'character = ["alder", "birch"]'))
 
 
 def test_a_fault_below_a_list_in_render_keeps_its_line() -> None:
-    text = DEMO.replace('character = "alder@7"', 'character = ["alder", "birch"]').replace(
+    text = DEMO.replace('character = "alder@8"', 'character = ["alder", "birch"]').replace(
         "duration_frames = 9 }", "duration_frames = 1 }", 1
     )
     with pytest.raises(DefinitionError) as raised:

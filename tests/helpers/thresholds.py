@@ -22,7 +22,7 @@ levels = [
 name = "character"
 label = "Character"
 levels = [
-    { name = "photorealistic", label = "A", render = { character = "alder@7" } },
+    { name = "photorealistic", label = "A", render = { character = "alder@8" } },
     { name = "cartoon", label = "B", render = { character = "cartoon" } },
 ]
 """

@@ -34,7 +34,7 @@ def every_eighth(name: str) -> LevelSet:
 
 @pytest.fixture(scope="module")
 def alder() -> LevelSet:
-    return every_eighth("alder@7")
+    return every_eighth("alder@8")
 
 
 def moved(character: LevelSet, movement: Movement) -> LevelSet:
@@ -186,10 +186,10 @@ def test_what_cannot_move_is_said_in_one_line(alder: LevelSet) -> None:
     check_look(settings_from(character="cartoon", gaze_mm=0.0), geometry("cartoon"))
     with pytest.raises(InputError, match=r"--brow-mm: expected at most 1, got 1\.5"):
         settings_from(brow_mm=1.5)
-    elsewhere = replace(geometry("alder@7"), inter_ocular_mm=16.0)
+    elsewhere = replace(geometry("alder@8"), inter_ocular_mm=16.0)
     with pytest.raises(InputError, match=r"no eye that shuts lies 8 mm beside .* leave out brow_mm"):
         moved_levels(alder, elsewhere, Movement(brow=0.5))
-    assert look_of(settings_from(character="alder@7", brow_mm=0.0), Options()).movement.declared == {
+    assert look_of(settings_from(character="alder@8", brow_mm=0.0), Options()).movement.declared == {
         "brow": 0
     }
     # alder's brows hold still of themselves: nothing is to be moved.

@@ -36,7 +36,7 @@ def test_the_manifest_says_in_mm_what_moved() -> None:
     assert float(whole["lower_lid_lift_mm"]) > 0.1
     assert float(whole["lower_lid_slide_mm"]) > 1.0
     assert float(still["lower_lid_slide_mm"]) == 0.0
-    # What the bake of alder@7 measured: brow and cheek hold still, the lower lid rises with the blink.
+    # What the bake of alder@8 measured: brow and cheek hold still, the lower lid rises with the blink.
     assert whole["brow_mm"] == "0.000"
     assert float(whole["cheek_mm"]) < 0.02
     assert whole["lower_lid_up_mm"] == still["lower_lid_up_mm"] == "0.151"
