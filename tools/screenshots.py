@@ -13,14 +13,13 @@ import tempfile
 from io import BytesIO
 from pathlib import Path
 
-import numpy as np
 from PIL import Image
 from playwright.sync_api import Page, sync_playwright
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from tools.screenshots_clips import save  # noqa: E402
+from tools.screenshots_clips import QUALITY  # noqa: E402
 
 IMAGES = ROOT / "docs" / "images"
 BIN = ROOT / ".venv" / "bin"
@@ -40,7 +39,7 @@ def analysis_pictures(folder: Path) -> None:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
         shown = browser.new_page(viewport={"width": 900, "height": 760})
         shown.goto(page.as_uri())
-        shown.screenshot(path=IMAGES / "table.png")
+        keep(shown, "table")
         browser.close()
 
 
@@ -65,6 +64,15 @@ def participant_pictures(folder: Path, clips: Path) -> None:
         process.stop()
 
 
+def keep(page: Page, name: str) -> None:
+    """Write what a page shows as WebP: lossless, or lossy where a face in it makes that the smaller file."""
+    picture = Image.open(BytesIO(page.screenshot())).convert("RGB")
+    files = [BytesIO(), BytesIO()]
+    picture.save(files[0], "WEBP", lossless=True, quality=100, method=6)
+    picture.save(files[1], "WEBP", quality=QUALITY, method=6)
+    (IMAGES / f"{name}.webp").write_bytes(min((file.getvalue() for file in files), key=len))
+
+
 def visit(page: Page, address: str) -> None:
     """From the link to the first rating."""
     page.goto(address)
@@ -83,9 +91,9 @@ def visit(page: Page, address: str) -> None:
     page.wait_for_selector(".ready")
     page.keyboard.press(" ")
     page.wait_for_timeout(500)
-    save(np.asarray(Image.open(BytesIO(page.screenshot())).convert("RGB")), IMAGES / "participant.webp")
+    keep(page, "participant")
     page.wait_for_selector(".scale")
-    page.screenshot(path=IMAGES / "scale.png")
+    keep(page, "scale")
 
 
 def main() -> None:

@@ -17,7 +17,9 @@ from playwright.sync_api import Page, sync_playwright
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
-IMAGES = ROOT / "docs" / "images"
+
+from tools.screenshots import IMAGES, keep  # noqa: E402
+
 PAGES = {
     "admin-monitor": "/studies/exp3/monitor",
     "admin-results": "/studies/exp3/results",
@@ -47,12 +49,21 @@ def pictures(folder: Path, stimuli: Path) -> None:
             sign_in(page, process.address, process.settings)
             for name, path in PAGES.items():
                 page.goto(f"{process.address}/admin{path}")
-                page.wait_for_load_state("load")
-                page.wait_for_timeout(1500)
-                page.screenshot(path=IMAGES / f"{name}.png")
+                show_simulated(page)
+                keep(page, name)
             browser.close()
     finally:
         process.stop()
+
+
+def show_simulated(page: Page) -> None:
+    """Wait for what a page shows, and have those shown who took part: simulated people."""
+    page.wait_for_load_state("load")
+    page.wait_for_timeout(1500)
+    simulated = page.get_by_role("radiogroup").get_by_text("Simulated")
+    if simulated.count():
+        simulated.click()
+    page.wait_for_timeout(3000)
 
 
 def simulate(data: Path, key: str, address: str) -> None:

@@ -3,7 +3,7 @@
 Examples:
   python tools/screenshots_clips.py                            all characters, into docs/images
 
-  python tools/screenshots_clips.py /tmp/sheets alder@8 hazel@4   two characters, elsewhere
+  python tools/screenshots_clips.py /tmp/sheets alder@8 hazel@5   two characters, elsewhere
 """
 
 import argparse
@@ -37,7 +37,7 @@ from stimuli_builder.clips.motion_blur import frame_weights  # noqa: E402
 
 SIZE = (960, 360)
 CLOSURES = (0.0, 0.25, 0.5, 0.75, 1.0)
-MOVED, LOWERED = "hazel@4", "alder@8"
+MOVED, LOWERED = "hazel@5", "alder@8"
 """Whose brow, cheek, squint and gaze are shown moved, and whose lower lid: one face each, for its size."""
 FACES_IN_A_ROW = 6
 QUALITY = 80
@@ -60,7 +60,7 @@ def main() -> None:
         if name == MOVED:
             save(movement_sheet(character, name), folder / "face-movement.webp")
     if not asked.names:
-        profile_curves(folder / "profiles.png")
+        profile_curves(folder / "profiles.webp")
 
 
 def arguments() -> argparse.Namespace:
@@ -158,7 +158,7 @@ def in_rows(pictures: list[Rgb], columns: int) -> Rgb:
 def profile_curves(path: Path) -> None:
     """The five profiles of Experiment 2 at 9 frames, as in the paper's Figure 8."""
     figure = Figure(figsize=(7.2, 3.6), layout="constrained")
-    FigureCanvasAgg(figure)
+    canvas = FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     model = default_model()
     mean = model.profile(np.zeros(model.coefficient_sd.size), "mean")
@@ -174,8 +174,9 @@ def profile_curves(path: Path) -> None:
     axes.set(xlabel="frames at 30 fps", ylabel="opening (1 = open)", xlim=(0, 9), ylim=(-0.03, 1.03))
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(frameon=False, loc="lower right")
-    figure.savefig(path, dpi=130, metadata={"Software": None})
-    print(f"{path.name}: {path.stat().st_size // 1024} KiB")
+    figure.set_dpi(130)
+    canvas.draw()
+    save(np.asarray(canvas.buffer_rgba())[..., :3], path)
 
 
 def save(picture: Rgb, path: Path) -> None:

@@ -25,7 +25,7 @@ Examples:
 
   stimuli clip --profile AL_ease --duration 9 --character cartoon --no-blur --out textbook.mp4
 
-  stimuli clip --character hazel@4 --brow-mm 0.25 --cheek-mm 0.3 --squint-mm 0.2 --gaze-mm 0.4 --out moved.mp4
+  stimuli clip --character hazel@5 --brow-mm 0.25 --cheek-mm 0.3 --squint-mm 0.2 --gaze-mm 0.4 --out moved.mp4
 
   stimuli clip --profile mine.csv --character my_renders/ --size 1920x720 --fps 60 --out big.mp4
 """

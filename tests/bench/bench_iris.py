@@ -24,7 +24,7 @@ from stimuli_builder.characters.facekit.training.scene import SampleScene
 from stimuli_builder.tracking.detector.detection import eye_points
 from stimuli_builder.tracking.iris import measure_iris
 
-FACES = ("alder@8", "birch@6", "cedar@4", "hazel@4", "alder-face@2", "cedar-face@2")
+FACES = ("alder@8", "birch@6", "cedar@4", "hazel@5", "alder-face@2", "cedar-face@2")
 NOISE = 0.015
 SEEN = ((0.0, 0.3), (0.3, 0.5), (0.5, 0.7), (0.7, 1.01))
 

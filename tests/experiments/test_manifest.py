@@ -36,7 +36,7 @@ def test_a_missing_clip_is_named(tmp_path: Path) -> None:
 def test_a_changed_clip_is_named(tmp_path: Path) -> None:
     manifest = write_folder(tmp_path)
     (tmp_path / "clip.mp4").write_bytes(b"another film here")
-    with pytest.raises(InputError, match=r"expected sha256 .* got .* build it again"):
+    with pytest.raises(InputError, match=r"expected sha256 .* got .* build the clips again"):
         check_files(manifest, tmp_path)
 
 

@@ -41,7 +41,7 @@ from stimuli_builder.tracking.detector.detection import along
 EYE_PX, CUT = 96.0, (192, 160)
 CURVE = 11
 """Points of each lid, canthi included, at even shares of its length."""
-FACES = ("alder@8", "birch@6", "cedar@4", "hazel@4", "alder-face@2", "cedar-face@2")
+FACES = ("alder@8", "birch@6", "cedar@4", "hazel@5", "alder-face@2", "cedar-face@2")
 ACTOR_FRAMES = 10
 Values = NDArray[np.float64]
 
