@@ -8,6 +8,7 @@ Examples:
 
 import argparse
 import sys
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -158,7 +159,7 @@ def in_rows(pictures: list[Rgb], columns: int) -> Rgb:
 def profile_curves(path: Path) -> None:
     """The five profiles of Experiment 2 at 9 frames, as in the paper's Figure 8."""
     figure = Figure(figsize=(7.2, 3.6), layout="constrained")
-    canvas = FigureCanvasAgg(figure)
+    FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     model = default_model()
     mean = model.profile(np.zeros(model.coefficient_sd.size), "mean")
@@ -174,9 +175,9 @@ def profile_curves(path: Path) -> None:
     axes.set(xlabel="frames at 30 fps", ylabel="opening (1 = open)", xlim=(0, 9), ylim=(-0.03, 1.03))
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(frameon=False, loc="lower right")
-    figure.set_dpi(130)
-    canvas.draw()
-    save(np.asarray(canvas.buffer_rgba())[..., :3], path)
+    drawn = BytesIO()
+    figure.savefig(drawn, dpi=130)
+    save(np.asarray(Image.open(drawn).convert("RGB")), path)
 
 
 def save(picture: Rgb, path: Path) -> None:
