@@ -41,10 +41,14 @@ def unlisted(declared: BaseModel, languages: Sequence[str]) -> str:
 
 
 def _texts(declared: BaseModel, prefix: str = "") -> Iterator[Text]:
-    """Every text that was written; those by default have the languages of the page and no others."""
+    """Every text that was written; those by default have the languages of the page and no others.
+
+    A stored declaration holds its defaults too: what is as by default counts as not written.
+    """
     for key, field in type(declared).model_fields.items():
-        if key in declared.model_fields_set:
-            yield from _within(getattr(declared, key), f"{prefix}{key}", _mentions(field.annotation))
+        value = getattr(declared, key)
+        if key in declared.model_fields_set and value != field.get_default(call_default_factory=True):
+            yield from _within(value, f"{prefix}{key}", _mentions(field.annotation))
 
 
 def _within(value: Any, path: str, is_text: bool) -> Iterator[Text]:

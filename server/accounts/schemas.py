@@ -1,16 +1,26 @@
 """What the account endpoints take and give."""
 
+import re
 from datetime import datetime
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
 
 from server.accounts.permission import Scope
 from server.models import Role
 from server.request_body import RequestBody
 from server.text import VisibleObject
 
-AccountName = Annotated[str, StringConstraints(strip_whitespace=True, pattern=r"^[\w.@+ -]{2,100}$")]
+NAME = re.compile(r"[\w.@+ -]{2,100}")
+
+
+def _is_a_name(text: str) -> str:
+    if not NAME.fullmatch(text):
+        raise ValueError("expected 2 to 100 letters, digits, spaces or any of . @ + - _")
+    return text
+
+
+AccountName = Annotated[str, StringConstraints(strip_whitespace=True), AfterValidator(_is_a_name)]
 TOKEN_DAYS_MAX = 366
 Password = Annotated[str, StringConstraints(min_length=1, max_length=200)]
 

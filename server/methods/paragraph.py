@@ -226,7 +226,8 @@ def _display(experiment: Experiment) -> list[str]:
     lines = [
         "Every clip was drawn frame by frame in the participant's browser and each frame's time recorded; of "
         "{plays} {plays:play|plays} in completed visits {plays_good} {plays_good:was|were} shown as "
-        "declared, {plays_uncertain} could not be verified, {plays_flagged} had a frame lost or late, and "
+        "declared, {plays_uncertain} could not be verified, {plays_flagged} {plays_flagged:was|were} flagged "
+        "(a frame lost or late, or the view disturbed: the page left, zoomed or loaded anew), and "
         "{plays_failed} failed."
     ]
     if experiment.display.calibrate != "off":

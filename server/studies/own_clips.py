@@ -52,7 +52,7 @@ def definition_text(name: str, placed: Placed, asked: OwnClips) -> str:
     return tomlkit.dumps(document)
 
 
-_START = "Press **Space** or **Enter** to start"
+_START = "Press **Space** or **Enter**, or tap, to start"
 _WATCHING = {
     "rating": f"{_START} a clip. You see it **once**. Then answer: ",
     "slider": f"{_START} a clip. You see it **once**. Then move the slider, by mouse or arrow keys: ",
@@ -72,7 +72,7 @@ _TASK = {"pairs": "compare two at a time", "just_noticeable": "compare two at a 
 def _texts(asked: OwnClips) -> dict[str, str]:
     task = _TASK.get(asked.template, "rate each of them")
     return {
-        "consent": f"# {asked.title}\n\nYou will watch short clips and {task}. "
+        "consent": f"# Taking part\n\nYou will watch short clips and {task}. "
         "Taking part is voluntary: you may choose *I do not agree*, and stop at any time with *Stop*. "
         "Your name and internet address are not stored.\n",
         "instructions": f"# What you will do\n\n{_WATCHING[asked.template]}*{asked.question}*\n",

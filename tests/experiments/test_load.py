@@ -1,7 +1,9 @@
 import json
+import re
 
 import pytest
 
+from experiments.definition import Experiment
 from experiments.definition.languages import unlisted
 from experiments.errors import InputError
 from experiments.load import (
@@ -17,6 +19,7 @@ from experiments.schema.canonical import definition_sha256
 from experiments.schema.stored import load_stored
 from experiments.schema.upgrades import FORMAT
 from experiments.trials.clip_rating.declaration import clip_rating_of
+from tests.helpers.studies import SHORT
 
 EXP1 = locate("exp1").read_text(encoding="utf-8")
 
@@ -166,6 +169,13 @@ def test_texts_that_nobody_is_offered_are_named() -> None:
     assert unlisted(parse_experiment(EXP1), ("en", "de")) == ""
     alone = parse_experiment(EXP1.replace('languages = ["en", "de"]', 'languages = ["en"]'))
     assert unlisted(alone, alone.languages).startswith("Texts in de are offered to nobody, such as that of ")
+    # Kept in a database it holds its defaults too, which nobody wrote.
+    in_english = re.sub(
+        r', de = "[^"]*"', "", SHORT.replace('languages = ["en", "de"]', 'languages = ["en"]')
+    )
+    short = parse_experiment(in_english)
+    stored = Experiment.model_validate(short.model_dump(mode="json"))
+    assert (stored.languages, unlisted(stored, stored.languages)) == (("en",), "")
 
 
 def test_a_text_without_the_first_language_is_refused() -> None:

@@ -56,6 +56,27 @@ def test_a_clip_chosen_by_mistake_is_left_out_and_what_was_typed_stays(
     expect(page.get_by_text("4 clips", exact=True)).to_be_visible()
 
 
+def test_a_file_that_is_no_clip_keeps_no_other_from_coming(dashboard: Dashboard, tmp_path: Path) -> None:
+    """A picture among clips stopped the upload for good: those behind it never came."""
+    page = dashboard.open("/studies/new")
+    page.get_by_label("Short name").fill("unfinished")
+    page.get_by_role("tab", name="From your own clips").click()
+    panel = page.get_by_role("tabpanel", name="From your own clips")
+    videos = [write_video(tmp_path / name, "libx264", size_px=(320, 120)) for name in NAMES[:3]]
+    (tmp_path / "poster.png").write_bytes(b"no film")
+    panel.locator('input[type="file"]').first.set_input_files(
+        [videos[0], tmp_path / "poster.png", *videos[1:]]
+    )
+    expect(panel.get_by_text("3 clips received")).to_be_visible(timeout=60_000)
+    refused = panel.get_by_role("alert").filter(has_text="1 of the files left out")
+    expect(refused).to_contain_text("'poster.png' is neither a video")
+    panel.get_by_label("Title of the study").fill("Unfinished")
+    panel.get_by_role("button", name="Create", exact=True).click()
+    expect(panel.get_by_text("expected clips in all 4 cells of the design, got 3 of them")).to_be_visible()
+    assert axe_violations(page) == []
+    panel.get_by_role("button", name="Begin anew").click()
+
+
 def test_all_clips_can_be_left_out_and_come_back(dashboard: Dashboard, tmp_path: Path) -> None:
     page = dashboard.open("/studies/new")
     page.get_by_role("tab", name="From your own clips").click()

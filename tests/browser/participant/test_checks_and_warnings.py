@@ -66,6 +66,7 @@ def test_a_check_is_answered_by_key_and_can_be_gone_around(
     visit = begun(server, page, CHECKED, tmp_path)
     to_the_check(visit)
     assert axe_violations(page) == []
+    assert page.get_by_role("button", name="Stop").is_visible()
     question = page.wait_for_selector("h1.question")
     page.keyboard.press("2")
     assert question is not None
@@ -78,6 +79,7 @@ def test_a_check_is_answered_by_key_and_can_be_gone_around(
     page.click("text=I cannot see moving patterns")
     left_out = page.wait_for_selector("text=This one is left out")
     assert left_out is not None
+    assert page.get_by_role("button", name="Stop").is_visible()
     assert axe_violations(page) == []
     page.click(".primary")
     # A check may be the last trial of all: what comes next depends on the order.

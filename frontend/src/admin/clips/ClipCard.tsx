@@ -3,6 +3,7 @@
 import { Anchor, Card, Text } from "@mantine/core";
 import type { Schemas } from "../api";
 import { ClipVideo } from "../studies/ClipVideo";
+import { counted } from "../ui/format";
 import { onDemand } from "../ui/onDemand";
 import { changesOf } from "./changes";
 
@@ -19,7 +20,7 @@ export function ClipCard({ study, clip, label = clip.cell }: { study: string; cl
       <ClipVideo url={clip.url} label={name} />
       <Text size="xs" c="dimmed" mt={6} className="wrap-anywhere">
         {clip.profile !== "" && `${clip.profile}, `}
-        {clip.frames} frames at {Number(clip.fps.toFixed(3))} fps, {Math.round(clip.bytes / 1024)} KiB
+        {counted(clip.frames, "frame")} at {Number(clip.fps.toFixed(3))} fps, {Math.round(clip.bytes / 1024)} KiB
       </Text>
       {clip.source != null && <Origin study={study} source={clip.source} />}
       {clip.closure.length > 0 && <ClosureFigure closure={clip.closure} label="Closure over time" />}

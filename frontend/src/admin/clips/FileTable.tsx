@@ -4,6 +4,7 @@ import { Alert, Badge, Button, Group, Stack, Text } from "@mantine/core";
 import { useVirtualizer } from "@tanstack/react-virtual";
 import { type RefObject, useRef } from "react";
 import type { Schemas } from "../api";
+import { counted } from "../ui/format";
 import { changesOf } from "./changes";
 import type { Upload } from "./useUpload";
 
@@ -144,5 +145,5 @@ function OneFile({ file, onReplace, onLeaveOut }: RowProps & { file: Schemas["Up
 }
 
 function sizeOf({ frames, fps, width_px, height_px }: Schemas["UploadedFile"]): string {
-  return frames == null || fps == null ? "" : `${frames} frames at ${Number(fps.toFixed(3))} fps, ${width_px} x ${height_px}`;
+  return frames == null || fps == null ? "" : `${counted(frames, "frame")} at ${Number(fps.toFixed(3))} fps, ${width_px} x ${height_px}`;
 }

@@ -4,6 +4,7 @@ import { Alert, Button, FileInput, Group, Progress, Select, Stack, Text } from "
 import { useState, type ReactNode } from "react";
 import type { Schemas } from "../api";
 import { onDemand } from "../ui/onDemand";
+import { LeftOut } from "./sending";
 import { sizeRemark } from "./sizes";
 import type { Upload } from "./useUpload";
 
@@ -65,6 +66,18 @@ export function UploadClips({ upload, label = "Clips", description, accept = `.z
 }
 
 function UploadProgress({ upload: { sending, broken, progress, goOn } }: { upload: Upload }) {
+  if (broken instanceof LeftOut) {
+    return (
+      <Alert color="yellow" title={`${count(broken.reasons.length)} of the files left out`} role="alert">
+        {broken.reasons.slice(0, MAX_PAIRS).map((reason) => (
+          <Text key={reason} size="sm">
+            {reason}
+          </Text>
+        ))}
+        {broken.reasons.length > MAX_PAIRS && <Text size="sm">And {count(broken.reasons.length - MAX_PAIRS)} more.</Text>}
+      </Alert>
+    );
+  }
   if (broken !== null) {
     return (
       <Alert color="red" variant="light" title="The upload stopped" role="alert">

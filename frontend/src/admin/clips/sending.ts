@@ -49,32 +49,57 @@ export async function beginUpload(fps: number | null): Promise<Schemas["UploadOu
   return persistently(() => unwrap(api.POST("/api/admin/uploads", { body: {}, bodySerializer: () => form })));
 }
 
-/** Send what the upload does not hold yet; `onSent` is told how many files are there. */
+/** Files that the server will not take, whatever the line; all others are there. */
+export class LeftOut extends Error {
+  override name = "LeftOut";
+  constructor(readonly reasons: readonly string[]) {
+    super(reasons.join(" "));
+  }
+}
+
+/** Send what the upload does not hold yet; `onSent` is told how many files are there. LeftOut where it refuses some. */
 export async function sendFiles(id: string, files: readonly File[], onSent: (count: number) => void): Promise<void> {
-  const path = { params: { path: { upload: id } } };
-  const there = await persistently(() => unwrap(api.GET("/api/admin/uploads/{upload}", path)));
-  const known = new Map(there.files.map((file) => [file.name, file.bytes]));
-  const missing = files.filter((file) => known.get(formOf(file.name)) !== file.size);
+  const missing = await missingOf(id, files);
+  const reasons: string[] = [];
   let sent = files.length - missing.length;
   onSent(sent);
   for (const batch of batchesOf(missing)) {
-    await persistently(() => {
-      const form = new FormData();
-      for (const file of batch) form.append("files", file);
-      return unwrap(api.POST("/api/admin/uploads/{upload}/files", { ...path, body: { files: [] }, bodySerializer: () => form }));
-    });
-    sent += batch.length;
+    const refused = await sendBatch(id, batch);
+    reasons.push(...refused);
+    sent += batch.length - refused.length;
     onSent(sent);
   }
+  if (reasons.length > 0) throw new LeftOut(reasons);
+}
+
+async function missingOf(id: string, files: readonly File[]): Promise<File[]> {
+  const there = await persistently(() => unwrap(api.GET("/api/admin/uploads/{upload}", { params: { path: { upload: id } } })));
+  const known = new Map(there.files.map((file) => [file.name, file.bytes]));
+  return files.filter((file) => known.get(formOf(file.name)) !== file.size);
+}
+
+/** One request; where the server refuses a file, one for each file that it does not hold. Why each was refused. */
+async function sendBatch(id: string, batch: readonly File[]): Promise<string[]> {
+  try {
+    await persistently(() => unwrap(api.POST("/api/admin/uploads/{upload}/files", filesFor(id, batch))));
+    return [];
+  } catch (error) {
+    if (!(error instanceof Refused) || error.status !== 422) throw error;
+    if (batch.length === 1) return [error.message];
+  }
+  const refused: string[] = [];
+  for (const file of await missingOf(id, batch)) refused.push(...(await sendBatch(id, [file])));
+  return refused;
+}
+
+function filesFor(id: string, files: readonly File[], replaces?: string) {
+  const form = new FormData();
+  for (const file of files) form.append("files", file);
+  if (replaces !== undefined) form.append("replaces", replaces);
+  return { params: { path: { upload: id } }, body: { files: [] }, bodySerializer: () => form };
 }
 
 /** Put another file in the place of one of the upload's. */
 export async function replaceFile(id: string, name: string, file: File): Promise<Schemas["UploadProgress"]> {
-  const form = new FormData();
-  form.append("files", file);
-  form.append("replaces", name);
-  const path = { params: { path: { upload: id } } };
-  return persistently(() =>
-    unwrap(api.POST("/api/admin/uploads/{upload}/files", { ...path, body: { files: [] }, bodySerializer: () => form })),
-  );
+  return persistently(() => unwrap(api.POST("/api/admin/uploads/{upload}/files", filesFor(id, [file], name))));
 }

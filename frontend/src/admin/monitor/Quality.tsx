@@ -52,7 +52,8 @@ export function Quality({ runs, of }: { runs: Schemas["MonitoredRun"][]; of: num
                 .join(", ")}${doubtful.length > 3 ? " …" : ""}`}
         </Text>
         <Text size="sm" c="dimmed">
-          Flagged or failed: pictures of the clip were left out or came late, or the page was left meanwhile. A failed clip is shown again.
+          Flagged or failed: pictures of the clip were left out or came late, or the page was left, zoomed or loaded anew meanwhile. A
+          failed clip is shown again.
         </Text>
       </Stack>
     </Card>

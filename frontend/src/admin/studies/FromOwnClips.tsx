@@ -1,6 +1,6 @@
 /** A study from somebody's own clips: upload, say which levels each has, ask a question. */
 
-import { Button, SegmentedControl, Select, Stack, Table, Text, Textarea, TextInput } from "@mantine/core";
+import { Alert, Button, SegmentedControl, Select, Stack, Table, Text, Textarea, TextInput } from "@mantine/core";
 import { useState } from "react";
 import type { Schemas } from "../api";
 import { UploadClips } from "../clips/UploadClips";
@@ -8,7 +8,7 @@ import { useUpload } from "../clips/useUpload";
 import { fieldsOf, levelsByPattern, patternProblem, unnamedFactors, withNames } from "./file-pattern";
 import { StillNeeded } from "./StillNeeded";
 import { TEMPLATES } from "./templates";
-import { useCreate } from "./useCreate";
+import { refusal, useCreate } from "./useCreate";
 
 const MAX_ROWS = 100;
 
@@ -46,7 +46,8 @@ function Levels({ name, upload, isLooked, onTaken, onCreated }: LevelsProps) {
   const [asked, setAsked] = useState({ title: "", question: template.question, low: "very unnatural", high: "very natural" });
   const [names, setNames] = useState<Record<string, string>>({});
   const files = upload.files.map((file) => file.name);
-  const create = useCreate(onTaken, onCreated);
+  const create = useCreate(onTaken, onCreated, true);
+  const refused = refusal(create.error);
   const needed = [
     (!isLooked || files.length === 0) && "clips that have been looked into",
     by === "pattern" && patternProblem(withNames(pattern, names), files),
@@ -118,6 +119,11 @@ function Levels({ name, upload, isLooked, onTaken, onCreated }: LevelsProps) {
       {template.ends && field("low", "Lowest answer means")}
       {template.ends && field("high", "Highest answer means")}
       <StillNeeded parts={needed} />
+      {refused !== null && (
+        <Alert color="red" variant="light" title="The study was not created" role="alert">
+          {refused}
+        </Alert>
+      )}
       <Button
         style={{ alignSelf: "flex-start" }}
         disabled={needed.some(Boolean)}

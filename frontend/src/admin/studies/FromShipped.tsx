@@ -46,14 +46,14 @@ export function FromShipped({ name, onTaken }: { name: string; onTaken: (message
                       </Button>
                     </Group>
                   ) : (
-                    <Alert color="yellow">
+                    <Alert color="yellow" className="wrap-anywhere">
                       Its clips are not built on this server. Run <code>{experiment.build}</code> there, or upload them.
                     </Alert>
                   )}
                 </Card>
               ))}
           </SimpleGrid>
-          <Unbuilt demos={experiments.filter(isUnbuiltDemo)} />
+          <Unbuilt demos={experiments.filter((one) => isUnbuiltDemo(one) && !present.has(one.name))} />
         </Stack>
       )}
     </Answer>

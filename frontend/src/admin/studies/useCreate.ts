@@ -2,14 +2,22 @@ import { useNavigate } from "@tanstack/react-router";
 import { api, Refused, type Schemas, unwrap } from "../api";
 import { useChange } from "../ui/useChange";
 
-/** Create a study and open it; `taken` is told where another study has the name. */
-export function useCreate(taken: (message: string) => void, created?: () => void) {
+const isTaken = (error: Error | null) => error instanceof Refused && error.code === "name_taken";
+
+/** Why no study was made, but for its name; null where that is not so. */
+export const refusal = (error: Error | null): string | null => (error === null || isTaken(error) ? null : error.message);
+
+/**
+ * Create a study and open it; `taken` is told where another study has the name.
+ * @param told whether the page itself tells of every other refusal
+ */
+export function useCreate(taken: (message: string) => void, created?: () => void, told = false) {
   const navigate = useNavigate();
   return useChange((body: Schemas["NewStudy"]) => unwrap(api.POST("/api/admin/studies", { body })), {
     touches: [["studies"]],
     done: "The study is created, as a draft.",
     refused: (error) => {
-      if (!(error instanceof Refused) || error.code !== "name_taken") return false;
+      if (!isTaken(error)) return told;
       taken(error.message);
       return true;
     },

@@ -4,7 +4,7 @@ import { h } from "../../../ui/element";
 import { markdown } from "../../../ui/markdown";
 import { button, showPage } from "../../../ui/page";
 import { playbackRecord } from "../../playback/record";
-import { choose, screenSignal } from "../../screens/support";
+import { choose, screenSignal, stopButton } from "../../screens/support";
 import type { Session } from "../../session";
 import { beginView, spanOf, timesOf, viewsBefore } from "../../views/ledger";
 import type { RatingBody } from "../rating";
@@ -15,7 +15,7 @@ import { unlessBroken } from "../shared/broken";
 import { numbering } from "../shared/parameters";
 import { prepareClip, release } from "../shared/prepare";
 import { showOnce, type Shown, waitForStart } from "../shared/showing";
-import { clipSize, stage, type Stage } from "../shared/stage";
+import { clipSize, showStage, type Stage } from "../shared/stage";
 import { checkBody, unrated } from "./body";
 
 /** Thrown to leave the clip, or the question, for the other way. */
@@ -46,7 +46,7 @@ function asked(session: Session, trial: TrialInfo): ShownCheck {
 }
 
 async function watchAndAnswer(session: Session, display: HTMLElement, trial: TrialInfo): Promise<RatingBody> {
-  const clipStage = stageFor(session, display, trial);
+  const clipStage = showStage(session, display, () => clipSize(session, trial));
   const other = way(session, clipStage);
   const before = viewsBefore(trial, 1).at(-1)?.[0]?.showing;
   if (before) sayAlreadySeen(session, clipStage);
@@ -73,12 +73,6 @@ function way(session: Session, clipStage: Stage): Way {
   const leave = offered ? button(offered.label, () => taken.abort(), "plain") : null;
   if (leave) clipStage.element.append(h("div", { class: "other-way" }, leave));
   return { left, signal: taken.signal, button: leave };
-}
-
-function stageFor(session: Session, display: HTMLElement, trial: TrialInfo): Stage {
-  const clipStage = stage(session.player.element, () => clipSize(session, trial), session.t("clip_name"));
-  display.replaceChildren(clipStage.element);
-  return clipStage;
 }
 
 async function watch(session: Session, clipStage: Stage, trial: TrialInfo, other: Way): Promise<Shown> {
@@ -126,7 +120,7 @@ function bodyOf(session: Session, trial: TrialInfo, shown: Shown, { name, answer
 async function otherWay(session: Session, display: HTMLElement, trial: TrialInfo): Promise<RatingBody> {
   const footer = h("footer", { class: "actions" });
   const text = session.run.checks?.other_way?.text ?? "";
-  showPage(display, { body: [h("div", { class: "prose" }, ...markdown(text)), footer] });
+  showPage(display, { body: [h("div", { class: "prose" }, ...markdown(text)), footer] }).append(stopButton(session));
   await choose(session, footer, [{ label: session.t("continue"), value: true }], "always");
   const playback = playbackRecord(null, [], session.screen.record());
   return checkBody(session, trial, { check: null, other_way: true }, playback);

@@ -21,7 +21,7 @@ export interface Stage {
   layout: Layout;
 }
 
-export function stage(clip: HTMLElement, size: () => Size, name: string): Stage {
+function stage(clip: HTMLElement, size: () => Size, name: string): Stage {
   const marks = ["tl", "tr", "bl", "br"].map((corner) => h("i", { class: `mark mark-${corner}` }));
   const frame = h("div", { class: "clip", role: "img", "aria-label": name }, clip, ...marks);
   const fit = (): void => {
