@@ -149,11 +149,7 @@ def make_series(
 
     `allow_gaps` left at None means: in a track yes (its frames without a fit say why), in a plain series no.
     """
-    if table[column].dtype.kind not in "fiu":
-        words = table[column][pd.to_numeric(table[column], errors="coerce").isna() & table[column].notna()]
-        got = f", got {words.iloc[0]!r} in row {words.index[0] + 1}" if words.size else ""
-        raise InputError(f"{path.name}: column '{column}' must hold numbers{got}")
-    values = table[column].to_numpy(dtype=np.float64)
+    values = _numbers(table, column, path)
     values = np.where(np.isfinite(values), values, np.nan)
     if values.size < scaled_frames(300, fps):
         raise InputError(
@@ -195,6 +191,15 @@ def make_series(
     )
 
 
+def _numbers(table: pd.DataFrame, column: str, path: Path) -> Array:
+    """(n,) a column's values; InputError naming the first that is no number."""
+    if table[column].dtype.kind not in "fiu":
+        words = table[column][pd.to_numeric(table[column], errors="coerce").isna() & table[column].notna()]
+        got = f", got {words.iloc[0]!r} in row {words.index[0] + 1}" if words.size else ""
+        raise InputError(f"{path.name}: column '{column}' must hold numbers{got}")
+    return table[column].to_numpy(dtype=np.float64)
+
+
 def bridge_gaps(values: Array, most_frames: int) -> tuple[Array, int]:
     """Fill inner runs of NaN no longer than `most_frames` by straight lines; return the number filled."""
     filled = values.copy()
@@ -213,7 +218,7 @@ def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
     return list(zip(np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist(), strict=True))
 
 
-def resampled(table: pd.DataFrame, columns: Sequence[str]) -> pd.DataFrame:
+def resampled(table: pd.DataFrame, columns: Sequence[str], path: Path) -> pd.DataFrame:
     """Bring columns to even times at the mean rate of `time_s`, by straight lines between true times.
 
     Gaps stay gaps: a value next to an empty one is empty.
@@ -222,7 +227,7 @@ def resampled(table: pd.DataFrame, columns: Sequence[str]) -> pd.DataFrame:
     even = np.linspace(times[0], times[-1], times.size)
     data: dict[str, Array | pd.Series] = {"frame": np.arange(even.size, dtype=np.float64), "time_s": even}
     for column in columns:
-        data[column] = np.interp(even, times, table[column].to_numpy(dtype=np.float64))
+        data[column] = np.interp(even, times, _numbers(table, column, path))
     if "status" in table.columns:
         nearest = np.clip(np.searchsorted(times, even), 0, times.size - 1)
         data["status"] = table["status"].iloc[nearest].reset_index(drop=True)
@@ -249,5 +254,5 @@ def read_series(
         raise InputError(f"{path.name} has no column time_s: --resample needs the time of every frame")
     rate = series_fps(table, fps, path, uneven=resample)
     if resample:
-        table = resampled(table, chosen)
+        table = resampled(table, chosen, path)
     return [make_series(table, column, rate, path, allow_gaps=allow_gaps) for column in chosen]

@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -128,3 +130,10 @@ def test_a_file_that_is_no_table_is_refused(tmp_path, content):
 def test_a_missing_file_is_refused(tmp_path):
     with pytest.raises(InputError, match="cannot be read"):
         read_series(tmp_path / "none.csv", [], 240)
+
+
+def test_a_word_in_a_series_that_is_to_be_resampled_is_named(tmp_path: Path) -> None:
+    values = [*GOOD[:6], "lost", *GOOD[7:]]
+    path = _write(tmp_path / "series.csv", "time_s,a", [np.arange(400) / 240, values])
+    with pytest.raises(InputError, match=r"must hold numbers, got 'lost' in row 7"):
+        read_series(path, ["a"], resample=True)
