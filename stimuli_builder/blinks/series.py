@@ -84,7 +84,7 @@ def choose_columns(table: pd.DataFrame, named: Sequence[str], path: Path) -> lis
         if name not in table.columns:
             raise InputError(f"{path.name} has no column '{name}'{_near_or_plausible(name, candidates)}")
     if named:
-        return list(named)
+        return list(dict.fromkeys(named))
     tracked = [name for name in DISTANCE_COLUMNS if name in table.columns]
     if tracked:
         return tracked

@@ -2,6 +2,7 @@
 
 import sys
 import time
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -98,10 +99,13 @@ def track_folder(job: TrackJob) -> None:
         raise InputError(f"{job.video}: no video in this folder ({' '.join(sorted(VIDEO_SUFFIXES))})")
     if job.out.exists() and not job.out.is_dir():
         raise InputError(f"{job.out}: expected a folder for the tracks of {job.video}, this is a file")
+    if not job.out.parent.is_dir():
+        raise InputError(f"{job.out}: the folder {job.out.parent} does not exist; make it first")
     job.out.mkdir(exist_ok=True)
+    namesakes = Counter(video.stem for video in videos)
     refused = 0
     for number, video in enumerate(videos, start=1):
-        out = job.out / f"{video.stem}.csv"
+        out = job.out / f"{video.stem if namesakes[video.stem] == 1 else video.name}.csv"
         if out.exists():
             print(f"{number}/{len(videos)} {out}: there already")
             continue

@@ -132,6 +132,11 @@ def test_a_missing_file_is_refused(tmp_path):
         read_series(tmp_path / "none.csv", [], 240)
 
 
+def test_a_column_that_is_named_twice_is_read_once(tmp_path: Path) -> None:
+    path = _write(tmp_path / "series.csv", "time_s,a", [np.arange(400) / 240, GOOD])
+    assert [series.column for series in read_series(path, ["a", "a"])] == ["a"]
+
+
 def test_a_word_in_a_series_that_is_to_be_resampled_is_named(tmp_path: Path) -> None:
     values = [*GOOD[:6], "lost", *GOOD[7:]]
     path = _write(tmp_path / "series.csv", "time_s,a", [np.arange(400) / 240, values])

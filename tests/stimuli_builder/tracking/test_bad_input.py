@@ -239,12 +239,23 @@ def test_a_folder_is_tracked_and_goes_on_where_it_stopped(stimuli, folder, tmp_p
     assert (tmp_path / "tracks" / "a.csv").stat().st_mtime_ns == before
 
 
+def test_videos_of_one_name_in_a_folder_have_a_track_each(stimuli, folder, tmp_path):
+    """a.mkv was taken for the a.mp4 that was tracked already, and left out."""
+    (folder / "b.mov").unlink()
+    (folder / "a.mkv").write_bytes((folder / "a.mp4").read_bytes())
+    code, _, error = stimuli("track", folder, "--model", tmp_path / "m.npz", "--out", tmp_path / "tracks")
+    assert (code, error) == (0, "")
+    assert sorted(path.name for path in (tmp_path / "tracks").iterdir()) == ["a.mkv.csv", "a.mp4.csv"]
+
+
 def test_a_folder_takes_no_options_of_one_video(stimuli, folder, recording, tmp_path):
     one = ("--labels", recording.labels)
     assert "are one video's" in stimuli("track", folder, "--out", tmp_path / "tracks", *one)[2]
     (tmp_path / "none").mkdir()
     assert "no video in this folder" in stimuli("track", tmp_path / "none", "--out", tmp_path / "t")[2]
     assert not (tmp_path / "tracks").exists()
+    nowhere = tmp_path / "no" / "tracks"
+    assert "does not exist; make it first" in stimuli("track", folder, "--out", nowhere)[2]
 
 
 def test_accuracy_of_files_that_do_not_belong_together(stimuli, recording, tmp_path):
