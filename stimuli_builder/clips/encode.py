@@ -17,8 +17,10 @@ from experiments.errors import InputError
 
 CRF = 12
 PRESET = "faster"
+LESS_SEARCH = "subme=2:ref=1:weightp=0"
+"""Preset `faster` spends a third of its time on what pictures that hardly move do not need."""
 X264 = (
-    "threads=1:lookahead-threads=1:sliced-threads=0:bframes=0:keyint=infinite:scenecut=0:"
+    f"{LESS_SEARCH}:threads=1:lookahead-threads=1:sliced-threads=0:bframes=0:keyint=infinite:scenecut=0:"
     "colorprim=bt709:transfer=bt709:colormatrix=bt709:range=tv:log-level=error"
 )
 BT709, LIMITED_RANGE = 1, 1
