@@ -11,6 +11,7 @@ import pandas as pd
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from experiments.counted import counted
+from stimuli_builder.blinks.both_eyes import asymmetry_lines
 from stimuli_builder.blinks.extract import EyeBlinks
 from stimuli_builder.blinks.plots import sequence_figure, series_figure
 from stimuli_builder.blinks.profile import Array
@@ -58,7 +59,7 @@ def report_text(
         columns=[eye.series.column for eye in eyes],
         blinks=blink_rows(eyes, accepted, scale),
         quality=quality_rows(eyes),
-        pairs=pair_lines(accepted),
+        pairs=[*pair_lines(accepted), *asymmetry_lines(eyes)],
         doubts=list(doubts),
         scale=None if scale is None else f"{scale.mm_per_px:.4f} mm in a pixel: {scale.rule}",
         nearly_closed=f"{NEARLY_CLOSED:.0%}",

@@ -1,7 +1,7 @@
 """Cut the profiles of measured blinks out of their series, one eye at a time or both together."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
@@ -191,74 +191,3 @@ def eye_profiles(
 ) -> list[BlinkProfile]:
     """Return the profile of every blink of one eye."""
     return [eye_profile(eye_blinks, blink, recording, eye, label) for blink in eye_blinks.blinks]
-
-
-def paired_blinks(left: EyeBlinks, right: EyeBlinks) -> list[tuple[MeasuredBlink, MeasuredBlink]]:
-    """Match the blinks of both eyes whose minima lie within the other's blink; each is used once."""
-    free = list(right.blinks)
-    pairs = []
-    for blink in left.blinks:
-        for other in free:
-            if (
-                blink.onset_frame < other.minimum_frame < blink.end_frame
-                and other.onset_frame < blink.minimum_frame < other.end_frame
-            ):
-                pairs.append((blink, other))
-                free.remove(other)
-                break
-    return pairs
-
-
-def both_eyes(
-    eyes: Sequence[EyeBlinks], names: Sequence[Eye | None]
-) -> list[tuple[MeasuredBlink, MeasuredBlink]]:
-    """Return the blinks of the left eye with their partners in the right one; none for other columns."""
-    if len(eyes) != 2 or set(names) != {"left", "right"}:
-        return []
-    by_name = dict(zip(names, eyes, strict=True))
-    return paired_blinks(by_name["left"], by_name["right"])
-
-
-def paired_profiles(left: EyeBlinks, right: EyeBlinks, recording: str) -> list[BlinkProfile]:
-    """Return the blinks seen in both eyes: earlier onset, later end, the minimum the left eye's."""
-    profiles = []
-    for number, (blink, other) in enumerate(paired_blinks(left, right), start=1):
-        onset = min(blink.onset_frame, other.onset_frame)
-        end = max(blink.end_frame, other.end_frame)
-        both = [
-            closure_at_300(eye.smooth, eye.series.fps, onset, blink.minimum_frame, end, row.closed_distance)
-            for eye, row in ((left, blink), (right, other))
-        ]
-        closure, minimum = both[0]
-        profiles.append(
-            BlinkProfile(
-                profile_id=f"{recording}-both-{number:02d}",
-                closure=np.round(closure, 6),
-                closure_other=np.round(both[1][0], 6),
-                minimum_index=minimum,
-                down_frames=minimum,
-                up_frames=closure.size - 1 - minimum,
-                amplitude=round(float(closure.max()), 6),
-                source=f"recorded: {recording}, both eyes, blinks {blink.number} and {other.number}",
-                eye="both",
-                recording=recording,
-                rest_before=round(blink.rest_before, 6),
-                rest_after=round(blink.rest_after, 6),
-            )
-        )
-    return profiles
-
-
-def all_profiles(
-    eyes: Sequence[EyeBlinks], recording: str, names: Sequence[Eye | None]
-) -> list[BlinkProfile]:
-    """Return every eye's profiles, then those of both eyes together where there are two."""
-    profiles = [
-        profile
-        for eye_blinks, name in zip(eyes, names, strict=True)
-        for profile in eye_profiles(eye_blinks, recording, name, "one" if len(eyes) == 1 else "")
-    ]
-    if set(names) == {"left", "right"} and len(eyes) == 2:
-        by_name = dict(zip(names, eyes, strict=True))
-        profiles += paired_profiles(by_name["left"], by_name["right"], recording)
-    return profiles

@@ -85,7 +85,7 @@ def _series_row(
     step = max(1, (last - first) // 6000)
     frames = np.arange(first, last, step)
     axes.plot(frames / fps, eye.smooth[first:last:step], color=colour, lw=0.9, label=eye.series.column)
-    top = float(np.nanmax(eye.smooth))
+    top = float(np.nanmax(eye.smooth)) or 1.0  # a column of zeros has no height
     axes.set_ylim(-0.03 * top, 1.12 * top)
     for blink in eye.blinks:
         if blink.end_s <= start_s or blink.onset_s >= stop_s:

@@ -4,22 +4,15 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
-import pandas as pd
-from rich.box import SIMPLE_HEAD
-from rich.console import Console
-from rich.table import Table
-
-from experiments.counted import counted
 from experiments.errors import InputError
 from experiments.files import check_targets
+from stimuli_builder.blinks.both_eyes import all_profiles, asymmetry_lines, both_eyes
+from stimuli_builder.blinks.console_report import print_blinks, print_written
 from stimuli_builder.blinks.events.recognise import recognise
 from stimuli_builder.blinks.extract import (
     EyeBlinks,
-    all_profiles,
     blinks_of,
-    both_eyes,
     eye_of,
     rate_doubt,
     require_blinks,
@@ -40,9 +33,6 @@ from stimuli_builder.blinks.review import (
 )
 from stimuli_builder.blinks.series import read_series
 from stimuli_builder.blinks.tables import blinks_frame, summarise, write_blinks, write_events, write_summary
-
-FEW_BLINKS = 3
-"""Fewer than these say nothing of how far this person's lids close at most."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +89,10 @@ def run_blinks(job: BlinksJob) -> None:
     if job.events is not None and job.classify:
         write_events(job.events, eyes)
     write_blinks(job.out, frame)
-    _report(job, summaries, frame, lost)
+    events = job.events if job.classify else None
+    written = [job.out, job.profiles, events, *job.more.paths, job.summary, job.plot, job.plot_aligned]
+    print_blinks(summaries, lost, closed_given=job.closed is not None)
+    print_written(len(frame), written)
 
 
 def label_recording(job: BlinksJob) -> list[EyeBlinks]:
@@ -123,6 +116,8 @@ def label_recording(job: BlinksJob) -> list[EyeBlinks]:
         require_blinks(eye, job.options)
         if doubt := rate_doubt(eye):
             sys.stderr.write(f"warning: {doubt}\n")
+    for line in asymmetry_lines(eyes):
+        sys.stderr.write(f"note: {line}\n")
     return eyes
 
 
@@ -209,52 +204,3 @@ def _write_figures(
         save_figure(
             aligned_figure({name: group for name, group in groups.items() if group}), job.plot_aligned
         )
-
-
-def _report(
-    job: BlinksJob, summaries: Sequence[dict[str, Any]], frame: pd.DataFrame, lost: Sequence[Review]
-) -> None:
-    console = Console()
-    headers = ("blinks", "/min", "complete", "rejected", "down", "up", "total", "closure")
-    table = Table(box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
-    table.add_column("column", no_wrap=True)
-    for header in headers:
-        table.add_column(header, justify="right", no_wrap=True)
-    table.caption, table.caption_justify = "down, up, total in ms; these and closure: medians", "left"
-    for row in summaries:
-        medians = [
-            f"{row[name].get('median', float('nan')):.0f}" for name in ("down_ms", "up_ms", "duration_ms")
-        ]
-        closure = f"{row['closure'].get('median', float('nan')):.2f}"
-        counts = [str(row["blinks"]), f"{row['rate_per_minute']:.1f}", str(row["complete"])]
-        table.add_row(row["column"], *counts, str(row["rejected"]), *medians, closure)
-    console.print(table)
-    for row in summaries:
-        if 0 < row["blinks"] < FEW_BLINKS and job.closed is None:
-            console.print(
-                f"{row['column']}: too few blinks to say which are complete: closed is what they themselves "
-                "reach; give --closed where it is known"
-            )
-        for refused in row["refused"]:
-            console.print(
-                f"{row['column']}: minimum at frame {refused['minimum']} left out: {refused['reason']}"
-            )
-        if row["other_events"]:
-            seen = ", ".join(
-                f"{count} {kind.replace('_', ' ')}" for kind, count in row["other_events"].items()
-            )
-            console.print(f"{row['column']}: besides blinks: {seen}")
-        if row["missing_frames"]:
-            console.print(f"{row['column']}: {row['missing_frames']} frames without a value were left out")
-        if row["bridged_frames"]:
-            console.print(f"{row['column']}: {row['bridged_frames']} frames in short gaps were filled")
-    for review in lost:
-        console.print(
-            f"the review names a blink at frame {review.minimum_frame} of {review.column}: none is there"
-        )
-    events = job.events if job.classify else None
-    written = [job.out, job.profiles, events, *job.more.paths, job.summary, job.plot, job.plot_aligned]
-    console.print(
-        f"{counted(len(frame), 'blink')}; wrote "
-        + ", ".join(str(path) for path in written if path is not None)
-    )

@@ -146,6 +146,7 @@ def summarise(eye_blinks: EyeBlinks, frame: pd.DataFrame, profiles: Sequence[Bli
         "rejected": int((frame["column"] == series.column).sum() - len(rows)),
         "refused": [asdict(refused) for refused in eye_blinks.refused],
         "other_events": dict(Counter(event.kind for event in eye_blinks.events if event.kind != "blink")),
+        "asymmetry": _asymmetry(eye_blinks),
         "bridged_frames": series.bridged_frames,
         "missing_frames": series.missing_frames,
         "rate_per_minute": round(len(rows) / minutes, 3),
@@ -165,6 +166,12 @@ def summarise(eye_blinks: EyeBlinks, frame: pd.DataFrame, profiles: Sequence[Bli
         "amplitude_histogram": amplitude_histogram(closures),
         "mean_blink": _mean_blink(profiles),
     }
+
+
+def _asymmetry(eye_blinks: EyeBlinks) -> dict[str, Any] | None:
+    """What the eye does at the other's blinks; None for one eye, and by the paper's rule."""
+    side = None if eye_blinks.recognised is None else eye_blinks.recognised.asymmetry
+    return None if side is None else asdict(side) | {"share": round(side.share, 4)}
 
 
 def write_summary(path: Path, summaries: Sequence[dict[str, Any]]) -> None:

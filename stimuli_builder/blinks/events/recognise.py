@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stimuli_builder.blinks.events.apart import apart
+from stimuli_builder.blinks.events.asymmetry import Asymmetry, asymmetry
 from stimuli_builder.blinks.events.candidates import RIPPLE, Candidate, candidate_at
 from stimuli_builder.blinks.events.generated import CLASSES, CLOSED_EYE_S
 from stimuli_builder.blinks.events.levels import Depth
@@ -35,10 +36,12 @@ class Recognised:
     """Events of one eye in order of time, and the deepest frames of blinks whose start or end is missing.
 
     An eye may blink or be shut while it is lowered (squint, gaze shift); else no two of its events overlap.
+    `asymmetry` is what this eye does at the blinks of the other; None where no such blink is seen.
     """
 
     events: tuple[LidEvent, ...]
     cut: tuple[int, ...]
+    asymmetry: Asymmetry | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,20 +56,46 @@ class _Told:
     cut: list[int]
 
 
+@dataclass(frozen=True, eq=False)
+class _Look:
+    """Pieces of an eye and the probabilities (dips, kinds) of their dips."""
+
+    pieces: list[Piece]
+    told: list[Array]
+
+
 def recognise(eyes: Sequence[BlinkSeries]) -> list[Recognised]:
-    """Return the events of each series; two series are taken as the two eyes of one face."""
-    pieces = looked_at(eyes)
-    probabilities = second_look(pieces)
+    """Return the events of each series; two series are taken as the two eyes of one face.
+
+    An eye whose fellow moves much less is judged by itself, and so is one that does not move.
+    """
+    together = _looks(eyes)
+    if len(eyes) != 2:
+        return [_recognised(look, eye.fps, None) for look, eye in zip(together, eyes, strict=True)]
+    alone = [_looks([eye])[0] for eye in eyes]
+    sides = [asymmetry(alone[k].pieces, alone[1 - k].pieces, alone[1 - k].told) for k in range(2)]
     results = []
-    for series, of_eye, told_of_eye in zip(eyes, pieces, probabilities, strict=True):
-        events: list[LidEvent] = []
-        cut: list[int] = []
-        for piece, of_piece in zip(of_eye, told_of_eye, strict=True):
-            told = _judged(piece, of_piece, series.fps)
-            cut += told.cut
-            events += apart(_listed(told), piece.depth.smooth, piece.start, series.fps)
-        results.append(Recognised(tuple(events), tuple(cut)))
+    for k, eye in enumerate(eyes):
+        own, other = sides[k], sides[1 - k]
+        by_itself = (other is not None and other.is_weak) or (own is not None and not own.moves)
+        results.append(_recognised((alone if by_itself else together)[k], eye.fps, own))
     return results
+
+
+def _looks(eyes: Sequence[BlinkSeries]) -> list[_Look]:
+    """Both looks at each series, two as the eyes of one face."""
+    pieces = looked_at(eyes)
+    return [_Look(*look) for look in zip(pieces, second_look(pieces), strict=True)]
+
+
+def _recognised(look: _Look, fps: float, side: Asymmetry | None) -> Recognised:
+    events: list[LidEvent] = []
+    cut: list[int] = []
+    for piece, of_piece in zip(look.pieces, look.told, strict=True):
+        told = _judged(piece, of_piece, fps)
+        cut += told.cut
+        events += apart(_listed(told), piece.depth.smooth, piece.start, fps)
+    return Recognised(tuple(events), tuple(cut), side)
 
 
 def _judged(piece: Piece, probabilities: Array, fps: float) -> _Told:

@@ -9,7 +9,8 @@ import pandas as pd
 from experiments.errors import InputError
 from experiments.files import whole_file
 from stimuli_builder.blinks.blink_model import BlinkModel
-from stimuli_builder.blinks.extract import all_profiles, blinks_of
+from stimuli_builder.blinks.both_eyes import all_profiles
+from stimuli_builder.blinks.extract import blinks_of
 from stimuli_builder.blinks.label_options import LabelOptions, preset
 from stimuli_builder.blinks.library.recordings import LIBRARY_FOLDER, Recording
 from stimuli_builder.blinks.profile import BlinkProfile
