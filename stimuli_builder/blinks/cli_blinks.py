@@ -86,7 +86,7 @@ def blinks(
         typer.Option(help="Table of all lid events; OUT with the ending .events.csv without it."),
     ] = None,
     resample: Annotated[
-        bool, typer.Option("--resample", help="Bring uneven times (time_s) to an even rate first.")
+        bool, typer.Option("--resample", help="Bring uneven times to an even rate first; holes are not seen.")
     ] = False,
     summary: Annotated[Path | None, typer.Option(help="Summary to write (JSON).")] = None,
     report: Annotated[

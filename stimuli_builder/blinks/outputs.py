@@ -81,6 +81,7 @@ def _write_text(path: Path, text: str) -> None:
 def _doubts(table: pd.DataFrame, eyes: Sequence[EyeBlinks]) -> list[str]:
     """What a track says of its own frames, and rates that are unlikely."""
     lines = [doubt for doubt in (rate_doubt(eye) for eye in eyes) if doubt]
+    lines += eyes[0].series.notes
     if "status" in table.columns:
         counts = table["status"].value_counts()
         for status in ("doubtful", "lost"):

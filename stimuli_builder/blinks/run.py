@@ -98,8 +98,8 @@ def run_blinks(job: BlinksJob) -> None:
 def label_recording(job: BlinksJob) -> list[EyeBlinks]:
     """Label every column of the job; none with a blink is refused, an unlikely rate is told."""
     given = read_series(job.series, job.columns, job.fps, allow_gaps=job.allow_gaps, resample=job.resample)
-    if given[0].note:
-        sys.stderr.write(f"note: {given[0].note}\n")
+    for note in given[0].notes:
+        sys.stderr.write(f"note: {note}\n")
     seen = recognise(given) if job.classify else [None] * len(given)
     eyes = [
         blinks_of(

@@ -1,7 +1,7 @@
 """An inter-eyelid distance over time: read from a plain series or a track, filtered with zero phase."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 from experiments.errors import InputError, nearest
 from stimuli_builder.blinks.csv_table import NOTE, few, read_table
 from stimuli_builder.blinks.profile import Array
+from stimuli_builder.blinks.times import MAX_BRIDGED_MS, resampled, series_fps
 from stimuli_builder.blinks.tracked_lid import tracked_lower_lid
 
 PAPER_FPS = 300
 DISTANCE_COLUMNS = ("left_distance_px", "right_distance_px", "distance_px")
 INDEX_COLUMNS = ("frame", "time_s", "valid")
-MAX_BRIDGED_MS = 1000 / 30
-"""Longest gap that is filled by a straight line: ten frames of the paper's, the filter's width."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +36,8 @@ class BlinkSeries:
         Frames filled by a straight line, and frames left out of the labelling.
     lower_up_mm, lower_nasal_mm : (n,) float64 array or None
         Place of the lower lid where a track holds it.
-    note : str
-        How its file was read, where that is not plain: semicolons, decimal commas.
+    notes : tuple of str
+        How its file was read, where that is not plain: semicolons, decimal commas, holes.
     """
 
     distance: Array
@@ -49,7 +48,7 @@ class BlinkSeries:
     missing_frames: int = 0
     lower_up_mm: Array | None = None
     lower_nasal_mm: Array | None = None
-    note: str = ""
+    notes: tuple[str, ...] = ()
 
 
 def scaled_frames(paper_frames: float, fps: float) -> float:
@@ -102,52 +101,19 @@ def _near_or_plausible(name: str, candidates: Sequence[str]) -> str:
     return f"; expected one of: {plausible}" if plausible else ""
 
 
-def series_fps(table: pd.DataFrame, fps: float | None, path: Path, *, uneven: bool = False) -> float:
-    """Return the frame rate: given, or measured from `time_s`; both must agree within 1%.
-
-    `uneven` takes times whose steps differ, for a series that is resampled.
-    """
-    measured = _measured_fps(table, path, uneven=uneven) if "time_s" in table.columns else None
-    if fps is None and measured is None:
-        raise InputError(
-            f"{path.name} has no column time_s (it has {few(list(table.columns))}); expected a "
-            "track, or lid distances: give the recording's rate with --fps"
-        )
-    if fps is not None and not (np.isfinite(fps) and 10 <= fps <= 10_000):
-        raise InputError(f"the rate must lie between 10 and 10000 frames a second, got --fps {fps:g}")
-    if fps is not None and measured is not None and abs(fps / measured - 1) > 0.01:
-        raise InputError(
-            f"--fps {fps:g} contradicts {path.name}, whose time_s runs at {measured:.2f}; leave --fps out"
-        )
-    rate = measured if measured is not None else fps
-    if rate is None or rate < 10:
-        raise InputError(
-            f"{path.name}: at {rate} frames a second no blink can be seen; 10 or more are needed"
-        )
-    return rate
-
-
-def _measured_fps(table: pd.DataFrame, path: Path, *, uneven: bool) -> float:
-    times = pd.to_numeric(table["time_s"], errors="coerce").to_numpy(dtype=np.float64)
-    steps = np.diff(times)
-    if steps.size == 0 or not np.isfinite(steps).all() or (steps <= 0).any():
-        raise InputError(f"{path.name}: time_s must be complete and increase from row to row")
-    step = float(np.median(steps))
-    if not uneven and (np.abs(steps / step - 1) > 0.2).any():
-        row = int(np.argmax(np.abs(steps / step - 1) > 0.2)) + 2
-        raise InputError(
-            f"{path.name}: time_s is uneven (row {row}); labels need a constant frame rate: "
-            "--resample brings it to one"
-        )
-    return float((times.size - 1) / (times[-1] - times[0]))
-
-
 def make_series(
-    table: pd.DataFrame, column: str, fps: float, path: Path, *, allow_gaps: bool | None = None
+    table: pd.DataFrame,
+    column: str,
+    fps: float,
+    path: Path,
+    *,
+    allow_gaps: bool | None = None,
+    unseen: NDArray[np.bool_] | None = None,
 ) -> BlinkSeries:
     """Return one column as a series: short gaps bridged, long ones kept as NaN or refused.
 
     `allow_gaps` left at None means: in a track yes (its frames without a fit say why), in a plain series no.
+    Gaps of `unseen` frames, which the table itself says were not seen, are never refused.
     """
     values = _numbers(table, column, path)
     values = np.where(np.isfinite(values), values, np.nan)
@@ -163,9 +129,10 @@ def make_series(
     reach = round(MAX_BRIDGED_MS * fps / 1000)
     filled, bridged = bridge_gaps(values, reach)
     missing = np.isnan(filled)
-    if missing.any() and not gaps_allowed:
-        first = int(np.argmax(missing))
-        rest = missing[first:]
+    unsaid = missing if unseen is None else missing & ~unseen
+    if unsaid.any() and not gaps_allowed:
+        first = int(np.argmax(unsaid))
+        rest = unsaid[first:]
         length = int(np.argmin(rest)) if not rest.all() else rest.size
         raise InputError(
             f"{path.name}: column '{column}' has no value on {length} frames from row {first + 2} on; "
@@ -183,7 +150,6 @@ def make_series(
         fps=fps,
         column=column,
         is_px=column.endswith("_px"),
-        note=table.attrs.get(NOTE, ""),
         bridged_frames=bridged,
         missing_frames=int(missing.sum()),
         lower_up_mm=up,
@@ -218,24 +184,6 @@ def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
     return list(zip(np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist(), strict=True))
 
 
-def resampled(table: pd.DataFrame, columns: Sequence[str], path: Path) -> pd.DataFrame:
-    """Bring columns to even times at the mean rate of `time_s`, by straight lines between true times.
-
-    Gaps stay gaps: a value next to an empty one is empty.
-    """
-    times = table["time_s"].to_numpy(dtype=np.float64)
-    even = np.linspace(times[0], times[-1], times.size)
-    data: dict[str, Array | pd.Series] = {"frame": np.arange(even.size, dtype=np.float64), "time_s": even}
-    for column in columns:
-        data[column] = np.interp(even, times, _numbers(table, column, path))
-    if "status" in table.columns:
-        nearest = np.clip(np.searchsorted(times, even), 0, times.size - 1)
-        data["status"] = table["status"].iloc[nearest].reset_index(drop=True)
-    even_table = pd.DataFrame(data)
-    even_table.attrs = table.attrs
-    return even_table
-
-
 def read_series(
     path: Path,
     columns: Sequence[str] = (),
@@ -253,6 +201,12 @@ def read_series(
     if resample and "time_s" not in table.columns:
         raise InputError(f"{path.name} has no column time_s: --resample needs the time of every frame")
     rate = series_fps(table, fps, path, uneven=resample)
+    notes, unseen = [str(table.attrs.get(NOTE, ""))], None
     if resample:
-        table = resampled(table, chosen, path)
-    return [make_series(table, column, rate, path, allow_gaps=allow_gaps) for column in chosen]
+        for column in chosen:
+            _numbers(table, column, path)
+        table, unseen, note = resampled(table, chosen, rate, path)
+        notes.append(note)
+    said = tuple(note for note in notes if note)
+    eyes = [make_series(table, name, rate, path, allow_gaps=allow_gaps, unseen=unseen) for name in chosen]
+    return [replace(eye, notes=said) for eye in eyes]

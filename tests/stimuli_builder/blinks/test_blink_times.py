@@ -1,0 +1,79 @@
+"""Holes in time stamps are not seen: no straight line crosses them, no minute counts them."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from experiments.errors import InputError
+from stimuli_builder.blinks.profile import Array
+from stimuli_builder.blinks.series import read_series
+
+
+def written(path: Path, times: Array, values: Array) -> Path:
+    pd.DataFrame({"time_s": times, "gap": values}).to_csv(path, index=False)
+    return path
+
+
+@pytest.mark.parametrize("fps", [30.0, 60.0, 240.0])
+def test_a_pause_in_the_times_is_no_recording(stimuli, make_known, tmp_path: Path, fps: float) -> None:
+    known = make_known(fps=fps, noise=0.05)
+    times = np.arange(known.distance.size) / fps
+    times[known.minima[1] + round(fps) :] += 60  # between two blinks
+    path = written(tmp_path / "s.csv", times, known.distance)
+    ended = stimuli(
+        "blinks", path, "--resample", "--out", tmp_path / "b.csv", "--summary", tmp_path / "s.json"
+    )
+    assert ended.code == 0, ended.err
+    assert "s.csv: 1 hole in time_s" in ended.err
+    assert "60 s together" in ended.err
+    (column,) = json.loads((tmp_path / "s.json").read_text(encoding="utf-8"))["columns"]
+    assert column["blinks"] == 4
+    assert column["fps"] == pytest.approx(fps, rel=0.001)
+    assert column["minutes"] == pytest.approx(known.distance.size / fps / 60, rel=0.01)
+
+
+def test_a_hole_of_half_a_second_costs_the_blink_in_it_alone(stimuli, make_known, tmp_path: Path) -> None:
+    known = make_known(fps=120.0, noise=0.05)
+    times = np.arange(known.distance.size) / 120
+    seen = (times < 5.8) | (times > 6.3)  # the third blink is at 6 s
+    path = written(tmp_path / "s.csv", times[seen], known.distance[seen])
+    assert stimuli("blinks", path, "--resample", "--out", tmp_path / "b.csv").code == 0
+    minima = pd.read_csv(tmp_path / "b.csv")["minimum_s"]
+    assert minima.to_list() == pytest.approx([2, 4, 8], abs=0.03)
+
+
+@pytest.mark.parametrize(
+    ("fps", "dropped", "holes"), [(30.0, 1, 0), (30.0, 2, 1), (240.0, 6, 0), (240.0, 9, 1)]
+)
+def test_a_few_dropped_frames_are_bridged(tmp_path: Path, fps: float, dropped: int, holes: int) -> None:
+    times = np.delete(np.arange(round(4 * fps)) / fps, np.s_[100 : 100 + dropped])
+    path = written(tmp_path / "s.csv", times, np.linspace(20, 30, times.size))
+    (series,) = read_series(path, resample=True)
+    assert series.distance.size == pytest.approx(4 * fps, abs=dropped)  # at the mean rate
+    assert series.missing_frames == pytest.approx(holes * dropped, abs=1)
+    assert len(series.notes) == holes
+
+
+def test_an_empty_value_is_still_refused_beside_a_hole(tmp_path: Path) -> None:
+    times = np.arange(400) / 60
+    times[200:] += 5
+    values = np.full(400, 20.0)
+    values[50:100] = np.nan
+    path = written(tmp_path / "s.csv", times, values)
+    with pytest.raises(InputError, match=r"has no value on 5[01] frames"):
+        read_series(path, resample=True)
+
+
+def test_times_that_jump_by_years_are_refused(tmp_path: Path) -> None:
+    times = np.arange(400) / 60
+    times[200:] += 1.7e9
+    with pytest.raises(InputError, match="are the most: cut the recording where it pauses"):
+        read_series(written(tmp_path / "s.csv", times, np.full(400, 20.0)), resample=True)
+
+
+def test_a_rate_too_low_is_told_in_few_digits(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"at 0\.03 frames a second no blink"):
+        read_series(written(tmp_path / "s.csv", np.arange(400) / 0.03, np.full(400, 20.0)))
