@@ -82,11 +82,9 @@ def _doubts(table: pd.DataFrame, eyes: Sequence[EyeBlinks]) -> list[str]:
     """What a track says of its own frames, and rates that are unlikely."""
     lines = [doubt for doubt in (rate_doubt(eye) for eye in eyes) if doubt]
     lines += eyes[0].series.notes
-    if "status" in table.columns:
-        counts = table["status"].value_counts()
-        for status in ("doubtful", "lost"):
-            if status in counts:
-                lines.append(f"{int(counts[status]):,} of {len(table):,} frames are {status}")
+    lost = int((table["status"] == "lost").sum()) if "status" in table.columns else 0
+    if lost:
+        lines.append(f"{lost:,} of {len(table):,} frames are lost")
     if "error_px" in table.columns and table["error_px"].notna().any():
         lines.append(f"stated error of the points, median: {table['error_px'].median():.2f} px")
     return lines

@@ -13,10 +13,11 @@ from stimuli_builder.blinks.csv_table import NOTE, few, read_table
 from stimuli_builder.blinks.profile import Array
 from stimuli_builder.blinks.times import MAX_BRIDGED_MS, resampled, series_fps
 from stimuli_builder.blinks.tracked_lid import tracked_lower_lid
+from stimuli_builder.blinks.validity import CONFIDENCE_COLUMN, VALID_COLUMNS, unseen_rows
 
 PAPER_FPS = 300
 DISTANCE_COLUMNS = ("left_distance_px", "right_distance_px", "distance_px")
-INDEX_COLUMNS = ("frame", "time_s", "valid")
+INDEX_COLUMNS = ("frame", "time_s", "timestamp", "time_ms", *VALID_COLUMNS, CONFIDENCE_COLUMN)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,8 +108,8 @@ def make_series(
     fps: float,
     path: Path,
     *,
-    allow_gaps: bool | None = None,
-    unseen: NDArray[np.bool_] | None = None,
+    allow_gaps: bool | None,
+    unseen: NDArray[np.bool_],
 ) -> BlinkSeries:
     """Return one column as a series: short gaps bridged, long ones kept as NaN or refused.
 
@@ -129,7 +130,7 @@ def make_series(
     reach = round(MAX_BRIDGED_MS * fps / 1000)
     filled, bridged = bridge_gaps(values, reach)
     missing = np.isnan(filled)
-    unsaid = missing if unseen is None else missing & ~unseen
+    unsaid = missing & ~unseen
     if unsaid.any() and not gaps_allowed:
         first = int(np.argmax(unsaid))
         rest = unsaid[first:]
@@ -201,12 +202,12 @@ def read_series(
     if resample and "time_s" not in table.columns:
         raise InputError(f"{path.name} has no column time_s: --resample needs the time of every frame")
     rate = series_fps(table, fps, path, uneven=resample)
-    notes, unseen = [str(table.attrs.get(NOTE, ""))], None
+    unseen, notes = unseen_rows(table, path)
+    for column in chosen:
+        table[column] = np.where(unseen, np.nan, _numbers(table, column, path))
     if resample:
-        for column in chosen:
-            _numbers(table, column, path)
-        table, unseen, note = resampled(table, chosen, rate, path)
+        table, unseen, note = resampled(table, chosen, rate, path, unseen)
         notes.append(note)
-    said = tuple(note for note in notes if note)
+    said = tuple(note for note in (str(table.attrs.get(NOTE, "")), *notes) if note)
     eyes = [make_series(table, name, rate, path, allow_gaps=allow_gaps, unseen=unseen) for name in chosen]
     return [replace(eye, notes=said) for eye in eyes]

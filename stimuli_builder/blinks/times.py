@@ -73,17 +73,22 @@ def _hole_limit_s(steps: Array) -> float:
 
 
 def resampled(
-    table: pd.DataFrame, columns: Sequence[str], fps: float, path: Path
+    table: pd.DataFrame, columns: Sequence[str], fps: float, path: Path, unseen: NDArray[np.bool_]
 ) -> tuple[pd.DataFrame, NDArray[np.bool_], str]:
     """Bring columns to even times at `fps`, by straight lines between true times.
 
     Gaps stay gaps: a value next to an empty one is empty. So is what lies in a hole of `time_s`.
 
+    Parameters
+    ----------
+    unseen : (rows,) bool array
+        Rows that were not seen.
+
     Returns
     -------
     table : DataFrame
-    in_hole : (n,) bool array
-        Frames of the new table that lie in a hole.
+    unseen : (n,) bool array
+        Frames of the new table that lie in a hole, or beside a row that was not seen.
     note : str
         How many holes, and how long together; empty without one.
     """
@@ -108,7 +113,7 @@ def resampled(
         data["status"] = table["status"].iloc[nearest].reset_index(drop=True)
     even_table = pd.DataFrame(data)
     even_table.attrs = table.attrs
-    return even_table, in_hole, _hole_note(steps, path)
+    return even_table, in_hole | unseen[left] | unseen[left + 1], _hole_note(steps, path)
 
 
 def _hole_note(steps: Array, path: Path) -> str:

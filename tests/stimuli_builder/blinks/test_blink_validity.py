@@ -1,0 +1,79 @@
+"""Frames that their table calls not valid are not seen, and doubtful ones are said."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from experiments.errors import InputError
+from stimuli_builder.blinks.series import read_series
+
+FPS = 120.0
+BAD = slice(300, 420)
+"""Between two blinks, at 2 and 4 s; zeros there read as a closed eye."""
+
+
+def spoilt(make_known, name: str, good: object, bad: object) -> pd.DataFrame:
+    """A series whose tracker wrote zeros for a second, and said so in a column."""
+    known = make_known(fps=FPS, noise=0.05)
+    distance, column = known.distance.copy(), np.full(known.distance.size, good, dtype=object)
+    distance[BAD], column[BAD] = 0.0, bad
+    return pd.DataFrame({" gap_l": distance, name: column})
+
+
+@pytest.mark.parametrize(
+    ("name", "good", "bad"),
+    [(" success", 1, 0), ("valid", True, False), ("Valid", "true", ""), (" confidence", 0.98, 0.2)],
+)
+def test_frames_that_are_not_valid_are_not_seen(
+    stimuli, make_known, tmp_path: Path, name: str, good: object, bad: object
+) -> None:
+    spoilt(make_known, name, good, bad).to_csv(tmp_path / "s.csv", index=False)
+    files = ("--out", tmp_path / "b.csv", "--report", tmp_path / "r.html")
+    ended = stimuli("blinks", tmp_path / "s.csv", "--column", "gap_l", "--fps", FPS, *files)
+    assert ended.code == 0, ended.err
+    assert "s.csv: 120 of 1,200 frames" in ended.err
+    assert "taken as not seen" in ended.err
+    assert "taken as not seen" in (tmp_path / "r.html").read_text(encoding="utf-8")
+    events = pd.read_csv(tmp_path / "b.events.csv")
+    assert events["kind"].to_list() == ["blink"] * 4
+
+
+def test_frames_not_valid_stay_unseen_when_times_are_evened(make_known, tmp_path: Path) -> None:
+    table = spoilt(make_known, "success", 1, 0)
+    table["time_s"] = np.arange(len(table)) / FPS + np.random.default_rng(2).uniform(0, 0.002, len(table))
+    table.to_csv(tmp_path / "s.csv", index=False)
+    (series,) = read_series(tmp_path / "s.csv", ["gap_l"], resample=True)
+    assert series.missing_frames == pytest.approx(121, abs=1)
+    assert np.isnan(series.distance[305:415]).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "good", "bad", "message"),
+    [
+        ("valid", "yes", "no", "by 1 and 0 .* got 'yes'"),
+        ("success", 0, 0, "nothing is left: take the column out"),
+        ("confidence", 98, 12, "between 0 and 1, got 12 to 98"),
+    ],
+)
+def test_a_column_of_something_else_is_refused(
+    make_known, tmp_path: Path, name: str, good: object, bad: object, message: str
+) -> None:
+    spoilt(make_known, name, good, bad).to_csv(tmp_path / "s.csv", index=False)
+    with pytest.raises(InputError, match=message):
+        read_series(tmp_path / "s.csv", ["gap_l"], FPS)
+
+
+def test_doubtful_frames_of_a_track_are_said(stimuli, make_known, tmp_path: Path) -> None:
+    known = make_known(noise=0.05)
+    status = np.where(np.arange(known.distance.size) < 50, "doubtful", "tracked")
+    times = np.arange(known.distance.size) / known.fps
+    track = pd.DataFrame({"time_s": times, "distance_px": known.distance, "status": status})
+    track.to_csv(tmp_path / "t.csv", index=False)
+    ended = stimuli(
+        "blinks", tmp_path / "t.csv", "--out", tmp_path / "b.csv", "--report", tmp_path / "r.html"
+    )
+    assert ended.code == 0, ended.err
+    assert "t.csv: 50 of 3,000 frames are doubtful" in ended.err
+    assert (tmp_path / "r.html").read_text(encoding="utf-8").count("frames are doubtful") == 1
