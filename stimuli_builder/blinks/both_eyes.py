@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from experiments.counted import counted
-from stimuli_builder.blinks.extract import EyeBlinks, eye_of, eye_profiles
+from stimuli_builder.blinks.column_names import eye_of
+from stimuli_builder.blinks.extract import EyeBlinks, eye_profiles
 from stimuli_builder.blinks.measure import MeasuredBlink, closure_at_300
 from stimuli_builder.blinks.profile import BlinkProfile, Eye
 

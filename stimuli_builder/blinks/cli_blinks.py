@@ -14,7 +14,8 @@ CLASSIFIER = "classifier"
 EXAMPLES = """
 Label the blinks of a series (eye aspect ratio or distance) or of a track, and measure them.
 
-The series is a CSV with a column of distances; a track's distance columns are found by themselves. Blinks,
+The series is a CSV with a column of distances; a track's distance columns are found by themselves. Columns of
+closure (eyeBlinkLeft, AU45_r) are turned round. Blinks,
 squints, gaze shifts and closed eyes are told apart at any rate from 15 to 1,000 frames a second.
 BLINKS.csv gets a row a blink; the blinks' profiles (closure at 300 fps) and a table of all events are
 written beside it. --preset chooses the paper's rule instead; its frame counts are at 300 fps and scale.
@@ -88,6 +89,13 @@ def blinks(
     resample: Annotated[
         bool, typer.Option("--resample", help="Bring uneven times to an even rate first; holes are not seen.")
     ] = False,
+    inverted: Annotated[
+        bool | None,
+        typer.Option(
+            "--inverted/--not-inverted",
+            help="Whether high is shut (closures, blendshapes); from the column's name without it.",
+        ),
+    ] = None,
     summary: Annotated[Path | None, typer.Option(help="Summary to write (JSON).")] = None,
     report: Annotated[
         Path | None,
@@ -140,6 +148,7 @@ def blinks(
             classify=preset == CLASSIFIER,
             events=events or out.with_name(f"{out.stem}.events.csv"),
             resample=resample,
+            inverted=inverted,
             more=MoreOutputs(report, lids, scale, curve, curve_format),
             summary=summary,
             plot=plot,

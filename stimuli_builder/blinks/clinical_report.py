@@ -12,6 +12,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from experiments.counted import counted
 from stimuli_builder.blinks.both_eyes import asymmetry_lines
+from stimuli_builder.blinks.column_names import eye_of
 from stimuli_builder.blinks.extract import EyeBlinks
 from stimuli_builder.blinks.plots import sequence_figure, series_figure
 from stimuli_builder.blinks.profile import Array
@@ -159,6 +160,10 @@ def pair_lines(accepted: pd.DataFrame) -> list[str]:
     columns = list(dict.fromkeys(accepted["column"]))
     if len(columns) != 2:
         return []
+    if {eye_of(column) for column in columns} != {"left", "right"}:
+        return [
+            "the columns' names do not say which eye is which (EAR_left, EAR_right): blinks are not paired"
+        ]
     first = pairs[pairs["column"] == columns[0]]
     alone = [int((accepted["column"] == c).sum() - (pairs["column"] == c).sum()) for c in columns]
     lines = [

@@ -141,16 +141,6 @@ def rate_doubt(eye: EyeBlinks) -> str:
     )
 
 
-def eye_of(column: str) -> Eye | None:
-    """Tell the eye from a column's name: left..., ..._l, right..., ..._r; else None."""
-    name = column.lower()
-    if name.startswith("left") or name.endswith(("_l", "_left")):
-        return "left"
-    if name.startswith("right") or name.endswith(("_r", "_right")):
-        return "right"
-    return None
-
-
 def eye_profile(
     eye_blinks: EyeBlinks, blink: MeasuredBlink, recording: str, eye: Eye | None, label: str = ""
 ) -> BlinkProfile:

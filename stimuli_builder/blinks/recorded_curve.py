@@ -5,8 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from experiments.errors import InputError
+from stimuli_builder.blinks.column_names import eye_of
 from stimuli_builder.blinks.export.curve import AnimationCurve
-from stimuli_builder.blinks.extract import EyeBlinks, eye_of
+from stimuli_builder.blinks.extract import EyeBlinks
 from stimuli_builder.blinks.profile import Array
 from stimuli_builder.blinks.units import closure_course
 

@@ -8,12 +8,12 @@ from pathlib import Path
 from experiments.errors import InputError
 from experiments.files import check_targets
 from stimuli_builder.blinks.both_eyes import all_profiles, asymmetry_lines, both_eyes
+from stimuli_builder.blinks.column_names import eye_of
 from stimuli_builder.blinks.console_report import print_blinks, print_written
 from stimuli_builder.blinks.events.recognise import recognise
 from stimuli_builder.blinks.extract import (
     EyeBlinks,
     blinks_of,
-    eye_of,
     rate_doubt,
     require_blinks,
 )
@@ -51,6 +51,7 @@ class BlinksJob:
     classify: bool = True
     events: Path | None = None
     resample: bool = False
+    inverted: bool | None = None
     more: MoreOutputs = field(default_factory=MoreOutputs)
     summary: Path | None = None
     plot: Path | None = None
@@ -97,7 +98,14 @@ def run_blinks(job: BlinksJob) -> None:
 
 def label_recording(job: BlinksJob) -> list[EyeBlinks]:
     """Label every column of the job; none with a blink is refused, an unlikely rate is told."""
-    given = read_series(job.series, job.columns, job.fps, allow_gaps=job.allow_gaps, resample=job.resample)
+    given = read_series(
+        job.series,
+        job.columns,
+        job.fps,
+        allow_gaps=job.allow_gaps,
+        resample=job.resample,
+        inverted=job.inverted,
+    )
     for note in given[0].notes:
         sys.stderr.write(f"note: {note}\n")
     seen = recognise(given) if job.classify else [None] * len(given)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from experiments.errors import InputError, nearest
 from stimuli_builder.blinks.csv_table import NOTE, few, read_table
+from stimuli_builder.blinks.inverted import opening_of
 from stimuli_builder.blinks.profile import Array
 from stimuli_builder.blinks.times import MAX_BRIDGED_MS, resampled, series_fps
 from stimuli_builder.blinks.tracked_lid import tracked_lower_lid
@@ -192,10 +193,11 @@ def read_series(
     *,
     allow_gaps: bool | None = None,
     resample: bool = False,
+    inverted: bool | None = None,
 ) -> list[BlinkSeries]:
     """Read the distance columns of a plain series or track CSV, see `choose_columns` and `series_fps`.
 
-    `resample` brings uneven times to even ones first.
+    `resample` brings uneven times to even ones first. `inverted` says whether high is shut (`opening_of`).
     """
     table = read_table(path)
     chosen = choose_columns(table, columns, path)
@@ -204,10 +206,17 @@ def read_series(
     rate = series_fps(table, fps, path, uneven=resample)
     unseen, notes = unseen_rows(table, path)
     for column in chosen:
-        table[column] = np.where(unseen, np.nan, _numbers(table, column, path))
+        values = np.where(unseen, np.nan, _numbers(table, column, path))
+        table[column], note = opening_of(values, column, path, _is_inverted(column, inverted))
+        notes.append(note)
     if resample:
         table, unseen, note = resampled(table, chosen, rate, path, unseen)
         notes.append(note)
     said = tuple(note for note in (str(table.attrs.get(NOTE, "")), *notes) if note)
     eyes = [make_series(table, name, rate, path, allow_gaps=allow_gaps, unseen=unseen) for name in chosen]
     return [replace(eye, notes=said) for eye in eyes]
+
+
+def _is_inverted(column: str, inverted: bool | None) -> bool | None:
+    """A track's own distances are openings."""
+    return False if inverted is None and column in DISTANCE_COLUMNS else inverted
