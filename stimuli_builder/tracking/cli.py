@@ -83,8 +83,8 @@ def track(
     relabel: Annotated[
         Path | None,
         typer.Option(
-            help="Label file for the worst frames, to be corrected by hand; where it is there, its frames "
-            "train the model and win over the detector."
+            help="Label file for the worst frames, to be corrected by hand; where it is there, the frames "
+            "corrected or accepted in it train the model and win over the detector."
         ),
     ] = None,
 ) -> None:
@@ -165,14 +165,17 @@ def train(
     from experiments.errors import InputError
     from experiments.files import check_targets
     from stimuli_builder.progress import step_progress
-    from stimuli_builder.tracking.cli_track import report_modes
+    from stimuli_builder.tracking.cli_track import report_modes, warn
+    from stimuli_builder.tracking.labels import load_labels
     from stimuli_builder.tracking.learn import learn, open_video, training_steps
     from stimuli_builder.tracking.model_file import save_model
+    from stimuli_builder.tracking.proposals import unreviewed
 
     if labels is None:
         raise InputError("expected --labels with the label file of this video")
     check_targets([out], [video, labels])
     info = open_video(video, accept_variable_rate)
+    warn(unreviewed(load_labels(labels)))
     options = _options(shape_variance, appearance_variance, coupled_variance, paper_modes, base_pixels)
     with step_progress("training", training_steps(folds, refine)) as advance:
         lesson = learn(info, labels, options, one_eye=one_eye, folds=folds, refine=refine, advance=advance)

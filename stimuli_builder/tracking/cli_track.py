@@ -14,12 +14,13 @@ from stimuli_builder.blinks.plots import check_figure_name
 from stimuli_builder.progress import frame_progress, step_progress
 from stimuli_builder.tracking.labelfree import label_free_lesson
 from stimuli_builder.tracking.labels import Labels, load_labels
-from stimuli_builder.tracking.learn import Lesson, learn, open_video, training_steps
+from stimuli_builder.tracking.learn import Lesson, check_eyes, learn, open_video, training_steps
 from stimuli_builder.tracking.model import CoupledModel
 from stimuli_builder.tracking.model_file import load_model
 from stimuli_builder.tracking.outcome import TrackSummary
 from stimuli_builder.tracking.plot import plot_track
 from stimuli_builder.tracking.preview import write_preview
+from stimuli_builder.tracking.proposals import by_hand, unmarked, unreviewed
 from stimuli_builder.tracking.relabel import worst_frames, write_relabel
 from stimuli_builder.tracking.shapes import Points
 from stimuli_builder.tracking.survey import survey
@@ -30,6 +31,7 @@ from stimuli_builder.video_clock import DamagedFileError
 from stimuli_builder.video_scan import declared_frames
 from stimuli_builder.video_writer import check_video_name
 
+Hints = Mapping[int, Points | str]
 REASONS_TOLD = 6
 VIDEO_SUFFIXES = {".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm", ".mts", ".mpg", ".wmv"}
 
@@ -79,7 +81,7 @@ def _track(job: TrackJob, info: VideoInfo) -> None:
     if job.accept_damaged_end:
         _say_how_far(info)
     if job.relabel is not None:
-        _relabel(job.relabel, info, model, job.out, hints)
+        _relabel(job.relabel, info, model, job, hints)
     _pictures(job, info, model)
 
 
@@ -145,9 +147,10 @@ def _check(job: TrackJob) -> None:
         check_figure_name(job.plot)
 
 
-def _model(job: TrackJob, info: VideoInfo) -> tuple[CoupledModel, Mapping[int, Points | str]]:
+def _model(job: TrackJob, info: VideoInfo) -> tuple[CoupledModel, Hints]:
     """A model from labels, from a file, or from what the detector sees; then with its detections."""
     if job.labels is not None:
+        warn(unreviewed(load_labels(job.labels)))
         with step_progress("training", training_steps(job.folds, job.refine)) as advance:
             lesson = learn(
                 info,
@@ -168,8 +171,8 @@ def _model(job: TrackJob, info: VideoInfo) -> tuple[CoupledModel, Mapping[int, P
     return model, {}
 
 
-def _label_free(job: TrackJob, info: VideoInfo) -> tuple[CoupledModel, Mapping[int, Points | str]]:
-    by_hand = _by_hand(job.relabel, info)
+def _label_free(job: TrackJob, info: VideoInfo) -> tuple[CoupledModel, Hints]:
+    hand = _by_hand(job, info)
     with frame_progress() as progress:
         task = progress.add_task("finding eyes", total=info.frame_count)
         seen = survey(info, one_eye=job.one_eye, advance=lambda now: progress.update(task, completed=now))
@@ -180,25 +183,40 @@ def _label_free(job: TrackJob, info: VideoInfo) -> tuple[CoupledModel, Mapping[i
         else ""
     )
     print(f"{line}{more}; training on them", flush=True)
-    with step_progress("training", training_steps()) as advance:
+    with step_progress("training", training_steps(refine=job.refine)) as advance:
         lesson = label_free_lesson(
-            info, seen, job.options, one_eye=job.one_eye, by_hand=by_hand, advance=advance
+            info, seen, job.options, one_eye=job.one_eye, by_hand=hand, refine=job.refine, advance=advance
         )
     report_modes(lesson)
     return lesson.model, seen.hints
 
 
-def _by_hand(path: Path | None, info: VideoInfo) -> Labels | None:
-    return load_labels(path, info.size_px, info.frame_count) if path is not None and path.exists() else None
+def _by_hand(job: TrackJob, info: VideoInfo) -> Labels | None:
+    """What a person changed or accepted in the file to relabel; None where there is no file yet."""
+    if job.relabel is None or not job.relabel.exists():
+        return None
+    labels = load_labels(job.relabel, info.size_px, info.frame_count, fewest=1)
+    check_eyes(labels, job.one_eye)
+    warn(unmarked(labels))
+    return by_hand(labels)
 
 
-def _relabel(
-    path: Path, info: VideoInfo, model: CoupledModel, out: Path, hints: Mapping[int, Points | str]
-) -> None:
-    before = _by_hand(path, info)
-    worst = worst_frames(out, model.eyes, info.fps, hints)
-    new = write_relabel(path, info, model.markers, worst, {} if before is None else before.frames)
-    print(f"{path}: {new} frames to correct on the labelling page; run the same command again then")
+def _relabel(path: Path, info: VideoInfo, model: CoupledModel, job: TrackJob, hints: Hints) -> None:
+    hand = by_hand(load_labels(path, fewest=1)).frames if path.exists() else {}
+    proposed = write_relabel(
+        path, info, model.markers, worst_frames(job.out, model.eyes, info.fps, hints), hand
+    )
+    count = "counts" if len(hand) == 1 else "count"
+    print(
+        f"{path}: {counted(len(hand), 'frame')} corrected or accepted, which {count}; {proposed} as "
+        "proposed, which do not: correct or accept them on the labelling page, then run this command again"
+    )
+
+
+def warn(line: str) -> None:
+    """Print a warning on stderr, unless there is nothing to say."""
+    if line:
+        sys.stderr.write(f"warning: {line}\n")
 
 
 def _report(out: Path, summary: TrackSummary, prepared_s: float) -> None:

@@ -10,6 +10,7 @@ from experiments.errors import InputError
 from stimuli_builder.tracking.accuracy import Advance
 from stimuli_builder.tracking.labels import Labels, save_labels
 from stimuli_builder.tracking.learn import Lesson, lesson_from
+from stimuli_builder.tracking.proposals import DETECTED
 from stimuli_builder.tracking.shapes import (
     EYE_POINTS,
     Points,
@@ -87,10 +88,9 @@ def proposed_labels(info: VideoInfo, seen: Survey, out: Path, wanted_frames: int
             "ask for fewer (--frames)"
         )
     eyes = len(next(iter(good.values()))) // EYE_POINTS
-    labels = Labels(
-        out, info.size_px, default_markers(eyes), {n: good[n] for n in most_varied(good, wanted_frames)}
-    )
-    save_labels(labels, info.path.name, "detector on single frames, not reviewed")
+    chosen = {n: good[n] for n in most_varied(good, wanted_frames)}
+    labels = Labels(out, info.size_px, default_markers(eyes), chosen, chosen)
+    save_labels(labels, info.path.name, DETECTED)
     return labels
 
 
@@ -104,7 +104,7 @@ def label_free_lesson(
     refine: bool | None = None,
     advance: Advance = None,
 ) -> Lesson:
-    """Train the model on the most varied of the detections; frames labelled by hand win.
+    """Train the model on the most varied of the detections; frames labelled by hand (all of `by_hand`) win.
 
     Twelve frames by hand or more train alone: a person and a detector mean slightly different points.
     `advance` is called after each of `training_steps`.

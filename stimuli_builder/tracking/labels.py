@@ -31,12 +31,18 @@ class Labels:
         (width, height) of the video they belong to.
     frames : dict of int to float64 array
         Frame number -> (18, 2) or, for one eye, (9, 2) points in pixels, x right, y down.
+    proposed : dict of int to float64 array or None
+        What a program proposed for frames that nobody has accepted since; None where the file does not say.
+    origin : str
+        Where the points come from, in words of whoever wrote the file.
     """
 
     path: Path
     size_px: tuple[int, int]
     markers: LidMarkers
     frames: dict[int, Points]
+    proposed: dict[int, Points] | None = None
+    origin: str = ""
 
     @property
     def eyes(self) -> int:
@@ -44,13 +50,20 @@ class Labels:
         return self.markers.eyes
 
 
-def load_labels(path: Path, size_px: tuple[int, int] | None = None, frame_count: int | None = None) -> Labels:
+def load_labels(
+    path: Path,
+    size_px: tuple[int, int] | None = None,
+    frame_count: int | None = None,
+    fewest: int = FEWEST_FRAMES,
+) -> Labels:
     """Read and check a label file.
 
     Parameters
     ----------
     size_px, frame_count : (int, int), int
         Of the video the labels are to be used with; checked where given.
+    fewest : int
+        Frames that must be labelled.
 
     Raises
     ------
@@ -65,13 +78,21 @@ def load_labels(path: Path, size_px: tuple[int, int] | None = None, frame_count:
             f"{size_px[0]} x {size_px[1]}; "
             "use the video they were made on"
         )
-    frames = _frames(path, document.get("frames"))
+    frames = _frames(path, document.get("frames"), fewest)
     eyes = len(next(iter(frames.values()))) // EYE_POINTS
     for number, points in frames.items():
         _check_frame(f"{path}: frame {number}", points, eyes, (width, height))
         if frame_count is not None and number >= frame_count:
             raise InputError(f"{path}: frame {number} is labelled, the video ends at frame {frame_count - 1}")
-    return Labels(path, (width, height), _markers(path, document, eyes), frames)
+    origin = document.get("origin")
+    return Labels(
+        path,
+        (width, height),
+        _markers(path, document, eyes),
+        frames,
+        _proposed(path, document.get("proposed")),
+        origin if isinstance(origin, str) else "",
+    )
 
 
 def _document(path: Path) -> dict[str, Any]:
@@ -104,20 +125,34 @@ def _size(path: Path, document: dict[str, Any]) -> tuple[int, int]:
     return size[0], size[1]
 
 
-def _frames(path: Path, data: object) -> dict[int, Points]:
+def _proposed(path: Path, data: object) -> dict[int, Points] | None:
+    if data is None:
+        return None
+    if not isinstance(data, dict):
+        raise InputError(
+            f"{path}: expected 'proposed': {{frame number: points}}, found {type(data).__name__}"
+        )
+    return {_number(path, key): _points(f"{path}: proposed frame {key}", data[key]) for key in data}
+
+
+def _number(path: Path, key: object) -> int:
+    if not str(key).strip().isdecimal():
+        raise InputError(f"{path}: expected a frame number from 0, found '{key}'")
+    return int(str(key))
+
+
+def _frames(path: Path, data: object, fewest: int) -> dict[int, Points]:
     if data is None:
         raise InputError(f"{path}: 'frames' is missing; expected the points of each labelled frame")
     if not isinstance(data, dict):
         raise InputError(f"{path}: expected 'frames': {{frame number: points}}, found {type(data).__name__}")
-    if len(data) < FEWEST_FRAMES:
+    if len(data) < fewest:
         raise InputError(
-            f"{path}: {len(data)} labelled frames, at least {FEWEST_FRAMES} are needed and about 20 are good"
+            f"{path}: {len(data)} labelled frames, at least {fewest} are needed and about 20 are good"
         )
     frames: dict[int, Points] = {}
     for key, points in data.items():
-        if not str(key).strip().isdecimal():
-            raise InputError(f"{path}: expected a frame number from 0, found '{key}'")
-        number = int(key)
+        number = _number(path, key)
         if number in frames:
             raise InputError(f"{path}: frame {number} occurs twice; keep one set of points for each frame")
         frames[number] = _points(f"{path}: frame {number}", points)
@@ -206,15 +241,21 @@ def _markers(path: Path, document: dict[str, Any], eyes: int) -> LidMarkers:
 
 def save_labels(labels: Labels, video: str, origin: str) -> None:
     """Write a label file at `labels.path`, in the form `load_labels` reads; points to 0.001 px."""
-    document = {
+    document: dict[str, Any] = {
         "video": video,
         "image_size_px": list(labels.size_px),
         "origin": origin,
         "point_order": POINT_ORDER,
         "mid_upper": [list(eye) for eye in labels.markers.upper],
         "mid_lower": [list(eye) for eye in labels.markers.lower],
-        "frames": {str(number): np.round(points, 3).tolist() for number, points in labels.frames.items()},
+        "frames": _rounded(labels.frames),
     }
+    if labels.proposed is not None:
+        document["proposed"] = _rounded(labels.proposed)
     with whole_text(labels.path) as stream:
         json.dump(document, stream, indent=1)
         stream.write("\n")
+
+
+def _rounded(frames: dict[int, Points]) -> dict[str, Any]:
+    return {str(number): np.round(points, 3).tolist() for number, points in frames.items()}

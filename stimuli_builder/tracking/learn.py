@@ -67,7 +67,7 @@ def learn(
         Called after each of `training_steps`.
     """
     labels = load_labels(labels_path, info.size_px, info.frame_count)
-    _check_eyes(labels, one_eye)
+    check_eyes(labels, one_eye)
     return lesson_from(info, labels, options, folds=folds, refine=refine, advance=advance)
 
 
@@ -105,7 +105,8 @@ def lesson_from(
     return Lesson(believed, labels, held_out, refined)
 
 
-def _check_eyes(labels: Labels, one_eye: bool) -> None:
+def check_eyes(labels: Labels, one_eye: bool) -> None:
+    """Refuse labels of two eyes for a close-up of one, and the other way round."""
     if one_eye and labels.eyes == 2:
         raise InputError(f"{labels.path}: holds 18 points a frame, --one-eye expects 9; leave --one-eye out")
     if not one_eye and labels.eyes == 1:

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from stimuli_builder.tracking.labels import Labels, save_labels
+from stimuli_builder.tracking.proposals import TRACKED
 from stimuli_builder.tracking.shapes import LidMarkers, Points
 from stimuli_builder.tracking.table import numbers, point_columns, track_rows
 from stimuli_builder.video import VideoInfo
@@ -47,9 +48,15 @@ def write_relabel(
     worst: Mapping[int, Points],
     by_hand: Mapping[int, Points],
 ) -> int:
-    """Write the frames to correct, those labelled before kept as they are; return how many are new."""
+    """Write the frames to correct as proposals, beside those corrected before; return how many are proposed.
+
+    Parameters
+    ----------
+    by_hand : mapping of int to float64 array
+        Frames that a person changed or accepted, see `proposals.by_hand`.
+    """
     inside = {n: np.clip(points, 0, np.array(info.size_px) - 1) for n, points in worst.items()}
     new = {n: points for n, points in inside.items() if n not in by_hand}
-    labels = Labels(path, info.size_px, markers, dict(sorted((new | dict(by_hand)).items())))
-    save_labels(labels, info.path.name, "proposed by the tracker for correction by hand")
+    frames = dict(sorted((new | dict(by_hand)).items()))
+    save_labels(Labels(path, info.size_px, markers, frames, new), info.path.name, TRACKED)
     return len(new)

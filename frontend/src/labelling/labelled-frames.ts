@@ -24,6 +24,12 @@ export function acceptedOf(frames: Frames): [number, Shape][] {
   return [...frames].filter(([, { accepted }]) => accepted).map(([number, { shape }]) => [number, shape]);
 }
 
+/** Whether a frame's points are still those that a program proposed: they wait to be accepted. */
+export function isProposed({ frames, rest }: LabelFile, number: number): boolean {
+  const proposals = new Map(Object.entries(rest["proposed"] ?? {}));
+  return JSON.stringify(proposals.get(String(number))) === JSON.stringify(frames.get(number));
+}
+
 /** Places of blinks: those of the eyes found, then other brief changes, up to eight. */
 function briefPlaces({ pictures, eyes }: Looked, count: 1 | 2): number[] {
   const blinks = (eyesFor(eyes, count)?.blinks ?? []).slice(0, BRIEF_CHANGES);

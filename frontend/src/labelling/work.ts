@@ -2,7 +2,16 @@
 
 import { begun, changed, type History, redone, undone } from "./history";
 import { defaultMarkers, type LabelFile } from "./label-file";
-import { acceptedOf, chooseFrames, type Frames, type LabelledFrame, type Looked, problemOf, requireSameVideo } from "./labelled-frames";
+import {
+  acceptedOf,
+  chooseFrames,
+  type Frames,
+  isProposed,
+  type LabelledFrame,
+  type Looked,
+  problemOf,
+  requireSameVideo,
+} from "./labelled-frames";
 import { type Point, type Shape, withEyeMoved, withEyeStretched, withPoint } from "./points";
 import type { OpenedVideo } from "./video";
 
@@ -53,7 +62,7 @@ export function withLabels(work: Work, name: string, labels: LabelFile): Work {
   requireSameVideo(name, labels, work.opened.video);
   const { eyes, midUpper, midLower, rest } = labels;
   const numbers = [...labels.frames.keys()];
-  const frames: Frames = new Map([...labels.frames].map(([number, shape]) => [number, { shape, accepted: true }]));
+  const frames: Frames = new Map([...labels.frames].map(([number, shape]) => [number, { shape, accepted: !isProposed(labels, number) }]));
   const chosen = chooseFrames(work.opened.looked, numbers, eyes);
   return {
     ...begunWith(work, frames, eyes),
@@ -125,9 +134,10 @@ export function withRedo(work: Work): Work {
   return { ...work, history: redone(work.history), problem: null };
 }
 
-/** What `stimuli track --labels` is given: the accepted frames. */
+/** What `stimuli track --labels` is given: the accepted frames; of these none is a mere proposal any more. */
 export function labelFileOf({ opened, eyes, markers, history }: Work): (LabelFile & { video: string }) | null {
   if (opened === null) return null;
   const { name, size } = opened.video;
-  return { video: name, size, eyes, ...markers, frames: new Map(acceptedOf(history.now)) };
+  const rest = { ...markers.rest, proposed: {} };
+  return { video: name, size, eyes, ...markers, rest, frames: new Map(acceptedOf(history.now)) };
 }

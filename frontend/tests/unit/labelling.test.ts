@@ -23,6 +23,7 @@ import { traceOf, tracePath, zoomedWindow } from "../../src/labelling/trace";
 import {
   atFrame,
   atNeighbour,
+  labelFileOf,
   NO_WORK,
   withAccepted,
   withEyes,
@@ -152,6 +153,15 @@ describe("the work on a video", () => {
     expect([loaded.history.now === loaded.saved, withUndo(loaded).history.now]).toEqual([true, loaded.saved]);
     expect(() => withLabels(opened, "a.json", parseLabels("a.json", text([900, 480], 1)))).toThrow("900 x 480 pixels");
     expect(() => withLabels(opened, "a.json", parseLabels("a.json", text(SIZE, 30)))).toThrow("ends at frame 29");
+  });
+  it("lets frames wait that are as a program proposed them, and saves accepted ones as no proposals", () => {
+    const moved = withPoint(shape, 3, [at(shape, 3)[0], at(shape, 3)[1] - 2], SIZE);
+    const text = JSON.stringify({ image_size_px: SIZE, frames: { 5: shape, 12: moved, 20: shape }, proposed: { 5: shape, 12: shape } });
+    const loaded = withLabels(opened, "a.json", parseLabels("a.json", text));
+    expect([accepted(loaded), loaded.current]).toEqual([[12, 20], 5]);
+    const saved = labelFileOf(withAccepted(loaded, shape));
+    expect([[...(saved?.frames.keys() ?? [])], saved?.rest["proposed"]]).toEqual([[5, 12, 20], {}]);
+    expect([...(labelFileOf(loaded)?.frames.keys() ?? [])]).toEqual([12, 20]);
   });
   it("begins anew with another number of eyes, the frames to label kept", () => {
     const one = withEyes({ ...withAccepted(opened, shape), selected: 12 }, 1);

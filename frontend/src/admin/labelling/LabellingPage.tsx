@@ -23,6 +23,8 @@ const STARTS = {
   proposal: "Proposed from the labelled frames: correct what is off, then accept.",
 } as const;
 
+const WAITING = "Not accepted yet: correct what is off, then accept. Only accepted frames are saved.";
+
 export function LabellingPage() {
   const work = useLabelling();
   useUnsaved(work.unsaved);
@@ -141,7 +143,11 @@ function Frame({ work }: { work: Labelling }) {
         </Group>
       </Group>
       <Text size="sm" mb="xs" role="status">
-        {work.startedFrom === null ? "The points of this frame are yours." : STARTS[work.startedFrom]}
+        {work.startedFrom === null
+          ? frame?.accepted === false
+            ? WAITING
+            : "The points of this frame are yours."
+          : STARTS[work.startedFrom]}
       </Text>
       {work.picture !== null && work.shape !== null && (
         <Stage
