@@ -34,6 +34,22 @@ def check_targets(outputs: Iterable[Path | None], inputs: Iterable[Path | None] 
             taken.append(path.resolve())
 
 
+def check_ending(path: Path, ending: str, what: str) -> None:
+    """Refuse a name for output whose ending tells of another kind of file.
+
+    Parameters
+    ----------
+    ending : str
+        Wanted, with its dot.
+    what : str
+        The output in words, as `a track`.
+    """
+    if path.suffix.lower() != ending:
+        raise InputError(
+            f"{path}: {what} is written as {ending[1:].upper()}; use a name that ends in {ending}"
+        )
+
+
 def remove_quietly(path: Path) -> None:
     """Remove `path` if it is there."""
     with suppress(OSError):

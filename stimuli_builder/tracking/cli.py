@@ -163,7 +163,7 @@ def train(
       stimuli train eye.mp4 --labels eye.labels.json --one-eye --folds 8
     """
     from experiments.errors import InputError
-    from experiments.files import check_targets
+    from experiments.files import check_ending, check_targets
     from stimuli_builder.progress import step_progress
     from stimuli_builder.tracking.cli_track import report_modes, warn
     from stimuli_builder.tracking.labels import load_labels
@@ -174,6 +174,8 @@ def train(
     if labels is None:
         raise InputError("expected --labels with the label file of this video")
     check_targets([out], [video, labels])
+    if out is not None:
+        check_ending(out, ".npz", "a model")
     info = open_video(video, accept_variable_rate)
     warn(unreviewed(load_labels(labels)))
     options = _options(shape_variance, appearance_variance, coupled_variance, paper_modes, base_pixels)

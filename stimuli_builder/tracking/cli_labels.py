@@ -57,13 +57,14 @@ def label(
 
       stimuli label eye.mp4 --one-eye --frames 25 --out eye.labels.json
     """
-    from experiments.files import check_targets
+    from experiments.files import check_ending, check_targets
     from stimuli_builder.progress import frame_progress
     from stimuli_builder.tracking.labelfree import proposed_labels
     from stimuli_builder.tracking.learn import open_video
     from stimuli_builder.tracking.survey import survey
 
     check_targets([out], [video])
+    check_ending(out, ".json", "a label file")
     info = open_video(video, accept_variable_rate)
     with frame_progress() as progress:
         task = progress.add_task("finding eyes", total=info.frame_count)
@@ -85,13 +86,14 @@ def iris(
 
       stimuli iris face.mp4 track.csv --out iris.csv
     """
-    from experiments.files import check_targets
+    from experiments.files import check_ending, check_targets
     from stimuli_builder.progress import frame_progress
     from stimuli_builder.tracking.iris import IRIS_MM
     from stimuli_builder.tracking.iris_table import write_irises
     from stimuli_builder.tracking.learn import open_video
 
     check_targets([out], [video, track])
+    check_ending(out, ".csv", "the table of irises")
     info = open_video(video, accept_variable_rate=True)
     with frame_progress() as progress:
         task = progress.add_task("irises", total=info.frame_count)

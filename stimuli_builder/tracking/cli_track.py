@@ -9,7 +9,7 @@ from pathlib import Path
 
 from experiments.counted import counted
 from experiments.errors import InputError
-from experiments.files import check_targets, temporary_beside
+from experiments.files import check_ending, check_targets, temporary_beside
 from stimuli_builder.blinks.plots import check_figure_name
 from stimuli_builder.progress import frame_progress, step_progress
 from stimuli_builder.tracking.labelfree import label_free_lesson
@@ -141,6 +141,9 @@ def _check(job: TrackJob) -> None:
     if job.relabel is not None:
         temporary_beside(job.relabel)
     check_targets([job.out, job.preview, job.plot], [job.video, job.labels, job.model, job.relabel])
+    check_ending(job.out, ".csv", "a track")
+    if job.relabel is not None:
+        check_ending(job.relabel, ".json", "the label file of --relabel")
     if job.preview is not None:
         check_video_name(job.preview)
     if job.plot is not None:
@@ -242,8 +245,17 @@ def _pictures(job: TrackJob, info: VideoInfo, model: CoupledModel) -> None:
             write_preview(model, info, job.out, job.preview, lambda: progress.advance(task))
         print(f"{job.preview}: preview written")
     if job.plot is not None:
-        count = plot_track(job.out, info.fps, job.plot)
-        print(f"{job.plot}: trace with {count} blink{'' if count == 1 else 's'}")
+        _plot(job.out, info.fps, job.plot)
+
+
+def _plot(track: Path, fps: float, figure: Path) -> None:
+    """Plot a track that is written; what no blinks can be told from stays without a plot, and is said."""
+    try:
+        count = plot_track(track, fps, figure)
+    except InputError as error:
+        warn(f"{figure}: no plot, the track is written ({error})")
+        return
+    print(f"{figure}: trace with {counted(count, 'blink')}")
 
 
 def report_modes(lesson: Lesson) -> None:

@@ -265,3 +265,44 @@ def test_accuracy_of_files_that_do_not_belong_together(stimuli, recording, tmp_p
     assert code == 2
     assert "compare a track with its own truth" in error
     assert "not a track" in stimuli("accuracy", recording.labels, recording.truth)[2]
+
+
+@pytest.mark.parametrize(
+    ("command", "option", "name", "line"),
+    [
+        ("track", "--out", "t.mp4", "a track is written as CSV; use a name that ends in .csv"),
+        ("track", "--out", "t", "a track is written as CSV; use a name that ends in .csv"),
+        ("track", "--relabel", "worst.csv", "the label file of --relabel is written as JSON"),
+        ("train", "--out", "model.json", "a model is written as NPZ; use a name that ends in .npz"),
+        ("label", "--out", "labels.csv", "a label file is written as JSON"),
+        ("iris", "--out", "iris.json", "the table of irises is written as CSV"),
+    ],
+)
+def test_a_name_of_another_kind_of_file_is_refused_before_work(
+    stimuli, recording, tmp_path, command, option, name, line
+):
+    given = {"iris": (recording.truth,), "train": ("--labels", recording.labels)}.get(command, ())
+    more = ("--out", tmp_path / "t.csv") if option == "--relabel" else ()
+    code, _, error = stimuli(command, recording.video, *given, *more, option, tmp_path / name)
+    assert code == 2
+    assert line in error
+    assert error.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_track_too_short_for_a_plot_is_written_and_the_plot_is_told(stimuli, recording, tmp_path):
+    write_frames(tmp_path / "short.mp4", recording.pictures[:30], fps=200)
+    model, out, plot = tmp_path / "m.npz", tmp_path / "t.csv", tmp_path / "p.png"
+    fast = ("--no-refine", "--folds", 2, "--base-pixels", 1000)
+    stimuli("train", recording.video, "--labels", recording.labels, "--out", model, *fast)
+    code, said, error = stimuli(
+        "track", tmp_path / "short.mp4", "--model", model, "--out", out, "--plot", plot
+    )
+    assert code == 0
+    assert "30 frames" in said
+    assert error.startswith(
+        f"warning: {plot}: no plot, the track is written (t.csv: 30 frames at 200 fps are"
+    )
+    assert error.count("\n") == 1
+    assert out.exists()
+    assert not plot.exists()
