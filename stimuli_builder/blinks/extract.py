@@ -1,7 +1,7 @@
 """Cut the profiles of measured blinks out of their series, one eye at a time or both together."""
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
@@ -27,7 +27,7 @@ from stimuli_builder.blinks.series import BlinkSeries, scaled_frames
 LID_FILTER_FRAMES = 10
 PLAUSIBLE_MS = (120, 600)
 """Median durations that are believed: 330 ms is usual."""
-USUAL_CLOSING_MS = (65, 140)
+USUAL_CLOSING_MS = (55, 140)
 USUAL_SPEED = (15, 28)
 """Peak closing velocity over amplitude, per second (main sequence). A rate off by a factor of two puts it and
 the closing time outside, on opposite sides; a person seldom has both there."""
@@ -117,25 +117,30 @@ def _why_none(eye: EyeBlinks, options: LabelOptions) -> str:
     what = f"its deepest dip is {deepest:.0%} of the opening"
     if others:
         what += f", it has {', '.join(f'{count} x {kind}' for kind, count in others.items())}"
-    elif deepest < options.minimum_depth:
+    elif eye.recognised is None and deepest < options.minimum_depth:
         what += f", a blink needs {options.minimum_depth:.0%} (--minimum-depth)"
     return f"{what}; is the column right, and --fps?"
 
 
-def rate_doubt(eye: EyeBlinks) -> str:
-    """Why the rate of a series may be wrong, in words; empty where its blinks last as blinks do."""
-    if not eye.blinks:
+def rate_doubt(eyes: Sequence[EyeBlinks]) -> str:
+    """Why the rate of a recording may be wrong, in words; empty where its blinks last as blinks do.
+
+    Both eyes have one rate, so that the blinks of all columns are looked at together.
+    """
+    blinks = [blink for eye in eyes for blink in eye.blinks]
+    if not blinks:
         return ""
-    duration_ms = float(np.median([blink.duration_ms for blink in eye.blinks]))
-    closing_ms = float(np.median([blink.down_ms for blink in eye.blinks]))
-    speed = float(np.median([blink.peak_closing_velocity / blink.amplitude for blink in eye.blinks]))
+    fps = eyes[0].series.fps
+    duration_ms = float(np.median([blink.duration_ms for blink in blinks]))
+    closing_ms = float(np.median([blink.down_ms for blink in blinks]))
+    speed = float(np.median([blink.peak_closing_velocity / blink.amplitude for blink in blinks]))
     # Under 60 fps the filter and the frames, not the lid, rule how fast a blink seems to be.
-    slow = closing_ms > USUAL_CLOSING_MS[1] and (speed < USUAL_SPEED[0] or eye.series.fps < TELLING_FPS)
-    fast = closing_ms < USUAL_CLOSING_MS[0] and (speed > USUAL_SPEED[1] or eye.series.fps < TELLING_FPS)
+    slow = closing_ms > USUAL_CLOSING_MS[1] and (speed < USUAL_SPEED[0] or fps < TELLING_FPS)
+    fast = closing_ms < USUAL_CLOSING_MS[0] and (speed > USUAL_SPEED[1] or fps < TELLING_FPS)
     if PLAUSIBLE_MS[0] <= duration_ms <= PLAUSIBLE_MS[1] and not slow and not fast:
         return ""
     return (
-        f"at {eye.series.fps:g} fps the blinks of '{eye.series.column}' last {duration_ms:.0f} ms and close "
+        f"at {fps:.4g} fps the blinks last {duration_ms:.0f} ms and close "
         f"in {closing_ms:.0f} ms (medians), where {PLAUSIBLE_MS[0]}-{PLAUSIBLE_MS[1]} and "
         f"{USUAL_CLOSING_MS[0]}-{USUAL_CLOSING_MS[1]} are usual: is --fps right?"
     )

@@ -80,7 +80,7 @@ def _write_text(path: Path, text: str) -> None:
 
 def _doubts(table: pd.DataFrame, eyes: Sequence[EyeBlinks]) -> list[str]:
     """What a track says of its own frames, and rates that are unlikely."""
-    lines = [doubt for doubt in (rate_doubt(eye) for eye in eyes) if doubt]
+    lines = [doubt for doubt in (rate_doubt(eyes),) if doubt]
     lines += eyes[0].series.notes
     lost = int((table["status"] == "lost").sum()) if "status" in table.columns else 0
     if lost:

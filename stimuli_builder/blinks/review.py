@@ -65,15 +65,16 @@ def _review(row: dict[object, object] | dict[str, object], number: int, path: Pa
     decision: Decision = "accept" if word == "accept" else "reject"
     if word != decision:
         raise InputError(
-            f"{path.name} row {number}: unknown decision '{word}'{did_you_mean(word, ['accept', 'reject'])}"
+            f"{path.name} line {number}: unknown decision '{word}'{did_you_mean(word, ['accept', 'reject'])}"
         )
     frame = _frame(values, "minimum_frame", number, path)
     if frame is None:
-        raise InputError(f"{path.name} row {number}: minimum_frame must be a whole number")
+        raise InputError(f"{path.name} line {number}: minimum_frame must be a whole number")
     onset, end = (_frame(values, name, number, path) for name in EDGE_COLUMNS)
     if not (frame if onset is None else onset + 1) <= frame <= (frame if end is None else end - 1):
         raise InputError(
-            f"{path.name} row {number}: expected onset_frame before and end_frame after minimum_frame {frame}"
+            f"{path.name} line {number}: expected onset_frame before and end_frame after "
+            f"minimum_frame {frame}"
         )
     reason = values["reason"] if isinstance(values["reason"], str) else ""
     return Review(str(values["column"]), frame, decision, reason, onset, end)
@@ -90,7 +91,7 @@ def _frame(values: dict[str, object], name: str, number: int, path: Path) -> int
     except ValueError:
         frame = -1.0
     if not (frame >= 0 and frame.is_integer()):
-        raise InputError(f"{path.name} row {number}: {name} must be a whole number, got {value!r}")
+        raise InputError(f"{path.name} line {number}: {name} must be a whole number, got {value!r}")
     return int(frame)
 
 

@@ -17,6 +17,7 @@ from stimuli_builder.blinks.extract import (
     rate_doubt,
     require_blinks,
 )
+from stimuli_builder.blinks.file_endings import CURVES, TABLE, check_endings
 from stimuli_builder.blinks.label_options import LabelOptions
 from stimuli_builder.blinks.outputs import MoreOutputs
 from stimuli_builder.blinks.profile import BlinkProfile
@@ -122,8 +123,8 @@ def label_recording(job: BlinksJob) -> list[EyeBlinks]:
     with_blinks = [eye for eye in eyes if eye.blinks]
     for eye in with_blinks or eyes:
         require_blinks(eye, job.options)
-        if doubt := rate_doubt(eye):
-            sys.stderr.write(f"warning: {doubt}\n")
+    if doubt := rate_doubt(eyes):
+        sys.stderr.write(f"warning: {doubt}\n")
     for line in asymmetry_lines(eyes):
         sys.stderr.write(f"note: {line}\n")
     return eyes
@@ -154,6 +155,18 @@ def _check(job: BlinksJob) -> None:
         job.review,
     ]
     check_targets(outputs, [job.series])
+    check_endings(
+        {
+            "--out": (job.out, TABLE),
+            "--profiles": (job.profiles, TABLE),
+            "--events": (events, TABLE),
+            "--lids": (job.more.lids, TABLE),
+            "--review": (job.review, TABLE),
+            "--summary": (job.summary, (".json",)),
+            "--report": (job.more.report, (".html", ".htm")),
+            "--curve": (job.more.curve, CURVES[job.more.curve_format]),
+        }
+    )
 
 
 def _reviewed(

@@ -12,7 +12,7 @@ from experiments.errors import InputError, nearest
 from stimuli_builder.blinks.csv_table import NOTE, few, read_table
 from stimuli_builder.blinks.inverted import opening_of
 from stimuli_builder.blinks.profile import Array
-from stimuli_builder.blinks.times import MAX_BRIDGED_MS, resampled, series_fps
+from stimuli_builder.blinks.times import MAX_BRIDGED_MS, resampled, series_fps, with_time_s
 from stimuli_builder.blinks.tracked_lid import tracked_lower_lid
 from stimuli_builder.blinks.validity import CONFIDENCE_COLUMN, VALID_COLUMNS, unseen_rows
 
@@ -137,7 +137,7 @@ def make_series(
         rest = unsaid[first:]
         length = int(np.argmin(rest)) if not rest.all() else rest.size
         raise InputError(
-            f"{path.name}: column '{column}' has no value on {length} frames from row {first + 2} on; "
+            f"{path.name}: column '{column}' has no value on {length} frames from line {first + 2} on; "
             "mend the series, or label round the gap with --allow-gaps"
         )
     if np.nanmin(values) < 0:
@@ -163,7 +163,7 @@ def _numbers(table: pd.DataFrame, column: str, path: Path) -> Array:
     """(n,) a column's values; InputError naming the first that is no number."""
     if table[column].dtype.kind not in "fiu":
         words = table[column][pd.to_numeric(table[column], errors="coerce").isna() & table[column].notna()]
-        got = f", got {words.iloc[0]!r} in row {words.index[0] + 1}" if words.size else ""
+        got = f", got {words.iloc[0]!r} in line {words.index[0] + 2}" if words.size else ""
         raise InputError(f"{path.name}: column '{column}' must hold numbers{got}")
     return table[column].to_numpy(dtype=np.float64)
 
@@ -199,12 +199,13 @@ def read_series(
 
     `resample` brings uneven times to even ones first. `inverted` says whether high is shut (`opening_of`).
     """
-    table = read_table(path)
+    table, times_note = with_time_s(read_table(path), path)
     chosen = choose_columns(table, columns, path)
     if resample and "time_s" not in table.columns:
         raise InputError(f"{path.name} has no column time_s: --resample needs the time of every frame")
     rate = series_fps(table, fps, path, uneven=resample)
     unseen, notes = unseen_rows(table, path)
+    notes.insert(0, times_note)
     for column in chosen:
         values = np.where(unseen, np.nan, _numbers(table, column, path))
         table[column], note = opening_of(values, column, path, _is_inverted(column, inverted))

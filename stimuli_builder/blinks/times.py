@@ -23,6 +23,21 @@ UNEVEN = 0.2
 """Part of the usual step by which steps may differ in a series that is not resampled."""
 
 
+def with_time_s(table: pd.DataFrame, path: Path) -> tuple[pd.DataFrame, str]:
+    """The table with a column time_s, of `timestamp` or `time_ms` where it has none, and a line on that."""
+    if "time_s" in table.columns:
+        return table, ""
+    name = next((one for one in table.columns if one.lower() in ("timestamp", "time_ms")), None)
+    if name is None:
+        return table, ""
+    times = pd.to_numeric(table[name], errors="coerce").astype(np.float64)
+    # No recording has less than a frame a second, so that steps above 1 are ms.
+    is_ms = name.lower() == "time_ms" or float(np.nanmedian(np.diff(times), axis=None)) > 1
+    made = table.assign(time_s=times / 1000 if is_ms else times)
+    made.attrs = table.attrs
+    return made, f"{path.name}: times are from '{name}', in {'ms' if is_ms else 's'}"
+
+
 def series_fps(table: pd.DataFrame, fps: float | None, path: Path, *, uneven: bool = False) -> float:
     """Return the frame rate: given, or measured from `time_s`; both must agree within 1%.
 
@@ -55,9 +70,9 @@ def _measured_fps(table: pd.DataFrame, path: Path, *, uneven: bool) -> float:
         raise InputError(f"{path.name}: time_s must be complete and increase from row to row")
     off = np.abs(steps / np.median(steps) - 1) > UNEVEN
     if not uneven and off.any():
-        row = int(np.argmax(off)) + 2
+        line = int(np.argmax(off)) + 3  # the header is line 1, and a step ends at the second of two rows
         raise InputError(
-            f"{path.name}: time_s is uneven (row {row}); labels need a constant frame rate: "
+            f"{path.name}: time_s is uneven (line {line}); labels need a constant frame rate: "
             "--resample brings it to one"
         )
     # A pause of a minute says nothing of the rate.

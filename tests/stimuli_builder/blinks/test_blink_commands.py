@@ -123,6 +123,15 @@ def test_a_decision_about_a_blink_that_is_gone_is_told_and_kept(stimuli, series_
             ["--column", "gap_l", "--column", "gap_r", "--fps", "300", "--review", "r.csv", "--accept", "1"],
             "gap_l:1",
         ),
+        (
+            ["--column", "gap_l", "--fps", "300", "--report", "r.png"],
+            "--report r.png: expected a name that ends in .html",
+        ),
+        (["--column", "gap_l", "--fps", "300", "--curve", "c.png"], "ends in .csv or .txt"),
+        (
+            ["--column", "gap_l", "--fps", "300", "--lids", "l.xlsx"],
+            "--lids l.xlsx: expected a name that ends in .csv",
+        ),
         (["--column", "gap_l", "--fps", "300", "--plot", "figure.gif"], "no figure format 'gif'"),
         (["--column", "gap_l", "--fps", "300", "--summary", "none/s.json"], "does not exist"),
         (["--column", "gap_l", "--fps", "300", "--summary", "b.csv"], "a name of its own"),

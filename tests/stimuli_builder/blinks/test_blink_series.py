@@ -92,7 +92,7 @@ GOOD = [0.3] * 400
             [range(400), [*GOOD[:6], "abc", *GOOD[7:]]],
             ["a"],
             240,
-            "must hold numbers, got 'abc' in row 7",
+            "must hold numbers, got 'abc' in line 8",
         ),
         ("frame,a", [range(400), GOOD], ["a"], None, "give the recording's rate"),
         ("frame,a", [range(400), GOOD], ["a"], -5, "between 10 and 10000"),
@@ -104,11 +104,11 @@ GOOD = [0.3] * 400
             [range(400), [0.3] * 99 + [""] * 60 + [0.3] * 241],
             ["a"],
             240,
-            "no value on 60 frames from row 101",
+            "no value on 60 frames from line 101",
         ),
         ("frame,a", [range(400), [0.3] * 399 + [-1.0]], ["a"], 240, "negative"),
         ("time_s,a", [np.arange(400) / 240, GOOD], ["a"], 100, "contradicts"),
-        ("time_s,a", [[*np.arange(399) / 240, 9.0], GOOD], ["a"], None, "uneven"),
+        ("time_s,a", [[*np.arange(399) / 240, 9.0], GOOD], ["a"], None, r"uneven \(line 401\)"),
         ("time_s,a", [[*np.arange(399) / 240, 0.0], GOOD], ["a"], None, "increase"),
     ],
 )
@@ -140,5 +140,5 @@ def test_a_column_that_is_named_twice_is_read_once(tmp_path: Path) -> None:
 def test_a_word_in_a_series_that_is_to_be_resampled_is_named(tmp_path: Path) -> None:
     values = [*GOOD[:6], "lost", *GOOD[7:]]
     path = _write(tmp_path / "series.csv", "time_s,a", [np.arange(400) / 240, values])
-    with pytest.raises(InputError, match=r"must hold numbers, got 'lost' in row 7"):
+    with pytest.raises(InputError, match=r"must hold numbers, got 'lost' in line 8"):
         read_series(path, ["a"], resample=True)

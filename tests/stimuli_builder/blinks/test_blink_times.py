@@ -77,3 +77,20 @@ def test_times_that_jump_by_years_are_refused(tmp_path: Path) -> None:
 def test_a_rate_too_low_is_told_in_few_digits(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"at 0\.03 frames a second no blink"):
         read_series(written(tmp_path / "s.csv", np.arange(400) / 0.03, np.full(400, 20.0)))
+
+
+@pytest.mark.parametrize(
+    ("name", "factor", "unit"),
+    [
+        ("timestamp", 1.0, "s"),
+        (" timestamp", 1.0, "s"),
+        ("timestamp", 1000.0, "ms"),
+        ("time_ms", 1000.0, "ms"),
+    ],
+)
+def test_usual_names_of_times_are_read(tmp_path: Path, name: str, factor: float, unit: str) -> None:
+    times = np.arange(400) / 240 * factor
+    pd.DataFrame({name: times, "gap": np.full(400, 20.0)}).to_csv(tmp_path / "s.csv", index=False)
+    (series,) = read_series(tmp_path / "s.csv")
+    assert series.fps == pytest.approx(240)
+    assert series.notes == (f"s.csv: times are from '{name.strip()}', in {unit}",)
