@@ -107,7 +107,8 @@ def blinks(
     scale: Annotated[
         str | None,
         typer.Option(
-            help="mm in a pixel (of a card in the picture), 'inter-ocular' (60 mm) or 'eye-width' (28.2 mm)."
+            help="mm in a pixel (of a card in the picture), 'inter-ocular' (60 mm), 'eye-width' (28.2 mm) "
+            "or 'iris:I.csv' (11.7 mm, by a table of 'stimuli iris')."
         ),
     ] = None,
     curve: Annotated[

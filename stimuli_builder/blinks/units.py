@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from experiments.errors import InputError, nearest
 from experiments.files import whole_file
+from stimuli_builder.blinks.csv_table import read_table
 from stimuli_builder.blinks.events.levels import local_opening
 from stimuli_builder.blinks.profile import Array
 from stimuli_builder.blinks.series import BlinkSeries
@@ -24,6 +25,11 @@ SCALES = {
     "inter-ocular": f"the middles of both eyes are {INTER_OCULAR_MM:g} mm apart",
     "eye-width": f"an eye is {FISSURE_LENGTH_MM:g} mm from canthus to canthus",
 }
+
+
+IRIS_FILE = "iris:"
+"""Beginning of a scale by the irises of a table that `stimuli iris` wrote."""
+LEAST_IRISES = 5
 
 
 @dataclass(frozen=True)
@@ -44,10 +50,13 @@ def check_scale(scale: str) -> float | None:
     """
     if scale in SCALES:
         return None
+    if scale.startswith(IRIS_FILE):
+        _by_irises(Path(scale.removeprefix(IRIS_FILE)))
+        return None
     try:
         value = float(scale)
     except ValueError:
-        rules = " or ".join(f"'{rule}'" for rule in SCALES)
+        rules = ", ".join(f"'{rule}'" for rule in SCALES) + f" or '{IRIS_FILE}' and a table of stimuli iris"
         near = nearest(scale, SCALES)
         raise InputError(
             f"--scale {scale}: expected a number of mm in a pixel, {rules}"
@@ -68,10 +77,30 @@ def scale_of(table: pd.DataFrame, scale: str | None, path: Path) -> Scale | None
     """
     if scale is None:
         return None
+    if scale.startswith(IRIS_FILE):
+        return _by_irises(Path(scale.removeprefix(IRIS_FILE)))
     value = check_scale(scale)
     if value is None:
         return _by_rule(table, scale, path)
     return Scale(value, f"{value:g} mm in a pixel, as given (a card or a ruler in the picture)")
+
+
+def _by_irises(path: Path) -> Scale:
+    """The scale by the median diameter of the irises in a table of `stimuli iris`, both eyes together."""
+    from stimuli_builder.tracking.iris import IRIS_MM
+
+    table = read_table(path)
+    columns = [name for name in table.columns if name.endswith("iris_diameter_px")]
+    diameters = table[columns].apply(pd.to_numeric, errors="coerce").to_numpy(dtype=np.float64)
+    seen = diameters[np.isfinite(diameters) & (diameters > 0)]
+    if seen.size < LEAST_IRISES:
+        raise InputError(
+            f"--scale {IRIS_FILE}{path.name}: expected a table of stimuli iris with {LEAST_IRISES} irises or "
+            f"more, got {seen.size}; measure them by stimuli iris VIDEO TRACK --out I.csv"
+        )
+    middle = float(np.median(seen))
+    rule = f"an iris is {IRIS_MM:g} mm wide, {middle:.1f} px here (median of {seen.size:,} in {path.name})"
+    return Scale(IRIS_MM / middle, rule)
 
 
 def _by_rule(table: pd.DataFrame, rule: str, path: Path) -> Scale:

@@ -53,6 +53,48 @@ def test_a_head_that_comes_nearer_closes_no_eye():
     assert closure_course(series, 0.0).max() < 0.06
 
 
+@pytest.fixture
+def close_up(make_known, tmp_path):
+    """A track of a close-up, 34 px open."""
+    known = make_known(noise=0.05)
+    times = np.arange(known.distance.size) / known.fps
+    path = tmp_path / "t.csv"
+    pd.DataFrame({"time_s": times, "distance_px": known.distance, "status": "tracked"}).to_csv(
+        path, index=False
+    )
+    return path
+
+
+def test_a_scale_by_the_irises_makes_mm_of_px(stimuli, close_up, tmp_path):
+    diameters = [*[""] * 20, *["46.8"] * 30, *["45.8"] * 10, *["48.8"] * 10]
+    pd.DataFrame({"frame": range(70), "iris_diameter_px": diameters}).to_csv(tmp_path / "i.csv", index=False)
+    files = ("--out", tmp_path / "b.csv", "--lids", tmp_path / "l.csv", "--report", tmp_path / "r.html")
+    ended = stimuli("blinks", close_up, *files, "--scale", f"iris:{tmp_path / 'i.csv'}")
+    assert ended.code == 0, ended.err
+    lids = pd.read_csv(tmp_path / "l.csv")
+    assert lids["distance_mm"].median() == pytest.approx(34 * 11.7 / 46.8, abs=0.02)
+    page = (tmp_path / "r.html").read_text(encoding="utf-8")
+    assert "0.2500 mm in a pixel: an iris is 11.7 mm wide, 46.8 px here (median of 50 in i.csv)" in page
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("frame,iris_diameter_px\n0,\n1,46\n", "with 5 irises or more, got 1"),
+        ("frame,a\n0,1\n", "with 5 irises or more, got 0"),
+        (None, "cannot be read"),
+    ],
+)
+def test_a_table_without_irises_is_no_scale(stimuli, close_up, tmp_path, content, message):
+    if content is not None:
+        (tmp_path / "i.csv").write_text(content, encoding="utf-8")
+    files = ("--out", tmp_path / "b.csv", "--lids", tmp_path / "l.csv")
+    ended = stimuli("blinks", close_up, *files, "--scale", f"iris:{tmp_path / 'i.csv'}")
+    assert ended.code == 2
+    assert message in ended.err
+    assert not (tmp_path / "b.csv").exists()
+
+
 @pytest.mark.parametrize(("format_name", "read"), [("json", json.loads), ("usd", str), ("gltf", json.loads)])
 def test_the_recording_is_exported_as_a_curve(labelled, tmp_path, make_known, format_name, read):
     ended = labelled("--curve", tmp_path / "c", "--curve-format", format_name)

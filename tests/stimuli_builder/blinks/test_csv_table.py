@@ -125,7 +125,8 @@ def test_a_scale_nobody_knows_is_refused_always(stimuli, series_file, monkeypatc
     ended = stimuli(*call)
     assert ended.code == 2
     assert ended.err == (
-        "error: --scale foo: expected a number of mm in a pixel, 'inter-ocular' or 'eye-width'\n"
+        "error: --scale foo: expected a number of mm in a pixel, 'inter-ocular', 'eye-width' or "
+        "'iris:' and a table of stimuli iris\n"
     )
     assert not (tmp_path / "b.csv").exists()
 
