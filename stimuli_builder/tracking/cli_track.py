@@ -78,6 +78,12 @@ def _track(job: TrackJob, info: VideoInfo) -> None:
             hints,
         )
     _report(job.out, summary, prepared_s)
+    if summary.repeated:
+        share = 1 - summary.repeated / summary.frames
+        warn(
+            f"{counted(summary.repeated, 'frame')} repeat the one before at even steps, as after a change of "
+            f"the frame rate: about {share * info.fps:.3g} pictures a second differ, not {info.fps:.4g}"
+        )
     if job.accept_damaged_end:
         _say_how_far(info)
     if job.relabel is not None:
@@ -185,6 +191,8 @@ def _label_free(job: TrackJob, info: VideoInfo) -> tuple[CoupledModel, Hints]:
         if seen.several_faces
         else ""
     )
+    if seen.further:
+        more += f"; {counted(seen.further, 'smaller face')} beside, seen in parts of the picture alone"
     print(f"{line}{more}; training on them", flush=True)
     with step_progress("training", training_steps(refine=job.refine)) as advance:
         lesson = label_free_lesson(

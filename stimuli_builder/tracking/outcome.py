@@ -43,6 +43,8 @@ class TrackSummary:
 
     Attributes
     ----------
+    repeated : int
+        Frames that repeat the one before at even steps, see `Hindsight`.
     fit_s : float
         Processor time of fitting alone.
     reasons : dict
@@ -54,6 +56,7 @@ class TrackSummary:
     reinitialised: int = 0
     doubtful: int = 0
     lost: int = 0
+    repeated: int = 0
     fit_s: float = 0.0
     total_s: float = 0.0
     reasons: dict[tuple[str, str], tuple[int, int, str]] = field(default_factory=dict)

@@ -19,10 +19,16 @@ seconds of three actors have 1.2%, of two recordings 4% (most hold a blink)."""
 
 
 class Stillness:
-    """The last two seconds of points, or ten frames where those last longer, of frames that show any."""
+    """The last two seconds of points, or ten frames where those last longer, of frames that show any.
+
+    Attributes
+    ----------
+    window : int
+        Frames of it.
+    """
 
     def __init__(self, fps: float):
-        self._window = max(LEAST_FRAMES, round(WINDOW_S * fps))
+        self.window = max(LEAST_FRAMES, round(WINDOW_S * fps))
         self._count = 0
         self._first: Points | None = None
 
@@ -41,12 +47,12 @@ class Stillness:
         """
         if self._first is None:
             self._first = points.copy()
-            self._ring = np.zeros((self._window, *points.shape))
+            self._ring = np.zeros((self.window, *points.shape))
             self._sum, self._squares = np.zeros(points.shape), np.zeros(points.shape)
-        oldest = self._ring[self._count % self._window]
-        share = moved_share(points, self._first, oldest, self._sum, self._squares, self._window)
+        oldest = self._ring[self._count % self.window]
+        share = moved_share(points, self._first, oldest, self._sum, self._squares, self.window)
         self._count += 1
-        return self._count >= self._window and share < STILL_SHARE
+        return self._count >= self.window and share < STILL_SHARE
 
     def forget(self) -> None:
         """Begin anew: a frame showed no eyes."""

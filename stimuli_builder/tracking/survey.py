@@ -1,7 +1,7 @@
 """What a detector sees of a video: at looks spread over it, the eyes of one face, and which are covered."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import count, islice
 from typing import Any
 
@@ -10,14 +10,15 @@ import numpy as np
 from experiments.errors import InputError
 from stimuli_builder.tracking.covers import covered_frames
 from stimuli_builder.tracking.detector.detection import Detection
-from stimuli_builder.tracking.detector.mesh import open_detector
-from stimuli_builder.tracking.detector.one_face import one_face
+from stimuli_builder.tracking.detector.mesh import FaceMesh, open_detector
+from stimuli_builder.tracking.detector.one_face import one_face, overlap
 from stimuli_builder.tracking.shapes import EYE_POINTS, Points
 from stimuli_builder.tracking.tracker import UNSEEN
 from stimuli_builder.video import Picture, VideoInfo, frames, rgb
 
 NOTHING: Picture = np.empty((0, 0, 3), np.uint8)
 LOOKED_AT = 400
+LOOKED_AT_IN_PARTS = 8
 FEWEST = 6
 LEAST_SEEN = 0.3
 """Share of the frames looked at that must show a face: below it, what was found is hardly one."""
@@ -40,6 +41,9 @@ class Survey:
         Frames looked at.
     several_faces : int
         Frames among them with more than one face; the one larger over the recording was taken.
+    further : int
+        Faces more than those that are seen at once, in the frame looked at in parts that has most: too small
+        beside the whole picture for the detector to see them there.
     unseen : frozenset of int
         Frames looked at in which the eyes of that face were not seen, or not wholly in the picture.
     covered : dict of int to str
@@ -49,6 +53,7 @@ class Survey:
     points: dict[int, Points]
     looked_at: int
     several_faces: int
+    further: int = 0
     unseen: frozenset[int] = frozenset()
     covered: dict[int, str] = field(default_factory=dict)
 
@@ -66,7 +71,7 @@ def survey(info: VideoInfo, *, one_eye: bool, advance: Callable[[int], None] | N
     InputError
         Too few frames show a face, or what was found is no face.
     """
-    seen = _looked(info, one_eye, advance)
+    seen, further = _looked(info, one_eye, advance)
     several = sum(len(faces) > 1 for faces in seen.values())
     of_face = {n: one for n, one in one_face(seen).items() if _inside(one.points, info)}
     eyes_seen = {n: one.points for n, one in of_face.items()}
@@ -80,24 +85,46 @@ def survey(info: VideoInfo, *, one_eye: bool, advance: Callable[[int], None] | N
     unseen = frozenset(seen.keys() - labels.keys())
     covers = covered_frames(info.path, {n: of_face[n].spreads for n in labels}, FEWEST)
     open_to_view = {n: points for n, points in labels.items() if n not in covers}
-    return Survey(open_to_view, len(seen), several, unseen, covers)
+    return Survey(open_to_view, len(seen), several, further, unseen, covers)
 
 
 def _looked(
     info: VideoInfo, one_eye: bool, advance: Callable[[int], None] | None
-) -> dict[int, list[Detection]]:
-    """What a detector sees at each look."""
+) -> tuple[dict[int, list[Detection]], int]:
+    """What a detector sees at each look, and the further faces seen in parts of some of them."""
     step = max(1, -(-info.frame_count // LOOKED_AT))
     seen: dict[int, list[Detection]] = {}
+    further, in_parts = [0], step * max(1, info.frame_count // step // LOOKED_AT_IN_PARTS)
     with open_detector(one_eye=one_eye, first=_first(info, step) if one_eye else ()) as detector:
         pictures = frames(info.path, read=_every(step))
         for number, picture in enumerate(islice(pictures, info.frame_count)):
             if not picture.size:
                 continue
             seen[number] = detector.detect(picture)
+            if isinstance(detector, FaceMesh) and seen[number] and number % in_parts == 0:
+                further.append(further_faces(detector, picture, seen[number]))
             if advance is not None:
                 advance(number)
-    return seen
+    # one frame alone may show what the mesh takes for a face
+    return seen, sorted(further)[-2] if len(further) > 2 else max(further)
+
+
+def further_faces(mesh: FaceMesh, picture: Picture, seen: Sequence[Detection]) -> int:
+    """Faces that are seen in parts of a picture only: squares of its shorter side, each half over the next.
+
+    The detector shrinks a picture to a small square first, so that a face below a tenth of it is not found.
+    """
+    height, width = picture.shape[:2]
+    side, long = min(height, width), max(height, width)
+    known = list(seen)
+    for start in np.linspace(0, long - side, max(2, round(2 * long / side) - 1)).astype(int).tolist():
+        x, y = (start, 0) if width >= height else (0, start)
+        part = np.ascontiguousarray(picture[y : y + side, x : x + side])
+        for face in mesh.faces(part):
+            moved = replace(face, box=face.box + np.array([x, y, x, y]))
+            if all(overlap(moved, other) == 0 for other in known):
+                known.append(moved)
+    return len(known) - len(seen)
 
 
 def _first(info: VideoInfo, step: int) -> list[Picture]:

@@ -74,7 +74,7 @@ def _each_once(detections: Sequence[Detection]) -> list[Detection]:
     """The detections of one frame, largest first, without smaller ones of the same face."""
     kept: list[Detection] = []
     for detection in sorted(detections, key=lambda one: one.area_px2, reverse=True):
-        if all(_overlap(detection, other) <= TWICE for other in kept):
+        if all(overlap(detection, other) <= TWICE for other in kept):
             kept.append(detection)
     return kept
 
@@ -114,7 +114,7 @@ def _away(before: Detection, now: Detection) -> float:
     return float(np.hypot(*between) / max(_width(before), _width(now), 1e-6))
 
 
-def _overlap(one: Detection, other: Detection) -> float:
+def overlap(one: Detection, other: Detection) -> float:
     """Area that two boxes share, as part of the area they cover together."""
     sides = np.minimum(one.box[2:], other.box[2:]) - np.maximum(one.box[:2], other.box[:2])
     shared = float(np.prod(np.maximum(sides, 0)))

@@ -5,6 +5,7 @@ import pytest
 
 from stimuli_builder.tracking.detector.detection import Detection
 from stimuli_builder.tracking.detector.one_face import one_face
+from stimuli_builder.tracking.survey import further_faces
 
 
 def at(x, side):
@@ -103,3 +104,29 @@ def test_a_close_up_whose_box_gets_flat_in_a_blink_is_kept_whole():
     flat = Detection(np.zeros((9, 2)), np.zeros((1, 5, 2)), np.array([200.0, 95.0, 400.0, 105.0]), (0.0,))
     seen = {n: [flat if 4 <= n < 7 else at(300, 200)] for n in range(12)}
     assert sorted(one_face(seen)) == list(range(12))
+
+
+class Mesh:
+    """Sees the bright squares of a picture that are a tenth of its longer side or more."""
+
+    def faces(self, picture):
+        rows, columns = np.nonzero(picture[:, :, 0] > 0)
+        found = []
+        for level in np.unique(picture[rows, columns, 0]):
+            y, x = np.nonzero(picture[:, :, 0] == level)
+            box = np.array([x.min(), y.min(), x.max() + 1, y.max() + 1], float)
+            if box[2] - box[0] >= max(picture.shape[:2]) / 10:
+                found.append(Detection(np.zeros((18, 2)), np.zeros((2, 5, 2)), box, (0.0, 0.0)))
+        return found
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize(("side", "more"), [(70, 1), (20, 0)])
+def test_a_face_too_small_beside_the_whole_picture_is_seen_in_a_part_of_it(turned, side, more):
+    picture = np.zeros((400, 1000, 3), np.uint8)
+    picture[100:300, 100:300] = 200
+    picture[200 : 200 + side, 800 : 800 + side] = 100
+    picture = picture.swapaxes(0, 1) if turned else picture
+    seen = Mesh().faces(picture)
+    assert len(seen) == 1
+    assert further_faces(Mesh(), picture, seen) == more

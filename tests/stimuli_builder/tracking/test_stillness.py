@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from stimuli_builder.actor.recording import Actor, ActorOptions
+from stimuli_builder.tracking.hindsight import STOOD, alike, evenly_repeated
 from stimuli_builder.tracking.stillness import Stillness
 from stimuli_builder.tracking.track import track_video
-from stimuli_builder.tracking.tracker import STILL, Tracker
+from stimuli_builder.tracking.tracker import FROZEN, STILL, Tracker
 from stimuli_builder.video_scan import scan_video
 
 FPS = 60
@@ -44,6 +45,83 @@ def test_a_still_picture_that_was_compressed_is_doubtful(lesson, recording, tmp_
         rows = list(csv.DictReader(stream))
     assert {row["status"] for row in rows[180:]} == {"doubtful"}
     assert STILL in {row["reason"] for row in rows[180:]}
+
+
+def tracked(lesson, folder, pictures, fps, **options):
+    """Rows and the summary of a track of these grey pictures, compressed."""
+    clip, out = folder / "clip.mp4", folder / "t.csv"
+    with av.open(str(clip), "w") as container:
+        stream = container.add_stream("libx264", rate=fps, options=options)
+        stream.height, stream.width = pictures[0].shape
+        stream.pix_fmt = "yuv420p"
+        for picture in pictures:
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="gray")))
+        container.mux(stream.encode())
+    summary = track_video(lesson.model, scan_video(clip), out)
+    with out.open() as stream:
+        return list(csv.DictReader(stream)), summary
+
+
+@pytest.mark.parametrize("options", [{"qp": "0"}, {"crf": "16", "preset": "ultrafast"}, {"crf": "28"}])
+def test_a_frozen_end_is_doubtful_from_its_first_frame_to_its_last(lesson, recording, tmp_path, options):
+    pictures = recording.pictures[:60:2] + [recording.pictures[60]] * 40
+    rows, summary = tracked(lesson, tmp_path, pictures, 30, **options)
+    assert {(row["status"], row["reason"]) for row in rows[:27]} == {("tracked", "")}
+    assert {(row["status"], row["reason"]) for row in rows[30:]} == {("doubtful", STOOD)}
+    assert 40 <= summary.doubtful <= 43
+    assert [int(row["frame"]) for row in rows] == list(range(70))
+
+
+@pytest.mark.parametrize("fps", [60, 240])
+def test_a_person_who_holds_still_for_a_second_is_not_called_a_still_picture(lesson, tmp_path, fps):
+    actor = Actor(ActorOptions(seconds=1.0, fps=fps, seed=3))
+    rows, _ = tracked(lesson, tmp_path, [actor.frame(n)[0] for n in range(fps)], fps, crf="28")
+    assert STOOD not in {row["reason"] for row in rows}
+
+
+@pytest.mark.parametrize(("every", "times"), [(1, 2), (1, 3), (4, 2)])
+def test_frames_that_a_change_of_rate_repeats_are_told_once_and_keep_their_status(
+    lesson, recording, tmp_path, every, times
+):
+    """30 to 60 frames/s, 20 to 60, and 4 frames made 5."""
+    pictures = [
+        p for n, p in enumerate(recording.pictures[:180:3]) for _ in range(times if n % every == 0 else 1)
+    ]
+    rows, summary = tracked(lesson, tmp_path, pictures, 60, qp="0")
+    assert {(row["status"], row["reason"]) for row in rows} == {("tracked", "")}
+    assert summary.repeated == len(pictures) - 60
+
+
+def test_frames_repeated_here_and_there_are_doubtful_each(lesson, recording, tmp_path):
+    again = {5, 6, 31, 50}
+    pictures = [p for n, p in enumerate(recording.pictures[:60]) for _ in range(2 if n in again else 1)]
+    rows, summary = tracked(lesson, tmp_path, pictures, 60, qp="0")
+    assert [n for n, row in enumerate(rows) if row["reason"] == FROZEN] == [6, 8, 34, 54]
+    assert summary.repeated == 0
+
+
+@pytest.mark.parametrize(
+    ("repeats", "even"),
+    [
+        (range(1, 40, 2), True),
+        ([n for n in range(60) if n % 10], True),
+        (range(25, 101, 25), True),
+        (range(5), False),
+        ([3, 4, 20, 21, 55], False),
+        ([4, 8], False),
+    ],
+)
+def test_even_repeats(repeats, even):
+    assert evenly_repeated(list(repeats), 9 if len(repeats) > 50 else 3) == even
+
+
+def test_pictures_are_alike_where_few_pixels_differ_by_much():
+    one = np.full((20, 50), 100, np.uint8)
+    other = one + np.uint8(3)
+    assert alike(one, other, 3, 0.003)
+    other[3, :4] = 104
+    assert not alike(one, other, 3, 0.003)
+    assert alike(one, other, 3, 0.004)
 
 
 def test_the_actor_who_holds_still_between_blinks_is_tracked(lesson):
