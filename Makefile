@@ -82,6 +82,7 @@ bench: setup-test ## speed, memory and accuracy, as figures and ratios (long)
 	@PYTHONPATH=. $(BIN)/python tests/bench/bench_lid_events.py $(BLINK_SERIES)
 	@PYTHONPATH=. $(BIN)/python tests/bench/bench_stated_error.py
 	@PYTHONPATH=. $(BIN)/python tests/bench/bench_label_free.py
+	@PYTHONPATH=. $(BIN)/python tests/bench/bench_label_error.py
 	@PYTHONPATH=. $(BIN)/python tests/bench/bench_track_speed.py
 	@PYTHONPATH=. $(BIN)/python tests/bench/bench_reflections.py
 	@test -z "$(FACEKIT)" || PYTHONPATH=. $(BIN)/python tests/bench/face_quality.py cedar@4 $(FACEKIT)

@@ -18,6 +18,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from scipy.stats import beta
 
 from stimuli_builder.actor.recording import Actor, ActorOptions, label_points, truth_points
 from stimuli_builder.environments import cache_folder
@@ -41,6 +42,7 @@ SECONDS, FPS = 2.5, 120
 NOISES_PX = {1: 0.0, 2: 1.0, 3: 1.0, 4: 2.0}
 BINS = (0, 0.5, 1, 1.5, 2, 3, 5, 100)
 RUN = 12
+WRONG_PERCENT = 6
 SPOILT = ("blurred", "darkened", "noisy", "covered")
 
 
@@ -138,6 +140,7 @@ def tell(name: str, frames_compared: list[Compared]) -> None:
                 f"  stated {low:4g} to {high:4g}%: {inside.sum():5d} frames  stated {s:5.2f}  true {t:5.2f}  "
                 f"within twice the stated {within:4.0%}\n"
             )
+    tell_wrong(frames_compared)
     off = [f for f in known if f.true > 100 * DOUBTFUL_SHARE]
     caught = sum(f.status == "doubtful" for f in off)
     good = [f for f in known if f.true <= 100 * DOUBTFUL_SHARE]
@@ -146,6 +149,17 @@ def tell(name: str, frames_compared: list[Compared]) -> None:
         f"  all: stated {np.sqrt((stated**2).mean()):.2f}, true {np.sqrt((true**2).mean()):.2f}; "
         f"off by more than 5%: {len(off)}, {caught} of them doubtful, beside {lost} lost; "
         f"{doubted} of {len(good)} others doubtful\n"
+    )
+
+
+def tell_wrong(frames_compared: list[Compared]) -> None:
+    """Print how many frames called `tracked` are off by more than 6%, and a 95% bound of their share."""
+    tracked = [frame for frame in frames_compared if frame.status == "tracked"]
+    wrong = sum(frame.true > WRONG_PERCENT for frame in tracked)
+    bound = 1.0 if wrong == len(tracked) else float(beta.ppf(0.95, wrong + 1, len(tracked) - wrong))
+    sys.stdout.write(
+        f"  called tracked: {len(tracked)}, off by more than {WRONG_PERCENT}%: {wrong}; "
+        f"at most {bound:.1%} at 95% (Clopper-Pearson, one-sided)\n"
     )
 
 
