@@ -18,7 +18,7 @@ STOOD = "the picture stands still: about the eyes it is that of the frames aroun
 STOOD_S = 0.5
 STOOD_FRAMES = 5
 """The fewest frames of a picture that stands still; below 10 frames/s they last longer than half a second."""
-ALIKE_SHARE = 0.003
+ALIKE_SHARE = 0.01
 ALIKE_LEVELS = 3.0
 """Pictures are alike where less than this share of the pixels about the eyes differs by more grey levels than
 these. A codec's own changes stay below it but for the first frames; two people and the actor, as recorded and
