@@ -165,7 +165,7 @@ def train(
     from experiments.errors import InputError
     from experiments.files import check_ending, check_targets
     from stimuli_builder.progress import step_progress
-    from stimuli_builder.tracking.cli_track import report_modes, warn
+    from stimuli_builder.tracking.cli_report import report_modes, warn
     from stimuli_builder.tracking.labels import load_labels
     from stimuli_builder.tracking.learn import learn, open_video, training_steps
     from stimuli_builder.tracking.model_file import save_model

@@ -12,12 +12,12 @@ from experiments.errors import InputError
 from experiments.files import check_ending, check_targets, temporary_beside
 from stimuli_builder.blinks.plots import check_figure_name
 from stimuli_builder.progress import frame_progress, step_progress
+from stimuli_builder.tracking.cli_report import report_modes, report_track, warn
 from stimuli_builder.tracking.labelfree import label_free_lesson
 from stimuli_builder.tracking.labels import Labels, load_labels
-from stimuli_builder.tracking.learn import Lesson, check_eyes, learn, open_video, training_steps
+from stimuli_builder.tracking.learn import check_eyes, learn, open_video, training_steps
 from stimuli_builder.tracking.model import CoupledModel
 from stimuli_builder.tracking.model_file import load_model
-from stimuli_builder.tracking.outcome import TrackSummary
 from stimuli_builder.tracking.plot import plot_track
 from stimuli_builder.tracking.preview import write_preview
 from stimuli_builder.tracking.proposals import by_hand, unmarked, unreviewed
@@ -32,7 +32,6 @@ from stimuli_builder.video_scan import declared_frames
 from stimuli_builder.video_writer import check_video_name
 
 Hints = Mapping[int, Points | str]
-REASONS_TOLD = 6
 VIDEO_SUFFIXES = {".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm", ".mts", ".mpg", ".wmv"}
 
 
@@ -77,7 +76,7 @@ def _track(job: TrackJob, info: VideoInfo) -> None:
             lambda now: progress.update(task, completed=now.frames, refresh=False),
             hints,
         )
-    _report(job.out, summary, prepared_s)
+    report_track(job.out, summary, prepared_s)
     if summary.repeated:
         share = 1 - summary.repeated / summary.frames
         warn(
@@ -224,28 +223,6 @@ def _relabel(path: Path, info: VideoInfo, model: CoupledModel, job: TrackJob, hi
     )
 
 
-def warn(line: str) -> None:
-    """Print a warning on stderr, unless there is nothing to say."""
-    if line:
-        sys.stderr.write(f"warning: {line}\n")
-
-
-def _report(out: Path, summary: TrackSummary, prepared_s: float) -> None:
-    print(
-        f"{out}: {summary.frames:,} frames, {summary.tracked:,} tracked "
-        f"({summary.doubtful:,} of them doubtful), {summary.reinitialised:,} re-initialised, "
-        f"{summary.lost:,} lost\n"
-        f"{summary.fit_fps:,.0f} frames/s fit only, "
-        f"{summary.end_to_end_fps:,.0f} frames/s with decoding; "
-        f"{summary.total_s:,.1f} s after {prepared_s:,.1f} s for the model"
-    )
-    usual = sorted(summary.reasons.items(), key=lambda entry: -entry[1][0])
-    for (status, _), (number, first, whole) in usual[:REASONS_TOLD]:
-        print(f"{counted(number, 'frame')} {status}, the first is {first}: {whole}")
-    if summary.tracked == summary.doubtful:
-        sys.stderr.write("warning: no frame is beyond doubt; look at a --preview before using any number\n")
-
-
 def _pictures(job: TrackJob, info: VideoInfo, model: CoupledModel) -> None:
     if job.preview is not None:
         with frame_progress() as progress:
@@ -264,15 +241,3 @@ def _plot(track: Path, fps: float, figure: Path) -> None:
         warn(f"{figure}: no plot, the track is written ({error})")
         return
     print(f"{figure}: trace with {counted(count, 'blink')}")
-
-
-def report_modes(lesson: Lesson) -> None:
-    """Print how many frames trained and how much of their variance is kept."""
-    model = lesson.model
-    kept = [f"{share:.1%}" for share in model.variance_kept]
-    print(
-        f"trained on {len(model.examples)} frames: {model.mode_counts[0]} shape modes ({kept[0]}), "
-        f"{model.mode_counts[1]} appearance modes ({kept[1]}), "
-        f"{model.mode_counts[2]} coupled modes ({kept[2]}), "
-        f"{model.mesh.pixel_count:,} base pixels, labels {'refined' if lesson.refined else 'as given'}"
-    )

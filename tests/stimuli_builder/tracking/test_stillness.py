@@ -44,7 +44,8 @@ def test_a_still_picture_that_was_compressed_is_doubtful(lesson, recording, tmp_
     with out.open() as stream:
         rows = list(csv.DictReader(stream))
     assert {row["status"] for row in rows[180:]} == {"doubtful"}
-    assert STILL in {row["reason"] for row in rows[180:]}
+    # A codec that keeps the picture shows that it stands still before two seconds of still lids do.
+    assert {row["reason"] for row in rows[180:]} <= {STILL, STOOD}
 
 
 def tracked(lesson, folder, pictures, fps, **options):
