@@ -40,7 +40,7 @@ def check_ending(path: Path, ending: str, what: str) -> None:
     Parameters
     ----------
     ending : str
-        Wanted, with its dot.
+        Expected, with its dot.
     what : str
         The output in words, as `a track`.
     """

@@ -13,23 +13,26 @@ from stimuli_builder.blinks.profile import BlinkProfile, Eye
 
 def asymmetry_lines(eyes: Sequence[EyeBlinks]) -> list[str]:
     """Lines about an eye that moves much less than the other, or not at all; none where both move alike."""
+    sides = {eye_of(eye.series.column) for eye in eyes}
+    fellow = "the other eye" if sides == {"left", "right"} else "the other column"
     lines = []
     for eye in eyes:
         side = None if eye.recognised is None else eye.recognised.asymmetry
-        if side is None or not side.is_weak:
+        # An eye that blinks more often than the other is not the one that does not move.
+        if side is None or not side.is_weak or len(eye.blinks) > side.blinks:
             continue
         name = eye_of(eye.series.column)
-        whose = f"{name} eye ({eye.series.column})" if name else eye.series.column
-        others = f"the other eye's {counted(side.blinks, 'blink')}"
+        label = f"{name} eye ({eye.series.column})" if name else eye.series.column
+        others = f"{fellow}'s {counted(side.blinks, 'blink')}"
         if side.moves:
             how = f"moves by {side.share:.0%} of {others} (median)"
         elif np.nanmax(eye.series.distance) == np.nanmin(eye.series.distance):
             how = f"does not move: every value is {np.nanmax(eye.series.distance):g}"
         elif eye.blinks:
-            how = f"does not move with {others}"
+            how = f"blinks apart from {fellow} ({counted(len(eye.blinks), 'blink')}, none at {others})"
         else:
             how = f"does not move beyond its noise at {others}"
-        lines.append(f"{whose}: {how}; the other eye was judged by itself")
+        lines.append(f"{label}: {how}; {fellow} was judged by itself")
     return lines
 
 

@@ -1,35 +1,53 @@
 """What the name of a column says: which eye it is of, and whether high is shut."""
 
 import re
-from itertools import pairwise
+from itertools import pairwise, zip_longest
 
 from stimuli_builder.blinks.profile import Eye
 
 _WORD = re.compile(r"[A-Z]{2,}(?=left|right|$|[^A-Za-z])|[A-Z]?[a-z]+|[A-Z]+(?![a-z])|[0-9]+")
 """A word of a column's name: EAR_l, leftEAR, EARleft, l_ear, EyeBlinkLeft."""
-_ACTION_UNIT = re.compile(r"AU[0-9]+_[rc]", re.IGNORECASE)
+_ACTION_UNIT = re.compile(r"AU[0-9]+_[rc](?![a-z])", re.IGNORECASE)
 """OpenFace's: r is a regression's intensity, not the right eye."""
 _SIDES: dict[str, Eye] = {
     "l": "left", "left": "left", "lefteye": "left", "leye": "left",
     "r": "right", "right": "right", "righteye": "right", "reye": "right",
 }  # fmt: skip
-_SHUT = frozenset({"blink", "closure", "closed", "closedness", "au45"})
+_SIDED = re.compile(
+    r"(?P<first>left|right)(eye|ear|gap|blink|lid|distance)|(eye|ear|gap|blink|lid|eyeblink)(?P<last>left|right)"
+)
+"""Words written together: lefteye, eyeblinkleft; not leftover, rightmost."""
+_NO_SIDE_BEFORE = re.compile(r"[0-9]+|squared")
+"""What a single letter before it is no side of: L2, r_squared."""
+_CLOSURES = frozenset({"closure", "closedness", "au45"})
+_SHUT = frozenset({"blink", "closed"})
 """Words of columns that are high where the lids are shut: ARKit's eyeBlinkLeft, OpenFace's AU45_r."""
+_OPENINGS = frozenset({"distance", "ear", "gap", "opening", "aperture", "fissure", "height", "px", "mm"})
+"""Words of a distance, by which blink and closed say only what it was measured for: blink_ear, closed_px."""
 
 
 def eye_of(column: str) -> Eye | None:
     """Tell the eye from the words of a column's name: l, left, r, right; else None."""
-    if _ACTION_UNIT.fullmatch(column):
+    if _ACTION_UNIT.match(column):
         return None
     words = [word.lower() for word in _WORD.findall(column)]
-    sides = {_SIDES[word] for word in words if word in _SIDES}
-    if not sides and words and words[0].startswith(("left", "right")):
-        return "left" if words[0].startswith("left") else "right"
+    sides = {
+        side
+        for word, following in zip_longest(words, words[1:], fillvalue="")
+        if (side := _side(word)) and not (len(word) == 1 and _NO_SIDE_BEFORE.fullmatch(following))
+    }
     return sides.pop() if len(sides) == 1 else None
+
+
+def _side(word: str) -> Eye | None:
+    """The eye of one word in small letters."""
+    sided = _SIDED.fullmatch(word)
+    return _SIDES.get(word if sided is None else sided["first"] or sided["last"])
 
 
 def is_high_when_shut(column: str) -> bool:
     """Whether a column's name is one of a closure, not of an opening."""
     words = [word.lower() for word in _WORD.findall(column)]
     pairs = {"".join(pair) for pair in pairwise(words)}
-    return not _SHUT.isdisjoint(pairs.union(words))
+    known = pairs.union(words)
+    return not _CLOSURES.isdisjoint(known) or (not _SHUT.isdisjoint(known) and _OPENINGS.isdisjoint(known))

@@ -12,12 +12,17 @@ REST = 0.25
 """A series that rests below this part of its top, and is above half of it for no longer than this part of the
 time, is one of a closure, or of eyes that are shut nearly always: a person says which."""
 TOP_PERCENTILE = 99.5
+RESTS_HIGH = 0.6
+"""A series that is named as a closure and rests above this part of its top is none, or of shut eyes."""
+GLITCH, GLITCHES = 2.0, 3
+"""A greatest value that is so many times the third greatest is a glitch, and no level of a shut lid."""
+_WAYS = "add --inverted if high is shut, --not-inverted if it is an opening"
 
 
 def opening_of(values: Array, column: str, path: Path, inverted: bool | None) -> tuple[Array, str]:
     """Return a column as an opening, 0 where the lids meet, and a line if it was turned round for that.
 
-    Closures up to 1 become 1 - closure; others are taken from their greatest value.
+    Closures up to 1 become 1 - closure; others are taken from their greatest value that is no glitch.
 
     Parameters
     ----------
@@ -27,22 +32,38 @@ def opening_of(values: Array, column: str, path: Path, inverted: bool | None) ->
     Raises
     ------
     InputError
-        Nobody says, the name does not tell, and the series looks like one of a closure.
+        Nobody says, and the series looks otherwise than its name.
     """
     by_name = is_high_when_shut(column)
     if inverted is None and not by_name and _rests_at_the_bottom(values):
         raise InputError(
-            f"{path.name}: column '{column}' rests near 0 and rises for short times, as a closure does "
-            "(1 = shut): add --inverted if high is shut, --not-inverted if it is an opening"
+            f"{path.name}: column '{column}' rests at {np.nanmedian(values):.3g} and rises to "
+            f"{np.nanmax(values):.3g} for short times, as a closure does (1 = shut): {_WAYS}"
+        )
+    if inverted is None and by_name and _rests_high(values):
+        raise InputError(
+            f"{path.name}: column '{column}' is named as a closure (1 = shut) and rests at "
+            f"{np.nanmedian(values):.3g}, near its top, as an opening does: {_WAYS}"
         )
     if not (by_name if inverted is None else inverted) or not np.isfinite(values).any():
         return values, ""
-    top = max(1.0, float(np.nanmax(values)))
+    top = max(1.0, _top(values[np.isfinite(values)]))
     why = "as its name says" if inverted is None else "as --inverted says"
     return (
-        top - values,
+        np.maximum(top - values, 0.0),
         f"{path.name}: '{column}' is high where lids are shut, {why}: taken as {top:g} minus it",
     )
+
+
+def _top(known: Array) -> float:
+    """The greatest value; the third greatest where that is a glitch."""
+    highest = np.sort(known)[-GLITCHES:]
+    return float(highest[0] if highest[-1] > GLITCH * max(highest[0], 0.5) else highest[-1])
+
+
+def _rests_high(values: Array) -> bool:
+    known = values[np.isfinite(values)]
+    return bool(known.size and np.median(known) > RESTS_HIGH * np.percentile(known, TOP_PERCENTILE) > 0)
 
 
 def _rests_at_the_bottom(values: Array) -> bool:

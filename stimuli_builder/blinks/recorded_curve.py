@@ -15,22 +15,23 @@ from stimuli_builder.blinks.units import closure_course
 def recorded_curve(eyes: Sequence[EyeBlinks]) -> AnimationCurve:
     """Closure of both lids over a whole recording at its own rate, gaps filled by straight lines.
 
-    With one column both eyes move alike. The lower lids' motion is the track's where it is known, else 0.
+    With one column both eyes move alike; of two, one without a blink stays open.
+    The lower lids' motion is the track's where it is known, else 0.
 
     Raises
     ------
     InputError
-        There are more than two columns, or one without a blink, whose closed level nothing tells.
+        There are more than two columns, or no blink, so that nothing tells the closed level.
     """
     if len(eyes) > 2:
         raise InputError(f"a curve has two eyes; choose them with --column, got {len(eyes)} columns")
-    for eye in eyes:
-        if not eye.blinks:
-            raise InputError(f"no blink in '{eye.series.column}': nothing tells where its lids are closed")
+    if not any(eye.blinks for eye in eyes):
+        columns = ", ".join(f"'{eye.series.column}'" for eye in eyes)
+        raise InputError(f"no blink in {columns}: nothing tells where its lids are closed")
     left, right = eyes[0], eyes[-1]
     if len(eyes) == 2 and eye_of(left.series.column) == "right":
         left, right = right, left
-    blinks = [(f"blink {b.number}", b.onset_s * left.series.fps) for b in left.blinks]
+    blinks = [(f"blink {b.number}", b.onset_s * left.series.fps) for b in left.blinks or right.blinks]
     lower = left.series
     return AnimationCurve(
         fps=left.series.fps,
@@ -43,6 +44,8 @@ def recorded_curve(eyes: Sequence[EyeBlinks]) -> AnimationCurve:
 
 
 def _course(eye: EyeBlinks) -> Array:
+    if not eye.blinks:
+        return np.zeros(eye.series.distance.size)
     return _filled(closure_course(eye.series, eye.blinks[0].closed_distance))
 
 

@@ -34,6 +34,7 @@ from stimuli_builder.blinks.review import (
 )
 from stimuli_builder.blinks.series import read_series
 from stimuli_builder.blinks.tables import blinks_frame, summarise, write_blinks, write_events, write_summary
+from stimuli_builder.blinks.units import iris_table
 
 
 @dataclass(frozen=True)
@@ -154,7 +155,7 @@ def _check(job: BlinksJob) -> None:
         job.plot_aligned,
         job.review,
     ]
-    check_targets(outputs, [job.series])
+    check_targets(outputs, [job.series, iris_table(job.more.scale)])
     check_endings(
         {
             "--out": (job.out, TABLE),

@@ -12,7 +12,7 @@ from experiments.errors import InputError, nearest
 from stimuli_builder.blinks.csv_table import NOTE, few, read_table
 from stimuli_builder.blinks.inverted import opening_of
 from stimuli_builder.blinks.profile import Array
-from stimuli_builder.blinks.times import MAX_BRIDGED_MS, resampled, series_fps, with_time_s
+from stimuli_builder.blinks.times import MAX_BRIDGED_MS, RESAMPLED, resampled, series_fps, with_time_s
 from stimuli_builder.blinks.tracked_lid import tracked_lower_lid
 from stimuli_builder.blinks.validity import CONFIDENCE_COLUMN, VALID_COLUMNS, unseen_rows
 
@@ -75,7 +75,7 @@ def box_filter(values: Array, width_frames: float) -> Array:
 
 
 def choose_columns(table: pd.DataFrame, named: Sequence[str], path: Path) -> list[str]:
-    """Return the distance columns to label: the wanted ones, else a track's, else the only candidate."""
+    """Return the distance columns to label: those named, else a track's, else the only candidate."""
     candidates = [
         str(name)
         for name in table.columns
@@ -134,10 +134,11 @@ def make_series(
     unsaid = missing & ~unseen
     if unsaid.any() and not gaps_allowed:
         first = int(np.argmax(unsaid))
+        start = f"{table['time_s'].iloc[first]:.3f} s" if RESAMPLED in table.attrs else f"line {first + 2}"
         rest = unsaid[first:]
         length = int(np.argmin(rest)) if not rest.all() else rest.size
         raise InputError(
-            f"{path.name}: column '{column}' has no value on {length} frames from line {first + 2} on; "
+            f"{path.name}: column '{column}' has no value on {length} frames from {start} on; "
             "mend the series, or label round the gap with --allow-gaps"
         )
     if np.nanmin(values) < 0:
@@ -199,7 +200,10 @@ def read_series(
 
     `resample` brings uneven times to even ones first. `inverted` says whether high is shut (`opening_of`).
     """
-    table, times_note = with_time_s(read_table(path), path)
+    table, times_note = read_table(path), ""
+    if fps is None or resample:
+        # A rate that was given stands by itself: columns of these names hold other things too.
+        table, times_note = with_time_s(table, path)
     chosen = choose_columns(table, columns, path)
     if resample and "time_s" not in table.columns:
         raise InputError(f"{path.name} has no column time_s: --resample needs the time of every frame")

@@ -14,28 +14,53 @@ from stimuli_builder.blinks.profile import Array
 
 MAX_BRIDGED_MS = 1000 / 30
 """Longest gap that is filled by a straight line: ten frames of the paper's, the filter's width."""
+TIMES = "times"
+"""Under this name a table keeps which of its columns time_s is from."""
+RESAMPLED = "resampled"
+"""So marked, a table's rows are no lines of its file."""
+UNITS = (("s", 1.0, 0.9), ("ms", 1e-3, 200.0), ("µs", 1e-6, 2e5), ("ns", 1e-9, np.inf))
+"""Units of times, their seconds, and the step below which a series is in them."""
 HOLE_STEPS = 2.5
 """A step of more than so many usual ones, and of more than `MAX_BRIDGED_MS`, is a hole: one frame that was
 dropped is bridged, and of a blink, which lasts for some 300 ms, no more than at 15 frames a second."""
 MAX_FRAMES = 20_000_000
 """23 hours at 240 frames a second, holes included."""
+MS_AND_A_HALF = 0.0015
+"""Below this step a frame that was dropped is no more than times rounded to ms."""
 UNEVEN = 0.2
 """Part of the usual step by which steps may differ in a series that is not resampled."""
 
 
 def with_time_s(table: pd.DataFrame, path: Path) -> tuple[pd.DataFrame, str]:
-    """The table with a column time_s, of `timestamp` or `time_ms` where it has none, and a line on that."""
+    """The table with a column time_s, of `timestamp` or `time_ms` where it has none, and a line on that.
+
+    Raises
+    ------
+    InputError
+        Such a column holds something else than times.
+    """
     if "time_s" in table.columns:
         return table, ""
     name = next((one for one in table.columns if one.lower() in ("timestamp", "time_ms")), None)
     if name is None:
         return table, ""
-    times = pd.to_numeric(table[name], errors="coerce").astype(np.float64)
-    # No recording has less than a frame a second, so that steps above 1 are ms.
-    is_ms = name.lower() == "time_ms" or float(np.nanmedian(np.diff(times), axis=None)) > 1
-    made = table.assign(time_s=times / 1000 if is_ms else times)
-    made.attrs = table.attrs
-    return made, f"{path.name}: times are from '{name}', in {'ms' if is_ms else 's'}"
+    times = pd.to_numeric(table[name], errors="coerce").to_numpy(dtype=np.float64)
+    steps = np.diff(times)
+    if not steps.size or not np.isfinite(steps).all() or (steps == 1).all():
+        got = "counts frames" if steps.size and (steps == 1).all() else "is not a number in every row"
+        raise InputError(f"{path.name}: '{name}' {got}; expected times: give the recording's rate with --fps")
+    unit, part = ("ms", 1e-3) if name.lower() == "time_ms" else _unit(float(np.median(steps)))
+    made = table.assign(time_s=times * part)
+    made.attrs = table.attrs | {TIMES: name}
+    return made, f"{path.name}: times are from '{name}', in {unit}"
+
+
+def _unit(step: float) -> tuple[str, float]:
+    """Name and seconds of the unit in which a usual step is one of a recording, of 5 frames a second or more.
+
+    Only seconds may be slower, so that a recording of 5 frames a second is told as what it is.
+    """
+    return next((unit, part) for unit, part, below in UNITS if step < below)
 
 
 def series_fps(table: pd.DataFrame, fps: float | None, path: Path, *, uneven: bool = False) -> float:
@@ -53,7 +78,8 @@ def series_fps(table: pd.DataFrame, fps: float | None, path: Path, *, uneven: bo
         raise InputError(f"the rate must lie between 10 and 10000 frames a second, got --fps {fps:g}")
     if fps is not None and measured is not None and abs(fps / measured - 1) > 0.01:
         raise InputError(
-            f"--fps {fps:g} contradicts {path.name}, whose time_s runs at {measured:.2f}; leave --fps out"
+            f"--fps {fps:g} contradicts {path.name}, whose {_name(table)} runs at {measured:.2f}; "
+            "leave --fps out"
         )
     rate = measured if measured is not None else fps
     if rate is None or rate < 10:
@@ -67,16 +93,27 @@ def _measured_fps(table: pd.DataFrame, path: Path, *, uneven: bool) -> float:
     times = pd.to_numeric(table["time_s"], errors="coerce").to_numpy(dtype=np.float64)
     steps = np.diff(times)
     if steps.size == 0 or not np.isfinite(steps).all() or (steps <= 0).any():
-        raise InputError(f"{path.name}: time_s must be complete and increase from row to row")
-    off = np.abs(steps / np.median(steps) - 1) > UNEVEN
+        raise InputError(f"{path.name}: {_name(table)} must be complete and increase from row to row")
+    off = np.abs(steps - np.median(steps)) > _allowed_s(times, steps)
     if not uneven and off.any():
         line = int(np.argmax(off)) + 3  # the header is line 1, and a step ends at the second of two rows
         raise InputError(
-            f"{path.name}: time_s is uneven (line {line}); labels need a constant frame rate: "
+            f"{path.name}: {_name(table)} is uneven (line {line}); labels need a constant frame rate: "
             "--resample brings it to one"
         )
     # A pause of a minute says nothing of the rate.
     return float(1 / steps[~_is_hole(steps)].mean())
+
+
+def _name(table: pd.DataFrame) -> str:
+    return str(table.attrs.get(TIMES, "time_s"))
+
+
+def _allowed_s(times: Array, steps: Array) -> float:
+    """By how much a step may differ from the usual one: times in whole ms are rounded by up to one."""
+    usual = float(np.median(steps))
+    is_rounded = usual > MS_AND_A_HALF and bool((np.abs(times * 1000 - np.round(times * 1000)) < 1e-3).all())
+    return max(UNEVEN * usual, 1.001e-3 if is_rounded else 0.0)
 
 
 def _is_hole(steps: Array) -> NDArray[np.bool_]:
@@ -124,10 +161,10 @@ def resampled(
         values = np.interp(even, times, table[column].to_numpy(dtype=np.float64))
         data[column] = np.where(in_hole, np.nan, values)
     if "status" in table.columns:
-        nearest = np.clip(np.searchsorted(times, even), 0, times.size - 1)
-        data["status"] = table["status"].iloc[nearest].reset_index(drop=True)
+        following = np.clip(np.searchsorted(times, even), 0, times.size - 1)
+        data["status"] = table["status"].iloc[following].reset_index(drop=True)
     even_table = pd.DataFrame(data)
-    even_table.attrs = table.attrs
+    even_table.attrs = table.attrs | {RESAMPLED: True}
     return even_table, in_hole | unseen[left] | unseen[left + 1], _hole_note(steps, path)
 
 

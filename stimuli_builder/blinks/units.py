@@ -50,8 +50,9 @@ def check_scale(scale: str) -> float | None:
     """
     if scale in SCALES:
         return None
-    if scale.startswith(IRIS_FILE):
-        _by_irises(Path(scale.removeprefix(IRIS_FILE)))
+    irises = iris_table(scale)
+    if irises is not None:
+        _by_irises(irises)
         return None
     try:
         value = float(scale)
@@ -77,12 +78,18 @@ def scale_of(table: pd.DataFrame, scale: str | None, path: Path) -> Scale | None
     """
     if scale is None:
         return None
-    if scale.startswith(IRIS_FILE):
-        return _by_irises(Path(scale.removeprefix(IRIS_FILE)))
+    irises = iris_table(scale)
+    if irises is not None:
+        return _by_irises(irises)
     value = check_scale(scale)
     if value is None:
         return _by_rule(table, scale, path)
     return Scale(value, f"{value:g} mm in a pixel, as given (a card or a ruler in the picture)")
+
+
+def iris_table(scale: str | None) -> Path | None:
+    """The table of irises that a wish for a scale names; None where it names none."""
+    return Path(scale.removeprefix(IRIS_FILE)) if scale is not None and scale.startswith(IRIS_FILE) else None
 
 
 def _by_irises(path: Path) -> Scale:

@@ -49,6 +49,7 @@ class Hindsight:
         self._first: Picture | None = None
         self._run, self._count = 0, 0
         self._repeats: deque[int] = deque()
+        self._earlier: TrackedFrame | None = None
 
     def after(self, picture: Picture, frame: TrackedFrame) -> Iterator[TrackedFrame]:
         """Take in the next frame and its reduced picture; give on what is now two seconds old, if any."""
@@ -97,8 +98,17 @@ class Hindsight:
             self._repeats.popleft()
         if frame.reason == FROZEN and evenly_repeated(list(self._repeats), self._longest):
             self.repeated += 1
-            return replace(frame, status="tracked", reason="")
+            frame = self._as_before(frame)
+        self._earlier = frame
         return frame
+
+    def _as_before(self, repeat: TrackedFrame) -> TrackedFrame:
+        """A repeat with the status of the frame that it repeats: its doubts are the same."""
+        earlier = self._earlier
+        if earlier is None or earlier.status == "lost":
+            return repeat
+        status = "tracked" if earlier.status == "reinitialised" else earlier.status
+        return replace(repeat, status=status, reason=earlier.reason)
 
 
 def _slices(box: Points, picture: Picture) -> tuple[slice, slice]:

@@ -42,8 +42,8 @@ class Survey:
     several_faces : int
         Frames among them with more than one face; the one larger over the recording was taken.
     further : int
-        Faces more than those that are seen at once, in the frame looked at in parts that has most: too small
-        beside the whole picture for the detector to see them there.
+        Faces more than those that are seen at once, too small beside the whole picture for the detector to
+        see them there: the second most in a frame looked at in parts, the most of up to two frames.
     unseen : frozenset of int
         Frames looked at in which the eyes of that face were not seen, or not wholly in the picture.
     covered : dict of int to str
@@ -94,7 +94,7 @@ def _looked(
     """What a detector sees at each look, and the further faces seen in parts of some of them."""
     step = max(1, -(-info.frame_count // LOOKED_AT))
     seen: dict[int, list[Detection]] = {}
-    further, in_parts = [0], step * max(1, info.frame_count // step // LOOKED_AT_IN_PARTS)
+    further, in_parts = [0], step * max(1, -(-info.frame_count // step // LOOKED_AT_IN_PARTS))
     with open_detector(one_eye=one_eye, first=_first(info, step) if one_eye else ()) as detector:
         pictures = frames(info.path, read=_every(step))
         for number, picture in enumerate(islice(pictures, info.frame_count)):

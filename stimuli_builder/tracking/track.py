@@ -66,6 +66,8 @@ def track_video(
             if advance is not None:
                 advance(summary)
         _write(hindsight.rest(), info, writer, summary)
+        if advance is not None:
+            advance(summary)
         summary.repeated = hindsight.repeated
         _refuse_nothing(info, summary)
     summary.total_s = time.perf_counter() - begun

@@ -7,8 +7,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from stimuli_builder.blinks.both_eyes import asymmetry_lines
 from stimuli_builder.blinks.events.generated import Motion, course, plan
 from stimuli_builder.blinks.events.recognise import Recognised, recognise
+from stimuli_builder.blinks.extract import blinks_of
+from stimuli_builder.blinks.label_options import LabelOptions
 from stimuli_builder.blinks.profile import Array
 from stimuli_builder.blinks.series import BlinkSeries
 
@@ -115,3 +118,27 @@ def test_the_still_eye_is_named_on_screen_in_report_and_summary(stimuli, palsy: 
     assert left["blinks"] == 0
     assert right["blinks"] == len(blinks(recognised([face(3, 120.0, 0.0, 0.01)[1][0]], 120.0)[0])) >= 3
     assert "nan" not in ended.out
+
+
+def lines_of(told: list[Recognised], eyes: list[Array], columns: tuple[str, str]) -> list[str]:
+    series = [
+        BlinkSeries(distance=eye, fps=120.0, column=name, is_px=False)
+        for eye, name in zip(eyes, columns, strict=True)
+    ]
+    return asymmetry_lines(
+        [blinks_of(one, LabelOptions(), recognised=seen) for one, seen in zip(series, told, strict=True)]
+    )
+
+
+def test_an_eye_that_blinks_is_not_named_for_a_glitch_of_the_other() -> None:
+    _, (moving, still) = face(3, 120.0, 0.0, 0.006)
+    still[1000:1030] -= 0.2 * np.hanning(30)
+    lines = lines_of(recognised([still, moving], 120.0), [still, moving], ("EAR_l", "EAR_r"))
+    assert not any(line.startswith("right eye") for line in lines)
+
+
+def test_columns_that_are_not_both_eyes_are_not_called_so() -> None:
+    _, eyes = face(3, 120.0, 0.0, 0.01)
+    (line,) = lines_of(recognised(eyes, 120.0), eyes, ("EAR_r", "EAR_r_still"))
+    assert "the other column's" in line
+    assert "other eye" not in line

@@ -77,6 +77,18 @@ def test_a_scale_by_the_irises_makes_mm_of_px(stimuli, close_up, tmp_path):
     assert "0.2500 mm in a pixel: an iris is 11.7 mm wide, 46.8 px here (median of 50 in i.csv)" in page
 
 
+def test_the_table_of_irises_is_not_written_over(stimuli, close_up, tmp_path):
+    table = tmp_path / "i.csv"
+    pd.DataFrame({"frame": range(9), "iris_diameter_px": [46.8] * 9}).to_csv(table, index=False)
+    before = table.read_bytes()
+    ended = stimuli(
+        "blinks", close_up, "--out", tmp_path / "b.csv", "--lids", table, "--scale", f"iris:{table}"
+    )
+    assert ended.code == 2
+    assert "already in use in this call" in ended.err
+    assert table.read_bytes() == before
+
+
 @pytest.mark.parametrize(
     ("content", "message"),
     [
@@ -105,6 +117,20 @@ def test_the_recording_is_exported_as_a_curve(labelled, tmp_path, make_known, fo
         assert len(content["closure_left"]) == known.distance.size
         assert content["closure_left"][known.minima[0]] == pytest.approx(1, abs=0.03)
         assert content["closure_right"][known.minima[1]] == pytest.approx(0.5 / 0.95, abs=0.06)
+
+
+def test_an_eye_that_does_not_blink_stays_open_in_the_curve(stimuli, series_file, tmp_path):
+    table = pd.read_csv(series_file)
+    table["gap_r"] = 30.0
+    table.to_csv(tmp_path / "s.csv", index=False)
+    ended = stimuli(
+        "blinks", tmp_path / "s.csv", "--column", "gap_l", "--column", "gap_r", "--fps", 300,
+        "--out", tmp_path / "b.csv", "--curve", tmp_path / "c", "--curve-format", "json",
+    )  # fmt: skip
+    assert ended.code == 0, ended.err
+    content = json.loads((tmp_path / "c").read_text(encoding="utf-8"))
+    assert max(content["closure_left"]) > 0.9
+    assert set(content["closure_right"]) == {0.0}
 
 
 def track(columns=("x", "y"), shift=70.0):

@@ -94,3 +94,43 @@ def test_usual_names_of_times_are_read(tmp_path: Path, name: str, factor: float,
     (series,) = read_series(tmp_path / "s.csv")
     assert series.fps == pytest.approx(240)
     assert series.notes == (f"s.csv: times are from '{name.strip()}', in {unit}",)
+
+
+@pytest.mark.parametrize(("part", "unit"), [(1e6, "µs"), (1e9, "ns")])
+def test_times_of_cameras_are_read(tmp_path: Path, part: float, unit: str) -> None:
+    times = np.round(np.arange(400) / 240 * part)
+    pd.DataFrame({"timestamp": times, "gap": np.full(400, 20.0)}).to_csv(tmp_path / "s.csv", index=False)
+    (series,) = read_series(tmp_path / "s.csv", ["gap"])
+    assert series.fps == pytest.approx(240)
+    assert series.notes == (f"s.csv: times are from 'timestamp', in {unit}",)
+
+
+@pytest.mark.parametrize(("fps", "even"), [(120, True), (240, True), (300, True), (500, True)])
+def test_times_that_are_rounded_to_a_millisecond_are_even(tmp_path: Path, fps: float, even: bool) -> None:
+    times = np.round(np.arange(600) / fps, 3)
+    path = written(tmp_path / "s.csv", times, np.full(600, 20.0))
+    assert read_series(path)[0].fps == pytest.approx(fps, rel=0.002)
+    path = written(tmp_path / "s.csv", np.delete(times, [300, 301]), np.full(598, 20.0))
+    with pytest.raises(InputError, match="uneven"):
+        read_series(path)
+
+
+@pytest.mark.parametrize(
+    ("stamps", "expected"),
+    [
+        (list(range(400)), "'timestamp' counts frames; expected times: give the recording's rate with --fps"),
+        ([f"2026-11-28T10:00:{n % 60:02d}" for n in range(400)], "'timestamp' is not a number in every row"),
+    ],
+)
+def test_a_rate_that_was_given_needs_no_column_of_times(tmp_path: Path, stamps, expected: str) -> None:
+    pd.DataFrame({"timestamp": stamps, "gap": np.full(400, 20.0)}).to_csv(tmp_path / "s.csv", index=False)
+    assert read_series(tmp_path / "s.csv", ["gap"], 240)[0].fps == 240
+    with pytest.raises(InputError, match=expected):
+        read_series(tmp_path / "s.csv", ["gap"])
+
+
+def test_a_gap_of_a_resampled_series_is_told_by_its_time(tmp_path: Path) -> None:
+    values = np.full(400, 20.0)
+    values[120:180] = np.nan
+    with pytest.raises(InputError, match=r"from 1\.98\d s on|from 2\.00\d s on"):
+        read_series(written(tmp_path / "s.csv", np.arange(400) / 60, values), resample=True)

@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import pytest
 
@@ -24,11 +23,22 @@ from stimuli_builder.blinks.series import read_series
         ),
         *(
             (name, "right")
-            for name in ("EAR_r", "r_ear", "rightEAR", "EAR.right", "EyeBlinkRight", "right", "EAR-R")
+            for name in ("eyeblinkright", "EAR_r", "r_ear", "rightEAR", "EAR.right", "EyeBlinkRight", "EAR-R")
         ),
         *(
             (name, None)
             for name in ("AU45_r", "AU45_c", "EAR", "distance_px", "brightness", "level", "left_right", "")
+        ),
+        *(
+            (name, None)
+            for name in (
+                "L2_distance",
+                "ear_L1",
+                "d_r_squared",
+                "leftover_px",
+                "rightmost_x",
+                "AU45_r_smooth",
+            )
         ),
     ],
 )
@@ -44,6 +54,7 @@ def test_the_eye_is_told_from_the_words_of_a_name(name: str, eye: str | None) ->
             for name in ("eyeBlinkLeft", "EyeBlinkRight", "AU45_r", "closure_left", "gap_l_closure")
         ),
         *((name, False) for name in ("EAR_l", "AU04_r", "opening", "left_distance_px", "enclosed")),
+        *((name, False) for name in ("blink_distance", "left_blink_EAR", "eye_closed_distance", "closed_px")),
     ],
 )
 def test_a_closure_is_told_from_its_name(name: str, shut: bool) -> None:
@@ -73,8 +84,8 @@ def test_what_looks_like_a_closure_waits_for_a_word(stimuli, make_known, tmp_pat
 
 def test_an_opening_under_a_closures_name_is_left_as_it_is_on_request(make_known, tmp_path: Path) -> None:
     distance = make_known().distance
-    pd.DataFrame({"blink_distance": distance}).to_csv(tmp_path / "s.csv", index=False)
-    (series,) = read_series(tmp_path / "s.csv", ["blink_distance"], 300, inverted=False)
+    pd.DataFrame({"eyeBlinkLeft": distance}).to_csv(tmp_path / "s.csv", index=False)
+    (series,) = read_series(tmp_path / "s.csv", ["eyeBlinkLeft"], 300, inverted=False)
     assert series.distance == pytest.approx(distance)
     assert series.notes == ()
 
@@ -85,7 +96,23 @@ def test_an_opening_is_not_taken_for_a_closure(make_known, tmp_path: Path, part:
     distance[: round(part * distance.size)] = 8.0
     pd.DataFrame({"gap": distance}).to_csv(tmp_path / "s.csv", index=False)
     (series,) = read_series(tmp_path / "s.csv", ["gap"], 300)
-    assert np.nanmedian(series.distance) in (pytest.approx(8.0), pytest.approx(42, abs=1))
+    assert series.distance == pytest.approx(distance)
+    assert series.notes == ()
+
+
+def test_an_opening_that_is_named_as_a_closure_waits_for_a_word(make_known, tmp_path: Path) -> None:
+    pd.DataFrame({"eyeBlinkLeft": make_known(noise=0.05).distance}).to_csv(tmp_path / "s.csv", index=False)
+    with pytest.raises(InputError, match=r"is named as a closure .* near its top, as an opening does"):
+        read_series(tmp_path / "s.csv", ["eyeBlinkLeft"], 300)
+
+
+def test_a_glitch_is_no_level_of_a_shut_lid(make_known, tmp_path: Path) -> None:
+    closure = 1 - make_known(noise=0.05).distance / 34.2
+    closure[700:702] = 40.0
+    pd.DataFrame({"closure": closure}).to_csv(tmp_path / "s.csv", index=False)
+    (series,) = read_series(tmp_path / "s.csv", ["closure"], 300)
+    assert series.distance.max() == pytest.approx(1.0, abs=0.02)
+    assert series.distance.min() >= 0
 
 
 def test_columns_without_a_side_are_not_said_to_blink_apart(

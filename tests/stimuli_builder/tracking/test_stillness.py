@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from stimuli_builder.actor.recording import Actor, ActorOptions
-from stimuli_builder.tracking.hindsight import STOOD, alike, evenly_repeated
+from stimuli_builder.tracking.hindsight import STOOD, Hindsight, alike, evenly_repeated
+from stimuli_builder.tracking.outcome import TrackedFrame
 from stimuli_builder.tracking.stillness import Stillness
 from stimuli_builder.tracking.track import track_video
 from stimuli_builder.tracking.tracker import FROZEN, STILL, Tracker
@@ -91,6 +92,21 @@ def test_frames_that_a_change_of_rate_repeats_are_told_once_and_keep_their_statu
     rows, summary = tracked(lesson, tmp_path, pictures, 60, qp="0")
     assert {(row["status"], row["reason"]) for row in rows} == {("tracked", "")}
     assert summary.repeated == len(pictures) - 60
+
+
+def test_a_repeat_of_a_doubtful_frame_is_doubtful_for_the_same_reason():
+    hindsight, out = Hindsight(60, 1), []
+    rng = np.random.default_rng(1)
+    for number in range(240):
+        picture = rng.integers(0, 255, (40, 120)).astype(np.uint8)
+        seen = ("doubtful", "jump") if number // 2 % 5 == 0 else ("tracked", "")
+        given = ("doubtful", FROZEN) if number % 2 else seen
+        out += hindsight.after(picture, TrackedFrame(*given, EYE, np.ones(1), 1.0, 3))
+    out += hindsight.rest()
+    said = [(frame.status, frame.reason) for frame in out]
+    assert said[1::2] == said[::2]
+    assert said.count(("doubtful", "jump")) == 48
+    assert hindsight.repeated == 120
 
 
 def test_frames_repeated_here_and_there_are_doubtful_each(lesson, recording, tmp_path):
