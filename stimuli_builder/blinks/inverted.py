@@ -1,5 +1,6 @@
 """Series that are high where the lids are shut, turned round: closures, blendshapes, action units."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,9 @@ GLITCH, GLITCHES = 2.0, 3
 _WAYS = "add --inverted if high is shut, --not-inverted if it is an opening"
 
 
-def opening_of(values: Array, column: str, path: Path, inverted: bool | None) -> tuple[Array, str]:
+def opening_of(
+    values: Array, column: str, path: Path, inverted: bool | None, others: Sequence[Array] = ()
+) -> tuple[Array, str]:
     """Return a column as an opening, 0 where the lids meet, and a line if it was turned round for that.
 
     Closures up to 1 become 1 - closure; others are taken from their greatest value that is no glitch.
@@ -28,6 +31,9 @@ def opening_of(values: Array, column: str, path: Path, inverted: bool | None) ->
     ----------
     inverted : bool or None
         Whether high is shut; None tells it from the column's name.
+    others : sequence of float64 array
+        Columns of the same kind, as the other eye's: one greatest value holds for all, so that an eye that
+        closes less keeps to be seen as such.
 
     Raises
     ------
@@ -47,7 +53,8 @@ def opening_of(values: Array, column: str, path: Path, inverted: bool | None) ->
         )
     if not (by_name if inverted is None else inverted) or not np.isfinite(values).any():
         return values, ""
-    top = max(1.0, _top(values[np.isfinite(values)]))
+    known = [one[np.isfinite(one)] for one in (values, *others)]
+    top = max(1.0, *(_top(one) for one in known if one.size))
     why = "as its name says" if inverted is None else "as --inverted says"
     return (
         np.maximum(top - values, 0.0),

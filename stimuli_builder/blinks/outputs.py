@@ -14,7 +14,7 @@ from stimuli_builder.blinks.csv_table import read_table
 from stimuli_builder.blinks.export.formats import CurveTarget, check_format, write_curve
 from stimuli_builder.blinks.extract import EyeBlinks, rate_doubt
 from stimuli_builder.blinks.recorded_curve import recorded_curve
-from stimuli_builder.blinks.units import check_scale, scale_of, write_lids
+from stimuli_builder.blinks.units import check_scale, scale_doubt, scale_of, write_lids
 
 
 @dataclass(frozen=True)
@@ -58,17 +58,23 @@ class MoreOutputs:
         scale = scale_of(table, self.scale, source)
         if scale is not None and not eyes[0].series.is_px:
             raise InputError(f"--scale needs distances in px; '{eyes[0].series.column}' is in another unit")
+        doubts = [doubt for eye in eyes if (doubt := scale_doubt(eye.series, scale))]
+        for doubt in doubts:
+            sys.stderr.write(f"warning: {doubt}\n")
         writers: list[Callable[[], None]] = []
         if self.curve is not None:
             text = write_curve(self.curve_format, recorded_curve(eyes), CurveTarget())
             writers.append(partial(_write_text, self.curve, text))
         if self.lids is not None:
             known = [(eye.series, eye.blinks[0].closed_distance) for eye in eyes if eye.blinks]
+            for eye in eyes:
+                if not eye.blinks:
+                    sys.stderr.write(f"note: {self.lids}: without {eye.series.column}, which has no blink\n")
             writers.append(partial(write_lids, self.lids, known, scale))
         if self.report is not None:
             from stimuli_builder.blinks.clinical_report import report_text
 
-            page = report_text(source, eyes, frame, scale, _doubts(table, eyes))
+            page = report_text(source, eyes, frame, scale, [*_doubts(table, eyes), *doubts])
             writers.append(partial(_write_text, self.report, page))
         return writers
 

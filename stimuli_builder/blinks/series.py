@@ -9,16 +9,24 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from experiments.errors import InputError, nearest
+from stimuli_builder.blinks.column_names import is_high_when_shut
 from stimuli_builder.blinks.csv_table import NOTE, few, read_table
 from stimuli_builder.blinks.inverted import opening_of
 from stimuli_builder.blinks.profile import Array
-from stimuli_builder.blinks.times import MAX_BRIDGED_MS, RESAMPLED, resampled, series_fps, with_time_s
+from stimuli_builder.blinks.times import (
+    MAX_BRIDGED_MS,
+    RESAMPLED,
+    is_time,
+    resampled,
+    series_fps,
+    with_time_s,
+)
 from stimuli_builder.blinks.tracked_lid import tracked_lower_lid
 from stimuli_builder.blinks.validity import CONFIDENCE_COLUMN, VALID_COLUMNS, unseen_rows
 
 PAPER_FPS = 300
 DISTANCE_COLUMNS = ("left_distance_px", "right_distance_px", "distance_px")
-INDEX_COLUMNS = ("frame", "time_s", "timestamp", "time_ms", *VALID_COLUMNS, CONFIDENCE_COLUMN)
+INDEX_COLUMNS = ("frame", *VALID_COLUMNS, CONFIDENCE_COLUMN)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +87,7 @@ def choose_columns(table: pd.DataFrame, named: Sequence[str], path: Path) -> lis
     candidates = [
         str(name)
         for name in table.columns
-        if table[name].dtype.kind == "f" and str(name).lower() not in INDEX_COLUMNS
+        if table[name].dtype.kind == "f" and str(name).lower() not in INDEX_COLUMNS and not is_time(str(name))
     ]
     for name in named:
         if name not in table.columns:
@@ -210,9 +218,10 @@ def read_series(
     rate = series_fps(table, fps, path, uneven=resample)
     unseen, notes = unseen_rows(table, path)
     notes.insert(0, times_note)
+    given = {column: np.where(unseen, np.nan, _numbers(table, column, path)) for column in chosen}
     for column in chosen:
-        values = np.where(unseen, np.nan, _numbers(table, column, path))
-        table[column], note = opening_of(values, column, path, _is_inverted(column, inverted))
+        others = [one for name, one in given.items() if is_high_when_shut(name) == is_high_when_shut(column)]
+        table[column], note = opening_of(given[column], column, path, _is_inverted(column, inverted), others)
         notes.append(note)
     if resample:
         table, unseen, note = resampled(table, chosen, rate, path, unseen)

@@ -16,6 +16,8 @@ MAX_BRIDGED_MS = 1000 / 30
 """Longest gap that is filled by a straight line: ten frames of the paper's, the filter's width."""
 TIMES = "times"
 """Under this name a table keeps which of its columns time_s is from."""
+TIME_NAMES = frozenset({"time", "times", "timems", "timestamp", "timestamps", "timestampms"})
+"""Letters of their names; of a unit s says nothing, as the steps tell it."""
 RESAMPLED = "resampled"
 """So marked, a table's rows are no lines of its file."""
 UNITS = (("s", 1.0, 0.9), ("ms", 1e-3, 200.0), ("µs", 1e-6, 2e5), ("ns", 1e-9, np.inf))
@@ -32,7 +34,7 @@ UNEVEN = 0.2
 
 
 def with_time_s(table: pd.DataFrame, path: Path) -> tuple[pd.DataFrame, str]:
-    """The table with a column time_s, of `timestamp` or `time_ms` where it has none, and a line on that.
+    """The table with a column time_s, of another column of times where it has none, and a line on that.
 
     Raises
     ------
@@ -41,7 +43,7 @@ def with_time_s(table: pd.DataFrame, path: Path) -> tuple[pd.DataFrame, str]:
     """
     if "time_s" in table.columns:
         return table, ""
-    name = next((one for one in table.columns if one.lower() in ("timestamp", "time_ms")), None)
+    name = next((one for one in table.columns if is_time(one)), None)
     if name is None:
         return table, ""
     times = pd.to_numeric(table[name], errors="coerce").to_numpy(dtype=np.float64)
@@ -49,10 +51,19 @@ def with_time_s(table: pd.DataFrame, path: Path) -> tuple[pd.DataFrame, str]:
     if not steps.size or not np.isfinite(steps).all() or (steps == 1).all():
         got = "counts frames" if steps.size and (steps == 1).all() else "is not a number in every row"
         raise InputError(f"{path.name}: '{name}' {got}; expected times: give the recording's rate with --fps")
-    unit, part = ("ms", 1e-3) if name.lower() == "time_ms" else _unit(float(np.median(steps)))
+    unit, part = ("ms", 1e-3) if _letters(name).endswith("ms") else _unit(float(np.median(steps)))
     made = table.assign(time_s=times * part)
     made.attrs = table.attrs | {TIMES: name}
     return made, f"{path.name}: times are from '{name}', in {unit}"
+
+
+def is_time(column: str) -> bool:
+    """Whether a column's name is one of times: time, Time (s), time_ms, timestamp, timestamp_ms."""
+    return _letters(column) in TIME_NAMES
+
+
+def _letters(column: str) -> str:
+    return "".join(letter for letter in column.lower() if letter.isalnum())
 
 
 def _unit(step: float) -> tuple[str, float]:

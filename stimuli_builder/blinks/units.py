@@ -30,6 +30,10 @@ SCALES = {
 IRIS_FILE = "iris:"
 """Beginning of a scale by the irises of a table that `stimuli iris` wrote."""
 LEAST_IRISES = 5
+MAX_IRIS_RATIO = 1.25
+"""Of both eyes' irises: a head turned by 35 degrees, at the distance of an arm."""
+FISSURES_MM = (3.0, 16.0)
+"""Openings of people's eyes; what lies outside has another scale than the one that was given."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +42,19 @@ class Scale:
 
     mm_per_px: float
     rule: str
+
+
+def scale_doubt(series: BlinkSeries, scale: Scale | None) -> str:
+    """A line where the usual opening in mm is none of a person's; empty otherwise."""
+    if scale is None:
+        return ""
+    opening = float(np.nanpercentile(series.distance, 85)) * scale.mm_per_px
+    if FISSURES_MM[0] <= opening <= FISSURES_MM[1]:
+        return ""
+    return (
+        f"{series.column}: the lids are {opening:.3g} mm apart when open, where people's are "
+        f"{FISSURES_MM[0]:g} to {FISSURES_MM[1]:g}: is --scale right ({scale.rule})?"
+    )
 
 
 def check_scale(scale: str) -> float | None:
@@ -104,6 +121,13 @@ def _by_irises(path: Path) -> Scale:
         raise InputError(
             f"--scale {IRIS_FILE}{path.name}: expected a table of stimuli iris with {LEAST_IRISES} irises or "
             f"more, got {seen.size}; measure them by stimuli iris VIDEO TRACK --out I.csv"
+        )
+    middles = [float(np.nanmedian(one)) for one in diameters.T if np.isfinite(one).any()]
+    if max(middles) > MAX_IRIS_RATIO * min(middles):
+        raise InputError(
+            f"--scale {IRIS_FILE}{path.name}: the irises of both eyes are {min(middles):.3g} and "
+            f"{max(middles):.3g} px wide (medians), which those of one face are not: look at the recording "
+            "with stimuli track --preview, or give mm in a pixel"
         )
     middle = float(np.median(seen))
     rule = f"an iris is {IRIS_MM:g} mm wide, {middle:.1f} px here (median of {seen.size:,} in {path.name})"

@@ -55,6 +55,12 @@ def _not_valid(column: pd.Series, path: Path) -> NDArray[np.bool_]:
 
 def _not_sure(column: pd.Series, path: Path) -> NDArray[np.bool_]:
     values = pd.to_numeric(column, errors="coerce").to_numpy(dtype=np.float64)
+    words = column[np.isnan(values) & column.notna().to_numpy()]
+    if words.size:
+        raise InputError(
+            f"{path.name}: column '{column.name}' must hold numbers between 0 and 1, got {words.iloc[0]!r}; "
+            "mend it, or name it otherwise"
+        )
     if (values < 0).any() or (values > 1).any():
         raise InputError(
             f"{path.name}: column '{column.name}' must lie between 0 and 1, got "

@@ -12,7 +12,7 @@ class LidEvent:
     kind : str
         "blink", "squint", "gaze_shift" or "closed_eye" (closed phase of 0.5 s or more).
     probability : float
-        The classifier's, of this kind among the four and 'nothing'.
+        The classifier's, of this kind among the four and 'nothing'; 1 where `with_long_closures` tells.
     frame : int
         Deepest frame of the series.
     onset_s, closed_from_s, minimum_s, closed_to_s, end_s : float

@@ -11,6 +11,7 @@ from stimuli_builder.blinks.events.candidates import RIPPLE, Candidate, candidat
 from stimuli_builder.blinks.events.generated import CLASSES, CLOSED_EYE_S
 from stimuli_builder.blinks.events.levels import Depth
 from stimuli_builder.blinks.events.lid_event import LidEvent
+from stimuli_builder.blinks.events.long_closure import with_long_closures
 from stimuli_builder.blinks.events.pieces import Piece, looked_at
 from stimuli_builder.blinks.events.second_look import second_look
 from stimuli_builder.blinks.events.template import Timing, timing_of
@@ -71,14 +72,14 @@ def recognise(eyes: Sequence[BlinkSeries]) -> list[Recognised]:
     """
     together = _looks(eyes)
     if len(eyes) != 2:
-        return [_recognised(look, eye.fps, None) for look, eye in zip(together, eyes, strict=True)]
+        return [_recognised(look, eye, None) for look, eye in zip(together, eyes, strict=True)]
     alone = [_looks([eye])[0] for eye in eyes]
     sides = [asymmetry(alone[k].pieces, alone[1 - k].pieces, alone[1 - k].told) for k in range(2)]
     results = []
     for k, eye in enumerate(eyes):
         own, other = sides[k], sides[1 - k]
         by_itself = (other is not None and other.is_weak) or (own is not None and not own.moves)
-        results.append(_recognised((alone if by_itself else together)[k], eye.fps, own))
+        results.append(_recognised((alone if by_itself else together)[k], eye, own))
     return results
 
 
@@ -88,14 +89,14 @@ def _looks(eyes: Sequence[BlinkSeries]) -> list[_Look]:
     return [_Look(*look) for look in zip(pieces, second_look(pieces), strict=True)]
 
 
-def _recognised(look: _Look, fps: float, side: Asymmetry | None) -> Recognised:
+def _recognised(look: _Look, eye: BlinkSeries, side: Asymmetry | None) -> Recognised:
     events: list[LidEvent] = []
     cut: list[int] = []
     for piece, of_piece in zip(look.pieces, look.told, strict=True):
-        told = _judged(piece, of_piece, fps)
+        told = _judged(piece, of_piece, eye.fps)
         cut += told.cut
-        events += apart(_listed(told), piece.depth.smooth, piece.start, fps)
-    return Recognised(tuple(events), tuple(cut), side)
+        events += apart(_listed(told), piece.depth.smooth, piece.start, eye.fps)
+    return Recognised(tuple(with_long_closures(eye.distance, eye.fps, events)), tuple(cut), side)
 
 
 def _judged(piece: Piece, probabilities: Array, fps: float) -> _Told:

@@ -77,6 +77,25 @@ def test_a_scale_by_the_irises_makes_mm_of_px(stimuli, close_up, tmp_path):
     assert "0.2500 mm in a pixel: an iris is 11.7 mm wide, 46.8 px here (median of 50 in i.csv)" in page
 
 
+def test_irises_that_are_not_of_one_face_are_no_scale(stimuli, close_up, tmp_path):
+    table = pd.DataFrame({"left_iris_diameter_px": [46.8] * 9, "right_iris_diameter_px": [4.0] * 9})
+    table.to_csv(tmp_path / "i.csv", index=False)
+    files = ("--out", tmp_path / "b.csv", "--lids", tmp_path / "l.csv")
+    ended = stimuli("blinks", close_up, *files, "--scale", f"iris:{tmp_path / 'i.csv'}")
+    assert ended.code == 2
+    assert "the irises of both eyes are 4 and 46.8 px wide" in ended.err
+
+
+def test_a_scale_that_no_eye_has_is_doubted_on_screen_and_in_the_report(stimuli, close_up, tmp_path):
+    files = ("--out", tmp_path / "b.csv", "--report", tmp_path / "r.html")
+    ended = stimuli("blinks", close_up, *files, "--scale", "2.5")
+    assert ended.code == 0, ended.err
+    doubt = "mm apart when open, where people's are 3 to 16"
+    assert doubt in ended.err
+    assert doubt in (tmp_path / "r.html").read_text(encoding="utf-8").replace("&#39;", "'")
+    assert "apart when open" not in stimuli("blinks", close_up, *files, "--scale", "0.25").err
+
+
 def test_the_table_of_irises_is_not_written_over(stimuli, close_up, tmp_path):
     table = tmp_path / "i.csv"
     pd.DataFrame({"frame": range(9), "iris_diameter_px": [46.8] * 9}).to_csv(table, index=False)

@@ -86,6 +86,9 @@ def test_a_rate_too_low_is_told_in_few_digits(tmp_path: Path) -> None:
         (" timestamp", 1.0, "s"),
         ("timestamp", 1000.0, "ms"),
         ("time_ms", 1000.0, "ms"),
+        ("timestamp_ms", 1000.0, "ms"),
+        ("Time (s)", 1.0, "s"),
+        ("time", 1000.0, "ms"),
     ],
 )
 def test_usual_names_of_times_are_read(tmp_path: Path, name: str, factor: float, unit: str) -> None:

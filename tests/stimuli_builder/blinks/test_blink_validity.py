@@ -77,3 +77,10 @@ def test_doubtful_frames_of_a_track_are_said(stimuli, make_known, tmp_path: Path
     assert ended.code == 0, ended.err
     assert "t.csv: 50 of 3,000 frames are doubtful" in ended.err
     assert (tmp_path / "r.html").read_text(encoding="utf-8").count("frames are doubtful") == 1
+
+
+def test_a_confidence_in_words_is_refused(tmp_path: Path) -> None:
+    table = pd.DataFrame({"gap": np.full(400, 20.0), "confidence": ["97%"] * 400})
+    table.to_csv(tmp_path / "s.csv", index=False)
+    with pytest.raises(InputError, match="'confidence' must hold numbers between 0 and 1, got '97%'"):
+        read_series(tmp_path / "s.csv", ["gap"], 240)

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -132,3 +133,13 @@ def test_words_in_place_of_a_closure_are_refused(tmp_path: Path) -> None:
     pd.DataFrame({"eyeBlinkLeft": ["x"] * 400}).to_csv(tmp_path / "s.csv", index=False)
     with pytest.raises(InputError, match="must hold numbers"):
         read_series(tmp_path / "s.csv", ["eyeBlinkLeft"], 240)
+
+
+@pytest.mark.parametrize("top", [1.0, 5.0, 100.0])
+def test_an_eye_that_closes_less_keeps_to_be_seen_as_such(make_known, tmp_path: Path, top: float) -> None:
+    closure = top * (1 - make_known(noise=0.05).distance / 34.2)
+    table = pd.DataFrame({"closure_left": closure, "closure_right": 0.2 * closure})
+    table.to_csv(tmp_path / "s.csv", index=False)
+    left, right = read_series(tmp_path / "s.csv", list(table.columns), 300)
+    assert np.ptp(right.distance) == pytest.approx(0.2 * np.ptp(left.distance), rel=0.01)
+    assert np.median(right.distance) == pytest.approx(np.median(left.distance), rel=0.03)

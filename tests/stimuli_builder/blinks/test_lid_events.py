@@ -303,3 +303,21 @@ def test_uneven_times_are_resampled_on_request(stimuli, tmp_path):
     assert found["minimum_s"].to_numpy() + times[0] == pytest.approx(
         np.array([2, 5, 9, 13, 16]) + 0.115, abs=0.06
     )
+
+
+@pytest.mark.parametrize("seconds", [0.7, 3.0, 9.0, 12.0, 30.0])
+@pytest.mark.parametrize("fps", [30.0, 120.0])
+def test_eyes_that_stay_shut_are_told_however_long(fps, seconds):
+    shut = Motion("closed_eye", 11, 0.2, seconds, 0.4, 0.95)
+    later = [11 + seconds + 3 * n for n in (1, 2, 3)]
+    (seen,) = recognise([eye(lids([*blinks_at(2, 5, 8), shut, *blinks_at(*later)], fps, seconds + 24), fps)])
+    assert [event.kind for event in seen.events] == ["blink"] * 3 + ["closed_eye"] + ["blink"] * 3
+    event = seen.events[3]
+    assert event.closed_to_s - event.closed_from_s == pytest.approx(seconds, abs=0.3)
+    assert_apart(seen.events)
+
+
+def test_lids_that_are_lowered_for_long_are_not_called_shut():
+    lowered = Motion("gaze_shift", 11, 0.2, 20.0, 0.4, 0.5)
+    (seen,) = recognise([eye(lids([*blinks_at(2, 5, 8, 34, 37), lowered], 60.0, 40.0), 60.0)])
+    assert "closed_eye" not in {event.kind for event in seen.events}
