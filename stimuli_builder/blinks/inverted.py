@@ -21,7 +21,7 @@ _WAYS = "add --inverted if high is shut, --not-inverted if it is an opening"
 
 
 def opening_of(
-    values: Array, column: str, path: Path, inverted: bool | None, others: Sequence[Array] = ()
+    values: Array, column: str, path: Path, inverted: bool | None, same_kind: Sequence[Array]
 ) -> tuple[Array, str]:
     """Return a column as an opening, 0 where the lids meet, and a line if it was turned round for that.
 
@@ -31,30 +31,29 @@ def opening_of(
     ----------
     inverted : bool or None
         Whether high is shut; None tells it from the column's name.
-    others : sequence of float64 array
-        Columns of the same kind, as the other eye's: one greatest value holds for all, so that an eye that
-        closes less keeps to be seen as such.
+    same_kind : sequence of float64 array
+        The column and those of its kind, as the other eye's: one greatest value holds for all, so that an eye
+        that closes less keeps to be seen as such.
 
     Raises
     ------
     InputError
         Nobody says, and the series looks otherwise than its name.
     """
-    by_name = is_high_when_shut(column)
-    if inverted is None and not by_name and _rests_at_the_bottom(values):
+    by_name, known = is_high_when_shut(column), values[np.isfinite(values)]
+    if inverted is None and not by_name and _rests_at_the_bottom(known):
         raise InputError(
-            f"{path.name}: column '{column}' rests at {np.nanmedian(values):.3g} and rises to "
-            f"{np.nanmax(values):.3g} for short times, as a closure does (1 = shut): {_WAYS}"
+            f"{path.name}: column '{column}' rests at {np.median(known):.3g} and rises to "
+            f"{known.max():.3g} for short times, as a closure does (1 = shut): {_WAYS}"
         )
-    if inverted is None and by_name and _rests_high(values):
+    if inverted is None and by_name and _rests_high(known):
         raise InputError(
             f"{path.name}: column '{column}' is named as a closure (1 = shut) and rests at "
-            f"{np.nanmedian(values):.3g}, near its top, as an opening does: {_WAYS}"
+            f"{np.median(known):.3g}, near its top, as an opening does: {_WAYS}"
         )
-    if not (by_name if inverted is None else inverted) or not np.isfinite(values).any():
+    if not (by_name if inverted is None else inverted) or not known.size:
         return values, ""
-    known = [one[np.isfinite(one)] for one in (values, *others)]
-    top = max(1.0, *(_top(one) for one in known if one.size))
+    top = max(1.0, *(_top(one[np.isfinite(one)]) for one in same_kind))
     why = "as its name says" if inverted is None else "as --inverted says"
     return (
         np.maximum(top - values, 0.0),
@@ -63,18 +62,19 @@ def opening_of(
 
 
 def _top(known: Array) -> float:
-    """The greatest value; the third greatest where that is a glitch."""
-    highest = np.sort(known)[-GLITCHES:]
+    """The greatest value; the third greatest where that is a glitch; 0 of none."""
+    if not known.size:
+        return 0.0
+    count = min(GLITCHES, known.size)
+    highest = np.sort(np.partition(known, -count)[-count:])
     return float(highest[0] if highest[-1] > GLITCH * max(highest[0], 0.5) else highest[-1])
 
 
-def _rests_high(values: Array) -> bool:
-    known = values[np.isfinite(values)]
+def _rests_high(known: Array) -> bool:
     return bool(known.size and np.median(known) > RESTS_HIGH * np.percentile(known, TOP_PERCENTILE) > 0)
 
 
-def _rests_at_the_bottom(values: Array) -> bool:
-    known = values[np.isfinite(values)]
+def _rests_at_the_bottom(known: Array) -> bool:
     if not known.size:
         return False
     middle, top = np.percentile(known, [50, TOP_PERCENTILE])

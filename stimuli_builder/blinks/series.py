@@ -220,8 +220,12 @@ def read_series(
     notes.insert(0, times_note)
     given = {column: np.where(unseen, np.nan, _numbers(table, column, path)) for column in chosen}
     for column in chosen:
-        others = [one for name, one in given.items() if is_high_when_shut(name) == is_high_when_shut(column)]
-        table[column], note = opening_of(given[column], column, path, _is_inverted(column, inverted), others)
+        same_kind = [
+            one for name, one in given.items() if is_high_when_shut(name) == is_high_when_shut(column)
+        ]
+        table[column], note = opening_of(
+            given[column], column, path, _is_inverted(column, inverted), same_kind
+        )
         notes.append(note)
     if resample:
         table, unseen, note = resampled(table, chosen, rate, path, unseen)

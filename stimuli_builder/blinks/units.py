@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from experiments.errors import InputError, nearest
 from experiments.files import whole_file
 from stimuli_builder.blinks.csv_table import read_table
-from stimuli_builder.blinks.events.levels import local_opening
+from stimuli_builder.blinks.events.levels import OPEN_PERCENTILE, local_opening
 from stimuli_builder.blinks.profile import Array
 from stimuli_builder.blinks.series import BlinkSeries
 from stimuli_builder.blinks.tracked_lid import FISSURE_LENGTH_MM
@@ -48,7 +48,7 @@ def scale_doubt(series: BlinkSeries, scale: Scale | None) -> str:
     """A line where the usual opening in mm is none of a person's; empty otherwise."""
     if scale is None:
         return ""
-    opening = float(np.nanpercentile(series.distance, 85)) * scale.mm_per_px
+    opening = float(np.nanpercentile(series.distance, OPEN_PERCENTILE)) * scale.mm_per_px
     if FISSURES_MM[0] <= opening <= FISSURES_MM[1]:
         return ""
     return (

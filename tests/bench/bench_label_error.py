@@ -32,11 +32,11 @@ def tell_left_out(folder: Path, name: str, labels: Labels) -> None:
     info = scan_video(folder / f"{name}.mp4")
     pictures = read_frames(info, list(labels.frames))
     results = cross_validate(pictures, labels.frames, labels.markers, TrainingOptions(), 5)
-    found = [one for one in results if one.rms_px is not None]
-    points = np.sqrt(np.mean([(one.rms_px / one.width_px) ** 2 for one in found]))
-    gaps = np.concatenate([one.distance_errors_px / one.width_px for one in found])
+    measured = [one for one in results if one.rms_px is not None]
+    points = np.sqrt(np.mean([(one.rms_px / one.width_px) ** 2 for one in measured]))
+    gaps = np.concatenate([one.distance_errors_px / one.width_px for one in measured])
     sys.stdout.write(
-        f"{name}: {len(found)} of {len(results)} frames left out found; points {points:.1%} of the eye's "
+        f"{name}: {len(measured)} of {len(results)} frames left out found; points {points:.1%} of the eye's "
         f"width off (root mean square, along and across), lid distance {np.sqrt((gaps**2).mean()):.1%}\n"
     )
 
