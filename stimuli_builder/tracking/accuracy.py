@@ -39,6 +39,8 @@ class HeldOut:
         Distance of each landmark from its label.
     width_px : float or None
         Mean width of the labelled eyes.
+    points : float64 array (9 * eyes, 2) or None
+        Landmarks as fitted, in pixels of the video.
     """
 
     frame: int
@@ -48,6 +50,7 @@ class HeldOut:
     residuals: Values | None
     point_errors_px: Values | None = None
     width_px: float | None = None
+    points: Points | None = None
 
 
 def cross_validate(
@@ -103,7 +106,7 @@ def _held_out(
     restored = restored_points(fit.vertices[: len(label)].astype(np.float64), model.reduction)
     errors = inter_eyelid_distances(restored, model.markers) - inter_eyelid_distances(label, model.markers)
     away = np.hypot(*(restored - label).T)
-    return HeldOut(frame, fold, _rms(restored - label), errors, fit.residuals, away, widths(label))
+    return HeldOut(frame, fold, _rms(restored - label), errors, fit.residuals, away, widths(label), restored)
 
 
 def _rms(differences: Points) -> float:

@@ -1,7 +1,7 @@
 """What a detector sees of a video: at looks spread over it, the eyes of one face, and which are covered."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import count, islice
 from typing import Any
 
@@ -10,7 +10,8 @@ import numpy as np
 from experiments.errors import InputError
 from stimuli_builder.tracking.covers import covered_frames
 from stimuli_builder.tracking.detector.detection import Detection
-from stimuli_builder.tracking.detector.mesh import FaceMesh, open_detector
+from stimuli_builder.tracking.detector.face_mesh import FaceMesh
+from stimuli_builder.tracking.detector.mesh import open_detector
 from stimuli_builder.tracking.detector.one_face import one_face, overlap
 from stimuli_builder.tracking.shapes import EYE_POINTS, Points
 from stimuli_builder.tracking.tracker import UNSEEN
@@ -27,6 +28,10 @@ UPRIGHT_DEG = 60
 upside down: left and right, above and below an eye are then not what they are called."""
 STEADY = 3.0
 """Eyes' widths over the frames looked at stay within this factor, or they belong to no one face."""
+UNSURE_SHARE = 0.075
+"""A face is read within this part of its eyes' widths in pictures and their mirror images, as the median of
+the frames looked at: 0.02 to 0.05 of a real face and of rendered ones, in noise and blur too; 0.10 of eyes
+drawn without a face, whose lids were 5% off."""
 
 
 @dataclass(frozen=True)
@@ -82,6 +87,7 @@ def survey(info: VideoInfo, *, one_eye: bool, advance: Callable[[int], None] | N
     )
     _require_upright(info, eyes_seen, labels)
     _require_face(info, labels, len(seen), one_eye)
+    _require_agreement(info, [of_face[n] for n in labels])
     unseen = frozenset(seen.keys() - labels.keys())
     covers = covered_frames(info.path, {n: of_face[n].spreads for n in labels}, FEWEST)
     open_to_view = {n: points for n, points in labels.items() if n not in covers}
@@ -121,9 +127,9 @@ def further_faces(mesh: FaceMesh, picture: Picture, seen: Sequence[Detection]) -
         x, y = (start, 0) if width >= height else (0, start)
         part = np.ascontiguousarray(picture[y : y + side, x : x + side])
         for face in mesh.faces(part):
-            moved = replace(face, box=face.box + np.array([x, y, x, y]))
-            if all(overlap(moved, other) == 0 for other in known):
-                known.append(moved)
+            in_picture = face.moved(x, y)
+            if all(overlap(in_picture, other) == 0 for other in known):
+                known.append(in_picture)
     return len(known) - len(seen)
 
 
@@ -179,4 +185,14 @@ def _require_face(info: VideoInfo, labels: dict[int, Points], looked: int, one_e
         raise InputError(
             f"{info.path}: what looks like eyes is {low:.0f} to {high:.0f} px wide over the frames looked "
             f"at: no one face{more}; or label frames by hand (--labels)"
+        )
+
+
+def _require_agreement(info: VideoInfo, detections: Sequence[Detection]) -> None:
+    share = float(np.median([one.mirror_share for one in detections]))
+    if share > UNSURE_SHARE:
+        raise InputError(
+            f"{info.path}: what looks like eyes is read differently in the mirror image (by {share:.0%} of "
+            f"their width, and {UNSURE_SHARE:.1%} is the most of a face that can be read); for a close-up of "
+            "one eye add --one-eye; or label frames by hand (--labels)"
         )

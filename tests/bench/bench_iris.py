@@ -33,8 +33,8 @@ class AtlasScene(SampleScene):
     """The scene that a shipped face was rendered from."""
 
     def __init__(self, kit, name: str, size_px: tuple[int, int]) -> None:
-        framing = "face" if name.endswith("-face") else "eyes"
-        FaceScene.__init__(self, kit, load_identity(name.removesuffix("-face")), framing, size_px)
+        identity, _, framing = name.partition("@")[0].partition("-")
+        FaceScene.__init__(self, kit, load_identity(identity), framing or "eyes", size_px)
 
 
 def eyes(name: str, kit, every: int) -> Iterator[tuple]:

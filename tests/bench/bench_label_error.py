@@ -3,7 +3,8 @@
     python tests/bench/bench_label_error.py [FOLDER]
 
 FOLDER (../shared/data/face_video) holds NAME.mp4 and NAME.points.json. Trained without a fifth of
-the labels, five times, points are compared with those left out. Then the labels are taken for the truth, and
+the labels, five times, points and lids (distance of lid points from the labelled lid's curve: a point's way
+along the lid is no error) are compared with those left out. Then the labels are taken for the truth, and
 other labels with so many pixels of error across the lid for each point (independent of one another) are
 correlated with it in their lid distances, as `bench_label_free.py` does with the track's.
 """
@@ -15,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from stimuli_builder.tracking.accuracy import cross_validate
+from stimuli_builder.tracking.certainty import lid_offsets
 from stimuli_builder.tracking.labels import Labels, load_labels
 from stimuli_builder.tracking.shapes import inter_eyelid_distances
 from stimuli_builder.tracking.training import TrainingOptions
@@ -34,10 +36,12 @@ def tell_left_out(folder: Path, name: str, labels: Labels) -> None:
     results = cross_validate(pictures, labels.frames, labels.markers, TrainingOptions(), 5)
     measured = [one for one in results if one.rms_px is not None]
     points = np.sqrt(np.mean([(one.rms_px / one.width_px) ** 2 for one in measured]))
+    away = [np.mean(lid_offsets(one.points, labels.frames[one.frame])) for one in measured]
     gaps = np.concatenate([one.distance_errors_px / one.width_px for one in measured])
     sys.stdout.write(
         f"{name}: {len(measured)} of {len(results)} frames left out found; points {points:.1%} of the eye's "
-        f"width off (root mean square, along and across), lid distance {np.sqrt((gaps**2).mean()):.1%}\n"
+        f"width off (root mean square, along and across), lids {np.mean(away):.1%} (worst frame "
+        f"{max(away):.1%}), lid distance {np.sqrt((gaps**2).mean()):.1%}\n"
     )
 
 

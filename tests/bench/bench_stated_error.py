@@ -94,28 +94,30 @@ def actors(folder: Path) -> Iterator[list[Compared]]:
         labels = Labels(folder / "labels.json", (512, 384), default_markers(2), labelled)
         info = scan_video(video)
         model = lesson_from(info, labels, TrainingOptions(), refine=None).model
-        yield compared(info, model, {}, dict(enumerate(truth)), along=True)
+        yield compared(tracked_rows(info, model, {}), 2, info.path, dict(enumerate(truth)), along=True)
 
 
-def compared(
-    info: VideoInfo, model: CoupledModel, hints: dict[int, Points], truth: dict[int, Points], *, along: bool
-) -> list[Compared]:
-    """Stated and true error of every frame with a truth; not `along`: lid points from the labelled curves."""
+def tracked_rows(info: VideoInfo, model: CoupledModel, hints: dict[int, Points]) -> dict[int, dict]:
+    """Rows of the track by frame."""
     with tempfile.TemporaryDirectory() as bare:
         out = Path(bare) / "track.csv"
         track_video(model, info, out, None, hints)
-        rows = {int(row["frame"]): row for row in track_rows(out)}
-    names = point_columns(model.eyes)
-    errors = error_columns(model.eyes)
-    lids = [9 * eye + point for eye in range(model.eyes) for point in UPPER_LID + LOWER_LID]
+        return {int(row["frame"]): row for row in track_rows(out)}
+
+
+def compared(
+    rows: dict[int, dict], eyes: int, path: str, truth: dict[int, Points], *, along: bool
+) -> list[Compared]:
+    """Stated and true error of every frame with a truth; not `along`: lid points from the labelled curves."""
+    lids = [9 * eye + point for eye in range(eyes) for point in UPPER_LID + LOWER_LID]
     results = []
     for number, true in truth.items():
         row = rows[number]
         if row["status"] == "lost":
             results.append(Compared(np.nan, np.nan, "lost"))
             continue
-        points = numbers(row, names, info.path).reshape(-1, 2)
-        stated = numbers(row, errors, info.path)
+        points = numbers(row, point_columns(eyes), path).reshape(-1, 2)
+        stated = numbers(row, error_columns(eyes), path)
         if along:
             away = np.sqrt(((points - true) ** 2).sum(1).mean()) / widths(true)
         else:
@@ -179,12 +181,16 @@ def recordings(folder: Path) -> None:
         others = {n: labels.frames[n] for n in ordered[1::2]}
         tell(
             f"{name}, {len(half.frames)} labels, others compared",
-            compared(info, model, {}, others, along=True),
+            compared(tracked_rows(info, model, {}), model.eyes, info.path, others, along=True),
         )
         if (cache_folder() / "face-mesh-0.10.21" / "ready").exists():
             seen = survey(info, one_eye=one_eye)
             free = label_free_lesson(info, seen, TrainingOptions(), one_eye=one_eye).model
-            tell(f"{name}, no labels, lids", compared(info, free, seen.hints, labels.frames, along=False))
+            rows = tracked_rows(info, free, seen.hints)
+            tell(
+                f"{name}, no labels, lids",
+                compared(rows, free.eyes, info.path, labels.frames, along=False),
+            )
 
 
 def main() -> None:

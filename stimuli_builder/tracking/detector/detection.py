@@ -1,8 +1,8 @@
 """What a detector of eyes gives, whichever it is: lid contours as the tracker's points."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, replace
+from typing import Protocol, Self
 
 import numpy as np
 
@@ -27,17 +27,26 @@ class Detection:
         Least x and y, then greatest x and y, of the face; of the eye in a close-up.
     spreads : tuple of float
         Of each eye, its `contour_spread`.
+    mirror_share : float
+        Mean distance of its points as read in the picture from those of its mirror image, as part of the
+        eye's width; infinite where the mirror image does not show the face, 0 where none was looked at.
     """
 
     points: Points
     iris: Points
     box: Points
     spreads: tuple[float, ...]
+    mirror_share: float = 0.0
 
     @property
     def area_px2(self) -> float:
         """Area of the box in square pixels."""
         return float(np.prod(self.box[2:] - self.box[:2]))
+
+    def moved(self, x: float, y: float) -> Self:
+        """The detection, so many pixels to the right and down."""
+        by = np.array([x, y])
+        return replace(self, points=self.points + by, iris=self.iris + by, box=self.box + np.tile(by, 2))
 
 
 class LidDetector(Protocol):

@@ -11,7 +11,7 @@ from experiments.errors import InputError
 from stimuli_builder.environments import cache_folder
 from stimuli_builder.tracking.covers import LEAST_SPREAD, covered_frames
 from stimuli_builder.tracking.detector.detection import contour_spread
-from stimuli_builder.tracking.detector.mesh import FaceMesh
+from stimuli_builder.tracking.detector.face_mesh import FaceMesh
 from stimuli_builder.tracking.faults import Faults
 from stimuli_builder.tracking.fit import Fitter
 from stimuli_builder.tracking.labelfree import label_free_lesson

@@ -1,0 +1,144 @@
+"""Recordings of the rendered faces that ship, with exact lids: for benches that need a truth without labels.
+
+Blinks, head and light are those of the synthetic actor (`stimuli_builder.actor.physiology`), but for a blink
+every second. Each frame is the level of the face whose closure is nearest, so that the geometry it was
+rendered from tells where its lids are; it is moved, turned and scaled by that head, blurred, noisy and
+written as H.264.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+
+import cv2
+import numpy as np
+from bench_close_up import MIRRORED, from_left
+from bench_iris import AtlasScene
+
+from stimuli_builder.actor.physiology import Blink, Course, course, plan_blinks
+from stimuli_builder.characters.atlas import SHIPPED, Atlas, load_atlas
+from stimuli_builder.characters.colour import linear_to_srgb
+from stimuli_builder.characters.facekit.training.draw import SamplePose
+from stimuli_builder.characters.facekit.training.labels import labels_of
+from stimuli_builder.tracking.detector.detection import eye_points
+from stimuli_builder.tracking.shapes import Points, widths
+from stimuli_builder.video import Picture
+from stimuli_builder.video_writer import VideoWriter
+
+SECONDS, FPS = 6.0, 60
+CLOSE_UP_PX = 300
+TURNED, GROWN = 2.0, 2.0
+"""How much more than the actor's a head turns, and comes nearer and goes away."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """A face before a camera: the mean width of its eyes in the picture, noise as an sd in grey levels."""
+
+    face: str
+    one_eye: bool
+    size_px: tuple[int, int]
+    eye_px: float
+    noise: float
+    blur_px: float
+    crf: int
+    seed: int
+
+
+LOOKS = (
+    Look("alder-face@2", False, (720, 900), 170, 2, 0.5, 18, 11),
+    Look("alder-face@2", False, (360, 450), 85, 4, 0.7, 26, 12),
+    Look("cedar-face@2", False, (720, 900), 170, 2, 0.5, 18, 13),
+    Look("cedar-face@2", False, (240, 300), 55, 4, 0.7, 26, 14),
+    Look("alder@8", True, (640, 480), CLOSE_UP_PX, 3, 0.7, 20, 15),
+    Look("birch@6", True, (640, 480), CLOSE_UP_PX, 3, 0.7, 26, 16),
+    Look("cedar@4", True, (640, 480), CLOSE_UP_PX, 5, 1.0, 20, 17),
+    Look("hazel@5", True, (640, 480), CLOSE_UP_PX, 5, 0.7, 26, 18),
+)
+
+
+class RenderedFace:
+    """Pictures and lids of a face by the number of its level."""
+
+    def __init__(self, kit, name: str, *, one_eye: bool) -> None:
+        self._atlas: Atlas = load_atlas(SHIPPED / name)
+        self._scene = AtlasScene(kit, name, self._atlas.size_px)
+        self._open = linear_to_srgb(self._atlas.base_linear())
+        self._one_eye = one_eye
+        self.closures = self._atlas.closures
+        self.points = cache(self._points)
+
+    def picture(self, level: int) -> Picture:
+        """The whole frame at a level, sRGB."""
+        picture = self._open.copy()
+        picture[self._atlas.crop] = self._atlas.level_srgb(level)
+        return picture
+
+    def _points(self, level: int) -> Points:
+        closure = float(self.closures[level])
+        eyes = labels_of(self._scene, SamplePose(closure, closure_right=closure))["eyes"]
+        curves = [(np.array(eye["upper"]) - 0.5, np.array(eye["lower"]) - 0.5) for eye in eyes.values()]
+        read = sorted(
+            (from_left(eye_points(upper[::-1], lower)) for upper, lower in curves), key=lambda eye: eye[0, 0]
+        )
+        return read[0] if self._one_eye else np.concatenate([read[0], read[1][MIRRORED]])
+
+
+def blinks(seed: int) -> list[Blink]:
+    """The first six of the actor's plan, a second apart, so that lids are on their way often."""
+    plan = plan_blinks(100, np.random.default_rng([seed, 4]))[: round(SECONDS)]
+    return [replace(blink, apex_s=0.4 + second) for second, blink in enumerate(plan)]
+
+
+def recording(kit, look: Look, folder: Path, spoil=None) -> tuple[Path, dict[int, Points]]:
+    """Write a recording and give its file and the points of each frame.
+
+    `spoil(number, picture, points)`, where given, makes another picture of each.
+    """
+    face = RenderedFace(kit, look.face, one_eye=look.one_eye)
+    count = round(SECONDS * FPS)
+    now = course(np.arange(count) / FPS, blinks(look.seed), look.seed)
+    rng = np.random.default_rng([look.seed, 5])
+    scale = look.eye_px / widths(face.points(0))
+    middle = face.points(0).mean(axis=0) if look.one_eye else np.array(face.picture(0).shape[1::-1]) / 2
+    truth = {}
+    path = folder / f"{look.face}-{look.seed}.mp4"
+    with VideoWriter(path, FPS, look.size_px, crf=look.crf) as writer:
+        for number in range(count):
+            level = int(np.abs(face.closures - np.clip(now.closure[number, 0], 0, 1)).argmin())
+            matrix = _camera(now, number, scale, middle, look.size_px)
+            truth[number] = face.points(level) @ matrix[:, :2].T + matrix[:, 2]
+            taken = _taken(face.picture(level), matrix, look, now.light[number], rng)
+            writer.write(taken if spoil is None else spoil(number, taken, truth[number]))
+    return path, truth
+
+
+def _camera(now: Course, number: int, scale: float, middle: Points, size_px: tuple[int, int]) -> np.ndarray:
+    """The 2 x 3 matrix that takes the face's pixels to the picture's."""
+    dx, dy, turn, size = now.head[number]
+    cos, sin = np.cos(TURNED * turn), np.sin(TURNED * turn)
+    rotation = scale * (1 + GROWN * (size - 1)) * np.array([[cos, -sin], [sin, cos]])
+    target = np.array(size_px) / 2 + (dx, dy)
+    return np.column_stack([rotation, target - rotation @ middle])
+
+
+def _taken(
+    picture: Picture, matrix: np.ndarray, look: Look, light: float, rng: np.random.Generator
+) -> Picture:
+    """The picture as the camera has it: smaller sizes are averaged, then come blur, light and noise."""
+    shrunk = float(np.linalg.norm(matrix[:, 0]))
+    if shrunk < 1:
+        picture = cv2.GaussianBlur(picture, (0, 0), 0.5 / shrunk)
+    moved = cv2.warpAffine(
+        picture, matrix, look.size_px, flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
+    )
+    soft = cv2.GaussianBlur(moved, (0, 0), look.blur_px).astype(np.float64)
+    noise = rng.normal(0, look.noise, (*soft.shape[:2], 1))
+    return np.clip(light * soft + noise, 0, 255).astype(np.uint8)
+
+
+def recordings(kit, folder: Path, spoil=None) -> Iterator[tuple[Look, Path, dict[int, Points]]]:
+    """Every look's recording, one after the other."""
+    for look in LOOKS:
+        yield (look, *recording(kit, look, folder, spoil))

@@ -1,0 +1,86 @@
+"""A face is read in the picture and in its mirror image, and in a margin where it fills the picture."""
+
+from itertools import islice
+
+import numpy as np
+import pytest
+
+from stimuli_builder.characters.atlas import SHIPPED, load_atlas
+from stimuli_builder.characters.colour import linear_to_srgb
+from stimuli_builder.environments import cache_folder
+from stimuli_builder.tracking.detector.detection import Detection
+from stimuli_builder.tracking.detector.face_mesh import SAME_FACE, in_both, mirrored
+from stimuli_builder.tracking.detector.mesh import open_detector
+from stimuli_builder.tracking.shapes import widths
+from stimuli_builder.video import frames, rgb
+
+WIDTH_PX = 640
+
+
+def face(shift: float = 0.0) -> Detection:
+    rng = np.random.default_rng(3)
+    eye = np.array([[0, 20], [8, 12], [16, 8], [24, 8], [32, 12], [40, 20], [30, 26], [20, 28], [10, 26.0]])
+    other = eye * [-1, 1] + [140, 0]
+    points = np.concatenate([eye, other]) + np.array([200 + shift, 100])
+    return Detection(points, rng.uniform(200, 340, (2, 5, 2)), np.array([150.0, 60, 400, 300]), (0.0, 0.0))
+
+
+def test_a_face_mirrored_twice_is_itself():
+    back = mirrored(mirrored(face(), WIDTH_PX), WIDTH_PX)
+    assert back.points == pytest.approx(face().points)
+    assert back.iris == pytest.approx(face().iris)
+    assert back.box == pytest.approx(face().box)
+
+
+def test_a_mirrored_face_has_its_image_left_eye_first_from_the_outer_canthus():
+    turned = mirrored(face(), WIDTH_PX).points
+    assert turned[0, 0] < turned[5, 0] < turned[14, 0] < turned[9, 0]
+    assert turned[:, 1] == pytest.approx(face().points[:, 1])
+
+
+def test_a_face_in_both_images_is_the_mean_and_tells_how_far_they_differ():
+    both = in_both(face(), [face(80), face(2)])
+    assert both.points == pytest.approx(face(1).points)
+    assert both.mirror_share == pytest.approx(2 / widths(face().points))
+
+
+@pytest.mark.parametrize("others", [[], [face(SAME_FACE * 40 + 1)]], ids=["none", "another"])
+def test_a_face_that_the_mirror_image_does_not_show_stays_and_is_unsure(others):
+    alone = in_both(face(), others)
+    assert alone.points == pytest.approx(face().points)
+    assert alone.mirror_share == np.inf
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    if not (cache_folder() / "face-mesh-0.10.21" / "ready").exists():
+        pytest.skip(
+            "the face detector's environment is not made; 'stimuli track VIDEO' without labels makes it"
+        )
+    with open_detector(one_eye=False) as detector:
+        yield detector
+
+
+def test_a_picture_and_its_mirror_image_have_the_same_lids(mesh, shared_data):
+    pictures = islice(frames(shared_data / "face_video" / "single_face.mp4", read=rgb), 0, 72, 12)
+    for picture in pictures:
+        seen = mesh.detect(picture)[0]
+        turned = mesh.detect(np.ascontiguousarray(picture[:, ::-1]))[0]
+        assert mirrored(turned, picture.shape[1]).points == pytest.approx(seen.points, abs=1e-3)
+
+
+@pytest.mark.parametrize("name", ["alder-face@2", "cedar-face@2"])
+def test_a_face_that_fills_the_picture_is_seen(mesh, name):
+    atlas = load_atlas(SHIPPED / name)
+    picture = linear_to_srgb(atlas.base_linear())
+    for level in (0, 32, 64, 96, 128):
+        picture[atlas.crop] = atlas.level_srgb(level)
+        seen = mesh.detect(picture)
+        assert len(seen) == 1
+        assert seen[0].mirror_share < 0.075
+
+
+def test_pictures_without_a_face_show_none_in_a_margin_either(mesh):
+    grey = np.full((480, 640, 3), 127, np.uint8)
+    noise = np.random.default_rng(1).integers(0, 256, grey.shape, np.uint8)
+    assert [mesh.detect(grey), mesh.detect(noise)] == [[], []]
