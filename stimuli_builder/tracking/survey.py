@@ -87,7 +87,8 @@ def survey(info: VideoInfo, *, one_eye: bool, advance: Callable[[int], None] | N
     )
     _require_upright(info, eyes_seen, labels)
     _require_face(info, labels, len(seen), one_eye)
-    _require_agreement(info, [of_face[n] for n in labels])
+    if not one_eye:
+        _require_agreement(info, [of_face[n] for n in labels])
     unseen = frozenset(seen.keys() - labels.keys())
     covers = covered_frames(info.path, {n: of_face[n].spreads for n in labels}, FEWEST)
     open_to_view = {n: points for n, points in labels.items() if n not in covers}
@@ -189,7 +190,7 @@ def _require_face(info: VideoInfo, labels: dict[int, Points], looked: int, one_e
 
 
 def _require_agreement(info: VideoInfo, detections: Sequence[Detection]) -> None:
-    share = float(np.median([one.mirror_share for one in detections]))
+    share = float(np.median([np.mean(one.mirror_shares) for one in detections]))
     if share > UNSURE_SHARE:
         raise InputError(
             f"{info.path}: what looks like eyes is read differently in the mirror image (by {share:.0%} of "

@@ -26,17 +26,18 @@ class Detection:
     box : float64 array (4,)
         Least x and y, then greatest x and y, of the face; of the eye in a close-up.
     spreads : tuple of float
-        Of each eye, its `contour_spread`.
-    mirror_share : float
-        Mean distance of its points as read in the picture from those of its mirror image, as part of the
-        eye's width; infinite where the mirror image does not show the face, 0 where none was looked at.
+        Of each eye, how steadily it is read: its `contour_spread` and, for a face, half of its mirror share,
+        added in quadrature.
+    mirror_shares : tuple of float
+        Of each eye of a face, mean distance of its points as read in the picture from those of its mirror
+        image, as part of the eye's width; infinite where the mirror image does not show the face.
     """
 
     points: Points
     iris: Points
     box: Points
     spreads: tuple[float, ...]
-    mirror_share: float = 0.0
+    mirror_shares: tuple[float, ...] = ()
 
     @property
     def area_px2(self) -> float:

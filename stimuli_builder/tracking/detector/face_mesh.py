@@ -56,19 +56,20 @@ def mirrored(face: Detection, width_px: int) -> Detection:
     return Detection(points.reshape(-1, 2), iris, np.array([right - end, top, right - left, low]), ())
 
 
-def apart(face: Detection, other: Detection) -> float:
-    """Mean distance of the eyes' points of two faces, in widths of the first's eyes."""
-    return float(np.hypot(*(face.points - other.points).T).mean() / widths(face.points))
+def apart(face: Detection, other: Detection) -> tuple[float, ...]:
+    """Mean distance of each eye's points from those of another face, in widths of the first's eyes."""
+    away = np.hypot(*(face.points - other.points).T).reshape(2, -1).mean(1)
+    return tuple((away / widths(face.points)).tolist())
 
 
 def in_both(face: Detection, others: Sequence[Detection]) -> Detection:
     """The mean of a face and of itself in the mirror image (`others`); the face where it is not there."""
-    nearest = min(others, key=lambda other: apart(face, other), default=None)
-    share = np.inf if nearest is None else apart(face, nearest)
-    if nearest is None or share > SAME_FACE:
-        return replace(face, mirror_share=np.inf)
+    nearest = min(others, key=lambda other: max(apart(face, other)), default=None)
+    shares = (np.inf, np.inf) if nearest is None else apart(face, nearest)
+    if nearest is None or np.mean(shares) > SAME_FACE:
+        return replace(face, mirror_shares=(np.inf, np.inf))
     points, iris = (face.points + nearest.points) / 2, (face.iris + nearest.iris) / 2
-    return replace(face, points=points, iris=iris, mirror_share=share)
+    return replace(face, points=points, iris=iris, mirror_shares=shares)
 
 
 def _fills(face: Detection, picture: Picture) -> bool:
@@ -94,7 +95,7 @@ class FaceMesh:
         faces = self._read_twice(picture)
         if not faces or _fills(faces[0], picture):
             faces = self._faces_in_margin(picture) or faces
-        return [replace(one, spreads=self._spreads(picture, one.points.reshape(2, -1, 2))) for one in faces]
+        return [replace(one, spreads=self._spreads(picture, one)) for one in faces]
 
     def faces(self, picture: Picture) -> list[Detection]:
         """The same without the eyes' `spreads`, which take longest."""
@@ -124,12 +125,15 @@ class FaceMesh:
         sides = ((margin, margin), (margin, margin), (0, 0))
         wider = np.pad(picture, sides, constant_values=MARGIN_GREY)
         faces = self._read_twice(wider)
-        return [face.moved(-margin, -margin) for face in faces if face.mirror_share <= SAME_FACE]
+        return [face.moved(-margin, -margin) for face in faces if np.isfinite(face.mirror_shares).all()]
 
-    def _spreads(self, picture: Picture, eyes: Points) -> tuple[float, ...]:
-        """Each eye's `contour_spread`; `eyes` is (2, 9, 2)."""
+    def _spreads(self, picture: Picture, face: Detection) -> tuple[float, ...]:
+        """How steadily each eye of a face is read, see `Detection.spreads`."""
+        eyes = face.points.reshape(2, -1, 2)
         views = [view for number, eye in enumerate(eyes) for view in views_of(eye, flip=number == 1)]
         part, within = _about(picture, views)
         seen = self._client.ask("eye", part, regions=within)["eyes"]
         contours = contours_of(seen).reshape(len(eyes), len(FACE_VIEWS), -1, 2)
-        return tuple(contour_spread(one, eye_axis(eye)[2]) for one, eye in zip(contours, eyes, strict=True))
+        spreads = [contour_spread(one, eye_axis(eye)[2]) for one, eye in zip(contours, eyes, strict=True)]
+        shares = np.nan_to_num(face.mirror_shares, posinf=0.0)
+        return tuple(np.hypot(spreads, shares / 2).tolist())

@@ -53,4 +53,4 @@ def _shows_a_face(mesh: FaceMesh, picture: Picture) -> bool:
     seen, turned = mesh.faces(picture), mesh.faces(np.ascontiguousarray(picture[:, ::-1]))
     if not seen or not turned:
         return False
-    return apart(seen[0], mirrored(turned[0], picture.shape[1])) < SAME_FACE
+    return bool(np.mean(apart(seen[0], mirrored(turned[0], picture.shape[1]))) < SAME_FACE)
