@@ -85,6 +85,7 @@ bench: setup-test ## speed, memory and accuracy, as figures and ratios (long)
 	@PYTHONPATH=. $(BIN)/python tests/bench/bench_label_error.py
 	@PYTHONPATH=. $(BIN)/python tests/bench/bench_track_speed.py
 	@PYTHONPATH=. $(BIN)/python tests/bench/bench_reflections.py
+	@test -z "$(FACEKIT)" || PYTHONPATH=. $(BIN)/python tests/bench/bench_rendered_tracks.py $(FACEKIT)
 	@test -z "$(FACEKIT)" || PYTHONPATH=. $(BIN)/python tests/bench/face_quality.py cedar@4 $(FACEKIT)
 
 screenshots: setup-test ## make the pictures of README and docs anew (needs the clips of `make run`)

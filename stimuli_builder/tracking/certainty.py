@@ -98,10 +98,15 @@ def doubt(
         return f"a shape unlike the labelled ones ({unusual:.1f} sd)"
     if before is not None and jump_px(points, before) > JUMP_SHARE * width:
         return "the eyes jump from one frame to the next"
-    rms = float(np.sqrt((errors**2).mean()))
-    if rms > DOUBTFUL_SHARE * width:
+    if fits_badly(errors, width):
+        rms = float(np.sqrt((errors**2).mean()))
         return f"the picture fits badly: stated error {rms:.1f} px is {rms / width:.0%} of the eye's width"
     return ""
+
+
+def fits_badly(errors: Values, width: float) -> bool:
+    """Whether stated errors (points,) make a frame doubtful whose eyes are `width` pixels wide."""
+    return float(np.sqrt((errors**2).mean())) > DOUBTFUL_SHARE * width
 
 
 @compiled_over(shapes)

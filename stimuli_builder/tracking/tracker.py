@@ -4,16 +4,21 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
-from stimuli_builder.tracking.certainty import DIFFERING_SHARE, doubt, lid_difference, stated_errors
+from stimuli_builder.tracking.certainty import (
+    DIFFERING_SHARE,
+    doubt,
+    fits_badly,
+    lid_difference,
+    stated_errors,
+)
+from stimuli_builder.tracking.detected_start import DetectedStart
 from stimuli_builder.tracking.faults import Faults
 from stimuli_builder.tracking.fit import Fit, Fitter
 from stimuli_builder.tracking.light import Light
 from stimuli_builder.tracking.model import CoupledModel
 from stimuli_builder.tracking.outcome import Status, TrackedFrame
 from stimuli_builder.tracking.picture import (
-    reduced_points,
     restored_points,
     same_picture,
     shows_something,
@@ -23,10 +28,7 @@ from stimuli_builder.tracking.shapes import (
     EYE_POINTS,
     Points,
     inter_eyelid_distances,
-    similarity_between,
-    unmoved,
     widths,
-    with_border,
 )
 from stimuli_builder.tracking.stillness import Stillness
 from stimuli_builder.video import Picture
@@ -66,7 +68,7 @@ class Tracker:
         self._before: Points | None = None
         self._loss = ""
         self._unseen = ""
-        self._to_parameters = _to_parameters(model)
+        self._from_detection = DetectedStart(self._fitter)
 
     def look(self, hint: Points | str) -> None:
         """Take in that a detector looks at the next frame: after one that sees nothing, fits are doubtful.
@@ -101,13 +103,15 @@ class Tracker:
             fit = self._fitter.fit(picture, self._last.c, self._last.pose)
             fault = self._faults.lost(fit, picture)
             fit, fault = self._with_hint(picture, fit, fault, hint)
+            if not fault and self._fits_badly(fit):
+                fit = self._in_better_light(raw, fit)
             if fault:
                 fit, fault = self._in_other_light(raw, self._last, fit, fault)
             if not fault:
                 return self._accepted(fit, "tracked", FROZEN if frozen else "", hint)
             self._loss = fault
         elif hint is not None:
-            fit = self._from(picture, hint)
+            fit = self._from_detection.fit(picture, hint)
             if not self._faults.lost(fit, picture):
                 started, loss = self._started, self._loss
                 again = f"found again after {loss}" if started else ""
@@ -127,18 +131,25 @@ class Tracker:
         self._light = light
         return other, ""
 
+    def _fits_badly(self, fit: Fit) -> bool:
+        """Whether the picture alone makes a fit doubtful, which keeps its light from being followed."""
+        return fits_badly(stated_errors(self.model, fit, None), widths(self._points(fit)))
+
+    def _in_better_light(self, raw: Picture, fit: Fit) -> Fit:
+        """A fit, or one from it in another light where the picture is explained better.
+
+        A light followed to a shadow's end would else stay: doubtful frames are not followed.
+        """
+        for light in list(self._other_lights(fit)):
+            picture = light.evened(raw)
+            other = self._fitter.fit(picture, fit.c, fit.pose)
+            if WORSE * _overall(other) < _overall(fit) and not self._faults.lost(other, picture):
+                fit, self._light = other, light
+        return fit
+
     def _blank(self, picture: Picture) -> str:
         """Why a picture cannot show an eye, or an empty string."""
         return "" if shows_something(picture, BLANK_RANGE, 4) else "a black or empty frame"
-
-    def _from(self, picture: Picture, hint: Points) -> Fit:
-        """Fit from a detector's points."""
-        shape = reduced_points(with_border(hint), self.model.reduction)
-        mean = self.model.mesh.vertices
-        pose = similarity_between(mean, shape)
-        away = (unmoved(shape, pose) - mean).ravel()
-        limit = 3 * self.model.sd
-        return self._fitter.fit(picture, np.clip(self._to_parameters @ away, -limit, limit), pose)
 
     def _with_hint(self, picture: Picture, fit: Fit, fault: str, hint: Points | None) -> tuple[Fit, str]:
         """The fit, or one started from the detector where that is nearer to it and no worse a picture."""
@@ -146,7 +157,7 @@ class Tracker:
             return fit, fault
         if not fault and lid_difference(self._points(fit), hint) < DIFFERING_SHARE / 2:
             return fit, fault
-        other = self._from(picture, hint)
+        other = self._from_detection.fit(picture, hint)
         wrong = self._faults.lost(other, picture)
         if not wrong and (fault or _overall(other) < WORSE * _overall(fit)):
             return other, ""
@@ -231,11 +242,3 @@ class Tracker:
 def _overall(fit: Fit) -> float:
     squares = [residual * residual for residual in fit.residuals.tolist()]
     return math.sqrt(sum(squares) / len(squares))
-
-
-def _to_parameters(model: CoupledModel) -> NDArray[np.float64]:
-    """Matrix (l, 2 V) from movements of the vertices to coupled parameters, least squares kept small."""
-    modes = model.shape_modes.reshape(len(model.sd), -1)
-    size = (modes**2).sum(1).mean() * model.sd.max() ** 2
-    ridge = 1e-3 * np.diag(size / np.maximum(model.sd, 1e-9) ** 2)
-    return np.asarray(np.linalg.solve(modes @ modes.T + ridge, modes))

@@ -1,10 +1,13 @@
 """A recording whose light changes is tracked as one in even light; a covered eye is lost in any light."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from stimuli_builder.tracking.fit import Fitter
 from stimuli_builder.tracking.light import Light, light_between
+from stimuli_builder.tracking.shapes import widths
 from stimuli_builder.tracking.tracker import Tracker
 
 EYE_PX = 60
@@ -97,3 +100,20 @@ def test_light_goes_back_where_nothing_is_told():
     for _ in range(400):
         light = light.following(1.0, 0.0)
     assert light.steady
+
+
+@pytest.mark.parametrize("stale", [Light(1.15, 3.4), Light(0.8, 0.0)])
+def test_a_light_that_is_over_is_left_although_doubtful_frames_are_not_followed(lesson, recording, stale):
+    """A shadow of a fifth of a second made the 280 frames after it of a rendered close-up doubtful."""
+    model = lesson.model
+    coarse = replace(
+        model,
+        point_errors=np.full_like(model.point_errors, 0.03 * widths(recording.points[0])),
+        error_slope=np.array([1.0]),
+        residual_limits=10 * model.residual_limits,
+    )
+    tracker = Tracker(coarse)
+    for picture in recording.pictures[:8]:
+        tracker.step(picture)
+    tracker._light = stale  # as a shadow may have left it
+    assert [tracker.step(picture).status for picture in recording.pictures[8:28]] == ["tracked"] * 20
