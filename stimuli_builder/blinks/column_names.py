@@ -26,11 +26,16 @@ _OPENINGS = frozenset({"distance", "ear", "gap", "opening", "aperture", "fissure
 """Words of a distance, by which blink and closed say only what it was measured for: blink_ear, closed_px."""
 
 
+def words_of(column: str) -> list[str]:
+    """The words of a column's name in small letters: left and ear for leftEAR."""
+    return [word.lower() for word in _WORD.findall(column)]
+
+
 def eye_of(column: str) -> Eye | None:
     """Tell the eye from the words of a column's name: l, left, r, right; else None."""
     if _ACTION_UNIT.match(column):
         return None
-    words = [word.lower() for word in _WORD.findall(column)]
+    words = words_of(column)
     sides = {
         side
         for word, following in zip_longest(words, words[1:], fillvalue="")
@@ -47,7 +52,7 @@ def _side(word: str) -> Eye | None:
 
 def is_high_when_shut(column: str) -> bool:
     """Whether a column's name is one of a closure, not of an opening."""
-    words = [word.lower() for word in _WORD.findall(column)]
+    words = words_of(column)
     pairs = {"".join(pair) for pair in pairwise(words)}
     known = pairs.union(words)
     return not _CLOSURES.isdisjoint(known) or (not _SHUT.isdisjoint(known) and _OPENINGS.isdisjoint(known))

@@ -9,9 +9,10 @@ from scipy.signal import find_peaks
 
 from stimuli_builder.blinks.bottom import turning_frame
 from stimuli_builder.blinks.events.lid_event import LidEvent
+from stimuli_builder.blinks.gaps import runs
 from stimuli_builder.blinks.label_options import DEFAULT_OPTIONS, LabelOptions
 from stimuli_builder.blinks.profile import Array
-from stimuli_builder.blinks.series import PAPER_FPS, box_filter, runs, scaled_frames
+from stimuli_builder.blinks.series import PAPER_FPS, box_filter, scaled_frames
 
 Frames = NDArray[np.intp]
 

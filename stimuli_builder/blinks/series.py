@@ -8,25 +8,25 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from experiments.errors import InputError, nearest
+from experiments.errors import InputError
+from stimuli_builder.blinks.column_choice import DISTANCE_COLUMNS, choose_columns
 from stimuli_builder.blinks.column_names import is_high_when_shut
-from stimuli_builder.blinks.csv_table import NOTE, few, read_table
+from stimuli_builder.blinks.csv_table import NOTE, read_table
+from stimuli_builder.blinks.gaps import bridge_gaps
 from stimuli_builder.blinks.inverted import opening_of
+from stimuli_builder.blinks.not_measured import without_what_is_not_measured
 from stimuli_builder.blinks.profile import Array
 from stimuli_builder.blinks.times import (
     MAX_BRIDGED_MS,
     RESAMPLED,
-    is_time,
     resampled,
     series_fps,
     with_time_s,
 )
 from stimuli_builder.blinks.tracked_lid import tracked_lower_lid
-from stimuli_builder.blinks.validity import CONFIDENCE_COLUMN, VALID_COLUMNS, unseen_rows
+from stimuli_builder.blinks.validity import unseen_rows
 
 PAPER_FPS = 300
-DISTANCE_COLUMNS = ("left_distance_px", "right_distance_px", "distance_px")
-INDEX_COLUMNS = ("frame", *VALID_COLUMNS, CONFIDENCE_COLUMN)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,35 +82,6 @@ def box_filter(values: Array, width_frames: float) -> Array:
     return np.asarray(np.convolve(values, kernel, mode="full")[reach : reach + values.size] / weight)
 
 
-def choose_columns(table: pd.DataFrame, named: Sequence[str], path: Path) -> list[str]:
-    """Return the distance columns to label: those named, else a track's, else the only candidate."""
-    candidates = [
-        str(name)
-        for name in table.columns
-        if table[name].dtype.kind == "f" and str(name).lower() not in INDEX_COLUMNS and not is_time(str(name))
-    ]
-    for name in named:
-        if name not in table.columns:
-            raise InputError(f"{path.name} has no column '{name}'{_near_or_plausible(name, candidates)}")
-    if named:
-        return list(dict.fromkeys(named))
-    tracked = [name for name in DISTANCE_COLUMNS if name in table.columns]
-    if tracked:
-        return tracked
-    if len(candidates) == 1:
-        return candidates
-    there = few(candidates) or "no column of decimal numbers but the times"
-    raise InputError(f"{path.name}: say with --column which series to label; it has {there}")
-
-
-def _near_or_plausible(name: str, candidates: Sequence[str]) -> str:
-    near = nearest(name, candidates)
-    if near is not None:
-        return f"; did you mean '{near}'?"
-    plausible = few([one for one in candidates if one in DISTANCE_COLUMNS] or candidates)
-    return f"; expected one of: {plausible}" if plausible else ""
-
-
 def make_series(
     table: pd.DataFrame,
     column: str,
@@ -123,37 +94,15 @@ def make_series(
     """Return one column as a series: short gaps bridged, long ones kept as NaN or refused.
 
     `allow_gaps` left at None means: in a track yes (its frames without a fit say why), in a plain series no.
-    Gaps of `unseen` frames, which the table itself says were not seen, are never refused.
+    Gaps of `unseen` frames (n,), which are known not to have been seen, are never refused.
     """
-    values = _numbers(table, column, path)
-    values = np.where(np.isfinite(values), values, np.nan)
-    if values.size < scaled_frames(300, fps):
-        raise InputError(
-            f"{path.name}: {values.size} frames at {fps:g} fps are less than a second: nothing to label"
-        )
-    if not np.isfinite(values).any():
-        raise InputError(f"{path.name}: column '{column}' is empty")
-    gaps_allowed = (
-        column in DISTANCE_COLUMNS and "status" in table.columns if allow_gaps is None else allow_gaps
-    )
+    values = _known_values(table, column, fps, path)
     reach = round(MAX_BRIDGED_MS * fps / 1000)
     filled, bridged = bridge_gaps(values, reach)
     missing = np.isnan(filled)
-    unsaid = missing & ~unseen
-    if unsaid.any() and not gaps_allowed:
-        first = int(np.argmax(unsaid))
-        start = f"{table['time_s'].iloc[first]:.3f} s" if RESAMPLED in table.attrs else f"line {first + 2}"
-        rest = unsaid[first:]
-        length = int(np.argmin(rest)) if not rest.all() else rest.size
-        raise InputError(
-            f"{path.name}: column '{column}' has no value on {length} frames from {start} on; "
-            "mend the series, or label round the gap with --allow-gaps"
-        )
-    if np.nanmin(values) < 0:
-        raise InputError(
-            f"{path.name}: column '{column}' has negative distances ({np.nanmin(values):g}); lids that meet "
-            "are 0 apart: set them to 0, or name another column with --column"
-        )
+    is_track = column in DISTANCE_COLUMNS and "status" in table.columns
+    if not (is_track if allow_gaps is None else allow_gaps):
+        _refuse_gaps(missing & ~unseen, table, column, path)
     lid = tracked_lower_lid(table, column) if column in DISTANCE_COLUMNS else None
     up, nasal = (None, None) if lid is None else (bridge_gaps(coordinate, reach)[0] for coordinate in lid)
     return BlinkSeries(
@@ -168,6 +117,38 @@ def make_series(
     )
 
 
+def _known_values(table: pd.DataFrame, column: str, fps: float, path: Path) -> Array:
+    """(n,) values, NaN where there is none; InputError where they are too few, or no distances."""
+    values = _numbers(table, column, path)
+    values = np.where(np.isfinite(values), values, np.nan)
+    if values.size < scaled_frames(300, fps):
+        raise InputError(
+            f"{path.name}: {values.size} frames at {fps:g} fps are less than a second: nothing to label"
+        )
+    if not np.isfinite(values).any():
+        raise InputError(f"{path.name}: column '{column}' is empty")
+    if np.nanmin(values) < 0:
+        raise InputError(
+            f"{path.name}: column '{column}' has negative distances ({np.nanmin(values):g}); lids that meet "
+            "are 0 apart: set them to 0, or name another column with --column"
+        )
+    return values
+
+
+def _refuse_gaps(gaps: NDArray[np.bool_], table: pd.DataFrame, column: str, path: Path) -> None:
+    """InputError that tells the first of gaps (n,) that nothing explains."""
+    if not gaps.any():
+        return
+    first = int(np.argmax(gaps))
+    start = f"{table['time_s'].iloc[first]:.3f} s" if RESAMPLED in table.attrs else f"line {first + 2}"
+    rest = gaps[first:]
+    length = int(np.argmin(rest)) if not rest.all() else rest.size
+    raise InputError(
+        f"{path.name}: column '{column}' has no value on {length} frames from {start} on; "
+        "mend the series, or label round the gap with --allow-gaps"
+    )
+
+
 def _numbers(table: pd.DataFrame, column: str, path: Path) -> Array:
     """(n,) a column's values; InputError naming the first that is no number."""
     if table[column].dtype.kind not in "fiu":
@@ -175,24 +156,6 @@ def _numbers(table: pd.DataFrame, column: str, path: Path) -> Array:
         got = f", got {words.iloc[0]!r} in line {words.index[0] + 2}" if words.size else ""
         raise InputError(f"{path.name}: column '{column}' must hold numbers{got}")
     return table[column].to_numpy(dtype=np.float64)
-
-
-def bridge_gaps(values: Array, most_frames: int) -> tuple[Array, int]:
-    """Fill inner runs of NaN no longer than `most_frames` by straight lines; return the number filled."""
-    filled = values.copy()
-    bridged = 0
-    for start, stop in runs(np.isnan(values)):
-        if start > 0 and stop < values.size and stop - start <= most_frames:
-            share = np.arange(1, stop - start + 1) / (stop - start + 1)
-            filled[start:stop] = values[start - 1] + share * (values[stop] - values[start - 1])
-            bridged += stop - start
-    return filled, bridged
-
-
-def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Return the (start, stop) of every run of True."""
-    edges = np.diff(np.concatenate([[0], mask.astype(np.int8), [0]]))
-    return list(zip(np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist(), strict=True))
 
 
 def read_series(
@@ -216,23 +179,43 @@ def read_series(
     if resample and "time_s" not in table.columns:
         raise InputError(f"{path.name} has no column time_s: --resample needs the time of every frame")
     rate = series_fps(table, fps, path, uneven=resample)
-    unseen, notes = unseen_rows(table, path)
-    notes.insert(0, times_note)
-    given = {column: np.where(unseen, np.nan, _numbers(table, column, path)) for column in chosen}
-    for column in chosen:
-        same_kind = [
-            one for name, one in given.items() if is_high_when_shut(name) == is_high_when_shut(column)
-        ]
-        table[column], note = opening_of(
-            given[column], column, path, _is_inverted(column, inverted), same_kind
-        )
-        notes.append(note)
+    unseen, notes = unseen_rows(table, chosen, path)
+    notes = [times_note, *notes, *_set_openings(table, chosen, path, inverted, unseen, rate)]
     if resample:
         table, unseen, note = resampled(table, chosen, rate, path, unseen)
         notes.append(note)
     said = tuple(note for note in (str(table.attrs.get(NOTE, "")), *notes) if note)
-    eyes = [make_series(table, name, rate, path, allow_gaps=allow_gaps, unseen=unseen) for name in chosen]
+    eyes = [
+        make_series(table, name, rate, path, allow_gaps=allow_gaps, unseen=unseen[name]) for name in chosen
+    ]
     return [replace(eye, notes=said) for eye in eyes]
+
+
+def _set_openings(
+    table: pd.DataFrame,
+    chosen: Sequence[str],
+    path: Path,
+    inverted: bool | None,
+    unseen: dict[str, NDArray[np.bool_]],
+    fps: float,
+) -> list[str]:
+    """Make openings of the chosen columns, NaN where nothing was measured, and note such rows as unseen."""
+    notes = []
+    given = {column: np.where(unseen[column], np.nan, _numbers(table, column, path)) for column in chosen}
+    times_s = np.arange(len(table)) / fps
+    if "time_s" in table.columns:
+        times_s = table["time_s"].to_numpy(dtype=np.float64) - float(table["time_s"].iloc[0])
+    for column in chosen:
+        same_kind = [
+            one for name, one in given.items() if is_high_when_shut(name) == is_high_when_shut(column)
+        ]
+        opening, note = opening_of(given[column], column, path, _is_inverted(column, inverted), same_kind)
+        table[column], lost = without_what_is_not_measured(
+            opening, fps, times_s, column, path, turned=bool(note)
+        )
+        unseen[column] = unseen[column] | (np.isfinite(opening) & table[column].isna().to_numpy())
+        notes += [note, *lost]
+    return notes
 
 
 def _is_inverted(column: str, inverted: bool | None) -> bool | None:

@@ -1,6 +1,6 @@
 """When the frames of a series were taken: its rate, times that are uneven, and holes in them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -136,22 +136,26 @@ def _hole_limit_s(steps: Array) -> float:
 
 
 def resampled(
-    table: pd.DataFrame, columns: Sequence[str], fps: float, path: Path, unseen: NDArray[np.bool_]
-) -> tuple[pd.DataFrame, NDArray[np.bool_], str]:
+    table: pd.DataFrame,
+    columns: Sequence[str],
+    fps: float,
+    path: Path,
+    unseen: Mapping[str, NDArray[np.bool_]],
+) -> tuple[pd.DataFrame, dict[str, NDArray[np.bool_]], str]:
     """Bring columns to even times at `fps`, by straight lines between true times.
 
     Gaps stay gaps: a value next to an empty one is empty. So is what lies in a hole of `time_s`.
 
     Parameters
     ----------
-    unseen : (rows,) bool array
-        Rows that were not seen.
+    unseen : mapping of str to (rows,) bool array
+        By column, rows that were not seen.
 
     Returns
     -------
     table : DataFrame
-    unseen : (n,) bool array
-        Frames of the new table that lie in a hole, or beside a row that was not seen.
+    unseen : dict of str to (n,) bool array
+        By column, frames of the new table that lie in a hole, or beside a row that was not seen.
     note : str
         How many holes, and how long together; empty without one.
     """
@@ -176,7 +180,8 @@ def resampled(
         data["status"] = table["status"].iloc[following].reset_index(drop=True)
     even_table = pd.DataFrame(data)
     even_table.attrs = table.attrs | {RESAMPLED: True}
-    return even_table, in_hole | unseen[left] | unseen[left + 1], _hole_note(steps, path)
+    unseen_frames = {name: in_hole | rows[left] | rows[left + 1] for name, rows in unseen.items()}
+    return even_table, unseen_frames, _hole_note(steps, path)
 
 
 def _hole_note(steps: Array, path: Path) -> str:

@@ -1,5 +1,6 @@
 """Frames of which their table itself says that they are not to be believed."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -7,45 +8,100 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from experiments.errors import InputError
+from stimuli_builder.blinks.column_names import eye_of, words_of
 
 VALID_COLUMNS = ("valid", "success")
 """1 where a frame was measured, 0 where not; 'success' is OpenFace's."""
+_VALID = frozenset(VALID_COLUMNS)
+_OF_ALL = _VALID | {"confidence", "is", "face", "eye", "eyes", "frame", "tracking", "landmarks"}
+"""Words of a validity's name that are of no columns in particular."""
 CONFIDENCE_COLUMN = "confidence"
 LEAST_CONFIDENCE = 0.5
 """Of 0 to 1, as OpenFace writes it beside 'success'; below it a frame is likelier wrong than right."""
 _WORDS = {"true": True, "1": True, "1.0": True, "false": False, "0": False, "0.0": False}
 
 
-def unseen_rows(table: pd.DataFrame, path: Path) -> tuple[NDArray[np.bool_], list[str]]:
+def is_validity(name: str) -> bool:
+    """Whether a column's name is one of validity: valid, success, EAR2D6_valid, BS_Valid, valid_left."""
+    words = [word for word in words_of(name) if eye_of(word) is None]
+    return bool(words) and not _VALID.isdisjoint({words[0], words[-1]})
+
+
+def unseen_rows(
+    table: pd.DataFrame, columns: Sequence[str], path: Path
+) -> tuple[dict[str, NDArray[np.bool_]], list[str]]:
     """Rows whose values are not to be believed by the table's own columns, and a line about each reason.
+
+    A validity with a side in its name (left_valid) is of that eye's columns alone, one with the beginning of
+    other columns' names (BS_Valid beside BS_blink) of theirs. With more than `VALID_COLUMNS` in its name it
+    is heeded where it holds 0 and 1 only.
+
+    Parameters
+    ----------
+    columns : sequence of str
+        The series that are labelled.
+
+    Returns
+    -------
+    unseen : dict of str to (rows,) bool array
+        By column of `columns`.
+    notes : list of str
 
     Raises
     ------
     InputError
         A column of `VALID_COLUMNS` holds something else than 0 and 1, one of confidence is not from 0 to 1,
-        or no row is left.
+        or no row of a series is left.
     """
-    unseen = np.zeros(len(table), np.bool_)
+    unseen = {column: np.zeros(len(table), np.bool_) for column in columns}
     notes = []
-    for name in table.columns:
-        if name.lower() in VALID_COLUMNS:
-            rows, why = _not_valid(table[name], path), f"are not valid by '{name}'"
-        elif name.lower() == CONFIDENCE_COLUMN:
-            rows, why = _not_sure(table[name], path), f"have a '{name}' below {LEAST_CONFIDENCE:g}"
-        else:
+    for name in map(str, table.columns):
+        rows, why = _doubted(table[name], path)
+        heeding = [column for column in columns if _is_about(name, column, table)]
+        if not rows.any() or not heeding:
             continue
-        if rows.any():
-            notes.append(f"{path.name}: {rows.sum():,} of {rows.size:,} frames {why}: taken as not seen")
-        unseen |= rows
-    if unseen.all():
+        eye = "" if len(heeding) == len(columns) else f" of {', '.join(heeding)}"
+        notes.append(f"{path.name}: {rows.sum():,} of {rows.size:,} frames{eye} {why}: taken as not seen")
+        for column in heeding:
+            unseen[column] |= rows
+    if any(rows.all() for rows in unseen.values()):
         raise InputError(f"{'; '.join(notes)}; nothing is left: take the column out if it is wrong")
     return unseen, notes + _doubtful(table, path)
 
 
+def _doubted(column: pd.Series, path: Path) -> tuple[NDArray[np.bool_], str]:
+    """(rows,) of a validity or confidence that are not to be believed, and why; none of another column."""
+    name = str(column.name)
+    if name.lower() == CONFIDENCE_COLUMN:
+        return _not_sure(column, path), f"have a '{name}' below {LEAST_CONFIDENCE:g}"
+    if name.lower() in VALID_COLUMNS or (is_validity(name) and not _other_words(_cells(column))):
+        return _not_valid(column, path), f"are not valid by '{name}'"
+    return np.zeros(column.size, np.bool_), ""
+
+
+def _is_about(name: str, column: str, table: pd.DataFrame) -> bool:
+    """Whether a validity is one of a series: of the same eye, and not of columns of another beginning."""
+    side, eye = eye_of(name), eye_of(column)
+    if side is not None and eye is not None and side != eye:
+        return False
+    stem = "".join(word for word in words_of(name) if word not in _OF_ALL and eye_of(word) is None)
+    measures = ["".join(words_of(str(one))) for one in table.columns if not is_validity(str(one))]
+    is_of_others = bool(stem) and any(one.startswith(stem) for one in measures)
+    return not is_of_others or "".join(words_of(column)).startswith(stem)
+
+
+def _cells(column: pd.Series) -> "pd.Series[str]":
+    return column.map(lambda cell: "0" if pd.isna(cell) else str(cell).strip().lower())
+
+
+def _other_words(cells: "pd.Series[str]") -> list[str]:
+    """What a column holds beside 0 and 1, true and false."""
+    return [word for word in cells.unique() if word not in _WORDS]
+
+
 def _not_valid(column: pd.Series, path: Path) -> NDArray[np.bool_]:
-    words = column.map(lambda cell: "0" if pd.isna(cell) else str(cell).strip().lower())
-    other = [word for word in words.unique() if word not in _WORDS]
-    if other:
+    words = _cells(column)
+    if other := _other_words(words):
         raise InputError(
             f"{path.name}: column '{column.name}' says which frames are valid by 1 and 0 (true and false), "
             f"got '{other[0]}'; name it otherwise if it says something else"

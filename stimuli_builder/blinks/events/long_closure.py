@@ -7,8 +7,9 @@ import numpy as np
 
 from stimuli_builder.blinks.events.levels import OPEN_PERCENTILE
 from stimuli_builder.blinks.events.lid_event import LidEvent
+from stimuli_builder.blinks.gaps import runs
 from stimuli_builder.blinks.profile import Array
-from stimuli_builder.blinks.series import box_filter, runs
+from stimuli_builder.blinks.series import box_filter
 
 LONG_S = 2.0
 SHUT_SHARE = 0.2

@@ -8,8 +8,9 @@ import numpy as np
 from stimuli_builder.blinks.events.candidates import Candidate, deep_level, features_of, find_candidates
 from stimuli_builder.blinks.events.levels import Depth, depth_of
 from stimuli_builder.blinks.events.network import FIRST_LOOK, shipped_network
+from stimuli_builder.blinks.gaps import runs
 from stimuli_builder.blinks.profile import Array
-from stimuli_builder.blinks.series import BlinkSeries, runs
+from stimuli_builder.blinks.series import BlinkSeries
 
 SHORTEST_PIECE_S = 0.8
 

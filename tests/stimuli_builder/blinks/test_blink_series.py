@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.errors import InputError
-from stimuli_builder.blinks.series import box_filter, bridge_gaps, read_series, runs, scaled_frames
+from stimuli_builder.blinks.gaps import bridge_gaps, runs
+from stimuli_builder.blinks.series import box_filter, read_series, scaled_frames
 
 
 @settings(deadline=None, max_examples=40)

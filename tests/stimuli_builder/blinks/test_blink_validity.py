@@ -84,3 +84,35 @@ def test_a_confidence_in_words_is_refused(tmp_path: Path) -> None:
     table.to_csv(tmp_path / "s.csv", index=False)
     with pytest.raises(InputError, match="'confidence' must hold numbers between 0 and 1, got '97%'"):
         read_series(tmp_path / "s.csv", ["gap"], 240)
+
+
+@pytest.mark.parametrize("name", ["EAR2D6_valid", "BS_Valid", "face_valid", "isValid", "detection_success"])
+def test_a_validity_of_a_longer_name_is_heeded(make_known, tmp_path: Path, name: str) -> None:
+    table = spoilt(make_known, name, 1, 0).rename(columns={" gap_l": "EAR2D6_l"})
+    table.assign(face_x=1.5).to_csv(tmp_path / "s.csv", index=False)
+    (series,) = read_series(tmp_path / "s.csv", ["EAR2D6_l"], FPS)
+    assert series.notes == (f"s.csv: 120 of 1,200 frames are not valid by '{name}': taken as not seen",)
+    assert series.missing_frames == 120
+
+
+@pytest.mark.parametrize("name", ["left_valid", "valid_l", "EAR_valid_left"])
+def test_a_validity_of_one_eye_holds_for_it_alone(make_known, tmp_path: Path, name: str) -> None:
+    table = spoilt(make_known, name, 1.0, 0.0)
+    table.insert(0, "gap_r", table[" gap_l"] + 0.5)
+    table.to_csv(tmp_path / "s.csv", index=False)
+    left, right = read_series(tmp_path / "s.csv", ["gap_l", "gap_r"], FPS)
+    assert (left.missing_frames, right.missing_frames) == (120, 0)
+    assert f"120 of 1,200 frames of gap_l are not valid by '{name}'" in left.notes[0]
+
+
+def test_a_validity_of_other_columns_is_not_heeded(make_known, tmp_path: Path) -> None:
+    table = spoilt(make_known, "BS_Valid", 1, 0).assign(BS_blink=0.5)
+    table.to_csv(tmp_path / "s.csv", index=False)
+    (series,) = read_series(tmp_path / "s.csv", ["gap_l"], FPS)
+    assert (series.missing_frames, series.notes) == (0, ())
+
+
+@pytest.mark.parametrize("name", ["valid_points", "points_valid", "invalid"])
+def test_a_number_of_valid_points_is_no_validity(make_known, tmp_path: Path, name: str) -> None:
+    spoilt(make_known, name, 68, 0).to_csv(tmp_path / "s.csv", index=False)
+    assert read_series(tmp_path / "s.csv", ["gap_l"], FPS)[0].missing_frames == 0
