@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from experiments.counted import counted
-from stimuli_builder.blinks.column_names import eye_of
+from stimuli_builder.blinks.column_names import eye_of, eye_pair, left_and_right
+from stimuli_builder.blinks.csv_table import few
 from stimuli_builder.blinks.extract import EyeBlinks, eye_profiles
 from stimuli_builder.blinks.measure import MeasuredBlink, closure_at_300
 from stimuli_builder.blinks.profile import BlinkProfile, Eye
@@ -13,9 +14,15 @@ from stimuli_builder.blinks.profile import BlinkProfile, Eye
 
 def asymmetry_lines(eyes: Sequence[EyeBlinks]) -> list[str]:
     """Lines about an eye that moves much less than the other, or not at all; none where both move alike."""
-    sides = {eye_of(eye.series.column) for eye in eyes}
-    fellow = "the other eye" if sides == {"left", "right"} else "the other column"
+    columns = [eye.series.column for eye in eyes]
+    pair = eye_pair(columns)
+    fellow = "the other column" if pair is None else "the other eye"
     lines = []
+    if len(eyes) > 2 and pair is None and eyes[0].recognised is not None:
+        lines.append(
+            f"of {len(eyes)} columns ({few(columns)}) no two are a left and a right eye by their names: each "
+            "is judged by itself, and an eye that moves less is not told"
+        )
     for eye in eyes:
         side = None if eye.recognised is None else eye.recognised.asymmetry
         # An eye that blinks more often than the other is not the one that does not move.
@@ -52,14 +59,10 @@ def paired_blinks(left: EyeBlinks, right: EyeBlinks) -> list[tuple[MeasuredBlink
     return pairs
 
 
-def both_eyes(
-    eyes: Sequence[EyeBlinks], names: Sequence[Eye | None]
-) -> list[tuple[MeasuredBlink, MeasuredBlink]]:
+def both_eyes(eyes: Sequence[EyeBlinks]) -> list[tuple[MeasuredBlink, MeasuredBlink]]:
     """Return the blinks of the left eye with their partners in the right one; none for other columns."""
-    if len(eyes) != 2 or set(names) != {"left", "right"}:
-        return []
-    by_name = dict(zip(names, eyes, strict=True))
-    return paired_blinks(by_name["left"], by_name["right"])
+    pair = eye_pair([eye.series.column for eye in eyes])
+    return [] if pair is None else paired_blinks(eyes[pair[0]], eyes[pair[1]])
 
 
 def paired_profiles(left: EyeBlinks, right: EyeBlinks, recording: str) -> list[BlinkProfile]:
@@ -101,7 +104,7 @@ def all_profiles(
         for eye_blinks, name in zip(eyes, names, strict=True)
         for profile in eye_profiles(eye_blinks, recording, name, "one" if len(eyes) == 1 else "")
     ]
-    if set(names) == {"left", "right"} and len(eyes) == 2:
-        by_name = dict(zip(names, eyes, strict=True))
-        profiles += paired_profiles(by_name["left"], by_name["right"], recording)
+    if (pair := left_and_right(names)) is not None:
+        left, right = (eyes[k] for k in pair)
+        profiles += paired_profiles(left, right, recording)
     return profiles

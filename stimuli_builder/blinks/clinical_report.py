@@ -12,7 +12,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from experiments.counted import counted
 from stimuli_builder.blinks.both_eyes import asymmetry_lines
-from stimuli_builder.blinks.column_names import eye_of
+from stimuli_builder.blinks.column_names import eye_pair
 from stimuli_builder.blinks.extract import EyeBlinks
 from stimuli_builder.blinks.plots import sequence_figure, series_figure
 from stimuli_builder.blinks.profile import Array
@@ -60,7 +60,7 @@ def report_text(
         columns=[eye.series.column for eye in eyes],
         blinks=blink_rows(eyes, accepted, scale),
         quality=quality_rows(eyes),
-        pairs=[*pair_lines(accepted), *asymmetry_lines(eyes)],
+        pairs=[*pair_lines(eyes, accepted), *asymmetry_lines(eyes)],
         doubts=list(doubts),
         scale=None if scale is None else f"{scale.mm_per_px:.4f} mm in a pixel: {scale.rule}",
         nearly_closed=f"{NEARLY_CLOSED:.0%}",
@@ -154,16 +154,18 @@ def _others(eye: EyeBlinks) -> str:
     return ", ".join(str(kinds.count(kind)) for kind in ("squint", "gaze_shift", "closed_eye"))
 
 
-def pair_lines(accepted: pd.DataFrame) -> list[str]:
+def pair_lines(eyes: Sequence[EyeBlinks], accepted: pd.DataFrame) -> list[str]:
     """How both eyes go together, in words; empty for one eye."""
-    pairs = accepted.dropna(subset=["partner"])
-    columns = list(dict.fromkeys(accepted["column"]))
-    if len(columns) != 2:
-        return []
-    if {eye_of(column) for column in columns} != {"left", "right"}:
+    columns = [eye.series.column for eye in eyes]
+    pair = eye_pair(columns)
+    if pair is None:
+        if len(columns) != 2:
+            return []
         return [
             "the columns' names do not say which eye is which (EAR_left, EAR_right): blinks are not paired"
         ]
+    columns = [columns[k] for k in sorted(pair)]
+    pairs = accepted.dropna(subset=["partner"])
     first = pairs[pairs["column"] == columns[0]]
     alone = [int((accepted["column"] == c).sum() - (pairs["column"] == c).sum()) for c in columns]
     lines = [

@@ -14,8 +14,16 @@ DISTANCE_COLUMNS = ("left_distance_px", "right_distance_px", "distance_px")
 INDEX_COLUMNS = ("frame", CONFIDENCE_COLUMN)
 
 
-def choose_columns(table: pd.DataFrame, named: Sequence[str], path: Path) -> list[str]:
-    """Return the distance columns to label: those named, else a track's, else the only candidate."""
+def choose_columns(table: pd.DataFrame, named: Sequence[str], path: Path) -> tuple[list[str], list[str]]:
+    """The distance columns to label: those named, else a track's, else the only candidate.
+
+    Of several, one that holds 0 and 1 alone, or the same as one before it, is no second eye and left out.
+
+    Returns
+    -------
+    columns, notes : list of str
+        And a line about each that is left out.
+    """
     candidates = [
         str(name)
         for name in table.columns
@@ -25,14 +33,52 @@ def choose_columns(table: pd.DataFrame, named: Sequence[str], path: Path) -> lis
         if name not in table.columns:
             raise InputError(f"{path.name} has no column '{name}'{_near_or_plausible(name, candidates)}")
     if named:
-        return list(dict.fromkeys(named))
+        return _distinct(table, list(dict.fromkeys(named)), path)
     tracked = [name for name in DISTANCE_COLUMNS if name in table.columns]
     if tracked:
-        return tracked
-    if len(candidates) == 1:
-        return candidates
-    there = few(candidates) or "no column of decimal numbers but the times"
-    raise InputError(f"{path.name}: say with --column which series to label; it has {there}")
+        return tracked, []
+    measures = [name for name in candidates if not _is_presence(table[name])]
+    if len(measures) == 1 or len(candidates) == 1:
+        return measures or candidates, []
+    raise InputError(f"{path.name}: {_not_chosen(table, candidates)}")
+
+
+def _distinct(table: pd.DataFrame, named: list[str], path: Path) -> tuple[list[str], list[str]]:
+    """The columns that may be eyes beside one another, and a line about each of the others."""
+    kept: list[str] = []
+    notes = []
+    measures = [name for name in named if not _is_presence(table[name])]
+    for name in named:
+        twin = next((one for one in kept if table[one].equals(table[name])), None)
+        if measures and name not in measures:
+            notes.append(f"{path.name}: '{name}' holds only 0 and 1, a presence and no eye: left out")
+        elif twin is not None:
+            notes.append(f"{path.name}: '{name}' holds the same values as '{twin}', no second eye: left out")
+        else:
+            kept.append(name)
+    return kept, notes
+
+
+def _is_presence(column: pd.Series) -> bool:
+    """Whether a column says by 0 and 1 alone that something is there, as OpenFace's AU45_c."""
+    return column.dtype.kind in "fiub" and set(column.dropna().unique().tolist()) == {0, 1}
+
+
+def _not_chosen(table: pd.DataFrame, candidates: Sequence[str]) -> str:
+    """Why no column is chosen, and what to do."""
+    if candidates:
+        return f"say with --column which series to label; it has {few(candidates)}"
+    whole = [
+        f"'{name}' (whole numbers)"
+        for name in table.columns
+        if table[name].dtype.kind in "iu" and not _is_of_another_kind(str(name))
+    ]
+    if not whole:
+        return "say with --column which series to label; it has no column of numbers but the times"
+    return (
+        f"expected a column of decimal numbers, got {few(whole)}; if one of them is the distance, name it "
+        "with --column"
+    )
 
 
 def _is_of_another_kind(name: str) -> bool:

@@ -1,6 +1,7 @@
 """What the name of a column says: which eye it is of, and whether high is shut."""
 
 import re
+from collections.abc import Sequence
 from itertools import pairwise, zip_longest
 
 from stimuli_builder.blinks.profile import Eye
@@ -42,6 +43,18 @@ def eye_of(column: str) -> Eye | None:
         if (side := _side(word)) and not (len(word) == 1 and _NO_SIDE_BEFORE.fullmatch(following))
     }
     return sides.pop() if len(sides) == 1 else None
+
+
+def eye_pair(columns: Sequence[str]) -> tuple[int, int] | None:
+    """Numbers of the left and the right eye's columns; None where not one is of each."""
+    return left_and_right([eye_of(column) for column in columns])
+
+
+def left_and_right(eyes: Sequence[Eye | None]) -> tuple[int, int] | None:
+    """Numbers of the one left and the one right eye; None where there are none, or more."""
+    if eyes.count("left") != 1 or eyes.count("right") != 1:
+        return None
+    return eyes.index("left"), eyes.index("right")
 
 
 def _side(word: str) -> Eye | None:

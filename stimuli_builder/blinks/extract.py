@@ -32,6 +32,7 @@ USUAL_SPEED = (15, 28)
 """Peak closing velocity over amplitude, per second (main sequence). A rate off by a factor of two puts it and
 the closing time outside, on opposite sides; a person seldom has both there."""
 TELLING_FPS = 60
+TESTED_FPS = (15, 1000)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +123,19 @@ def _why_none(eye: EyeBlinks, options: LabelOptions) -> str:
     return f"{what}; is the column right, and --fps?"
 
 
-def rate_doubt(eyes: Sequence[EyeBlinks]) -> str:
+def rate_doubts(eyes: Sequence[EyeBlinks]) -> list[str]:
+    """Lines about a rate at which the classifier was not tested, and one by which blinks do not last so."""
+    fps, lines = eyes[0].series.fps, []
+    if eyes[0].recognised is not None and not TESTED_FPS[0] <= fps <= TESTED_FPS[1]:
+        lines.append(
+            f"the classifier was tested at {TESTED_FPS[0]} to {TESTED_FPS[1]:,} frames a second, this is at "
+            f"{fps:.4g}: look at what it tells with --plot"
+        )
+    doubt = _rate_doubt(eyes)
+    return [*lines, doubt] if doubt else lines
+
+
+def _rate_doubt(eyes: Sequence[EyeBlinks]) -> str:
     """Why the rate of a recording may be wrong, in words; empty where its blinks last as blinks do.
 
     Both eyes have one rate, so that the blinks of all columns are looked at together.

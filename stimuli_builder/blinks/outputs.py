@@ -12,7 +12,7 @@ from experiments.errors import InputError
 from experiments.files import whole_text
 from stimuli_builder.blinks.csv_table import read_table
 from stimuli_builder.blinks.export.formats import CurveTarget, check_format, write_curve
-from stimuli_builder.blinks.extract import EyeBlinks, rate_doubt
+from stimuli_builder.blinks.extract import EyeBlinks, rate_doubts
 from stimuli_builder.blinks.recorded_curve import recorded_curve
 from stimuli_builder.blinks.units import check_scale, scale_doubt, scale_of, write_lids
 
@@ -86,8 +86,7 @@ def _write_text(path: Path, text: str) -> None:
 
 def _doubts(table: pd.DataFrame, eyes: Sequence[EyeBlinks]) -> list[str]:
     """What a track says of its own frames, and rates that are unlikely."""
-    lines = [doubt for doubt in (rate_doubt(eyes),) if doubt]
-    lines += eyes[0].series.notes
+    lines = [*rate_doubts(eyes), *eyes[0].series.notes]
     lost = int((table["status"] == "lost").sum()) if "status" in table.columns else 0
     if lost:
         lines.append(f"{lost:,} of {len(table):,} frames are lost")

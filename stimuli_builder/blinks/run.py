@@ -14,7 +14,7 @@ from stimuli_builder.blinks.events.recognise import recognise
 from stimuli_builder.blinks.extract import (
     EyeBlinks,
     blinks_of,
-    rate_doubt,
+    rate_doubts,
     require_blinks,
 )
 from stimuli_builder.blinks.file_endings import CURVES, TABLE, check_endings
@@ -71,7 +71,7 @@ def run_blinks(job: BlinksJob) -> None:
     eyes = [_with_moved_edges(job, eye, decided) for eye in eyes]
     names = [eye_of(eye.series.column) for eye in eyes]
     blinks = [blink for eye in eyes for blink in eye.blinks]
-    frame = blinks_frame(blinks, decided, both_eyes(eyes, names))
+    frame = blinks_frame(blinks, decided, both_eyes(eyes))
     accepted = [_accepted_only(eye, decided) for eye in eyes]
     profiles = all_profiles(accepted, job.series.stem, names)
     if not profiles:
@@ -124,7 +124,7 @@ def label_recording(job: BlinksJob) -> list[EyeBlinks]:
     with_blinks = [eye for eye in eyes if eye.blinks]
     for eye in with_blinks or eyes:
         require_blinks(eye, job.options)
-    if doubt := rate_doubt(eyes):
+    for doubt in rate_doubts(eyes):
         sys.stderr.write(f"warning: {doubt}\n")
     for line in asymmetry_lines(eyes):
         sys.stderr.write(f"note: {line}\n")

@@ -175,12 +175,12 @@ def read_series(
     if fps is None or resample:
         # A rate that was given stands by itself: columns of these names hold other things too.
         table, times_note = with_time_s(table, path)
-    chosen = choose_columns(table, columns, path)
+    chosen, left_out = choose_columns(table, columns, path)
     if resample and "time_s" not in table.columns:
         raise InputError(f"{path.name} has no column time_s: --resample needs the time of every frame")
     rate = series_fps(table, fps, path, uneven=resample)
     unseen, notes = unseen_rows(table, chosen, path)
-    notes = [times_note, *notes, *_set_openings(table, chosen, path, inverted, unseen, rate)]
+    notes = [times_note, *left_out, *notes, *_set_openings(table, chosen, path, inverted, unseen, rate)]
     if resample:
         table, unseen, note = resampled(table, chosen, rate, path, unseen)
         notes.append(note)

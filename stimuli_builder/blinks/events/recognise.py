@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from stimuli_builder.blinks.column_names import eye_pair
 from stimuli_builder.blinks.events.apart import apart
 from stimuli_builder.blinks.events.asymmetry import Asymmetry, asymmetry
 from stimuli_builder.blinks.events.candidates import RIPPLE, Candidate, candidate_at
@@ -68,11 +69,16 @@ class _Look:
 def recognise(eyes: Sequence[BlinkSeries]) -> list[Recognised]:
     """Return the events of each series; two series are taken as the two eyes of one face.
 
-    An eye whose fellow moves much less is judged by itself, and so is one that does not move.
+    Of three and more, those that one left and one right eye is named by are; others are judged by themselves.
     """
+    pair = (0, 1) if len(eyes) == 2 else eye_pair([eye.column for eye in eyes])
+    of_pair = {} if pair is None else dict(zip(pair, _of_one_face([eyes[k] for k in pair]), strict=True))
+    return [of_pair.get(k) or _recognised(_looks([eye])[0], eye, None) for k, eye in enumerate(eyes)]
+
+
+def _of_one_face(eyes: Sequence[BlinkSeries]) -> list[Recognised]:
+    """The events of both eyes; one is judged by itself where it does not move, or its fellow much less."""
     together = _looks(eyes)
-    if len(eyes) != 2:
-        return [_recognised(look, eye, None) for look, eye in zip(together, eyes, strict=True)]
     alone = [_looks([eye])[0] for eye in eyes]
     sides = [asymmetry(alone[k].pieces, alone[1 - k].pieces, alone[1 - k].told) for k in range(2)]
     results = []
