@@ -24,12 +24,14 @@ def asymmetry_lines(eyes: Sequence[EyeBlinks]) -> list[str]:
             "is judged by itself, and an eye that moves less is not told"
         )
     for eye in eyes:
+        winks_s = () if eye.recognised is None else eye.recognised.winks_s
+        if winks_s:
+            alone = f"{counted(len(winks_s), 'blink')} of this one alone, {fellow} open"
+            lines.append(f"{_label(eye)}: {alone}, first at {winks_s[0]:.1f} s")
         side = None if eye.recognised is None else eye.recognised.asymmetry
         # An eye that blinks more often than the other is not the one that does not move.
         if side is None or not side.is_weak or len(eye.blinks) > side.blinks:
             continue
-        name = eye_of(eye.series.column)
-        label = f"{name} eye ({eye.series.column})" if name else eye.series.column
         others = f"{fellow}'s {counted(side.blinks, 'blink')}"
         if side.moves:
             how = f"moves by {side.share:.0%} of {others} (median)"
@@ -39,8 +41,13 @@ def asymmetry_lines(eyes: Sequence[EyeBlinks]) -> list[str]:
             how = f"blinks apart from {fellow} ({counted(len(eye.blinks), 'blink')}, none at {others})"
         else:
             how = f"does not move beyond its noise at {others}"
-        lines.append(f"{label}: {how}; {fellow} was judged by itself")
+        lines.append(f"{_label(eye)}: {how}; {fellow} was judged by itself")
     return lines
+
+
+def _label(eye: EyeBlinks) -> str:
+    name = eye_of(eye.series.column)
+    return f"{name} eye ({eye.series.column})" if name else eye.series.column
 
 
 def paired_blinks(left: EyeBlinks, right: EyeBlinks) -> list[tuple[MeasuredBlink, MeasuredBlink]]:

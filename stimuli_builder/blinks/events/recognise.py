@@ -1,7 +1,7 @@
 """From lid series to events: what each dip is, how sure that is, and when it happened."""
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,9 +13,10 @@ from stimuli_builder.blinks.events.generated import CLASSES, CLOSED_EYE_S
 from stimuli_builder.blinks.events.levels import Depth
 from stimuli_builder.blinks.events.lid_event import LidEvent
 from stimuli_builder.blinks.events.long_closure import with_long_closures
-from stimuli_builder.blinks.events.pieces import Piece, looked_at
+from stimuli_builder.blinks.events.pieces import Piece, looked_at, partners
 from stimuli_builder.blinks.events.second_look import second_look
 from stimuli_builder.blinks.events.template import Timing, timing_of
+from stimuli_builder.blinks.events.winks import with_winks
 from stimuli_builder.blinks.profile import Array
 from stimuli_builder.blinks.series import BlinkSeries
 
@@ -38,12 +39,14 @@ class Recognised:
     """Events of one eye in order of time, and the deepest frames of blinks whose start or end is missing.
 
     An eye may blink or be shut while it is lowered (squint, gaze shift); else no two of its events overlap.
-    `asymmetry` is what this eye does at the blinks of the other; None where no such blink is seen.
+    `asymmetry` is what this eye does at the blinks of the other; None where no such blink is seen. `winks_s`
+    are the deepest moments of its blinks at which the other eye stays open, of two eyes that both blink.
     """
 
     events: tuple[LidEvent, ...]
     cut: tuple[int, ...]
     asymmetry: Asymmetry | None = None
+    winks_s: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,12 +84,24 @@ def _of_one_face(eyes: Sequence[BlinkSeries]) -> list[Recognised]:
     together = _looks(eyes)
     alone = [_looks([eye])[0] for eye in eyes]
     sides = [asymmetry(alone[k].pieces, alone[1 - k].pieces, alone[1 - k].told) for k in range(2)]
+    depths = [_of_length(depth, eyes[0].distance.size) for depth in partners([one.pieces for one in alone])]
     results = []
     for k, eye in enumerate(eyes):
         own, other = sides[k], sides[1 - k]
         by_itself = (other is not None and other.is_weak) or (own is not None and not own.moves)
-        results.append(_recognised((alone if by_itself else together)[k], eye, own))
+        result = _recognised((alone if by_itself else together)[k], eye, own)
+        if not by_itself and not (own is not None and own.is_weak):
+            lone = _recognised(alone[k], eye, own).events
+            events, winks_s = with_winks(result.events, lone, depths[1 - k], depths[k], eye.fps)
+            result = replace(result, events=tuple(events), winks_s=tuple(winks_s))
+        results.append(result)
     return results
+
+
+def _of_length(depth: Array | None, size: int) -> Array:
+    """A depth (n,) as long as its series; NaN where it was not seen."""
+    known = np.empty(0) if depth is None else depth
+    return np.pad(known, (0, size - known.size), constant_values=np.nan)
 
 
 def _looks(eyes: Sequence[BlinkSeries]) -> list[_Look]:
