@@ -10,11 +10,10 @@ import numpy as np
 
 from experiments.errors import InputError
 from experiments.files import whole_text
-from stimuli_builder.tracking.shapes import EYE_POINTS, LidMarkers, Points, default_markers, eye_axis
+from stimuli_builder.tracking.label_checks import check_frame
+from stimuli_builder.tracking.shapes import EYE_POINTS, LidMarkers, Points, default_markers
 
 FEWEST_FRAMES = 3
-ORDER_TOLERANCE = 0.06
-CROSSING_TOLERANCE = 0.12
 POINT_ORDER = (
     "9 points an eye, image-left eye first: outer canthus, 4 upper-lid points outer to inner, inner canthus, "
     "3 lower-lid points inner to outer; image-right eye mirrored"
@@ -81,7 +80,7 @@ def load_labels(
     frames = _frames(path, document.get("frames"), fewest)
     eyes = len(next(iter(frames.values()))) // EYE_POINTS
     for number, points in frames.items():
-        _check_frame(f"{path}: frame {number}", points, eyes, (width, height))
+        check_frame(f"{path}: frame {number}", points, eyes, (width, height))
         if frame_count is not None and number >= frame_count:
             raise InputError(f"{path}: frame {number} is labelled, the video ends at frame {frame_count - 1}")
     origin = document.get("origin")
@@ -173,49 +172,6 @@ def _points(where: str, data: object) -> Points:
         if not pair or not all(type(v) in (int, float) and math.isfinite(v) for v in point):
             raise InputError(f"{where}: point {index + 1} is {point!r}, expected [x, y] in pixels")
     return np.asarray(data, np.float64)
-
-
-def _check_frame(where: str, points: Points, eyes: int, size: tuple[int, int]) -> None:
-    outside = np.flatnonzero(((points < -0.5) | (points > np.array(size) - 0.5)).any(1))
-    if len(outside):
-        x, y = points[outside[0]]
-        raise InputError(
-            f"{where}: point {outside[0] + 1} at ({x:g}, {y:g}) is outside the picture "
-            f"of {size[0]} x {size[1]}"
-        )
-    centres = [
-        points[start : start + EYE_POINTS].mean(0)[0] for start in range(0, eyes * EYE_POINTS, EYE_POINTS)
-    ]
-    if centres != sorted(centres):
-        raise InputError(f"{where}: the eyes are swapped; points 1 to 9 belong to the image-left eye")
-    for eye in range(eyes):
-        _check_eye(where, points[EYE_POINTS * eye : EYE_POINTS * (eye + 1)], EYE_POINTS * eye)
-
-
-def _check_eye(where: str, eye: Points, first: int) -> None:
-    """Refuse an eye whose outline crosses itself by more than the wobble of a closed eye's labels."""
-    if np.hypot(*(eye[5] - eye[0])) < 4:
-        raise InputError(
-            f"{where}: canthi {first + 1} and {first + 6} are under 4 px apart; label a larger eye"
-        )
-    along, down, width = eye_axis(eye)
-    x, y = (eye - eye[0]) @ along / width, (eye - eye[0]) @ down / width
-    sign = 1.0 if x[5] > 0 else -1.0
-    upper, lower = sign * x[:6], sign * x[[5, 6, 7, 8, 0]]
-    for order, names in ((np.diff(upper), range(6)), (-np.diff(lower), (5, 6, 7, 8, 0))):
-        wrong = np.flatnonzero(order < -ORDER_TOLERANCE)
-        if len(wrong):
-            a, b = list(names)[wrong[0]], list(names)[wrong[0] + 1]
-            raise InputError(
-                f"{where}: points {first + a + 1} and {first + b + 1} cross; check the point order"
-            )
-    steps = np.argsort(upper)
-    upper_y = np.interp(sign * x[6:9], upper[steps], y[:6][steps])
-    crossed = np.flatnonzero(upper_y - y[6:9] > CROSSING_TOLERANCE)
-    if len(crossed):
-        raise InputError(
-            f"{where}: lower-lid point {first + 7 + crossed[0]} lies above the upper lid; they cross"
-        )
 
 
 def _markers(path: Path, document: dict[str, Any], eyes: int) -> LidMarkers:
