@@ -34,20 +34,20 @@ def check_targets(outputs: Iterable[Path | None], inputs: Iterable[Path | None] 
             taken.append(path.resolve())
 
 
-def check_ending(path: Path, ending: str, what: str) -> None:
-    """Refuse a name for output whose ending tells of another kind of file.
+def check_ending(path: Path | None, endings: tuple[str, ...], what: str) -> None:
+    """Refuse a name for output whose ending is not one of its kind; a name without an ending is refused too.
 
     Parameters
     ----------
-    ending : str
-        Expected, with its dot.
+    path : Path or None
+        None is no output.
+    endings : tuple of str
+        Expected, with their dots, in small letters.
     what : str
-        The output in words, as `a track`.
+        The output in words, as `a track`, or its option.
     """
-    if path.suffix.lower() != ending:
-        raise InputError(
-            f"{path}: {what} is written as {ending[1:].upper()}; use a name that ends in {ending}"
-        )
+    if path is not None and path.suffix.lower() not in endings:
+        raise InputError(f"{what}: expected a name that ends in {' or '.join(endings)}, got '{path.name}'")
 
 
 def remove_quietly(path: Path) -> None:

@@ -76,35 +76,48 @@ def _rejected(frame: pd.DataFrame) -> set[tuple[str, int]]:
 def blink_rows(eyes: Sequence[EyeBlinks], accepted: pd.DataFrame, scale: Scale | None) -> list[Row]:
     """Lines of the table of blinks, a value an eye; medians with the quartiles."""
     parts = [accepted[accepted["column"] == eye.series.column] for eye in eyes]
-    minutes = [(e.series.distance.size - e.series.missing_frames) / e.series.fps / 60 for e in eyes]
-    unit = "px" if eyes[0].series.is_px else "units"
-    factor = 1.0
-    if scale is not None:
-        unit, factor = "mm", scale.mm_per_px
-
-    def spread(name: str, digits: int = 0, by: float = 1.0) -> tuple[str, ...]:
-        return tuple(_quartiles(part[name] * by, digits) for part in parts)
-
-    closed = [(part["closed_to_s"] - part["closed_from_s"]) * 1000 for part in parts]
+    rates = tuple(f"{len(part) / eye.seconds * 60:.1f}" for part, eye in zip(parts, eyes, strict=True))
     pauses = [pd.Series(np.diff(np.sort(part["minimum_s"]))) for part in parts]
     return [
         Row("blinks", tuple(str(len(part)) for part in parts)),
-        Row("blinks a minute", tuple(f"{len(p) / m:.1f}" for p, m in zip(parts, minutes, strict=True))),
+        Row("blinks a minute", rates),
         Row("complete / partial", tuple(_complete(part) for part in parts)),
-        Row("duration, ms", spread("duration_ms")),
-        Row("closing, ms", spread("down_ms")),
-        Row("closed phase, ms", tuple(_quartiles(part) for part in closed)),
-        Row("opening, ms", spread("up_ms")),
-        Row("greatest closure", spread("closure", 2)),
-        Row(f"amplitude, {unit}", spread("amplitude", 2, factor)),
-        Row(f"peak closing speed, {unit}/s", spread("peak_closing_velocity", 1, factor)),
-        Row(f"peak opening speed, {unit}/s", spread("peak_opening_velocity", 1, factor)),
-        Row(
-            "main sequence: closing speed over amplitude, 1/s", tuple(_main_sequence(part) for part in parts)
-        ),
+        *_phase_rows(parts),
+        *_speed_rows(parts, scale, is_px=eyes[0].series.is_px),
         Row("interval, s", tuple(_quartiles(part, 2) for part in pauses)),
         Row("time nearly closed (closure ratio)", tuple(_closure_ratio(eye) for eye in eyes)),
     ]
+
+
+def _phase_rows(parts: Sequence[pd.DataFrame]) -> list[Row]:
+    """How long blinks and their phases last, and how far lids close."""
+    closed = [(part["closed_to_s"] - part["closed_from_s"]) * 1000 for part in parts]
+    return [
+        _spread_row("duration, ms", parts, "duration_ms"),
+        _spread_row("closing, ms", parts, "down_ms"),
+        Row("closed phase, ms", tuple(_quartiles(part) for part in closed)),
+        _spread_row("opening, ms", parts, "up_ms"),
+        _spread_row("greatest closure", parts, "closure", 2),
+    ]
+
+
+def _speed_rows(parts: Sequence[pd.DataFrame], scale: Scale | None, *, is_px: bool) -> list[Row]:
+    """Amplitudes and speeds, in mm where there is a scale."""
+    unit, factor = ("px" if is_px else "units", 1.0) if scale is None else ("mm", scale.mm_per_px)
+    return [
+        _spread_row(f"amplitude, {unit}", parts, "amplitude", 2, factor),
+        _spread_row(f"peak closing speed, {unit}/s", parts, "peak_closing_velocity", 1, factor),
+        _spread_row(f"peak opening speed, {unit}/s", parts, "peak_opening_velocity", 1, factor),
+        Row(
+            "main sequence: closing speed over amplitude, 1/s", tuple(_main_sequence(part) for part in parts)
+        ),
+    ]
+
+
+def _spread_row(
+    name: str, parts: Sequence[pd.DataFrame], column: str, digits: int = 0, factor: float = 1.0
+) -> Row:
+    return Row(name, tuple(_quartiles(part[column] * factor, digits) for part in parts))
 
 
 def _complete(part: pd.DataFrame) -> str:

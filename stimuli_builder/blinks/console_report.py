@@ -13,6 +13,8 @@ from stimuli_builder.blinks.review import Review
 
 FEW_BLINKS = 3
 """Fewer than these say nothing of how far this person's lids close at most."""
+MAX_NAME = 17
+"""Letters of a column's name beside which the figures keep their width on a screen of 80."""
 HEADERS = ("blinks", "/min", "complete", "rejected", "down", "up", "total", "closure")
 
 
@@ -27,7 +29,9 @@ def print_blinks(summaries: Sequence[dict[str, Any]], lost: Sequence[Review], *,
     for row in summaries:
         medians = [_median(row[name], 0) for name in ("down_ms", "up_ms", "duration_ms")]
         counts = [str(row["blinks"]), f"{row['rate_per_minute']:.1f}", str(row["complete"])]
-        table.add_row(row["column"], *counts, str(row["rejected"]), *medians, _median(row["closure"], 2))
+        table.add_row(
+            shortened(row["column"]), *counts, str(row["rejected"]), *medians, _median(row["closure"], 2)
+        )
     console.print(table)
     for row in summaries:
         for line in _column_lines(row, closed_given=closed_given):
@@ -36,6 +40,14 @@ def print_blinks(summaries: Sequence[dict[str, Any]], lost: Sequence[Review], *,
         console.print(
             f"the review names a blink at frame {review.minimum_frame} of {review.column}: none is there"
         )
+
+
+def shortened(name: str, longest: int = MAX_NAME) -> str:
+    """A name of at most `longest` letters, an ellipsis for its middle: both ends tell columns apart."""
+    if len(name) <= longest:
+        return name
+    end = (longest - 1) // 2
+    return f"{name[: longest - 1 - end]}…{name[-end:]}"
 
 
 def _column_lines(row: dict[str, Any], *, closed_given: bool) -> list[str]:

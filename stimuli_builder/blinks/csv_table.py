@@ -87,6 +87,17 @@ def _cells(path: Path, **options: Any) -> pd.DataFrame:
     return table
 
 
+def line_of(path: Path, row: int) -> int:
+    """Line of a file on which row `row` (from 0) of its table stands; blank lines are no rows.
+
+    For messages: the file is read again.
+    """
+    lines = path.read_text(encoding="utf-8-sig", errors="replace").split("\n")
+    blank = " \r" if "\t" in _header(path) else " \t\r"
+    written = [number for number, line in enumerate(lines, start=1) if line.strip(blank)]
+    return written[row + 1] if row + 1 < len(written) else row + 2
+
+
 def few(names: Sequence[str]) -> str:
     """The first names of columns; a table of face tracking has sixty, too many for a line."""
     rest = len(names) - MAX_NAMED

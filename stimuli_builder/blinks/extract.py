@@ -53,6 +53,15 @@ class EyeBlinks:
         """All lid events of the classifier, other than blinks too; none by the paper's rule."""
         return () if self.recognised is None else self.recognised.events
 
+    def closed_distance(self, given: float | None) -> float | None:
+        """Distance at lid contact: its blinks', else the one given; None where nothing tells it."""
+        return self.blinks[0].closed_distance if self.blinks else given
+
+    @property
+    def seconds(self) -> float:
+        """How long the eye was seen."""
+        return (self.series.distance.size - self.series.missing_frames) / self.series.fps
+
 
 def blinks_of(
     series: BlinkSeries,
@@ -100,11 +109,9 @@ def _moved(series: BlinkSeries, blink: LabelledBlink, edges: tuple[int, int] | N
     return replace(blink, onset=onset, end=end, event=event)
 
 
-def require_blinks(eye: EyeBlinks, options: LabelOptions) -> None:
-    """Refuse a series without a blink."""
-    if eye.blinks:
-        return
-    raise InputError(f"no blink in column '{eye.series.column}': {_why_none(eye, options)}")
+def why_no_blink(eye: EyeBlinks, options: LabelOptions) -> str:
+    """A line on a series without a blink."""
+    return f"no blink in column '{eye.series.column}': {_why_none(eye, options)}"
 
 
 def _why_none(eye: EyeBlinks, options: LabelOptions) -> str:
@@ -121,6 +128,11 @@ def _why_none(eye: EyeBlinks, options: LabelOptions) -> str:
     elif eye.recognised is None and deepest < options.minimum_depth:
         what += f", a blink needs {options.minimum_depth:.0%} (--minimum-depth)"
     return f"{what}; is the column right, and --fps?"
+
+
+def without_blinks(eyes: Sequence[EyeBlinks]) -> list[str]:
+    """A line about each column in which there is no blink."""
+    return [f"{eye.series.column}: no blinks in {eye.seconds:.0f} s" for eye in eyes if not eye.blinks]
 
 
 def rate_doubts(eyes: Sequence[EyeBlinks]) -> list[str]:

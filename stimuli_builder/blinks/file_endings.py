@@ -1,9 +1,9 @@
 """Endings of the files that `stimuli blinks` writes: what is in a file is what its name says."""
 
-from collections.abc import Mapping
 from pathlib import Path
 
 from experiments.errors import InputError
+from experiments.files import check_ending
 
 TABLE = (".csv", ".txt")
 CURVES = {
@@ -18,15 +18,15 @@ CURVES = {
 """Endings of `--curve` by `--curve-format`."""
 
 
-def check_endings(files: Mapping[str, tuple[Path | None, tuple[str, ...]]]) -> None:
-    """Refuse a file whose ending is of another kind; a name without one is taken.
-
-    Parameters
-    ----------
-    files : mapping of str to (Path or None, tuple of str)
-        By option, the file and the endings that it may have.
-    """
-    for option, (path, endings) in files.items():
-        if path is not None and path.suffix and path.suffix.lower() not in endings:
-            expected = " or ".join(endings)
-            raise InputError(f"{option} {path.name}: expected a name that ends in {expected}")
+def check_curve(path: Path | None, format_name: str) -> None:
+    """Refuse a curve whose ending is not of its format; name the format that the ending is of."""
+    if path is None:
+        return
+    endings, ending = CURVES[format_name], path.suffix.lower()
+    other = next((name for name, of_format in CURVES.items() if ending in of_format), None)
+    if ending not in endings and other is not None:
+        raise InputError(
+            f"--curve {path.name}: --curve-format {format_name} is written as {' or '.join(endings)}; add "
+            f"--curve-format {other}, or end the name so"
+        )
+    check_ending(path, endings, "--curve")

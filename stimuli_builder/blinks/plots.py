@@ -119,7 +119,8 @@ def sequence_figure(blinks: pd.DataFrame) -> "Figure":
         right.scatter(part["duration_ms"], part["closure"], 18, colour, label=str(column))
     _tidy(left, "amplitude", "peak speed (a second)")
     _tidy(right, "duration (ms)", "greatest closure")
-    left.legend(frameon=False, fontsize=9)
+    if len(blinks):
+        left.legend(frameon=False, fontsize=9)
     return figure
 
 

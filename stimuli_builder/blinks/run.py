@@ -4,9 +4,12 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
+
+import pandas as pd
 
 from experiments.errors import InputError
-from experiments.files import check_targets
+from experiments.files import check_ending, check_targets
 from stimuli_builder.blinks.both_eyes import all_profiles, asymmetry_lines, both_eyes
 from stimuli_builder.blinks.column_names import eye_of
 from stimuli_builder.blinks.console_report import print_blinks, print_written
@@ -15,9 +18,9 @@ from stimuli_builder.blinks.extract import (
     EyeBlinks,
     blinks_of,
     rate_doubts,
-    require_blinks,
+    why_no_blink,
 )
-from stimuli_builder.blinks.file_endings import CURVES, TABLE, check_endings
+from stimuli_builder.blinks.file_endings import TABLE
 from stimuli_builder.blinks.label_options import LabelOptions
 from stimuli_builder.blinks.outputs import MoreOutputs
 from stimuli_builder.blinks.profile import BlinkProfile
@@ -69,37 +72,59 @@ def run_blinks(job: BlinksJob) -> None:
     eyes = label_recording(job)
     reviews, decided, lost = _reviewed(job, eyes)
     eyes = [_with_moved_edges(job, eye, decided) for eye in eyes]
-    names = [eye_of(eye.series.column) for eye in eyes]
-    blinks = [blink for eye in eyes for blink in eye.blinks]
-    frame = blinks_frame(blinks, decided, both_eyes(eyes))
+    frame = blinks_frame([blink for eye in eyes for blink in eye.blinks], decided, both_eyes(eyes))
     accepted = [_accepted_only(eye, decided) for eye in eyes]
+    names = [eye_of(eye.series.column) for eye in eyes]
     profiles = all_profiles(accepted, job.series.stem, names)
-    if not profiles:
+    if not profiles and len(frame):
         raise InputError("the review rejects every blink: nothing is left to write")
     summaries = [
         summarise(eye, frame, [p for p in profiles if p.eye == name and _is_of(p, eye)])
         for eye, name in zip(accepted, names, strict=True)
     ]
-    more = job.more.prepared(job.series, eyes, frame)
-    _write_figures(job, eyes, decided, profiles)
-    write_profile_table(job.profiles, profiles)
-    if job.summary is not None:
-        write_summary(job.summary, summaries)
-    if job.review is not None and (job.reject or job.accept):
-        write_reviews(job.review, reviews)
-    for write in more:
-        write()
-    if job.events is not None and job.classify:
-        write_events(job.events, eyes)
-    write_blinks(job.out, frame)
-    events = job.events if job.classify else None
-    written = [job.out, job.profiles, events, *job.more.paths, job.summary, job.plot, job.plot_aligned]
+    written = _write(job, _Labelled(eyes, frame, profiles, summaries, decided, reviews))
     print_blinks(summaries, lost, closed_given=job.closed is not None)
     print_written(len(frame), written)
 
 
+@dataclass(frozen=True, eq=False)
+class _Labelled:
+    """A labelled and reviewed recording, as it is written; `decided` and `reviews` as of `_reviewed`."""
+
+    eyes: Sequence[EyeBlinks]
+    frame: pd.DataFrame
+    profiles: Sequence[BlinkProfile]
+    summaries: Sequence[dict[str, Any]]
+    decided: Mapping[tuple[str, int], Review]
+    reviews: Sequence[Review]
+
+
+def _write(job: BlinksJob, labelled: _Labelled) -> list[Path | None]:
+    """Write what the job asks for; without a blink there are no profiles. Return the files."""
+    more = job.more.prepared(job.series, labelled.eyes, labelled.frame, job.closed)
+    _write_figures(job, labelled.eyes, labelled.decided, labelled.profiles)
+    if labelled.profiles:
+        write_profile_table(job.profiles, labelled.profiles)
+    if job.summary is not None:
+        write_summary(job.summary, labelled.summaries)
+    if job.review is not None and (job.reject or job.accept):
+        write_reviews(job.review, labelled.reviews)
+    for write in more:
+        write()
+    events = job.events if job.classify else None
+    if events is not None:
+        write_events(events, labelled.eyes)
+    write_blinks(job.out, labelled.frame)
+    profiles = job.profiles if labelled.profiles else None
+    aligned = job.plot_aligned if labelled.profiles else None
+    return [job.out, profiles, events, *job.more.paths, job.summary, job.plot, aligned]
+
+
 def label_recording(job: BlinksJob) -> list[EyeBlinks]:
-    """Label every column of the job; none with a blink is refused, an unlikely rate is told."""
+    """Label every column of the job; an unlikely rate is told.
+
+    A recording without a blink is refused, or told where a report is asked for, which says so too.
+    """
     given = read_series(
         job.series,
         job.columns,
@@ -121,9 +146,11 @@ def label_recording(job: BlinksJob) -> list[EyeBlinks]:
         )
         for series, recognised in zip(given, seen, strict=True)
     ]
-    with_blinks = [eye for eye in eyes if eye.blinks]
-    for eye in with_blinks or eyes:
-        require_blinks(eye, job.options)
+    if not any(eye.blinks for eye in eyes):
+        why = why_no_blink(eyes[0], job.options)
+        if job.more.report is None:
+            raise InputError(f"{why}; --report FILE writes a report that says so")
+        sys.stderr.write(f"warning: {why}\n")
     for doubt in rate_doubts(eyes):
         sys.stderr.write(f"warning: {doubt}\n")
     for line in asymmetry_lines(eyes):
@@ -132,6 +159,7 @@ def label_recording(job: BlinksJob) -> list[EyeBlinks]:
 
 
 def _check(job: BlinksJob) -> None:
+    """Refuse what can be seen to be wrong before anything is read."""
     from stimuli_builder.blinks.plots import check_figure_name
 
     if not 0 < job.complete_from <= 1:
@@ -144,30 +172,20 @@ def _check(job: BlinksJob) -> None:
         if figure is not None:
             check_figure_name(figure)
     job.more.check()
+    _check_files(job)
+
+
+def _check_files(job: BlinksJob) -> None:
+    """Refuse names of files that cannot be written, or that tell of another kind of file."""
     events = job.events if job.classify else None
-    outputs = [
-        job.out,
-        job.profiles,
-        events,
-        *job.more.paths,
-        job.summary,
-        job.plot,
-        job.plot_aligned,
-        job.review,
-    ]
+    tables = {"--out": job.out, "--profiles": job.profiles, "--events": events, "--review": job.review}
+    figures = (job.plot, job.plot_aligned)
+    outputs = [*tables.values(), *job.more.paths, job.summary, *figures]
     check_targets(outputs, [job.series, iris_table(job.more.scale)])
-    check_endings(
-        {
-            "--out": (job.out, TABLE),
-            "--profiles": (job.profiles, TABLE),
-            "--events": (events, TABLE),
-            "--lids": (job.more.lids, TABLE),
-            "--review": (job.review, TABLE),
-            "--summary": (job.summary, (".json",)),
-            "--report": (job.more.report, (".html", ".htm")),
-            "--curve": (job.more.curve, CURVES[job.more.curve_format]),
-        }
-    )
+    for option, path in tables.items():
+        check_ending(path, TABLE, option)
+    check_ending(job.summary, (".json",), "--summary")
+    job.more.check_names()
 
 
 def _reviewed(
@@ -221,7 +239,9 @@ def _write_figures(
     if job.plot is not None:
         rejected = {key for key, review in decided.items() if review.decision == "reject"}
         save_figure(series_figure(eyes, rejected), job.plot)
-    if job.plot_aligned is not None:
+    if job.plot_aligned is not None and not profiles:
+        sys.stderr.write(f"note: {job.plot_aligned} is not written: there is no blink to lay on others\n")
+    elif job.plot_aligned is not None:
         groups = {eye.series.column: [p for p in profiles if _is_of(p, eye)] for eye in eyes}
         save_figure(
             aligned_figure({name: group for name, group in groups.items() if group}), job.plot_aligned

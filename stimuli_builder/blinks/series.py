@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from experiments.errors import InputError
 from stimuli_builder.blinks.column_choice import DISTANCE_COLUMNS, choose_columns
 from stimuli_builder.blinks.column_names import is_high_when_shut
-from stimuli_builder.blinks.csv_table import NOTE, read_table
+from stimuli_builder.blinks.csv_table import NOTE, line_of, read_table
 from stimuli_builder.blinks.gaps import bridge_gaps
 from stimuli_builder.blinks.inverted import opening_of
 from stimuli_builder.blinks.not_measured import without_what_is_not_measured
@@ -140,7 +140,9 @@ def _refuse_gaps(gaps: NDArray[np.bool_], table: pd.DataFrame, column: str, path
     if not gaps.any():
         return
     first = int(np.argmax(gaps))
-    start = f"{table['time_s'].iloc[first]:.3f} s" if RESAMPLED in table.attrs else f"line {first + 2}"
+    start = f"line {line_of(path, first)}"
+    if RESAMPLED in table.attrs:
+        start = f"{table['time_s'].iloc[first]:.3f} s"
     rest = gaps[first:]
     length = int(np.argmin(rest)) if not rest.all() else rest.size
     raise InputError(
@@ -153,7 +155,7 @@ def _numbers(table: pd.DataFrame, column: str, path: Path) -> Array:
     """(n,) a column's values; InputError naming the first that is no number."""
     if table[column].dtype.kind not in "fiu":
         words = table[column][pd.to_numeric(table[column], errors="coerce").isna() & table[column].notna()]
-        got = f", got {words.iloc[0]!r} in line {words.index[0] + 2}" if words.size else ""
+        got = f", got {words.iloc[0]!r} in line {line_of(path, int(words.index[0]))}" if words.size else ""
         raise InputError(f"{path.name}: column '{column}' must hold numbers{got}")
     return table[column].to_numpy(dtype=np.float64)
 

@@ -91,6 +91,7 @@ def blinks_frame(
     numbers = [field.name for field in fields(MeasuredBlink) if field.type in (float, "float")]
     numbers += ["partner_lag_ms", "partner_closure"]
     frame["partner"] = frame["partner"].astype("Int64")
+    frame[["complete", "accepted"]] = frame[["complete", "accepted"]].astype(bool)  # of no rows too
     frame[numbers] = frame[numbers].astype(float).round(6)
     return frame
 
@@ -136,7 +137,7 @@ def summarise(eye_blinks: EyeBlinks, frame: pd.DataFrame, profiles: Sequence[Bli
     """Return rate, spread and histograms of one column's accepted blinks, with the mean blink."""
     series = eye_blinks.series
     rows = frame[frame["accepted"] & (frame["column"] == series.column)]
-    minutes = (series.distance.size - series.missing_frames) / series.fps / 60
+    minutes = eye_blinks.seconds / 60
     durations, closures = rows["duration_ms"].to_numpy(), rows["closure"].to_numpy()
     return {
         "column": series.column,
@@ -151,21 +152,22 @@ def summarise(eye_blinks: EyeBlinks, frame: pd.DataFrame, profiles: Sequence[Bli
         "missing_frames": series.missing_frames,
         "rate_per_minute": round(len(rows) / minutes, 3),
         "complete": int(rows["complete"].sum()),
-        "duration_ms": _spread(durations),
-        "down_ms": _spread(rows["down_ms"].to_numpy()),
-        "up_ms": _spread(rows["up_ms"].to_numpy()),
-        "closure": _spread(closures),
-        "opening_to_closing_velocity": _spread(
-            (rows["peak_opening_velocity"] / rows["peak_closing_velocity"]).to_numpy()
-        ),
-        "peak_velocity_to_amplitude_per_s": _spread(
-            (rows["peak_closing_velocity"] / rows["amplitude"]).to_numpy()
-        ),
-        "interval_s": _spread(np.diff(rows["minimum_s"].to_numpy())),
+        **_spreads(rows),
         "duration_histogram": duration_histogram(durations),
         "amplitude_histogram": amplitude_histogram(closures),
         "mean_blink": _mean_blink(profiles),
     }
+
+
+def _spreads(rows: pd.DataFrame) -> dict[str, dict[str, float]]:
+    """Spread of every measure of blinks, by the summary's name of it."""
+    closing, opening = rows["peak_closing_velocity"], rows["peak_opening_velocity"]
+    measures = {name: rows[name] for name in ("duration_ms", "down_ms", "up_ms", "closure")} | {
+        "opening_to_closing_velocity": opening / closing,
+        "peak_velocity_to_amplitude_per_s": closing / rows["amplitude"],
+    }
+    spreads = {name: _spread(values.to_numpy()) for name, values in measures.items()}
+    return spreads | {"interval_s": _spread(np.diff(rows["minimum_s"].to_numpy()))}
 
 
 def _asymmetry(eye_blinks: EyeBlinks) -> dict[str, Any] | None:

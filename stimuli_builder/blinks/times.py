@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from experiments.counted import counted
 from experiments.errors import InputError
-from stimuli_builder.blinks.csv_table import few
+from stimuli_builder.blinks.csv_table import few, line_of
 from stimuli_builder.blinks.profile import Array
 
 MAX_BRIDGED_MS = 1000 / 30
@@ -107,7 +107,7 @@ def _measured_fps(table: pd.DataFrame, path: Path, *, uneven: bool) -> float:
         raise InputError(f"{path.name}: {_name(table)} must be complete and increase from row to row")
     off = np.abs(steps - np.median(steps)) > _allowed_s(times, steps)
     if not uneven and off.any():
-        line = int(np.argmax(off)) + 3  # the header is line 1, and a step ends at the second of two rows
+        line = line_of(path, int(np.argmax(off)) + 1)  # a step ends at the second of two rows
         raise InputError(
             f"{path.name}: {_name(table)} is uneven (line {line}); labels need a constant frame rate: "
             "--resample brings it to one"

@@ -175,7 +175,7 @@ def train(
         raise InputError("expected --labels with the label file of this video")
     check_targets([out], [video, labels])
     if out is not None:
-        check_ending(out, ".npz", "a model")
+        check_ending(out, (".npz",), "a model")
     info = open_video(video, accept_variable_rate)
     warn(unreviewed(load_labels(labels)))
     options = _options(shape_variance, appearance_variance, coupled_variance, paper_modes, base_pixels)

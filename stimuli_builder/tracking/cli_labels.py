@@ -64,7 +64,7 @@ def label(
     from stimuli_builder.tracking.survey import survey
 
     check_targets([out], [video])
-    check_ending(out, ".json", "a label file")
+    check_ending(out, (".json",), "a label file")
     info = open_video(video, accept_variable_rate)
     with frame_progress() as progress:
         task = progress.add_task("finding eyes", total=info.frame_count)
@@ -93,7 +93,7 @@ def iris(
     from stimuli_builder.tracking.learn import open_video
 
     check_targets([out], [video, track])
-    check_ending(out, ".csv", "the table of irises")
+    check_ending(out, (".csv",), "the table of irises")
     info = open_video(video, accept_variable_rate=True)
     with frame_progress() as progress:
         task = progress.add_task("irises", total=info.frame_count)

@@ -146,9 +146,9 @@ def _check(job: TrackJob) -> None:
     if job.relabel is not None:
         temporary_beside(job.relabel)
     check_targets([job.out, job.preview, job.plot], [job.video, job.labels, job.model, job.relabel])
-    check_ending(job.out, ".csv", "a track")
+    check_ending(job.out, (".csv",), "a track")
     if job.relabel is not None:
-        check_ending(job.relabel, ".json", "the label file of --relabel")
+        check_ending(job.relabel, (".json",), "the label file of --relabel")
     if job.preview is not None:
         check_video_name(job.preview)
     if job.plot is not None:

@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from experiments.errors import InputError, did_you_mean
+from experiments.errors import InputError, nearest
 from stimuli_builder.blinks.export.arkit import to_arkit
 from stimuli_builder.blinks.export.blender import to_blender
 from stimuli_builder.blinks.export.curve import AnimationCurve
@@ -36,10 +36,20 @@ FORMATS: Mapping[str, Callable[[AnimationCurve, CurveTarget], str]] = {
 }
 
 
-def check_format(format_name: str, target: CurveTarget) -> None:
-    """Refuse an unknown format, a name that a program could not take, or one name for both eyes."""
+def check_format(format_name: str, target: CurveTarget, option: str = "--format") -> None:
+    """Refuse an unknown format, a name that a program could not take, or one name for both eyes.
+
+    Parameters
+    ----------
+    option : str
+        Which the format is given by.
+    """
     if format_name not in FORMATS:
-        raise InputError(f"unknown --format '{format_name}'{did_you_mean(format_name, FORMATS)}")
+        near = nearest(format_name, FORMATS)
+        raise InputError(
+            f"unknown {option} '{format_name}'; expected one of: {', '.join(FORMATS)}"
+            + (f"; did you mean '{near}'?" if near else "")
+        )
     named = {"--left": target.left, "--right": target.right, "--target": target.name or "face"}
     for option, name in named.items():
         if not _SAFE_NAME.fullmatch(name):

@@ -125,12 +125,12 @@ def test_a_decision_about_a_blink_that_is_gone_is_told_and_kept(stimuli, series_
         ),
         (
             ["--column", "gap_l", "--fps", "300", "--report", "r.png"],
-            "--report r.png: expected a name that ends in .html",
+            "--report: expected a name that ends in .html or .htm, got 'r.png'",
         ),
         (["--column", "gap_l", "--fps", "300", "--curve", "c.png"], "ends in .csv or .txt"),
         (
             ["--column", "gap_l", "--fps", "300", "--lids", "l.xlsx"],
-            "--lids l.xlsx: expected a name that ends in .csv",
+            "--lids: expected a name that ends in .csv or .txt, got 'l.xlsx'",
         ),
         (["--column", "gap_l", "--fps", "300", "--plot", "figure.gif"], "no figure format 'gif'"),
         (["--column", "gap_l", "--fps", "300", "--summary", "none/s.json"], "does not exist"),
@@ -325,3 +325,15 @@ def test_a_blink_that_a_gap_cuts_is_told_by_its_frame_and_not_as_too_shallow(sti
     assert abs(int(told[1]) - lowest) < 8
     assert "deepest dip" not in ended.err
     assert not out.exists()
+
+
+def test_long_names_leave_the_figures_their_width(stimuli, series_file, tmp_path, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    name = "participant_12_session_3_eye_aspect_ratio_of_the_left_eye_smoothed_left"
+    pd.read_csv(series_file).rename(columns={"gap_l": name}).to_csv(tmp_path / "s.csv", index=False)
+    ended = stimuli("blinks", tmp_path / "s.csv", "--column", name, "--fps", 300, "--out", tmp_path / "b.csv")
+    assert ended.code == 0, ended.err
+    (row,) = [line for line in ended.out.splitlines() if line.strip().startswith("particip…")]
+    assert row.split() == ["particip…hed_left", *row.split()[1:]]
+    assert len(row.split()) == 9
+    assert "…" not in "".join(row.split()[1:])

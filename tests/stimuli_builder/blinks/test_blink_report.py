@@ -126,11 +126,14 @@ def test_a_table_without_irises_is_no_scale(stimuli, close_up, tmp_path, content
     assert not (tmp_path / "b.csv").exists()
 
 
-@pytest.mark.parametrize(("format_name", "read"), [("json", json.loads), ("usd", str), ("gltf", json.loads)])
-def test_the_recording_is_exported_as_a_curve(labelled, tmp_path, make_known, format_name, read):
-    ended = labelled("--curve", tmp_path / "c", "--curve-format", format_name)
+@pytest.mark.parametrize(
+    ("format_name", "ending", "read"),
+    [("json", ".json", json.loads), ("usd", ".usda", str), ("gltf", ".gltf", json.loads)],
+)
+def test_the_recording_is_exported_as_a_curve(labelled, tmp_path, make_known, format_name, ending, read):
+    ended = labelled("--curve", tmp_path / f"c{ending}", "--curve-format", format_name)
     assert ended.code == 0, ended.err
-    content = read((tmp_path / "c").read_text(encoding="utf-8"))
+    content = read((tmp_path / f"c{ending}").read_text(encoding="utf-8"))
     if format_name == "json":
         known = make_known(noise=0.05)
         assert len(content["closure_left"]) == known.distance.size
@@ -144,12 +147,50 @@ def test_an_eye_that_does_not_blink_stays_open_in_the_curve(stimuli, series_file
     table.to_csv(tmp_path / "s.csv", index=False)
     ended = stimuli(
         "blinks", tmp_path / "s.csv", "--column", "gap_l", "--column", "gap_r", "--fps", 300,
-        "--out", tmp_path / "b.csv", "--curve", tmp_path / "c", "--curve-format", "json",
+        "--out", tmp_path / "b.csv", "--curve", tmp_path / "c.json", "--curve-format", "json",
     )  # fmt: skip
     assert ended.code == 0, ended.err
-    content = json.loads((tmp_path / "c").read_text(encoding="utf-8"))
+    content = json.loads((tmp_path / "c.json").read_text(encoding="utf-8"))
     assert max(content["closure_left"]) > 0.9
     assert set(content["closure_right"]) == {0.0}
+
+
+@pytest.fixture
+def still(make_known, tmp_path):
+    """A series of an eye that lowers its lid for seconds, and does not blink."""
+    distance = make_known(fps=120.0, depths=(0.0,) * 4, noise=0.2).distance.copy()
+    distance[600:900] -= 10 * np.sin(np.linspace(0, np.pi, 300))
+    pd.DataFrame({"gap_l": distance}).to_csv(tmp_path / "still.csv", index=False)
+    return ("blinks", tmp_path / "still.csv", "--column", "gap_l", "--fps", 120, "--out", tmp_path / "b.csv")
+
+
+def test_a_recording_without_a_blink_has_a_report(stimuli, still, tmp_path):
+    ended = stimuli(*still)
+    assert ended.code == 2
+    assert "--report FILE writes a report that says so" in ended.err
+    files = ("--report", tmp_path / "r.html", "--summary", tmp_path / "s.json", "--plot", tmp_path / "p.png")
+    ended = stimuli(*still, *files, "--plot-aligned", tmp_path / "a.png")
+    assert ended.code == 0, ended.err
+    assert "warning: no blink in column 'gap_l'" in ended.err
+    page = (tmp_path / "r.html").read_text(encoding="utf-8")
+    assert "gap_l: no blinks in 10 s" in page
+    cells = dict(re.findall(r'<th scope="row">([^<]+)</th><td>([^<]*)</td>', page))
+    assert (cells["blinks"], cells["blinks a minute"]) == ("0", "0.0")
+    (column,) = json.loads((tmp_path / "s.json").read_text(encoding="utf-8"))["columns"]
+    assert (column["blinks"], column["rate_per_minute"]) == (0, 0)
+    assert len(pd.read_csv(tmp_path / "b.csv")) == 0
+    assert not (tmp_path / "b.profiles.csv").exists()
+    assert not (tmp_path / "a.png").exists()
+
+
+def test_a_closed_distance_makes_a_curve_of_an_eye_without_a_blink(stimuli, still, tmp_path):
+    more = ("--report", tmp_path / "r.html", "--curve", tmp_path / "c.json", "--curve-format", "json")
+    assert "nothing tells where its lids are closed: give --closed" in stimuli(*still, *more).err
+    ended = stimuli(*still, *more, "--lids", tmp_path / "l.csv", "--closed", 4)
+    assert ended.code == 0, ended.err
+    closure = json.loads((tmp_path / "c.json").read_text(encoding="utf-8"))["closure_left"]
+    assert max(closure) == pytest.approx(1 / 3, abs=0.05)
+    assert pd.read_csv(tmp_path / "l.csv")["gap_l_closure"].max() == pytest.approx(1 / 3, abs=0.05)
 
 
 def track(columns=("x", "y"), shift=70.0):
@@ -186,7 +227,16 @@ def test_a_chord_of_the_eyeball_is_its_angle():
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        (("--curve", "c.x", "--curve-format", "mya"), "unknown --format 'mya'"),
+        (
+            ("--curve", "c.x", "--curve-format", "mya"),
+            "unknown --curve-format 'mya'; expected one of: csv, json",
+        ),
+        (("--curve", "c.fbx", "--curve-format", "fbx"), "unknown --curve-format 'fbx'; expected one of: csv"),
+        (
+            ("--curve", "c.usd"),
+            "--curve c.usd: --curve-format csv is written as .csv or .txt; add --curve-format usd",
+        ),
+        (("--curve", "c"), "--curve: expected a name that ends in .csv or .txt, got 'c'"),
         (("--report", "r.html", "--scale", "inter-ocular"), "needs a track of both eyes"),
         (("--lids", "l.csv", "--scale", "0.5"), "is in another unit"),
         (("--report", "b.csv"), "a name of its own"),

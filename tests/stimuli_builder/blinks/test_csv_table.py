@@ -136,3 +136,23 @@ def test_a_scale_without_effect_is_said(stimuli, series_file, tmp_path):
     ended = stimuli(*call, "--scale", "0.25")
     assert ended.code == 0
     assert ended.err == "note: --scale has no effect here: mm stand in what --lids and --report write\n"
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_blank_lines_are_counted_as_lines(tmp_path, separator):
+    lines = [f"{k / 60:.4f}{separator}0.3" for k in range(400)]
+    lines[50:50] = ["", "  "]
+    lines[102] = lines[102].replace("0.3", "x")
+    (tmp_path / "s.csv").write_text("\n".join(["", f"time_s{separator}EAR", *lines]), encoding="utf-8")
+    with pytest.raises(InputError, match=r"got .x. in line 105$"):
+        read_series(tmp_path / "s.csv", ["EAR"])
+    lines[102] = lines[102].replace("x", "0.3")
+    for number in range(200, 220):
+        lines[number] = lines[number].removesuffix("0.3")
+    (tmp_path / "s.csv").write_text("\n".join([f"time_s{separator}EAR", *lines]), encoding="utf-8")
+    with pytest.raises(InputError, match="no value on 20 frames from line 202 on"):
+        read_series(tmp_path / "s.csv", ["EAR"])
+    del lines[300:320]
+    (tmp_path / "s.csv").write_text("\n".join([f"time_s{separator}EAR", *lines]), encoding="utf-8")
+    with pytest.raises(InputError, match=r"uneven \(line 302\)"):
+        read_series(tmp_path / "s.csv", ["EAR"])

@@ -270,12 +270,27 @@ def test_accuracy_of_files_that_do_not_belong_together(stimuli, recording, tmp_p
 @pytest.mark.parametrize(
     ("command", "option", "name", "line"),
     [
-        ("track", "--out", "t.mp4", "a track is written as CSV; use a name that ends in .csv"),
-        ("track", "--out", "t", "a track is written as CSV; use a name that ends in .csv"),
-        ("track", "--relabel", "worst.csv", "the label file of --relabel is written as JSON"),
-        ("train", "--out", "model.json", "a model is written as NPZ; use a name that ends in .npz"),
-        ("label", "--out", "labels.csv", "a label file is written as JSON"),
-        ("iris", "--out", "iris.json", "the table of irises is written as CSV"),
+        ("track", "--out", "t.mp4", "a track: expected a name that ends in .csv, got 't.mp4'"),
+        ("track", "--out", "t", "a track: expected a name that ends in .csv, got 't'"),
+        (
+            "track",
+            "--relabel",
+            "worst.csv",
+            "the label file of --relabel: expected a name that ends in .json, got 'worst.csv'",
+        ),
+        ("train", "--out", "model.json", "a model: expected a name that ends in .npz, got 'model.json'"),
+        (
+            "label",
+            "--out",
+            "labels.csv",
+            "a label file: expected a name that ends in .json, got 'labels.csv'",
+        ),
+        (
+            "iris",
+            "--out",
+            "iris.json",
+            "the table of irises: expected a name that ends in .csv, got 'iris.json'",
+        ),
     ],
 )
 def test_a_name_of_another_kind_of_file_is_refused_before_work(
