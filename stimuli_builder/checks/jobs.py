@@ -14,7 +14,6 @@ from stimuli_builder.checks.masks import LATTICE, digit, placed, shape
 from stimuli_builder.checks.own_look import first_blink, first_eye
 from stimuli_builder.clips.curves import ClipCurve
 from stimuli_builder.clips.encode import encode_clip, encoder_signature
-from stimuli_builder.clips.frames import FramePainter
 from stimuli_builder.clips.jobs import Look
 from stimuli_builder.clips.seeds import generator
 
@@ -128,6 +127,9 @@ class CheckJob:
                 yield picture
 
     def _own_look(self, look: Look) -> Iterator[Planes]:
+        # Its compiled kernels load slowly, and most studies have no such check.
+        from stimuli_builder.clips.frames import FramePainter
+
         painter = FramePainter(look.levels())
         # Blurred always: only the means of whole frames are the same in the reverse order.
         return painter.frames(self.curve, look.fps, blur=True)

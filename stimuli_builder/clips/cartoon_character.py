@@ -50,8 +50,13 @@ class CartoonCharacter:
         closures = np.linspace(0.0, 1.0, cartoon.LEVELS)
         levels = np.empty((len(closures), window.height, window.width, 3), np.uint16)
         rectangle = (window.x, window.y + top, window.width, window.height)
-        for index, closure in enumerate(closures):
-            levels[index] = _light_of_code(cartoon.draw_frame(float(closure), scaled, rectangle))
+        opened = cartoon.draw_frame(0.0, scaled, rectangle)
+        levels[:] = _light_of_code(opened)
+        for level, closure in zip(levels[1:], closures[1:], strict=True):
+            drawn = cartoon.draw_frame(float(closure), scaled, rectangle)
+            # Skin stands still, and a power costs more than a comparison.
+            moved = np.flatnonzero(drawn != opened)
+            level.reshape(-1)[moved] = _light_of_code(drawn.reshape(-1)[moved])
         base = _light_of_code(cartoon.draw_frame(0.0, scaled, (0, top, *size_px)))
         base[window.slices] = levels[0]
         return LevelSet(NAME, base, levels, closures, window, scaled[0] / cartoon.FRAME_MM[0])

@@ -3,9 +3,10 @@
 import ctypes
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from fractions import Fraction
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +50,7 @@ def encode_clip(
 ) -> bytes:
     """Encode 4:2:0 planes, each (height * 3 / 2, width), as an MP4 file.
 
+    One array shown several times in a row is one picture, taken over once.
     One GOP, no B-frames, constant rate, index in front of the data (fast start), BT.709 limited range. With
     `alone_qp` every picture is coded by itself at this quantiser: it is decoded the same whatever the others
     are, so that what coding leaves in it says nothing of them.
@@ -62,8 +64,7 @@ def encode_clip(
     try:
         with tempfile.TemporaryDirectory(prefix="palpebra-clip-") as folder:
             path = Path(folder) / "clip.mp4"
-            with _zeroed_memory():
-                _write(path, frames, size_px, fps, alone_qp)
+            _write(path, frames, size_px, fps, alone_qp)
             return path.read_bytes()
     except OSError as error:
         raise InputError(
@@ -77,9 +78,9 @@ def _zeroed_memory() -> Iterator[None]:
     """Memory is zero when it is taken: vector code of libx264's macroblock tree reads some that it never set.
 
     In a fresh process that memory is zero nearly always, so that bytes differed in one clip of some hundreds.
-    Other C libraries than glibc have no such switch.
+    Other C libraries than glibc have no such switch. Painting goes without: its arrays are large to fill.
     """
-    mallopt = getattr(ctypes.CDLL(None), "mallopt", None) if sys.platform == "linux" else None
+    mallopt = _mallopt()
     if mallopt is None:
         yield
         return
@@ -88,6 +89,11 @@ def _zeroed_memory() -> Iterator[None]:
         yield
     finally:
         mallopt(M_PERTURB, 0)
+
+
+@cache
+def _mallopt() -> Callable[[int, int], int] | None:
+    return getattr(ctypes.CDLL(None), "mallopt", None) if sys.platform == "linux" else None
 
 
 def _write(
@@ -111,9 +117,22 @@ def _write(
         context.time_base = 1 / rate
         context.color_range = LIMITED_RANGE
         context.colorspace = context.color_primaries = context.color_trc = BT709
+        shown, frame = None, None
         for number, planes in enumerate(frames):
-            frame = av.VideoFrame.from_ndarray(planes, format="yuv420p")
-            frame.pts, frame.time_base = number, 1 / rate
-            frame.color_range, frame.colorspace = LIMITED_RANGE, BT709
-            container.mux(stream.encode(frame))
-        container.mux(stream.encode(None))
+            # A picture that rests lies in libav's memory already.
+            if frame is None or planes is not shown:
+                shown, frame = planes, _frame(planes, rate)
+            frame.pts = number
+            with _zeroed_memory():
+                packets = stream.encode(frame)
+            container.mux(packets)
+        with _zeroed_memory():
+            packets = stream.encode(None)
+        container.mux(packets)
+
+
+def _frame(planes: NDArray[np.uint8], rate: Fraction) -> av.VideoFrame:
+    frame = av.VideoFrame.from_ndarray(planes, format="yuv420p")
+    frame.time_base = 1 / rate
+    frame.color_range, frame.colorspace = LIMITED_RANGE, BT709
+    return frame

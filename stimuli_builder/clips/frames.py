@@ -28,7 +28,10 @@ class FramePainter:
         self._base = character.base_planes
 
     def frames(self, curve: ClipCurve, fps: float, blur: bool, barcode: bool = False) -> Iterator[Planes]:
-        """Yield each frame as a (height * 3 / 2, width) array of 4:2:0 planes, fresh each time."""
+        """Yield each frame as a (height * 3 / 2, width) array of 4:2:0 planes, to be read only.
+
+        A picture that rests is one array, yielded again for each of its frames.
+        """
         if curve.lower_vertical_mm is not None and self.character.read_lower is None:
             raise InputError(
                 f"character '{self.character.name}' has no lower-lid layer: use lower_lid = 'none'"
@@ -40,14 +43,12 @@ class FramePainter:
             picture = painted.pop(key, None)
             if picture is None:
                 picture = self._paint(curve, samples, weights)
+                picture.flags.writeable = False
             # The picture shown last is the last to be forgotten.
             painted[key] = picture
             if len(painted) > PAINTED_KEPT:
                 painted.pop(next(iter(painted)))
-            planes = picture.copy()
-            if barcode:
-                draw_barcode(*split_planes(planes, width, height), number)
-            yield planes
+            yield _numbered(picture, width, height, number) if barcode else picture
 
     def light(self, curve: ClipCurve, samples: NDArray[np.int64], weights: NDArray[np.float64]) -> Light:
         """(h, w, 3) linear light (of 65535) of the window: weighted mean over samples of the curve."""
@@ -87,6 +88,13 @@ class FramePainter:
         from_middle = np.arange(window.x, window.x + window.width) + 0.5 - self.character.size_px[0] / 2
         share = from_middle / (SEAM_MM * self.character.px_per_mm) + 0.5
         return np.asarray(np.clip(share, 0.0, 1.0), np.float32)
+
+
+def _numbered(picture: Planes, width: int, height: int, number: int) -> Planes:
+    """A copy with the barcode of a frame's number."""
+    planes = picture.copy()
+    draw_barcode(*split_planes(planes, width, height), number)
+    return planes
 
 
 def eye_light(

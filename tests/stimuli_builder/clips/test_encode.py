@@ -36,6 +36,11 @@ def test_the_same_frames_give_the_same_bytes(frames: list[np.ndarray], content: 
     assert encode_clip(frames, (320, 120), 30) == content
 
 
+def test_a_picture_that_rests_gives_the_bytes_of_its_copies(frames: list[np.ndarray], content: bytes) -> None:
+    assert frames[0] is frames[1]
+    assert encode_clip([frame.copy() for frame in frames], (320, 120), 30) == content
+
+
 def test_pixels_survive_with_a_bare_loss(frames: list[np.ndarray], content: bytes) -> None:
     with av.open(io.BytesIO(content)) as container:
         decoded = [frame.to_ndarray(format="yuv420p") for frame in container.decode(video=0)]
