@@ -6,6 +6,7 @@ from pathlib import Path
 import pandas as pd
 
 from experiments.errors import InputError, nearest
+from stimuli_builder.blinks.column_names import eye_pair
 from stimuli_builder.blinks.csv_table import few
 from stimuli_builder.blinks.times import is_time
 from stimuli_builder.blinks.validity import CONFIDENCE_COLUMN, is_validity
@@ -15,14 +16,14 @@ INDEX_COLUMNS = ("frame", CONFIDENCE_COLUMN)
 
 
 def choose_columns(table: pd.DataFrame, named: Sequence[str], path: Path) -> tuple[list[str], list[str]]:
-    """The distance columns to label: those named, else a track's, else the only candidate.
+    """The distance columns to label: those named, else a track's, else the only candidate or pair of eyes.
 
     Of several, one that holds 0 and 1 alone, or the same as one before it, is no second eye and left out.
 
     Returns
     -------
     columns, notes : list of str
-        And a line about each that is left out.
+        And a line about each that is left out, and about eyes that were taken without being named.
     """
     candidates = [
         str(name)
@@ -40,6 +41,9 @@ def choose_columns(table: pd.DataFrame, named: Sequence[str], path: Path) -> tup
     measures = [name for name in candidates if not _is_presence(table[name])]
     if len(measures) == 1 or len(candidates) == 1:
         return measures or candidates, []
+    if len(measures) == 2 and eye_pair(measures) is not None:
+        eyes = " and ".join(f"'{name}'" for name in measures)
+        return measures, [f"{path.name}: {eyes} are taken as the two eyes; --column NAME takes another"]
     raise InputError(f"{path.name}: {_not_chosen(table, candidates)}")
 
 

@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 from experiments.errors import InputError
+from stimuli_builder.blinks.column_choice import choose_columns
 from stimuli_builder.blinks.column_names import eye_pair
 from stimuli_builder.blinks.events.recognise import recognise
 from stimuli_builder.blinks.series import BlinkSeries, read_series
@@ -31,6 +32,23 @@ def write(path: Path, **columns: object) -> Path:
 )
 def test_two_eyes_are_one_left_and_one_right(columns: tuple[str, ...], pair: tuple[int, int] | None) -> None:
     assert eye_pair(columns) == pair
+
+
+@pytest.mark.parametrize("others", [(), ("time_s", "frame", "left_valid")], ids=["alone", "beside times"])
+def test_one_left_and_one_right_eye_are_taken_without_being_named(tmp_path: Path, others: tuple) -> None:
+    values = np.random.default_rng(1).normal(10, 1, (2, 50))
+    ones = {name: np.arange(50) / 100 if name == "time_s" else np.ones(50, int) for name in others}
+    table = pd.DataFrame({"EAR_r": values[0], "EAR_l": values[1], **ones})
+    columns, notes = choose_columns(table, (), tmp_path / "s.csv")
+    assert columns == ["EAR_r", "EAR_l"]
+    assert notes == ["s.csv: 'EAR_r' and 'EAR_l' are taken as the two eyes; --column NAME takes another"]
+
+
+@pytest.mark.parametrize("names", [("EAR_l", "EAR_r", "EAR_mean"), ("a", "b"), ("EAR_l", "gap_l")])
+def test_columns_that_are_no_one_pair_of_eyes_are_to_be_named(tmp_path: Path, names: tuple[str, ...]) -> None:
+    table = pd.DataFrame({name: np.linspace(1.5, 2.5, 50) + n for n, name in enumerate(names)})
+    with pytest.raises(InputError, match="say with --column"):
+        choose_columns(table, (), tmp_path / "s.csv")
 
 
 def test_two_of_three_columns_are_judged_as_eyes(make_known) -> None:
