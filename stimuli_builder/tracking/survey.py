@@ -190,10 +190,18 @@ def _require_face(info: VideoInfo, labels: dict[int, Points], looked: int, one_e
 
 
 def _require_agreement(info: VideoInfo, detections: Sequence[Detection]) -> None:
-    share = float(np.median([np.mean(one.mirror_shares) for one in detections]))
-    if share > UNSURE_SHARE:
-        raise InputError(
-            f"{info.path}: what looks like eyes is read differently in the mirror image (by {share:.0%} of "
-            f"their width, and {UNSURE_SHARE:.1%} is the most of a face that can be read); for a close-up of "
-            "one eye add --one-eye; or label frames by hand (--labels)"
+    shares = np.array([np.mean(one.mirror_shares) for one in detections])
+    known = shares[np.isfinite(shares)]
+    if 2 * len(known) < len(shares):
+        told = f"is not seen in the mirror image on {len(shares) - len(known)} of {len(shares)} frames"
+    elif (share := float(np.median(known))) > UNSURE_SHARE:
+        told = (
+            f"is read differently in the mirror image (by {share:.0%} of the eyes' width, {UNSURE_SHARE:.1%} "
+            "is the most of a face that can be read)"
         )
+    else:
+        return
+    raise InputError(
+        f"{info.path}: what looks like a face {told}; for a close-up of one eye add --one-eye; or label "
+        "frames by hand (--labels)"
+    )

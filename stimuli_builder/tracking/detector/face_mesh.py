@@ -8,6 +8,7 @@ import numpy as np
 from stimuli_builder.tracking.detector.detection import Detection, contour_spread, eye_points
 from stimuli_builder.tracking.detector.eye_regions import SIDE_OF_WIDTH, Region, contours_of
 from stimuli_builder.tracking.detector.mesh_client import MeshClient
+from stimuli_builder.tracking.detector.one_face import overlap
 from stimuli_builder.tracking.shapes import Points, eye_axis, widths
 from stimuli_builder.video import Picture
 
@@ -94,15 +95,20 @@ class FaceMesh:
         """
         faces = self._read_twice(picture)
         if not faces or _fills(faces[0], picture):
-            faces = self._faces_in_margin(picture) or faces
+            in_margin = self._faces_in_margin(picture)
+            beside = [face for face in faces if all(overlap(face, one) == 0 for one in in_margin)]
+            faces = sorted(in_margin + beside, key=lambda one: one.area_px2, reverse=True)
         return [replace(one, spreads=self._spreads(picture, one)) for one in faces]
 
     def faces(self, picture: Picture) -> list[Detection]:
-        """The same without the eyes' `spreads`, which take longest."""
+        """The same by one reading, without the eyes' `spreads`, which take longest."""
+        return self._of_size(picture, LEAST_EYE_PX)
+
+    def _of_size(self, picture: Picture, least_eye_px: float) -> list[Detection]:
         eyes_of_faces = []
         for face in self._client.ask("faces", picture)["faces"]:
             eyes = [eye_points(np.array(upper), np.array(lower)) for upper, lower, _ in face["eyes"]]
-            if min(eye_axis(eye)[2] for eye in eyes) >= LEAST_EYE_PX:
+            if min(eye_axis(eye)[2] for eye in eyes) >= least_eye_px:
                 iris = np.array([iris for _, _, iris in face["eyes"]])
                 eyes_of_faces.append(Detection(np.concatenate(eyes), iris, np.array(face["box"]), ()))
         return sorted(eyes_of_faces, key=lambda one: one.area_px2, reverse=True)
@@ -112,7 +118,8 @@ class FaceMesh:
         faces = self.faces(picture)
         if not faces:
             return []
-        turned = self.faces(np.ascontiguousarray(picture[:, ::-1]))
+        # Eyes of 10 px in the picture may be read a little smaller here.
+        turned = self._of_size(np.ascontiguousarray(picture[:, ::-1]), LEAST_EYE_PX / 2)
         others = [mirrored(face, picture.shape[1]) for face in turned]
         return [in_both(face, others) for face in faces]
 
@@ -128,7 +135,11 @@ class FaceMesh:
         return [face.moved(-margin, -margin) for face in faces if np.isfinite(face.mirror_shares).all()]
 
     def _spreads(self, picture: Picture, face: Detection) -> tuple[float, ...]:
-        """How steadily each eye of a face is read, see `Detection.spreads`."""
+        """How steadily each eye of a face is read, see `Detection.spreads`.
+
+        A face that the mirror image does not show is judged by its contours alone: that it is not seen there
+        says nothing of a cover.
+        """
         eyes = face.points.reshape(2, -1, 2)
         views = [view for number, eye in enumerate(eyes) for view in views_of(eye, flip=number == 1)]
         part, within = _about(picture, views)

@@ -1,20 +1,25 @@
 """A face is read in the picture and in its mirror image, and in a margin where it fills the picture."""
 
+from dataclasses import replace
 from itertools import islice
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from experiments.errors import InputError
 from stimuli_builder.characters.atlas import SHIPPED, load_atlas
 from stimuli_builder.characters.colour import linear_to_srgb
 from stimuli_builder.environments import cache_folder
 from stimuli_builder.tracking.detector.detection import Detection
-from stimuli_builder.tracking.detector.face_mesh import SAME_FACE, in_both, mirrored
+from stimuli_builder.tracking.detector.face_mesh import SAME_FACE, FaceMesh, in_both, mirrored
 from stimuli_builder.tracking.detector.mesh import open_detector
 from stimuli_builder.tracking.shapes import widths
-from stimuli_builder.video import frames, rgb
+from stimuli_builder.tracking.survey import _require_agreement
+from stimuli_builder.video import VideoInfo, frames, rgb
 
 WIDTH_PX = 640
+INFO = VideoInfo(Path("v.mp4"), (WIDTH_PX, 480), 30.0, np.arange(9) / 30, np.arange(9), False)
 
 
 def face(shift: float = 0.0) -> Detection:
@@ -49,6 +54,57 @@ def test_a_face_that_the_mirror_image_does_not_show_stays_and_is_unsure(others):
     alone = in_both(face(), others)
     assert alone.points == pytest.approx(face().points)
     assert alone.mirror_shares == (np.inf, np.inf)
+
+
+def looks(shares: list[float]) -> list[Detection]:
+    return [replace(face(), mirror_shares=(share, share)) for share in shares]
+
+
+def test_a_face_that_is_read_alike_in_mirror_images_is_taken():
+    _require_agreement(INFO, looks([0.02, 0.05, 0.04, np.inf]))
+
+
+@pytest.mark.parametrize(
+    ("shares", "told"),
+    [
+        ([0.1, 0.12, 0.09, np.inf], "read differently in the mirror image (by 10% of"),
+        ([0.02, np.inf, np.inf, np.inf], "not seen in the mirror image on 3 of 4 frames"),
+        ([np.inf, np.inf], "not seen in the mirror image on 2 of 2 frames"),
+    ],
+    ids=["differs", "mostly absent", "absent"],
+)
+def test_a_face_that_mirror_images_contradict_is_refused_in_one_line(shares, told):
+    with pytest.raises(InputError) as refused:
+        _require_agreement(INFO, looks(shares))
+    assert told in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+class OneFaceClient:
+    """A client that sees one large face and, without a margin, a small one beside it."""
+
+    def ask(self, what, picture, **_):
+        if what == "eye":
+            return {"eyes": [[[[0.0, 0.0]] * 9, [[0.0, 0.0]] * 9, []]] * 8}
+        margin = (picture.shape[1] - WIDTH_PX) // 2
+        large = self._face(margin + 120, 400, 60)
+        # the mesh shrinks the wider picture further, and the small face is lost
+        return {"faces": [large] if margin else [large, self._face(540, 60, 12)]}
+
+    @staticmethod
+    def _face(left, side, eye_px):
+        along = np.linspace(0, eye_px, 9)
+        eyes = []
+        for start, step in ((left + 0.2 * side, 1), (left + 0.8 * side, -1)):
+            upper = np.stack([start + step * along, np.full(9, 200.0)], 1)
+            lower = np.stack([(start + step * along)[::-1], np.full(9, 210.0)], 1)
+            eyes.append([upper.tolist(), lower.tolist(), [[0.0, 0.0]] * 5])
+        return {"box": [left, 40, left + side, 40 + side], "eyes": eyes}
+
+
+def test_a_small_face_beside_one_that_fills_the_picture_is_kept():
+    seen = FaceMesh(OneFaceClient()).detect(np.zeros((480, WIDTH_PX, 3), np.uint8))
+    assert [round(float(one.box[2] - one.box[0])) for one in seen] == [400, 60]
 
 
 @pytest.fixture(scope="module")

@@ -308,7 +308,10 @@ def test_frames_in_which_no_face_is_seen_are_told_from_frames_not_looked_at(
         rows = list(csv.DictReader(stream))
     assert {row["status"] for row in rows[40:56]} <= {"doubtful", "lost"}
     assert UNSEEN in {row["reason"] for row in rows[40:56]}
-    assert UNSEEN not in {row["reason"] for row in rows[:40] + rows[58:]}
+    others = rows[:40] + rows[58:]
+    assert UNSEEN not in {row["reason"] for row in others}
+    # With half of the looks the most closed frame of the blink may be lost, which is no matter of this test.
+    assert sum(row["status"] == "tracked" for row in others) >= len(others) - 2
 
 
 @pytest.mark.parametrize(("cut_px", "unseen"), [(225, set()), (255, set(range(36, 72, 6)))])
