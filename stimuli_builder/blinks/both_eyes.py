@@ -1,6 +1,6 @@
 """Both eyes of a recording: blinks of the same moment, their profiles, and an eye that moves less."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -12,8 +12,13 @@ from stimuli_builder.blinks.measure import MeasuredBlink, closure_at_300
 from stimuli_builder.blinks.profile import BlinkProfile, Eye
 
 
-def asymmetry_lines(eyes: Sequence[EyeBlinks]) -> list[str]:
-    """Lines about an eye that moves much less than the other, or not at all; none where both move alike."""
+def asymmetry_lines(
+    eyes: Sequence[EyeBlinks], rejected: Collection[tuple[str, int]] = frozenset()
+) -> list[str]:
+    """Lines about winks, and an eye that moves much less than the other; none where both move alike.
+
+    `rejected` are the blinks, by column and number, that a review takes for none.
+    """
     columns = [eye.series.column for eye in eyes]
     pair = eye_pair(columns)
     fellow = "the other column" if pair is None else "the other eye"
@@ -24,7 +29,7 @@ def asymmetry_lines(eyes: Sequence[EyeBlinks]) -> list[str]:
             "is judged by itself, and an eye that moves less is not told"
         )
     for eye in eyes:
-        winks_s = () if eye.recognised is None else eye.recognised.winks_s
+        winks_s = _winks_s(eye, rejected)
         if winks_s:
             alone = f"{counted(len(winks_s), 'blink')} of this one alone, {fellow} open"
             lines.append(f"{_label(eye)}: {alone}, first at {winks_s[0]:.1f} s")
@@ -43,6 +48,15 @@ def asymmetry_lines(eyes: Sequence[EyeBlinks]) -> list[str]:
             how = f"does not move beyond its noise at {others}"
         lines.append(f"{_label(eye)}: {how}; {fellow} was judged by itself")
     return lines
+
+
+def _winks_s(eye: EyeBlinks, rejected: Collection[tuple[str, int]]) -> list[float]:
+    """The deepest moments of an eye's winks that are among its blinks and not rejected."""
+    if eye.recognised is None:
+        return []
+    accepted = [blink.minimum_s for blink in eye.blinks if (blink.column, blink.number) not in rejected]
+    within_s = 0.5 / eye.series.fps
+    return [wink for wink in eye.recognised.winks_s if any(abs(wink - one) < within_s for one in accepted)]
 
 
 def _label(eye: EyeBlinks) -> str:

@@ -48,7 +48,9 @@ def blinks(
     fps: Annotated[float | None, typer.Option(help="Frame rate; from the column time_s without it.")] = None,
     profiles: Annotated[
         Path | None,
-        typer.Option(help="Profiles table to write; OUT with the ending .profiles.csv without it."),
+        typer.Option(
+            help="Profiles table to write, empty without a blink; OUT with the ending .profiles.csv without it."
+        ),
     ] = None,
     preset: Annotated[
         str,
@@ -73,7 +75,11 @@ def blinks(
         float | None, typer.Option(help="Least depth of a blink as part of the opening; 0.23 without it.")
     ] = None,
     closed: Annotated[
-        float | None, typer.Option(help="Distance at lid contact; from the deepest blinks without it.")
+        float | None,
+        typer.Option(
+            help="Distance at lid contact; from the deepest blinks without it. An eye without a blink needs it for "
+            "--curve and --lids."
+        ),
     ] = None,
     complete_from: Annotated[float, typer.Option(help="Closure from which a blink is complete.")] = 0.95,
     allow_gaps: Annotated[

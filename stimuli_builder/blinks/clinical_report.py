@@ -60,7 +60,7 @@ def report_text(
         columns=[eye.series.column for eye in eyes],
         blinks=blink_rows(eyes, accepted, scale),
         quality=quality_rows(eyes),
-        pairs=[*pair_lines(eyes, accepted), *asymmetry_lines(eyes)],
+        pairs=[*pair_lines(eyes, accepted), *asymmetry_lines(eyes, _rejected(frame))],
         doubts=list(doubts),
         scale=None if scale is None else f"{scale.mm_per_px:.4f} mm in a pixel: {scale.rule}",
         nearly_closed=f"{NEARLY_CLOSED:.0%}",

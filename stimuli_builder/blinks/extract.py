@@ -9,6 +9,7 @@ import numpy as np
 
 from experiments.counted import counted
 from experiments.errors import InputError
+from stimuli_builder.blinks.events.levels import OPEN_PERCENTILE
 from stimuli_builder.blinks.events.lid_event import LidEvent
 from stimuli_builder.blinks.events.recognise import Recognised
 from stimuli_builder.blinks.label_options import LabelOptions
@@ -18,6 +19,7 @@ from stimuli_builder.blinks.measure import (
     closure_at_300,
     lid_motion_at_300,
     measure_blinks,
+    not_below,
     smoothed,
 )
 from stimuli_builder.blinks.profile import Array, BlinkProfile, Eye
@@ -54,8 +56,19 @@ class EyeBlinks:
         return () if self.recognised is None else self.recognised.events
 
     def closed_distance(self, given: float | None) -> float | None:
-        """Distance at lid contact: its blinks', else the one given; None where nothing tells it."""
-        return self.blinks[0].closed_distance if self.blinks else given
+        """Distance at lid contact: its blinks', else the one given; None where nothing tells it.
+
+        Raises
+        ------
+        InputError
+            There is no blink, and the one given is not below the opening: noise would shut the eye.
+        """
+        if self.blinks or given is None:
+            return self.blinks[0].closed_distance if self.blinks else None
+        opening = float(np.nanpercentile(self.series.distance, OPEN_PERCENTILE))
+        if given >= opening:
+            raise not_below(given, f"'{self.series.column}'", opening)
+        return given
 
     @property
     def seconds(self) -> float:

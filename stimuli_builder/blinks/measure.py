@@ -71,6 +71,14 @@ def closed_level(smooth: Array, blinks: Sequence[LabelledBlink], given: float | 
     return float(minima[:count].mean())
 
 
+def not_below(closed: float, what: str, opening: float) -> InputError:
+    """The refusal of a `--closed` at which what is open would be shut."""
+    return InputError(
+        f"--closed {closed:g} is not below the opening of {what} (up to {opening:g}); it is the distance that "
+        "stays when the lids meet"
+    )
+
+
 def smoothed(series: BlinkSeries, options: LabelOptions) -> Array:
     """Filtered distance; frames next to a gap are averaged over what there is, gaps stay NaN."""
     known = np.isfinite(series.distance)
@@ -109,10 +117,7 @@ def measure_blinks(
     fit = [blink for blink in blinks if closed < min(smooth[blink.onset], smooth[blink.end])]
     if not fit and closed_distance is not None:
         widest = max(float(smooth[blink.onset]) for blink in blinks)
-        raise InputError(
-            f"--closed {closed:g} is not below the opening of any blink of '{series.column}' "
-            f"(up to {widest:g}); it is the distance that stays when the lids meet"
-        )
+        raise not_below(closed, f"any blink of '{series.column}'", widest)
     reason = f"it begins or ends no further open than the closed distance {closed:.3g}"
     refused = [RefusedMinimum(blink.minimum, reason) for blink in blinks if blink not in fit]
     velocity = np.gradient(smooth) * series.fps

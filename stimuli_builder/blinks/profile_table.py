@@ -25,10 +25,9 @@ TABLE_COLUMNS = {
 
 def write_profile_table(path: Path, profiles: Sequence[BlinkProfile]) -> None:
     """Write profiles as a CSV of `TABLE_COLUMNS`; onset and end are the first and last sample."""
+    samples = [_samples(profile) for profile in profiles] or [pd.DataFrame(columns=list(TABLE_COLUMNS))]
     with whole_file(path) as partial:
-        pd.concat([_samples(profile) for profile in profiles]).to_csv(
-            partial, index=False, lineterminator="\n"
-        )
+        pd.concat(samples).to_csv(partial, index=False, lineterminator="\n")
 
 
 def _samples(profile: BlinkProfile) -> pd.DataFrame:

@@ -108,6 +108,8 @@ def write_reviews(path: Path, reviews: Sequence[Review]) -> None:
 
 def parse_choice(text: str, decision: Decision, blinks: Sequence[MeasuredBlink]) -> Review:
     """Turn `N=reason`, `N` or `COLUMN:N=reason` into a decision about one of `blinks`."""
+    if not blinks:
+        raise InputError(f"--{decision} {text}: there is no blink to decide on")
     which, _, reason = text.partition("=")
     column, _, digits = which.rpartition(":")
     columns = list(dict.fromkeys(blink.column for blink in blinks))

@@ -14,12 +14,7 @@ from stimuli_builder.blinks.both_eyes import all_profiles, asymmetry_lines, both
 from stimuli_builder.blinks.column_names import eye_of
 from stimuli_builder.blinks.console_report import print_blinks, print_written
 from stimuli_builder.blinks.events.recognise import recognise
-from stimuli_builder.blinks.extract import (
-    EyeBlinks,
-    blinks_of,
-    rate_doubts,
-    why_no_blink,
-)
+from stimuli_builder.blinks.extract import EyeBlinks, blinks_of, rate_doubts, why_no_blink
 from stimuli_builder.blinks.file_endings import TABLE
 from stimuli_builder.blinks.label_options import LabelOptions
 from stimuli_builder.blinks.outputs import MoreOutputs
@@ -35,7 +30,7 @@ from stimuli_builder.blinks.review import (
     read_reviews,
     write_reviews,
 )
-from stimuli_builder.blinks.series import read_series
+from stimuli_builder.blinks.series import BlinkSeries, read_series
 from stimuli_builder.blinks.tables import blinks_frame, summarise, write_blinks, write_events, write_summary
 from stimuli_builder.blinks.units import iris_table
 
@@ -78,6 +73,8 @@ def run_blinks(job: BlinksJob) -> None:
     profiles = all_profiles(accepted, job.series.stem, names)
     if not profiles and len(frame):
         raise InputError("the review rejects every blink: nothing is left to write")
+    for line in asymmetry_lines(eyes, _rejected(decided)):
+        sys.stderr.write(f"note: {line}\n")
     summaries = [
         summarise(eye, frame, [p for p in profiles if p.eye == name and _is_of(p, eye)])
         for eye, name in zip(accepted, names, strict=True)
@@ -100,11 +97,10 @@ class _Labelled:
 
 
 def _write(job: BlinksJob, labelled: _Labelled) -> list[Path | None]:
-    """Write what the job asks for; without a blink there are no profiles. Return the files."""
+    """Write what the job asks for; without a blink the table of profiles is empty. Return the files."""
     more = job.more.prepared(job.series, labelled.eyes, labelled.frame, job.closed)
     _write_figures(job, labelled.eyes, labelled.decided, labelled.profiles)
-    if labelled.profiles:
-        write_profile_table(job.profiles, labelled.profiles)
+    write_profile_table(job.profiles, labelled.profiles)
     if job.summary is not None:
         write_summary(job.summary, labelled.summaries)
     if job.review is not None and (job.reject or job.accept):
@@ -115,9 +111,8 @@ def _write(job: BlinksJob, labelled: _Labelled) -> list[Path | None]:
     if events is not None:
         write_events(events, labelled.eyes)
     write_blinks(job.out, labelled.frame)
-    profiles = job.profiles if labelled.profiles else None
     aligned = job.plot_aligned if labelled.profiles else None
-    return [job.out, profiles, events, *job.more.paths, job.summary, job.plot, aligned]
+    return [job.out, job.profiles, events, *job.more.paths, job.summary, job.plot, aligned]
 
 
 def label_recording(job: BlinksJob) -> list[EyeBlinks]:
@@ -135,8 +130,20 @@ def label_recording(job: BlinksJob) -> list[EyeBlinks]:
     )
     for note in given[0].notes:
         sys.stderr.write(f"note: {note}\n")
+    eyes = _blinks_of_all(job, given)
+    if not any(eye.blinks for eye in eyes):
+        why = why_no_blink(eyes[0], job.options)
+        if job.more.report is None:
+            raise InputError(f"{why}; --report FILE writes a report that says so")
+        sys.stderr.write(f"warning: {why}\n")
+    for doubt in rate_doubts(eyes):
+        sys.stderr.write(f"warning: {doubt}\n")
+    return eyes
+
+
+def _blinks_of_all(job: BlinksJob, given: Sequence[BlinkSeries]) -> list[EyeBlinks]:
     seen = recognise(given) if job.classify else [None] * len(given)
-    eyes = [
+    return [
         blinks_of(
             series,
             job.options,
@@ -146,16 +153,6 @@ def label_recording(job: BlinksJob) -> list[EyeBlinks]:
         )
         for series, recognised in zip(given, seen, strict=True)
     ]
-    if not any(eye.blinks for eye in eyes):
-        why = why_no_blink(eyes[0], job.options)
-        if job.more.report is None:
-            raise InputError(f"{why}; --report FILE writes a report that says so")
-        sys.stderr.write(f"warning: {why}\n")
-    for doubt in rate_doubts(eyes):
-        sys.stderr.write(f"warning: {doubt}\n")
-    for line in asymmetry_lines(eyes):
-        sys.stderr.write(f"note: {line}\n")
-    return eyes
 
 
 def _check(job: BlinksJob) -> None:
@@ -216,8 +213,12 @@ def _with_moved_edges(job: BlinksJob, eye: EyeBlinks, decided: Mapping[tuple[str
     )
 
 
+def _rejected(decided: Mapping[tuple[str, int], Review]) -> set[tuple[str, int]]:
+    return {key for key, review in decided.items() if review.decision == "reject"}
+
+
 def _accepted_only(eye: EyeBlinks, decided: Mapping[tuple[str, int], Review]) -> EyeBlinks:
-    rejected = {key for key, review in decided.items() if review.decision == "reject"}
+    rejected = _rejected(decided)
     kept = tuple(blink for blink in eye.blinks if (blink.column, blink.number) not in rejected)
     return replace(eye, blinks=kept)
 
@@ -237,10 +238,11 @@ def _write_figures(
     from stimuli_builder.blinks.plots import aligned_figure, save_figure, series_figure
 
     if job.plot is not None:
-        rejected = {key for key, review in decided.items() if review.decision == "reject"}
-        save_figure(series_figure(eyes, rejected), job.plot)
+        save_figure(series_figure(eyes, _rejected(decided)), job.plot)
     if job.plot_aligned is not None and not profiles:
-        sys.stderr.write(f"note: {job.plot_aligned} is not written: there is no blink to lay on others\n")
+        older = "; the one that is there is of an earlier call" if job.plot_aligned.exists() else ""
+        why = f"there is no blink to lay on others{older}"
+        sys.stderr.write(f"note: {job.plot_aligned} is not written: {why}\n")
     elif job.plot_aligned is not None:
         groups = {eye.series.column: [p for p in profiles if _is_of(p, eye)] for eye in eyes}
         save_figure(

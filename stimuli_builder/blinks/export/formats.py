@@ -51,9 +51,9 @@ def check_format(format_name: str, target: CurveTarget, option: str = "--format"
             + (f"; did you mean '{near}'?" if near else "")
         )
     named = {"--left": target.left, "--right": target.right, "--target": target.name or "face"}
-    for option, name in named.items():
+    for named_by, name in named.items():
         if not _SAFE_NAME.fullmatch(name):
-            raise InputError(f"{option} '{name}': expected a name of letters, digits and _ . : | -")
+            raise InputError(f"{named_by} '{name}': expected a name of letters, digits and _ . : | -")
     if target.left == target.right:
         raise InputError(f"--left and --right are both '{target.left}': each eye needs a shape of its own")
 

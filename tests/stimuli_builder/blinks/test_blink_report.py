@@ -155,44 +155,6 @@ def test_an_eye_that_does_not_blink_stays_open_in_the_curve(stimuli, series_file
     assert set(content["closure_right"]) == {0.0}
 
 
-@pytest.fixture
-def still(make_known, tmp_path):
-    """A series of an eye that lowers its lid for seconds, and does not blink."""
-    distance = make_known(fps=120.0, depths=(0.0,) * 4, noise=0.2).distance.copy()
-    distance[600:900] -= 10 * np.sin(np.linspace(0, np.pi, 300))
-    pd.DataFrame({"gap_l": distance}).to_csv(tmp_path / "still.csv", index=False)
-    return ("blinks", tmp_path / "still.csv", "--column", "gap_l", "--fps", 120, "--out", tmp_path / "b.csv")
-
-
-def test_a_recording_without_a_blink_has_a_report(stimuli, still, tmp_path):
-    ended = stimuli(*still)
-    assert ended.code == 2
-    assert "--report FILE writes a report that says so" in ended.err
-    files = ("--report", tmp_path / "r.html", "--summary", tmp_path / "s.json", "--plot", tmp_path / "p.png")
-    ended = stimuli(*still, *files, "--plot-aligned", tmp_path / "a.png")
-    assert ended.code == 0, ended.err
-    assert "warning: no blink in column 'gap_l'" in ended.err
-    page = (tmp_path / "r.html").read_text(encoding="utf-8")
-    assert "gap_l: no blinks in 10 s" in page
-    cells = dict(re.findall(r'<th scope="row">([^<]+)</th><td>([^<]*)</td>', page))
-    assert (cells["blinks"], cells["blinks a minute"]) == ("0", "0.0")
-    (column,) = json.loads((tmp_path / "s.json").read_text(encoding="utf-8"))["columns"]
-    assert (column["blinks"], column["rate_per_minute"]) == (0, 0)
-    assert len(pd.read_csv(tmp_path / "b.csv")) == 0
-    assert not (tmp_path / "b.profiles.csv").exists()
-    assert not (tmp_path / "a.png").exists()
-
-
-def test_a_closed_distance_makes_a_curve_of_an_eye_without_a_blink(stimuli, still, tmp_path):
-    more = ("--report", tmp_path / "r.html", "--curve", tmp_path / "c.json", "--curve-format", "json")
-    assert "nothing tells where its lids are closed: give --closed" in stimuli(*still, *more).err
-    ended = stimuli(*still, *more, "--lids", tmp_path / "l.csv", "--closed", 4)
-    assert ended.code == 0, ended.err
-    closure = json.loads((tmp_path / "c.json").read_text(encoding="utf-8"))["closure_left"]
-    assert max(closure) == pytest.approx(1 / 3, abs=0.05)
-    assert pd.read_csv(tmp_path / "l.csv")["gap_l_closure"].max() == pytest.approx(1 / 3, abs=0.05)
-
-
 def track(columns=("x", "y"), shift=70.0):
     """Table of two eyes 28 px wide whose middles are `shift` px apart."""
     eye = np.array([[0, 0], [5, -4], [11, -6], [17, -6], [23, -4], [28, 0], [21, 3], [14, 4], [7, 3]], float)

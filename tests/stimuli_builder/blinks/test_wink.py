@@ -55,7 +55,7 @@ def test_a_small_dip_of_one_eye_is_no_wink(make_known, fps: float) -> None:
         assert not any(abs(time - WINK_S) < 0.3 for time in blinks(eye))
 
 
-def test_a_wink_is_in_the_table_and_said(stimuli, make_known, tmp_path: Path) -> None:
+def test_a_wink_is_in_the_table_and_said_unless_rejected(stimuli, make_known, tmp_path: Path) -> None:
     left, right = face(make_known, 120.0, 0.01)
     pd.DataFrame({"EAR_l": left, "EAR_r": right}).to_csv(tmp_path / "s.csv", index=False)
     ended = stimuli(
@@ -70,3 +70,10 @@ def test_a_wink_is_in_the_table_and_said(stimuli, make_known, tmp_path: Path) ->
     assert (
         "note: left eye (EAR_l): 1 blink of this one alone, the other eye open, first at 6.0 s" in ended.err
     )
+    page, reject = tmp_path / "r.html", f"EAR_l:{WINK + 1}=talking"
+    ended = stimuli(
+        "blinks", tmp_path / "s.csv", "--column", "EAR_l", "--column", "EAR_r", "--fps", 120,
+        "--out", tmp_path / "b.csv", "--review", tmp_path / "v.csv", "--reject", reject, "--report", page,
+    )  # fmt: skip
+    assert ended.code == 0, ended.err
+    assert "of this one alone" not in ended.err + page.read_text(encoding="utf-8")
