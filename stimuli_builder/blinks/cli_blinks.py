@@ -49,7 +49,8 @@ def blinks(
     profiles: Annotated[
         Path | None,
         typer.Option(
-            help="Profiles table to write, empty without a blink; OUT with the ending .profiles.csv without it."
+            help="Profiles table to write (empty without a blink); OUT with the ending .profiles.csv "
+            "without it."
         ),
     ] = None,
     preset: Annotated[
@@ -77,8 +78,8 @@ def blinks(
     closed: Annotated[
         float | None,
         typer.Option(
-            help="Distance at lid contact; from the deepest blinks without it. An eye without a blink needs it for "
-            "--curve and --lids."
+            help="Distance at lid contact; from the deepest blinks without it. Eyes without a blink need it "
+            "for --curve and --lids."
         ),
     ] = None,
     complete_from: Annotated[float, typer.Option(help="Closure from which a blink is complete.")] = 0.95,

@@ -74,8 +74,8 @@ def closed_level(smooth: Array, blinks: Sequence[LabelledBlink], given: float | 
 def not_below(closed: float, what: str, opening: float) -> InputError:
     """The refusal of a `--closed` at which what is open would be shut."""
     return InputError(
-        f"--closed {closed:g} is not below the opening of {what} (up to {opening:g}); it is the distance that "
-        "stays when the lids meet"
+        f"--closed {closed:g} is not below the opening of {what} (up to {opening:g}); it is the distance "
+        "that stays when the lids meet"
     )
 
 

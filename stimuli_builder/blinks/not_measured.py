@@ -1,5 +1,7 @@
 """Values that are no lids: one that a tracker repeats for seconds, and zeros where it saw no face."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -19,14 +21,37 @@ SHUT_SHARE = 0.2
 OPEN_PERCENTILE = 85
 JUMP_SHARE = 0.6
 """Part of the opening that no lid leaves, nor comes back to, from one frame to the next."""
+LEAST_JUMP_FPS = 24.5
+"""Of 25 frames a second, whose times may tell a little less. In a longer frame a lid goes so far."""
+NOT_SEEN = "taken as not seen"
+LEFT = "left as it is: nothing else of it closes, so that these may be its blinks"
 NEAR_ZERO = 0.1
 """Part of the opening; a series that comes below it without being 0 has lids that meet at 0."""
 
 
-def not_measured(
-    opening: Array, fps: float, times_s: Array, *, turned: bool
-) -> list[tuple[str, NDArray[np.bool_], str]]:
-    """Rows of one column that hold no measurement.
+@dataclass(frozen=True)
+class _Kind:
+    """Rows that hold no measurement, or may not: (start, stop) of each run, and what they do in words.
+
+    Of a run the first `measured` rows were measured.
+    """
+
+    what: str
+    spans: Sequence[tuple[int, int]]
+    measured: int = 0
+    becomes: str = NOT_SEEN
+
+    def when(self, fps: float, times_s: Array) -> str:
+        """How often, how long, and from when on."""
+        times = "once" if len(self.spans) == 1 else f"{len(self.spans)} times"
+        seconds = sum(stop - start for start, stop in self.spans) / fps
+        return f"{times}, {seconds:.3g} s, first at {times_s[self.spans[0][0]]:.4g} s"
+
+
+def without_what_is_not_measured(
+    opening: Array, fps: float, times_s: Array, column: str, path: Path, *, turned: bool
+) -> tuple[Array, list[str]]:
+    """A column, NaN where it holds no measurement, and a line about each reason.
 
     Parameters
     ----------
@@ -37,37 +62,19 @@ def not_measured(
         From the first row.
     turned : bool
         Whether the column was turned round: its zeros are of lids that are shut.
-
-    Returns
-    -------
-    list of (str, bool array (n,), str)
-        What such rows do, which they are, and how often, how long and from when on.
     """
-    kinds = [("repeats one value for a second or longer", _frozen_runs(opening, fps), 1)]
-    if not turned:
-        kinds.append(("jumps to 0 and back from one frame to the next", _lost_runs(opening), 0))
-    told = []
-    for what, spans, first in kinds:
-        rows = np.zeros(opening.size, np.bool_)
-        for start, stop in spans:
-            rows[start + first : stop] = True  # the first of equal values was measured
-        if spans:
-            times = "once" if len(spans) == 1 else f"{len(spans)} times"
-            seconds = sum(stop - start for start, stop in spans) / fps
-            told.append((what, rows, f"{times}, {seconds:.3g} s, first at {times_s[spans[0][0]]:.4g} s"))
-    return told
-
-
-def without_what_is_not_measured(
-    opening: Array, fps: float, times_s: Array, column: str, path: Path, *, turned: bool
-) -> tuple[Array, list[str]]:
-    """A column, NaN where it holds no measurement, and a line about each reason; see `not_measured`."""
     eye = eye_of(column)
     label = f"{path.name}: '{column}'" + (f" ({eye} eye)" if eye else "")
+    kinds = [_Kind("repeats one value for a second or longer", _frozen_runs(opening, fps), measured=1)]
+    if not turned and fps >= LEAST_JUMP_FPS:
+        kinds.append(_zeros(opening))
     notes, kept = [], opening.copy()
-    for what, rows, when in not_measured(opening, fps, times_s, turned=turned):
-        kept[rows] = np.nan
-        notes.append(f"{label} {what}: {when}: taken as not seen")
+    for kind in kinds:
+        if not kind.spans:
+            continue
+        for start, stop in kind.spans if kind.becomes == NOT_SEEN else ():
+            kept[start + kind.measured : stop] = np.nan
+        notes.append(f"{label} {kind.what}: {kind.when(fps, times_s)}: {kind.becomes}")
     return kept, notes
 
 
@@ -98,18 +105,18 @@ def _has_noise(values: Array, elsewhere: NDArray[np.bool_], fps: float) -> bool:
     return bool((steps == 0).mean() <= MAX_REPEATS and reversals >= REVERSALS_A_S * steps.size / fps)
 
 
-def _lost_runs(values: Array) -> list[tuple[int, int]]:
-    """(start, stop) of zeros between open lids, in a series that else stays far from 0."""
+def _zeros(values: Array) -> _Kind:
+    """Zeros between open lids, in a series that else stays far from 0; not seen where it has other dips."""
+    what = "jumps to 0 and back from one frame to the next"
     zero = values == 0
     others = values[np.isfinite(values) & ~zero]
     if not zero.any() or not others.size:
-        return []
+        return _Kind(what, [])
     opening = float(np.percentile(others, OPEN_PERCENTILE))
     if others.min() < NEAR_ZERO * opening:
-        return []
-    beside = [(values[max(0, a - 1) : a], values[b : b + 1], (a, b)) for a, b in runs(zero)]
-    return [
-        span
-        for before, after, span in beside
-        if (np.concatenate([before, after]) >= JUMP_SHARE * opening).all()
-    ]
+        return _Kind(what, [])
+    low = values < JUMP_SHARE * opening
+    # A frame without a value (NaN) beside a zero tells of no lid on its way either: it is not low.
+    jumps = [(a, b) for a, b in runs(zero) if not low[max(0, a - 1) : a].any() and not low[b : b + 1].any()]
+    has_other_dips = any(not zero[a:b].any() for a, b in runs(low))
+    return _Kind(what, jumps, becomes=NOT_SEEN if has_other_dips else LEFT)

@@ -1,6 +1,7 @@
 """Frames of which their table itself says that they are not to be believed."""
 
 from collections.abc import Sequence
+from itertools import accumulate
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,10 @@ from stimuli_builder.blinks.column_names import eye_of, words_of
 VALID_COLUMNS = ("valid", "success")
 """1 where a frame was measured, 0 where not; 'success' is OpenFace's."""
 _VALID = frozenset(VALID_COLUMNS)
-_OF_ALL = _VALID | {"confidence", "is", "face", "eye", "eyes", "frame", "tracking", "landmarks"}
+_OF_ALL = _VALID | {"confidence", "is", "face", "eye", "eyes", "frame", "tracking", "detection", "landmarks"}
 """Words of a validity's name that are of no columns in particular."""
+_OF_OTHERS = frozenset({"not", "invalid", "blink", "trial", "task", "response"})
+"""With these it says something else than which frames were measured: valid_blink, trial_success."""
 CONFIDENCE_COLUMN = "confidence"
 LEAST_CONFIDENCE = 0.5
 """Of 0 to 1, as OpenFace writes it beside 'success'; below it a frame is likelier wrong than right."""
@@ -32,9 +35,9 @@ def unseen_rows(
 ) -> tuple[dict[str, NDArray[np.bool_]], list[str]]:
     """Rows whose values are not to be believed by the table's own columns, and a line about each reason.
 
-    A validity with a side in its name (left_valid) is of that eye's columns alone, one with the beginning of
-    other columns' names (BS_Valid beside BS_blink) of theirs. With more than `VALID_COLUMNS` in its name it
-    is heeded where it holds 0 and 1 only.
+    A validity with a side in its name (left_valid) is of that eye's columns alone, one with further words
+    (BS_Valid) of the columns whose names begin with them (BS_gap). With more than `VALID_COLUMNS` in its
+    name it is heeded where it holds 0 and 1 only, and a blank says nothing there.
 
     Parameters
     ----------
@@ -57,7 +60,7 @@ def unseen_rows(
     notes = []
     for name in map(str, table.columns):
         rows, why = _doubted(table[name], path)
-        heeding = [column for column in columns if _is_about(name, column, table)]
+        heeding = [column for column in columns if _is_about(name, column)]
         if not rows.any() or not heeding:
             continue
         eye = "" if len(heeding) == len(columns) else f" of {', '.join(heeding)}"
@@ -74,24 +77,30 @@ def _doubted(column: pd.Series, path: Path) -> tuple[NDArray[np.bool_], str]:
     name = str(column.name)
     if name.lower() == CONFIDENCE_COLUMN:
         return _not_sure(column, path), f"have a '{name}' below {LEAST_CONFIDENCE:g}"
-    if name.lower() in VALID_COLUMNS or (is_validity(name) and not _other_words(_cells(column))):
-        return _not_valid(column, path), f"are not valid by '{name}'"
+    if name.lower() in VALID_COLUMNS:
+        return _not_valid(_cells(column, blank="0"), path), f"are not valid by '{name}'"
+    cells = _cells(column, blank="1")
+    if is_validity(name) and not _other_words(cells):
+        return _not_valid(cells, path), f"are not valid by '{name}'"
     return np.zeros(column.size, np.bool_), ""
 
 
-def _is_about(name: str, column: str, table: pd.DataFrame) -> bool:
-    """Whether a validity is one of a series: of the same eye, and not of columns of another beginning."""
+def _is_about(name: str, column: str) -> bool:
+    """Whether a validity is one of a series: of its eye, and by no words but such as its name begins with."""
     side, eye = eye_of(name), eye_of(column)
-    if side is not None and eye is not None and side != eye:
+    if not _OF_OTHERS.isdisjoint(words_of(name)) or (side and eye and side != eye):
         return False
-    stem = "".join(word for word in words_of(name) if word not in _OF_ALL and eye_of(word) is None)
-    measures = ["".join(words_of(str(one))) for one in table.columns if not is_validity(str(one))]
-    is_of_others = bool(stem) and any(one.startswith(stem) for one in measures)
-    return not is_of_others or "".join(words_of(column)).startswith(stem)
+    words = _own_words(name)
+    beginnings = {*accumulate(words_of(column)), *accumulate(_own_words(column))}
+    return not words or "".join(words) in beginnings
 
 
-def _cells(column: pd.Series) -> "pd.Series[str]":
-    return column.map(lambda cell: "0" if pd.isna(cell) else str(cell).strip().lower())
+def _own_words(name: str) -> list[str]:
+    return [word for word in words_of(name) if word not in _OF_ALL and eye_of(word) is None]
+
+
+def _cells(column: pd.Series, blank: str) -> "pd.Series[str]":
+    return column.map(lambda cell: blank if pd.isna(cell) else str(cell).strip().lower())
 
 
 def _other_words(cells: "pd.Series[str]") -> list[str]:
@@ -99,11 +108,10 @@ def _other_words(cells: "pd.Series[str]") -> list[str]:
     return [word for word in cells.unique() if word not in _WORDS]
 
 
-def _not_valid(column: pd.Series, path: Path) -> NDArray[np.bool_]:
-    words = _cells(column)
+def _not_valid(words: "pd.Series[str]", path: Path) -> NDArray[np.bool_]:
     if other := _other_words(words):
         raise InputError(
-            f"{path.name}: column '{column.name}' says which frames are valid by 1 and 0 (true and false), "
+            f"{path.name}: column '{words.name}' says which frames are valid by 1 and 0 (true and false), "
             f"got '{other[0]}'; name it otherwise if it says something else"
         )
     return ~words.map(_WORDS).to_numpy(dtype=np.bool_)

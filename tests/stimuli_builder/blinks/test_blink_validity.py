@@ -86,7 +86,7 @@ def test_a_confidence_in_words_is_refused(tmp_path: Path) -> None:
         read_series(tmp_path / "s.csv", ["gap"], 240)
 
 
-@pytest.mark.parametrize("name", ["EAR2D6_valid", "BS_Valid", "face_valid", "isValid", "detection_success"])
+@pytest.mark.parametrize("name", ["EAR2D6_valid", "face_valid", "isValid", "detection_success"])
 def test_a_validity_of_a_longer_name_is_heeded(make_known, tmp_path: Path, name: str) -> None:
     table = spoilt(make_known, name, 1, 0).rename(columns={" gap_l": "EAR2D6_l"})
     table.assign(face_x=1.5).to_csv(tmp_path / "s.csv", index=False)
@@ -95,7 +95,7 @@ def test_a_validity_of_a_longer_name_is_heeded(make_known, tmp_path: Path, name:
     assert series.missing_frames == 120
 
 
-@pytest.mark.parametrize("name", ["left_valid", "valid_l", "EAR_valid_left"])
+@pytest.mark.parametrize("name", ["left_valid", "valid_l", "gap_valid_left"])
 def test_a_validity_of_one_eye_holds_for_it_alone(make_known, tmp_path: Path, name: str) -> None:
     table = spoilt(make_known, name, 1.0, 0.0)
     table.insert(0, "gap_r", table[" gap_l"] + 0.5)
@@ -116,3 +116,32 @@ def test_a_validity_of_other_columns_is_not_heeded(make_known, tmp_path: Path) -
 def test_a_number_of_valid_points_is_no_validity(make_known, tmp_path: Path, name: str) -> None:
     spoilt(make_known, name, 68, 0).to_csv(tmp_path / "s.csv", index=False)
     assert read_series(tmp_path / "s.csv", ["gap_l"], FPS)[0].missing_frames == 0
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("valid_blink", "BS_blink_valid", "trial_success", "task_success", "gap_response_valid"),
+        *("not_valid", "gap_not_valid", "last_valid", "success_note", "g_valid", "BS_Valid", "gaze_valid"),
+    ],
+)
+def test_a_validity_of_something_else_is_not_heeded(make_known, tmp_path: Path, name: str) -> None:
+    table = spoilt(make_known, name, 1, 0).rename(columns={" gap_l": "gap_l"})
+    table.to_csv(tmp_path / "s.csv", index=False)
+    (series,) = read_series(tmp_path / "s.csv", ["gap_l"], FPS)
+    assert (series.missing_frames, [note for note in series.notes if name in note]) == (0, [])
+
+
+def test_a_validity_is_of_the_columns_whose_names_begin_as_it_does(make_known, tmp_path: Path) -> None:
+    table = spoilt(make_known, "eyeGap_valid", 1, 0).rename(columns={" gap_l": "eyeGapLeft"})
+    table.assign(lid_r=table["eyeGapLeft"] + 1).to_csv(tmp_path / "s.csv", index=False)
+    eyes = read_series(tmp_path / "s.csv", ["eyeGapLeft", "lid_r"], FPS)
+    assert [eye.missing_frames for eye in eyes] == [120, 0]
+
+
+@pytest.mark.parametrize(("good", "bad", "missing"), [("", 0, 120), (1, "", 0)])
+def test_a_blank_says_nothing_in_a_validity_of_a_longer_name(
+    make_known, tmp_path: Path, good: object, bad: object, missing: int
+) -> None:
+    spoilt(make_known, "gap_valid", good, bad).to_csv(tmp_path / "s.csv", index=False)
+    assert read_series(tmp_path / "s.csv", ["gap_l"], FPS)[0].missing_frames == missing

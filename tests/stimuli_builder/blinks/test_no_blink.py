@@ -1,4 +1,4 @@
-"""A recording without a blink: its report, its empty tables, and the distance at which its lids would be shut."""
+"""A recording without a blink: its report, its empty tables, and the distance at which its lids are shut."""
 
 import json
 import re

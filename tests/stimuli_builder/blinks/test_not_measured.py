@@ -114,3 +114,44 @@ def test_zeros_at_both_ends_are_not_seen(make_known, tmp_path: Path) -> None:
     series = read(tmp_path, distance, 60.0)
     assert "2 times" in series.notes[0]
     assert series.missing_frames == 40
+
+
+def test_zeros_beside_frames_without_a_value_are_not_seen(make_known, tmp_path: Path) -> None:
+    distance = make_known(fps=60.0, noise=0.3, depths=(0.6, 0.5)).distance.copy()
+    distance[170:175], distance[175:190] = np.nan, 0.0
+    distance[300:310], distance[310] = 0.0, np.nan
+    pd.DataFrame({"gap_l": distance}).to_csv(tmp_path / "s.csv", index=False)
+    (series,) = read_series(tmp_path / "s.csv", fps=60.0, allow_gaps=True)
+    assert "2 times, 0.417 s" in series.notes[0]
+    assert np.isnan(series.distance[170:190]).all()
+    assert np.isnan(series.distance[300:311]).all()
+
+
+@pytest.mark.parametrize("fps", [15.0, 20.0])
+def test_lids_may_shut_within_a_frame_of_a_slow_camera(make_known, tmp_path: Path, fps: float) -> None:
+    # Another eye that never quite meets: zeros are the clipped minima of some blinks alone.
+    distance = make_known(fps=fps, noise=0.3, depths=(0.5, 0.6, 0.0, 0.0)).distance.copy()
+    for number in (3, 4):
+        distance[round(2 * number * fps)] = 0.0
+    series = read(tmp_path, distance, fps)
+    assert (series.notes, series.missing_frames) == ((), 0)
+
+
+def test_zeros_that_may_be_the_only_closures_are_left(make_known, tmp_path: Path) -> None:
+    closed = make_known(fps=60.0).distance < 17
+    opening = np.where(closed, 0.0, np.random.default_rng(3).normal(0.9, 0.01, closed.size))
+    opening[np.flatnonzero(closed)[0]] = 0.4  # one lid was caught on its way
+    series = read(tmp_path, opening, 60.0, "openness_l")
+    (note,) = series.notes
+    assert "s.csv: 'openness_l' (left eye) jumps to 0 and back from one frame to the next: 3 times" in note
+    assert "left as it is: nothing else of it closes" in note
+    assert series.missing_frames == 0
+    assert (series.distance == 0).sum() == closed.sum() - 1
+
+
+def test_zeros_beside_a_partial_blink_are_not_the_only_closures(make_known, tmp_path: Path) -> None:
+    distance = make_known(fps=60.0, noise=0.3, depths=(0.0, 0.5, 0.0)).distance.copy()
+    distance[100:112] = distance[340:352] = 0.0
+    series = read(tmp_path, distance, 60.0)
+    assert "2 times" in series.notes[0]
+    assert series.missing_frames == 24
