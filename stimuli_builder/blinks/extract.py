@@ -9,7 +9,6 @@ import numpy as np
 
 from experiments.counted import counted
 from experiments.errors import InputError
-from stimuli_builder.blinks.events.levels import OPEN_PERCENTILE
 from stimuli_builder.blinks.events.lid_event import LidEvent
 from stimuli_builder.blinks.events.recognise import Recognised
 from stimuli_builder.blinks.label_options import LabelOptions
@@ -22,7 +21,7 @@ from stimuli_builder.blinks.measure import (
     not_below,
     smoothed,
 )
-from stimuli_builder.blinks.profile import Array, BlinkProfile, Eye
+from stimuli_builder.blinks.profile import OPEN_PERCENTILE, Array, BlinkProfile, Eye
 from stimuli_builder.blinks.recognised import recognised_blinks
 from stimuli_builder.blinks.series import BlinkSeries, scaled_frames
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from stimuli_builder.blinks.column_names import eye_of
 from stimuli_builder.blinks.gaps import runs
-from stimuli_builder.blinks.profile import Array
+from stimuli_builder.blinks.profile import OPEN_PERCENTILE, Array
 
 FROZEN_S = 1.0
 MAX_REPEATS = 0.1
@@ -18,7 +18,6 @@ REVERSALS_A_S = 6.0
 """Noise goes up and down at least so often in a second; a curve without noise does by its blinks alone."""
 SHUT_SHARE = 0.2
 """Part of the way from the least value to the opening below which a value that stays is of shut lids."""
-OPEN_PERCENTILE = 85
 JUMP_SHARE = 0.6
 """Part of the opening that no lid leaves, nor comes back to, from one frame to the next."""
 LEAST_JUMP_FPS = 24.5

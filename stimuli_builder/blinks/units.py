@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from experiments.errors import InputError, nearest
 from experiments.files import whole_file
 from stimuli_builder.blinks.csv_table import read_table
-from stimuli_builder.blinks.events.levels import OPEN_PERCENTILE, local_opening
-from stimuli_builder.blinks.profile import Array
+from stimuli_builder.blinks.events.levels import local_opening
+from stimuli_builder.blinks.profile import OPEN_PERCENTILE, Array
 from stimuli_builder.blinks.series import BlinkSeries
 from stimuli_builder.blinks.tracked_lid import FISSURE_LENGTH_MM
 

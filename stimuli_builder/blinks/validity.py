@@ -79,8 +79,7 @@ def _doubted(column: pd.Series, path: Path) -> tuple[NDArray[np.bool_], str]:
         return _not_sure(column, path), f"have a '{name}' below {LEAST_CONFIDENCE:g}"
     if name.lower() in VALID_COLUMNS:
         return _not_valid(_cells(column, blank="0"), path), f"are not valid by '{name}'"
-    cells = _cells(column, blank="1")
-    if is_validity(name) and not _other_words(cells):
+    if is_validity(name) and not _other_words(cells := _cells(column, blank="1")):
         return _not_valid(cells, path), f"are not valid by '{name}'"
     return np.zeros(column.size, np.bool_), ""
 

@@ -1,5 +1,6 @@
 """Fitting the coupled AAM to one picture: the steepest-descent algebra, and buffers kept between frames."""
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -49,6 +50,12 @@ class Fit:
     spreads: Values
     iterations: int
     light: tuple[float, float] = (1.0, 0.0)
+
+    @property
+    def overall_residual(self) -> float:
+        """Root mean square grey levels over both eyes."""
+        squares = [residual * residual for residual in self.residuals.tolist()]
+        return math.sqrt(sum(squares) / len(squares))
 
 
 @dataclass(frozen=True)

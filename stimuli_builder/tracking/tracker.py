@@ -1,9 +1,9 @@
 """Tracking from frame to frame: each ends fitted, or with a status and a reason, never as a wrong number."""
 
-import math
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stimuli_builder.tracking.certainty import (
     DIFFERING_SHARE,
@@ -32,6 +32,8 @@ from stimuli_builder.tracking.shapes import (
 )
 from stimuli_builder.tracking.stillness import Stillness
 from stimuli_builder.video import Picture
+
+Values = NDArray[np.float64]
 
 FROZEN = "the same picture as the frame before"
 STILL = "the lids have not moved for two seconds: the picture may stand still"
@@ -103,12 +105,12 @@ class Tracker:
             fit = self._fitter.fit(picture, self._last.c, self._last.pose)
             fault = self._faults.lost(fit, picture)
             fit, fault = self._with_hint(picture, fit, fault, hint)
-            if not fault and self._fits_badly(fit):
-                fit = self._in_better_light(raw, fit)
-            if fault:
-                fit, fault = self._in_other_light(raw, self._last, fit, fault)
+            still = FROZEN if frozen else ""
             if not fault:
-                return self._accepted(fit, "tracked", FROZEN if frozen else "", hint)
+                return self._accepted(fit, "tracked", still, hint, raw)
+            fit, fault = self._in_other_light(raw, self._last, fit, fault)
+            if not fault:
+                return self._accepted(fit, "tracked", still, hint)
             self._loss = fault
         elif hint is not None:
             fit = self._from_detection.fit(picture, hint)
@@ -143,7 +145,9 @@ class Tracker:
         for light in list(self._other_lights(fit)):
             picture = light.evened(raw)
             other = self._fitter.fit(picture, fit.c, fit.pose)
-            if WORSE * _overall(other) < _overall(fit) and not self._faults.lost(other, picture):
+            if WORSE * other.overall_residual < fit.overall_residual and not self._faults.lost(
+                other, picture
+            ):
                 fit, self._light = other, light
         return fit
 
@@ -159,7 +163,7 @@ class Tracker:
             return fit, fault
         other = self._from_detection.fit(picture, hint)
         wrong = self._faults.lost(other, picture)
-        if not wrong and (fault or _overall(other) < WORSE * _overall(fit)):
+        if not wrong and (fault or other.overall_residual < WORSE * fit.overall_residual):
             return other, ""
         return fit, fault
 
@@ -180,7 +184,7 @@ class Tracker:
             return self._accepted(best, "tracked", "")
         self._lose()
         self._loss = self._loss or fault or "no place in the picture resembles the labelled frames"
-        residual = _overall(best) if best is not None and best.iterations else None
+        residual = best.overall_residual if best is not None and best.iterations else None
         # What a detector says here and now explains more than what the loss began with.
         why = self._unseen or self._loss
         return TrackedFrame("lost", why, None, None, residual, best.iterations if best else 0)
@@ -220,14 +224,16 @@ class Tracker:
             if anywhere is not None:
                 yield anywhere
 
-    def _accepted(self, fit: Fit, status: Status, reason: str, hint: Points | None = None) -> TrackedFrame:
+    def _accepted(
+        self, fit: Fit, status: Status, reason: str, hint: Points | None = None, raw: Picture | None = None
+    ) -> TrackedFrame:
+        """The frame of a fit that passed; with its picture as recorded, `raw`, another light may be tried."""
         before = self._before if status == "tracked" else None
+        points, errors, why = self._judged(fit, before, hint)
+        if why and raw is not None and self._fits_badly(fit):
+            fit = self._in_better_light(raw, fit)
+            points, errors, why = self._judged(fit, before, hint)
         self._last, self._lost_frames, self._started, self._loss = fit, 0, True, ""
-        points = self._points(fit)
-        difference = None if hint is None else lid_difference(points, hint)
-        errors = stated_errors(self.model, fit, None if difference is None else difference * widths(points))
-        why = doubt(self.model, fit, points, errors, difference, before)
-        why = why or self._faults.flat(fit) or self._unseen
         self._before = points
         if not why:
             self._light = self._light.following(*fit.light)
@@ -236,9 +242,12 @@ class Tracker:
         if why or reason in (FROZEN, STILL):
             status, reason = "doubtful", why or reason
         distances = inter_eyelid_distances(points, self.model.markers)
-        return TrackedFrame(status, reason, points, distances, _overall(fit), fit.iterations, errors)
+        return TrackedFrame(status, reason, points, distances, fit.overall_residual, fit.iterations, errors)
 
-
-def _overall(fit: Fit) -> float:
-    squares = [residual * residual for residual in fit.residuals.tolist()]
-    return math.sqrt(sum(squares) / len(squares))
+    def _judged(self, fit: Fit, before: Points | None, hint: Points | None) -> tuple[Points, Values, str]:
+        """Points of a fit, their stated errors, and why it may be wrong."""
+        points = self._points(fit)
+        difference = None if hint is None else lid_difference(points, hint)
+        errors = stated_errors(self.model, fit, None if difference is None else difference * widths(points))
+        why = doubt(self.model, fit, points, errors, difference, before)
+        return points, errors, why or self._faults.flat(fit) or self._unseen

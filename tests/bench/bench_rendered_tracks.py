@@ -13,12 +13,11 @@ recordings. Needs the detector's environment.
 
 import sys
 import tempfile
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from bench_label_free import tell as tell_lids
-from bench_stated_error import BINS, RUN, SPOILT, Compared, compared, spoilt, tell, tracked_rows
+from bench_stated_error import RUN, SPOILT, Compared, binned, compared, spoilt, tell, tracked_rows
 from matplotlib.figure import Figure
 from rendered_recordings import recordings
 
@@ -63,13 +62,9 @@ def curve(kinds: dict[str, list[Compared]], path: Path) -> None:
     for kind, frames in kinds.items():
         known = [frame for frame in frames if frame.status != "lost"]
         stated, true = np.array([f.stated for f in known]), np.array([f.true for f in known])
-        bins = [(stated >= low) & (stated < high) for low, high in pairwise(BINS)]
-        sizes = [inside.sum() for inside in bins]
-        means = [
-            [np.sqrt((values[inside] ** 2).mean()) for inside in bins if inside.any()]
-            for values in (stated, true)
-        ]
-        axes.plot(*means, "o-", label=f"{kind}, {sum(sizes)} frames")
+        bins = [inside for _, _, inside in binned(known)]
+        means = [[np.sqrt((values[inside] ** 2).mean()) for inside in bins] for values in (stated, true)]
+        axes.plot(*means, "o-", label=f"{kind}, {len(known)} frames")
     end = max(axes.get_xlim()[1], axes.get_ylim()[1])
     axes.plot([0, end], [0, end], color="grey", linewidth=0.8, label="stated = true")
     axes.set(xlabel="stated error, % of the eye's width", ylabel="true error, % of the eye's width")

@@ -127,21 +127,28 @@ def compared(
     return results
 
 
+def binned(known: list[Compared]) -> Iterator[tuple[float, float, np.ndarray]]:
+    """Ends of each bin of the stated error that holds frames, and which of them it holds."""
+    stated = np.array([frame.stated for frame in known])
+    for low, high in pairwise(BINS):
+        inside = (stated >= low) & (stated < high)
+        if inside.any():
+            yield low, high, inside
+
+
 def tell(name: str, frames_compared: list[Compared]) -> None:
     """Print the curve: of frames whose stated error lies in a bin, the true one."""
     lost = sum(frame.status == "lost" for frame in frames_compared)
     known = [frame for frame in frames_compared if frame.status != "lost"]
     stated, true = np.array([f.stated for f in known]), np.array([f.true for f in known])
     sys.stdout.write(f"{name}: {len(known)} frames, {lost} lost; % of the eye's width, root mean squares\n")
-    for low, high in pairwise(BINS):
-        inside = (stated >= low) & (stated < high)
-        if inside.any():
-            s, t = np.sqrt((stated[inside] ** 2).mean()), np.sqrt((true[inside] ** 2).mean())
-            within = (true[inside] <= 2 * stated[inside]).mean()
-            sys.stdout.write(
-                f"  stated {low:4g} to {high:4g}%: {inside.sum():5d} frames  stated {s:5.2f}  true {t:5.2f}  "
-                f"within twice the stated {within:4.0%}\n"
-            )
+    for low, high, inside in binned(known):
+        s, t = np.sqrt((stated[inside] ** 2).mean()), np.sqrt((true[inside] ** 2).mean())
+        within = (true[inside] <= 2 * stated[inside]).mean()
+        sys.stdout.write(
+            f"  stated {low:4g} to {high:4g}%: {inside.sum():5d} frames  stated {s:5.2f}  true {t:5.2f}  "
+            f"within twice the stated {within:4.0%}\n"
+        )
     tell_wrong(frames_compared)
     off = [f for f in known if f.true > 100 * DOUBTFUL_SHARE]
     caught = sum(f.status == "doubtful" for f in off)

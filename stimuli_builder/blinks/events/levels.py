@@ -5,11 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import percentile_filter
 
-from stimuli_builder.blinks.profile import Array
+from stimuli_builder.blinks.profile import OPEN_PERCENTILE, Array
 from stimuli_builder.blinks.series import box_filter
 
 OPEN_REACH_S = 5.0
-OPEN_PERCENTILE = 85
 LEAST_OPEN = 0.6
 """The local opening is at least this part of the recording's: else a long closed eye would count as open."""
 SMOOTHING_S = 0.033

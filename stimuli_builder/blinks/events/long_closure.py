@@ -5,10 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from stimuli_builder.blinks.events.levels import OPEN_PERCENTILE
 from stimuli_builder.blinks.events.lid_event import LidEvent
 from stimuli_builder.blinks.gaps import runs
-from stimuli_builder.blinks.profile import Array
+from stimuli_builder.blinks.profile import OPEN_PERCENTILE, Array
 from stimuli_builder.blinks.series import box_filter
 
 LONG_S = 2.0
