@@ -36,7 +36,10 @@ BetweenOption = Annotated[
 ]
 CovariateOption = Annotated[
     str,
-    typer.Option(help="Columns with numbers (age, trial), centred, separated by commas; no interactions."),
+    typer.Option(
+        help="Columns with numbers (age, trial), centred, separated by commas; age:blur or age:trial adds an "
+        "interaction with a factor or another covariate."
+    ),
 ]
 RandomOption = Annotated[
     str,

@@ -20,6 +20,26 @@ Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
+class NumberEffect:
+    """A covariate, or its interaction with other covariates and factors.
+
+    Attributes
+    ----------
+    name : str
+        Its members, separated by colons.
+    covariates, factors : tuple of str
+        The members; factors in the order of the design.
+    differs : bool
+        Participants can differ in it: every member varies within participants.
+    """
+
+    name: str
+    covariates: tuple[str, ...]
+    factors: tuple[str, ...]
+    differs: bool
+
+
+@dataclass(frozen=True)
 class ModelData:
     """Trials in coded form.
 
@@ -39,6 +59,8 @@ class ModelData:
         The effect of each column, `intercept` first.
     numbers : float64 array (n, k)
         Centred covariates.
+    number_effects : tuple of NumberEffect
+        Covariates in the order of `numbers`, then their interactions.
     groups : tuple of Grouping
         Participants, items (if any), further groupings.
     """
@@ -54,19 +76,36 @@ class ModelData:
     numbers: Floats = field(repr=False)
     effect_of: tuple[str, ...]
     column_names: tuple[str, ...]
+    number_effects: tuple[NumberEffect, ...] = ()
     notes: tuple[str, ...] = ()
 
     @property
     def effects(self) -> list[str]:
         """Effects in order, main effects first, covariates last, without the intercept."""
-        factorial = dict.fromkeys(name for name in self.effect_of if name != "intercept")
-        return [*factorial, *self.terms.covariates]
+        return [*self.factorial_effects, *(effect.name for effect in self.number_effects)]
+
+    @property
+    def factorial_effects(self) -> list[str]:
+        """Effects of factors alone, main effects first."""
+        return list(dict.fromkeys(name for name in self.effect_of if name != "intercept"))
 
     @property
     def slope_effects(self) -> list[str]:
-        """Effects in which participants can differ: of factors within participants alone."""
+        """Effects in which participants can differ: of what varies within them; covariates first."""
         inside = set(self.terms.within)
-        return [effect for effect in self.effects if inside.issuperset(effect.split(":"))]
+        of_factors = [name for name in self.factorial_effects if inside.issuperset(name.split(":"))]
+        mixed = [effect.name for effect in self.number_effects if effect.differs and effect.factors]
+        products = [
+            effect.name
+            for effect in self.number_effects
+            if effect.differs and not effect.factors and len(effect.covariates) > 1
+        ]
+        return [*self.covariate_slopes, *of_factors, *products, *mixed]
+
+    @property
+    def covariate_slopes(self) -> list[str]:
+        """Covariates that vary within participants."""
+        return [e.name for e in self.number_effects if e.differs and len(e.covariates) == 1 and not e.factors]
 
     @property
     def participants(self) -> Grouping:
@@ -82,28 +121,62 @@ class ModelData:
     def fixed_part(self) -> str:
         """The right-hand side of the formula, without random terms."""
         factorial = [" * ".join(self.factors)] if self.factors else []
-        return " + ".join([*factorial, *self.terms.covariates]) or "1"
+        return " + ".join([*factorial, *(effect.name for effect in self.number_effects)]) or "1"
 
     @property
     def x(self) -> Floats:
-        """Fixed effects (n, cells + covariates)."""
-        return np.hstack([self.fixed[self.cell], self.numbers])
+        """Fixed effects (n, cells + columns of covariates)."""
+        products = [self._product(effect, self.fixed) for effect in self.number_effects]
+        return np.hstack([self.fixed[self.cell], *products])
 
     def columns(self, effect: str) -> Integers:
         """Positions of an effect's columns in `x`."""
-        if effect in self.terms.covariates:
-            return np.array([len(self.effect_of) + self.terms.covariates.index(effect)])
-        return np.flatnonzero(np.array(self.effect_of) == effect)
+        return np.flatnonzero(np.array(self._effect_of_x) == effect)
+
+    @property
+    def _effect_of_x(self) -> list[str]:
+        of_numbers = [e.name for e in self.number_effects for _ in range(self._of_factors(e).size)]
+        return [*self.effect_of, *of_numbers]
+
+    def _of_factors(self, effect: NumberEffect) -> Integers:
+        """Columns of the factorial that an interaction of covariates multiplies; the intercept's of none."""
+        name = ":".join(effect.factors) or "intercept"
+        return np.flatnonzero(np.array(self.effect_of) == name)
+
+    def _product(self, effect: NumberEffect, coding: Floats) -> Floats:
+        """Columns (n, q) of covariates, multiplied with those of factors in one of the two codings."""
+        at = [self.terms.covariates.index(name) for name in effect.covariates]
+        number = self.numbers[:, at].prod(axis=1)
+        return np.asarray(number[:, None] * coding[:, self._of_factors(effect)][self.cell])
+
+    def unit(self, effect: str) -> float:
+        """Standard deviation of a covariate's column of `slope_columns`, in the covariate's own unit."""
+        found = next((one for one in self.number_effects if one.name == effect), None)
+        if found is None:
+            return 1.0
+        return float(np.sqrt((self._product(found, self.spread) ** 2).mean()))
+
+    def slope_columns(self, effects: Sequence[str]) -> Floats:
+        """Columns (n, p) whose coefficients differ between levels of a grouping, in units of `unit`."""
+        named = {effect.name: effect for effect in self.number_effects}
+        parts = [
+            self._product(named[effect], self.spread) / self.unit(effect)
+            if effect in named
+            else self.spread[:, np.array(self.effect_of) == effect][self.cell]
+            for effect in effects
+        ]
+        return np.hstack(parts)
 
     def differences(self, effect: str) -> Floats:
         """Contrasts (q, columns of x) of an effect as differences from the first level of each factor.
 
         The df of a test of several contrasts depend a little on how these are written; lmerTest's are these.
         """
-        width = len(self.effect_of) + len(self.terms.covariates)
-        if effect in self.terms.covariates:
+        found = next((one for one in self.number_effects if one.name == effect), None)
+        members = effect.split(":") if found is None else list(found.factors)
+        width = len(self._effect_of_x)
+        if found is not None and not members:
             return np.eye(width)[self.columns(effect)]
-        members = effect.split(":")
         rows: Floats = np.ones((1, 1))
         for factor, names in zip(self.factors, self.levels, strict=True):
             size = len(names)
@@ -112,7 +185,12 @@ class ModelData:
                 np.kron(rows, from_first if factor in members else np.full((1, size), 1 / size))
             )
         contrasts = rows @ self.fixed
-        return np.hstack([contrasts, np.zeros((len(contrasts), width - contrasts.shape[1]))])
+        whole = np.zeros((len(contrasts), width))
+        if found is None:
+            whole[:, : contrasts.shape[1]] = contrasts
+        else:
+            whole[:, self.columns(effect)] = contrasts[:, self._of_factors(found)]
+        return whole
 
     def random_effects(self, slopes: RandomSlopes) -> list[str]:
         """What differs between levels of a further grouping, `intercept` first; covariates do not."""
@@ -126,27 +204,41 @@ class ModelData:
     def random_terms(
         self, slopes: Slopes, effects: Sequence[str], random_slopes: RandomSlopes = "none"
     ) -> list[Term]:
-        """Participants with slopes of `effects` (`intercept` first), then every other group."""
+        """Participants with slopes of `effects` (`intercept` first), then every other group.
+
+        A covariate's slope is correlated with the intercept, and with other covariates': where zero lies on
+        the covariate's scale must not matter. Slopes of contrasts do not correlate, unless asked for.
+        """
         of_column = [effect for effect in effects for _ in self.columns(effect)]
-        columns = np.concatenate([self.columns(effect) for effect in effects])
-        p = len(columns)
+        p = len(of_column)
         if slopes == "correlated":
             rows, others = np.tril_indices(p)
             patterns = np.zeros((len(rows), p, p))
             patterns[np.arange(len(rows)), rows, others] = 1.0
         else:
             patterns = np.stack([np.diag([float(e == name) for name in of_column]) for e in effects])
+            shared = [of_column.index(name) for name in self.correlated_effects(effects)]
+            pairs = [(row, column) for i, row in enumerate(shared) for column in shared[:i]]
+            crossed = np.zeros((len(pairs), p, p))
+            for k, (row, column) in enumerate(pairs):
+                crossed[k, row, column] = 1.0
+            patterns = np.concatenate([patterns, crossed])
         people = self.participants
-        terms = [Term(people.codes, len(people.names), self.spread[:, columns][self.cell], patterns)]
+        terms = [Term(people.codes, len(people.names), self.slope_columns(effects), patterns)]
         return terms + [self._further_term(group, random_slopes) for group in self.groups[1:]]
+
+    def correlated_effects(self, effects: Sequence[str]) -> list[str]:
+        """The intercept and covariates among participants' terms, which correlate; nothing without these."""
+        sloped = [name for name in effects if name in self.covariate_slopes]
+        return ["intercept", *sloped] if sloped else []
 
     def _further_term(self, group: Grouping, slopes: RandomSlopes) -> Term:
         """Independent slopes, one variance an effect, as participants have them; or an intercept."""
         if slopes == "none" or not self.has_slopes(group):
             return intercept_term(group.codes, len(group.names))
         effects = self.random_effects(slopes)
-        of_column = [name for name in self.effect_of if name in effects]
-        z = self.spread[:, np.isin(self.effect_of, effects)][self.cell]
+        of_column = [name for name in effects for _ in self.columns(name)]
+        z = self.slope_columns(effects)
         patterns = np.stack([np.diag([float(name == e) for name in of_column]) for e in effects])
         return Term(group.codes, len(group.names), z, patterns)
 
@@ -167,7 +259,7 @@ def model_data(rows: pd.DataFrame, terms: ModelTerms) -> ModelData:
     values = ratings(rows, terms.rating)
     groups = groupings(rows, terms)
     terms, said = _by_participant(rows, terms, groups[0].codes)
-    factors = (*terms.between, *terms.within)
+    factors: tuple[str, ...] = (*terms.between, *terms.within)
     coded = [_coded(rows[name], name) for name in factors]
     levels = tuple(names for _, names in coded)
     shape = tuple(len(names) for names in levels)
@@ -177,6 +269,8 @@ def model_data(rows: pd.DataFrame, terms: ModelTerms) -> ModelData:
     _refuse_empty_cells(cell, factors, levels)
     fixed, spread, effect_of, names = coded_cells(list(factors), levels)
     numbers, centred = covariate_columns(rows, terms, groups[0].codes)
+    effects = _number_effects(terms, factors, numbers, groups[0].codes)
+    sizes = {factor: of[:-1] for factor, of in zip(factors, levels, strict=True)}
     data = ModelData(
         terms,
         factors,
@@ -188,11 +282,40 @@ def model_data(rows: pd.DataFrame, terms: ModelTerms) -> ModelData:
         spread,
         numbers,
         effect_of,
-        (*names, *terms.covariates),
+        (*names, *(name for effect in effects for name in _column_names(effect, sizes))),
+        effects,
         (*said, *centred),
     )
     _refuse_collinear(data)
     return data
+
+
+def _number_effects(
+    terms: ModelTerms, factors: Sequence[str], numbers: Floats, people: Integers
+) -> tuple[NumberEffect, ...]:
+    """Covariates, then their interactions; which of them vary within participants."""
+    each = pd.DataFrame(numbers, columns=list(terms.covariates)).groupby(people).nunique()
+    inside = {name for name in terms.covariates if int((each[name] > 1).sum()) > 1} | set(terms.within)
+    effects = []
+    for members in (*((name,) for name in terms.covariates), *terms.interactions):
+        of_factors = tuple(name for name in factors if name in members)
+        of_numbers = tuple(name for name in members if name not in of_factors)
+        name = ":".join((*of_factors, *of_numbers)) if len(members) > 1 else members[0]
+        differs = inside.issuperset(members)
+        effects.append(NumberEffect(name, of_numbers, of_factors, differs))
+    names = [effect.name for effect in effects]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"the interaction {name} is named twice; leave one out")
+    return tuple(effects)
+
+
+def _column_names(effect: NumberEffect, levels: dict[str, tuple[str, ...]]) -> list[str]:
+    rows = product(*(levels[factor] for factor in effect.factors))
+    return [
+        ":".join((*(f"{f}[{lv}]" for f, lv in zip(effect.factors, row, strict=True)), *effect.covariates))
+        for row in rows
+    ]
 
 
 def _by_participant(

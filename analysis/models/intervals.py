@@ -1,6 +1,6 @@
 """Profile likelihood intervals beside the estimates of a linear mixed model."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +20,7 @@ def with_intervals(
     theta: Floats,
     units: Units,
     progress: Callable[[str], None] | None = None,
+    scales: Sequence[float] = (),
 ) -> MixedResult:
     """Add profile intervals; standard deviations of correlated slopes are no parameters and have none.
 
@@ -35,21 +36,34 @@ def with_intervals(
         The scale of `c`.
     progress : callable, optional
         Takes a word on every interval before it is computed.
+    scales : sequence of float
+        Standard deviations of the covariates whose slopes the components are; 1 of others. Empty for all 1.
     """
     profile = Profile(c, theta)
-    correlated = result.slopes == "correlated"
-    without = len(c.blocks[0].patterns[0]) if correlated else 0
-    first = c.blocks[0].theta.stop if correlated else 0
-    count = len(result.components) - without + len(result.coefficients)
+    own = [row for row in result.components if row.group == result.components[0].group]
+    positions: list[int | None] = list(range(len(own)))
+    if result.slopes == "correlated":
+        positions = [None] * len(own)
+    positions = [None if row.correlations else k for row, k in zip(own, positions, strict=True)]
+    further = len(result.components) - 1 - len(own)
+    positions += [c.blocks[0].theta.stop + k for k in range(further)]
+    known_sds = sum(k is not None for k in positions) + 1
+    count = known_sds + len(result.coefficients)
 
     def say(number: int, name: str) -> None:
         if progress:
             progress(f"interval {number} of {count}, {name}")
 
-    ends: list[tuple[float, float] | None] = [None] * without
-    for number, row in enumerate(result.components[without:-1], start=1):
+    ends: list[tuple[float, float] | None] = []
+    number = 0
+    for row, k, scale in zip(result.components, positions, scales or [1.0] * len(positions), strict=False):
+        if k is None:
+            ends.append(None)
+            continue
+        number += 1
         say(number, f"SD of {row.group} {row.term}".strip())
-        ends.append(profile.sd(first + number - 1))
+        low, high = profile.sd(k)
+        ends.append((low / scale, high / scale))
     ends.append(profile.sigma())
     coefficients = []
     for column, known in enumerate(result.coefficients):

@@ -115,9 +115,7 @@ def _df_and_scale(q: int, a1: float, a2: float) -> tuple[float, float]:
     return df, 1.0 if abs(df - 2) < 1e-2 else df * rest / (df - 2)
 
 
-def kenward_roger(
-    terms: Sequence[Term], c: CrossProducts, theta: Floats, at: Criterion, correlated: bool = False
-) -> KenwardRoger:
+def kenward_roger(terms: Sequence[Term], c: CrossProducts, theta: Floats, at: Criterion) -> KenwardRoger:
     r"""The adjusted covariance of the estimates and what the df are made from.
 
     Parameters
@@ -129,8 +127,6 @@ def kenward_roger(
         Relative standard deviations at the REML estimate.
     at : Criterion
         The criterion there.
-    correlated : bool
-        Whether the first term has (co)variances of its own for every pair of columns.
 
     Raises
     ------
@@ -160,7 +156,7 @@ def kenward_roger(
     m = _inner(terms, [block.factor(theta) for block in c.blocks])
     phi = at.unscaled
     precision = np.linalg.inv(phi)
-    directions = list(_directions(terms, correlated))
+    directions = list(_directions(terms))
     scores = np.concatenate([x.reshape(-1, c.f) for x in at.terms_x])
     moved = [_applied(terms, one, scores) for one in directions]
     through = m @ np.concatenate(moved, axis=1)
@@ -213,16 +209,11 @@ class _Direction:
     d: Floats = field(repr=False)
 
 
-def _directions(terms: Sequence[Term], correlated: bool) -> Iterator[_Direction]:
+def _directions(terms: Sequence[Term]) -> Iterator[_Direction]:
+    """A direction for each variance (a pattern on the diagonal) and each covariance (one below it)."""
     for number, term in enumerate(terms):
-        if not correlated or number:
-            yield from (_Direction(number, pattern) for pattern in term.patterns)
-            continue
-        for a in range(term.p):
-            for b in range(a + 1):
-                d = np.zeros((term.p, term.p))
-                d[a, b] = d[b, a] = 1.0
-                yield _Direction(number, d)
+        for pattern in term.patterns:
+            yield _Direction(number, np.maximum(pattern, pattern.T))
 
 
 def _applied(terms: Sequence[Term], direction: _Direction, values: Floats) -> Floats:

@@ -24,9 +24,9 @@ from analysis.models.random_part import (
     untold,
 )
 from analysis.models.reml import CrossProducts, criterion, cross_products
-from analysis.models.roles import ModelTerms, RandomSlopes, Slopes
+from analysis.models.roles import ModelTerms, RandomSlopes, Slopes, split_covariates
 from analysis.models.satterthwaite import Uncertainty, uncertainty
-from analysis.models.slopes import slope_groups
+from analysis.models.slopes import slope_groups, unmodelled_slopes
 from analysis.models.terms import Term
 from analysis.models.units import Units, units_of
 from analysis.models.variances import fit_theta
@@ -70,7 +70,9 @@ def fit_mixed(
     between : sequence of str, optional
         Factors with one level for each participant, crossed with those within.
     covariates : sequence of str, optional
-        Numbers, centred, without interactions.
+        Numbers, centred. `age:blur` and `age:trial` are interactions with a factor or another covariate;
+        their covariates are in the model too. A covariate that varies within participants has a
+        by-participant slope wherever factors have one, correlated with the intercept.
     random : sequence of str, optional
         Further groupings with an intercept each (faces, laboratories); `a/b` is b nested in a.
     random_slopes : {"none", "main", "all"}, optional
@@ -90,8 +92,9 @@ def fit_mixed(
         Unknown columns, text for numbers, constant ratings, empty cells, or too few ratings for the model.
     """
     items = (item,) if isinstance(item, str) else tuple(item or ())
+    numbers, interactions = split_covariates(covariates, (*within, *between))
     terms = ModelTerms(
-        participant, rating, tuple(within), items, tuple(between), tuple(covariates), tuple(random)
+        participant, rating, tuple(within), items, tuple(between), numbers, tuple(random), interactions
     )
     data = model_data(rows, terms)
     effects, notes = slope_groups(data, slopes)
@@ -107,8 +110,12 @@ def fit_mixed(
         with refused_where_exact(data, random_terms):
             theta = fit_theta(c)
         fitted = _Fitted(data, random_terms, c, theta, units)
+        notes += unmodelled_slopes(data, slopes)
         result = _result(fitted, effects, slopes, random_slopes, df_method, (*data.notes, *notes))
-        return with_intervals(result, c, theta, units, progress) if intervals else result
+        if not intervals:
+            return result
+        scales = [data.unit(row.term) for row in result.components]
+        return with_intervals(result, c, theta, units, progress, scales)
 
 
 @dataclass(frozen=True)
@@ -137,7 +144,7 @@ def _result(
     notes += untold(known, theta_names(data, labels, slopes, random_slopes, c.blocks[0].theta.stop))
     spread: Uncertainty | KenwardRoger = known
     if df_method == "kenward-roger":
-        spread = kenward_roger(fitted.terms, c, theta, at, slopes == "correlated")
+        spread = kenward_roger(fitted.terms, c, theta, at)
     effects = tuple(
         MixedEffect(effect, *spread.f_test(at.beta, data.differences(effect))) for effect in data.effects
     )
@@ -147,7 +154,7 @@ def _result(
         terms = terms_of(data, group, random_slopes)
         sds = sigma * theta[block.theta]
         components += tuple(Component(group.name, *of) for of in zip(terms, map(float, sds), strict=True))
-    degenerate = degenerate_terms(components, factor, sigma)
+    degenerate = degenerate_terms(components, factor, sigma, data)
     components += (Component("residual", "", sigma),)
     return MixedResult(
         formula=formula_of(data, labels, slopes, random_slopes),

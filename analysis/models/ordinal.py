@@ -13,9 +13,9 @@ from analysis.models.ordinal_data import OrdinalData
 from analysis.models.ordinal_maximum import maximise, pooled_start
 from analysis.models.ordinal_result import OrdinalResult, RandomTerms, ordinal_result
 from analysis.models.quadrature import QuadratureLikelihood
-from analysis.models.roles import ModelTerms, Slopes
+from analysis.models.roles import ModelTerms, Slopes, split_covariates
 from analysis.models.separation import refuse_separation
-from analysis.models.slopes import slope_groups
+from analysis.models.slopes import slope_groups, unmodelled_slopes
 from experiments.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -60,7 +60,10 @@ def fit_ordinal(
         raise InputError("slopes of the ordinal model do not correlate; expected all, main or none")
     items = (item,) if isinstance(item, str) else tuple(item or ())
     _refuse_quadrature(quadrature, items, slopes)
-    columns = ModelTerms(participant, rating, tuple(within), items, tuple(between), tuple(covariates))
+    numbers, interactions = split_covariates(covariates, (*within, *between))
+    columns = ModelTerms(
+        participant, rating, tuple(within), items, tuple(between), numbers, interactions=interactions
+    )
     data = model_data(rows, columns)
     categories, codes = np.unique(data.rating, return_inverse=True)
     if len(categories) > MAXIMUM_CATEGORIES:
@@ -70,6 +73,7 @@ def fit_ordinal(
         )
     refuse_separation(data)
     groups, left_out = slope_groups(data, slopes)
+    left_out += unmodelled_slopes(data, slopes)
     ordinal = _ordinal_data(data, codes.astype(np.int64), len(categories), groups)
     # matrices this small only wait for a second thread
     with threadpool_limits(1, "blas"):
@@ -112,12 +116,11 @@ def _refuse_undetermined(data: ModelData, variances: Floats) -> None:
 
 
 def _ordinal_data(data: ModelData, codes: Integers, n_categories: int, groups: Sequence[str]) -> OrdinalData:
-    columns = np.concatenate([data.columns(group) for group in groups])
     term = np.concatenate([np.full(len(data.columns(group)), k) for k, group in enumerate(groups)])
     people, items = data.participants, data.items
     return OrdinalData(
         data.x[:, 1:],
-        data.spread[:, columns][data.cell],
+        data.slope_columns(groups),
         term.astype(np.int64),
         codes,
         people.codes,

@@ -160,7 +160,7 @@ def _sd_notes(p: Parameters, terms: RandomTerms, data: ModelData) -> list[str]:
 
 def _components(p: Parameters, terms: RandomTerms, data: ModelData) -> tuple[OrdinalComponent, ...]:
     components = [
-        OrdinalComponent(data.terms.participant, group, float(sd))
+        OrdinalComponent(data.terms.participant, group, float(sd) / data.unit(group))
         for group, sd in zip(terms.groups, p.sd[:-1], strict=True)
     ]
     if data.items is not None:

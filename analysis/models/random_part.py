@@ -35,6 +35,7 @@ def theta_names(
 ) -> list[str]:
     """The random term of each theta, `own` of which are the participants'."""
     names = [f"{data.terms.participant} {label}" for label in labels]
+    names += [data.terms.participant] * (own - len(names))
     if slopes == "correlated":
         names = [data.terms.participant] * own
     return names + [
@@ -65,9 +66,11 @@ def untold(known: Uncertainty, names: list[str]) -> tuple[str, ...]:
     )
 
 
-def degenerate_terms(components: tuple[Component, ...], factor: Floats, sigma: float) -> tuple[str, ...]:
+def degenerate_terms(
+    components: tuple[Component, ...], factor: Floats, sigma: float, data: ModelData
+) -> tuple[str, ...]:
     """What a singular fit says: which variances are zero, or that random terms depend on one another."""
-    zero = [f"{c.group} {c.term}" for c in components if c.sd < SINGULAR_THETA * sigma]
+    zero = [f"{c.group} {c.term}" for c in components if c.sd * data.unit(c.term) < SINGULAR_THETA * sigma]
     if zero:
         return (
             f"singular fit: the variance of {', '.join(zero)} is estimated as zero; these terms are kept at "
@@ -86,8 +89,13 @@ def terms_of(data: ModelData, group: Grouping, slopes: RandomSlopes) -> list[str
 
 def formula_of(data: ModelData, labels: list[str], slopes: Slopes, random_slopes: RandomSlopes) -> str:
     """The model as R writes it."""
-    bar = "|" if slopes == "correlated" else "||"
-    of_people = f"({_in_formula(labels)} {bar} {data.terms.participant})"
+    person = data.terms.participant
+    shared = labels if slopes == "correlated" else data.correlated_effects(labels)
+    rest = [label for label in labels if label not in shared]
+    parts = [f"({_in_formula(shared)} | {person})"] if shared else []
+    if rest:
+        parts.append(f"({'0 + ' if shared else ''}{_in_formula(rest)} || {person})")
+    of_people = " + ".join(parts)
     others = ""
     for group in data.groups[1:]:
         terms = terms_of(data, group, random_slopes)
@@ -107,11 +115,22 @@ def components_of_people(
     covariance = sigma**2 * factor @ factor.T
     sds = np.sqrt(np.diag(covariance))
     of_column = [label for label in labels for _ in data.columns(label)]
+    sds = sds / [data.unit(label) for label in of_column]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        roots = np.sqrt(np.diag(covariance))
+        correlation = covariance / np.outer(roots, roots)
     if slopes != "correlated":
         first = [of_column.index(label) for label in labels]
-        return [Component(participant, label, float(sds[i])) for label, i in zip(labels, first, strict=True)]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        correlation = covariance / np.outer(sds, sds)
+        shared = data.correlated_effects(labels)
+        return [
+            Component(
+                participant,
+                label,
+                float(sds[i]),
+                tuple(float(r) for r in correlation[i, :i]) if label in shared else (),
+            )
+            for label, i in zip(labels, first, strict=True)
+        ]
     return [
         Component(participant, name, float(sds[i]), tuple(float(r) for r in correlation[i, :i]))
         for i, name in enumerate(_told_apart(of_column))

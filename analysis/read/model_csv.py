@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from analysis.models.roles import split_covariates
 from analysis.read.exported_rows import EXPORT_COLUMNS, rows_that_count
 from analysis.read.number_columns import IN_COVARIATE, numbers, unusual_numbers
 from analysis.read.text_table import TextTable, read_text_table, texts_required
@@ -55,6 +56,7 @@ def read_model_input(
         item = ["profile_id"]
     if not within and not between and not covariates:
         raise InputError("--within names no column; expected e.g. --within face,blur")
+    covariates, _ = split_covariates(covariates, (*within, *between))
     _refuse_shared_roles(participant, rating, [*within, *between, *covariates], item)
     nested = list(dict.fromkeys(part for name in random for part in name.split("/")))
     texts = list(dict.fromkeys((participant, *within, *between, *item, *nested)))
