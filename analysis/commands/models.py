@@ -169,17 +169,18 @@ def ordinal(
         ),
     ] = OrdinalSlopesChoice.NONE,
     quadrature: Annotated[
-        int,
+        int | None,
         typer.Option(
             help="Nodes of adaptive Gauss-Hermite quadrature, for participants' intercepts alone (the "
-            "item of an export is then left out); 1 is Laplace's approximation.",
+            "item of an export is then left out); 1 is Laplace's approximation. Not given: as many nodes as "
+            "change nothing, or Laplace with items or slopes, with a warning where it is inaccurate.",
             min=1,
             max=100,
         ),
-    ] = 1,
+    ] = None,
     json: JsonOption = None,
 ) -> None:
-    """Cumulative-link (ordinal) mixed model: logit, flexible thresholds, crossed effects, slopes, Laplace.
+    """Cumulative-link (ordinal) mixed model: logit, flexible thresholds, crossed effects, slopes.
 
     Examples:
 
@@ -199,7 +200,7 @@ def ordinal(
 
     groups, numbers = names_in(between), names_in(covariate)
     data = _read(file, participant, rating, within, item, groups, numbers)
-    clips = data.item if quadrature == 1 or item else ()
+    clips = data.item if quadrature in (None, 1) or item else ()
     with saying("fitting"):
         result = fit_ordinal(
             data.rows, participant, rating, data.within, clips, slopes.value, groups, numbers, quadrature

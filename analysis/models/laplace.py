@@ -85,7 +85,9 @@ class LaplaceLikelihood:
                 self.u, self.v = u, v
                 return t, hessian
             u, v, t, value = self._step(p, (u, v), hessian.solve(*score), value)
-        raise InputError("the random effects of the ordinal model do not settle; the ratings may be too few")
+        raise InputError(
+            "the random effects of the ordinal model do not settle; ratings may be separated or few"
+        )
 
     def _step(
         self, p: Parameters, at: tuple[Floats, Floats], step: tuple[Floats, Floats], value: float
@@ -104,6 +106,11 @@ class LaplaceLikelihood:
         """Modes of participants' first coefficient (people,), roots of its entries in H^-1, trials there."""
         trials, hessian = self._modes(p, self.data.z * p.sd[self.data.term], float(p.sd[-1]))
         return self.u[:, 0], np.sqrt(hessian.blocks()[0][:, 0, 0]), trials
+
+    def spreads(self, p: Parameters) -> Floats:
+        """Participants' blocks (people, c, c) of H^-1 at the modes, which are kept."""
+        _, hessian = self._modes(p, self.data.z * p.sd[self.data.term], float(p.sd[-1]))
+        return hessian.blocks()[0]
 
     def evaluate(self, p: Parameters) -> tuple[float, Parameters]:
         r"""Laplace log-likelihood, and its gradient in the form of Parameters.

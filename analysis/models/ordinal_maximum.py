@@ -74,6 +74,19 @@ def _pack(p: Parameters) -> Floats:
     return np.concatenate([p.thresholds[:1], np.log(np.diff(p.thresholds)), p.beta, p.sd])
 
 
+def packed_gradient(gradient: Parameters, log_gaps: Floats) -> Floats:
+    """Gradient by the first threshold, the logs of the gaps between thresholds, coefficients, SDs."""
+    later = np.cumsum(gradient.thresholds[::-1])[::-1]
+    return np.concatenate([later[:1], later[1:] * np.exp(log_gaps), gradient.beta, gradient.sd])
+
+
+def newton_step(likelihood: Likelihood, maximum: Maximum) -> Floats:
+    """How far the maximum of another likelihood lies from this one, by its gradient here."""
+    _, gradient = likelihood.evaluate(maximum.parameters)
+    log_gaps = np.log(np.diff(maximum.parameters.thresholds))
+    return np.asarray(maximum.covariance @ packed_gradient(gradient, log_gaps), dtype=np.float64)
+
+
 def _unpack(packed: Floats, d: OrdinalData) -> Parameters:
     k = d.n_categories - 1
     thresholds = packed[0] + np.concatenate([[0.0], np.cumsum(np.exp(packed[1:k]))])
@@ -95,10 +108,7 @@ class _Search:
         """Log-likelihood and its gradient."""
         d = self.likelihood.data
         value, gradient = self.likelihood.evaluate(_unpack(packed, d))
-        k = d.n_categories - 1
-        later = np.cumsum(gradient.thresholds[::-1])[::-1]
-        gaps = later[1:] * np.exp(packed[1:k])
-        return value, np.concatenate([later[:1], gaps, gradient.beta, gradient.sd])
+        return value, packed_gradient(gradient, packed[1 : d.n_categories - 1])
 
     def climbed(self, start: Floats) -> Floats:
         """Where L-BFGS-B stops."""

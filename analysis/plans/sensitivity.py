@@ -19,7 +19,7 @@ MAX_RATINGS = 50_000
 """Above this the models would keep the report waiting; the commands mixed and ordinal still fit them."""
 
 MAX_CELLS = 16
-"""Above this the mixed model of the report has slopes for main effects only, which is said there."""
+"""Above this the models of the report have slopes for main effects only, as the report states."""
 
 
 def sensitivity_sections(
@@ -131,7 +131,8 @@ def ordinal_model(analysis: Analysis) -> Section:
     arguments = _model_arguments(analysis)
     random = [name for name in _random_factors(analysis) if name not in arguments["item"]]
     arguments["item"] = [*random, *arguments["item"]]
-    result = fit_ordinal(**arguments, slopes="main")
+    every = len(analysis.cells.cells) <= MAX_CELLS
+    result = fit_ordinal(**arguments, slopes="all" if every else "main")
     rows = []
     for effect in result.effects:
         ours = analysis.anova.effect(effect.effect)
@@ -155,9 +156,15 @@ def ordinal_model(analysis: Analysis) -> Section:
     )
     text = (
         "Ratings as ordered categories: cumulative logit with free thresholds, participants crossed with "
-        "blinks, by-participant slopes for the main effects, Laplace approximation, joint Wald tests. "
-        "Without slopes of interactions their p are too small where people differ in them."
+        f"blinks, by-participant slopes for {'every effect' if every else 'the main effects'}, Laplace "
+        "approximation, joint Wald tests."
     )
+    if not every:
+        text += (
+            f" With more than {MAX_CELLS} cells slopes for every effect take minutes (analysis ordinal "
+            "--slopes all fits them); without them the p of interactions are too small where people differ in "
+            "them."
+        )
     if named := _random_factors(analysis):
         text += (
             f" Items are the blinks of each {' and '.join(named)}; effects are not let differ between these, "

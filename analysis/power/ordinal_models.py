@@ -122,7 +122,7 @@ class OrdinalDesign:
         """The p of the condition; NaN where the data leave it undetermined."""
         rows = self.drawn(n, rng).astype(dict.fromkeys(("participant", "clip", "condition"), str))
         try:
-            model = fit_ordinal(rows, "participant", "rating", ["condition"], "clip", "main")
+            model = fit_ordinal(rows, "participant", "rating", ["condition"], "clip", "main", quadrature=1)
         except InputError:
             return [float("nan")]
         return [model.effects[0].p_value]

@@ -63,7 +63,7 @@ def model_files(
         ).strip(),
         floor="1e-3",
         limit="1e-5",
-        loose=[f'"{table}"' for table in ("mixed df", "ordinal se", "ordinal SD")],
+        loose=[f'"{table}"' for table in ("mixed df", "ordinal coefficient", "ordinal se", "ordinal SD")],
     )
     return {script: text.encode(), data: _ratings(arguments, model.factors, names).encode()}
 

@@ -96,3 +96,28 @@ def test_correlated_slopes_of_one_rating_a_cell_are_refused() -> None:
         InputError, match=r"more than 20 ratings for 2 correlated .* got 20; .* --slopes none"
     ):
         fit_mixed(SLEEP, "who", "extra", ["drug"], None, "correlated")
+
+
+@pytest.mark.parametrize("categories", [2, 4])
+@pytest.mark.parametrize("n", [5, 60])
+def test_separation_is_named_and_not_blamed_on_few_ratings(categories: int, n: int) -> None:
+    from analysis.models.design import model_data
+    from analysis.models.ordinal import _refuse_undetermined
+    from analysis.models.roles import ModelTerms
+    from analysis.models.separation import separated_columns
+
+    rng = np.random.default_rng(n)
+    rows = pd.DataFrame(
+        {"who": np.repeat(np.arange(n), 12), "a": np.tile(["u", "v"], 6 * n), "x": rng.normal(size=12 * n)}
+    )
+    noise = rng.integers(0, categories, 12 * n)
+    edges = np.linspace(-1, 1, categories + 1)[1:-1]
+    terms = ModelTerms("who", "y", ("a",), covariates=("x",))
+    free = model_data(rows.assign(y=noise), terms)
+    assert separated_columns(free) == []
+    with pytest.raises(InputError, match="too few ratings"):
+        _refuse_undetermined(free, np.zeros(2))
+    split = model_data(rows.assign(y=np.searchsorted(edges, rows["x"])), terms)
+    assert "x" in separated_columns(split)
+    with pytest.raises(InputError, match=r"separated.*however many ratings"):
+        _refuse_undetermined(split, np.zeros(2))

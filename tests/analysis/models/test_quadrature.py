@@ -103,3 +103,72 @@ def test_an_sd_at_its_limit_is_noted(monkeypatch) -> None:
     result = fit_ordinal(rows, "participant", "rating", ["A"])
     assert result.sd_participant == pytest.approx(np.exp(0.5))
     assert "the SD of participants is at its upper limit of 1.6" in result.notes[-1]
+
+
+FEW = pd.read_csv(GOLDEN / "few_answers.csv")
+OF_FEW = json.loads((GOLDEN / "few_answers.json").read_text(encoding="utf-8"))
+
+
+def test_the_default_is_accurate_where_laplace_is_far_off() -> None:
+    """glmer with 50 nodes; Laplace's SD is off by more than a twentieth."""
+    theirs = OF_FEW["quadrature"]
+    ours = fit_ordinal(FEW, "participant", "answer", [], between=["group"], covariates=["time"])
+    assert [c.estimate for c in ours.coefficients] == pytest.approx(theirs["estimates"], rel=2e-3)
+    assert [c.se for c in ours.coefficients] == pytest.approx(theirs["se"], rel=2e-3)
+    assert ours.sd_participant == pytest.approx(theirs["sd"], rel=1e-3)
+    assert ours.quadrature > 1
+    laplace = fit_ordinal(
+        FEW, "participant", "answer", [], between=["group"], covariates=["time"], quadrature=1
+    )
+    assert laplace.sd_participant == pytest.approx(OF_FEW["laplace"]["sd"], rel=1e-3)
+    assert abs(laplace.sd_participant / ours.sd_participant - 1) > 0.05
+
+
+def test_laplace_is_warned_of_where_it_is_not_accurate_and_only_there() -> None:
+    far = fit_ordinal(FEW, "participant", "answer", [], slopes="all", covariates=["time"])
+    assert any("Laplace's approximation is not accurate" in note for note in far.notes)
+    rows = pd.read_csv(GOLDEN / "ordinal_slopes.csv")
+    near = fit_ordinal(rows, "participant", "rating", ["A", "B"], "clip", "main")
+    assert not any("Laplace" in note for note in near.notes)
+
+
+def test_the_warning_knows_how_far_the_estimates_are_off() -> None:
+    """One step from Laplace's maximum goes most of the way to that of the integrals."""
+    from analysis.models.approximation import laplace_step
+    from analysis.models.ordinal_maximum import maximise, pooled_start
+
+    rng = np.random.default_rng(8)
+    participant = np.repeat(np.arange(80), 6)
+    x = rng.choice([-1.0, 1.0], (480, 1))
+    score = 0.8 * x[:, 0] + rng.normal(0, 1.5, 80)[participant] + rng.logistic(size=480)
+    zeros = np.zeros(480, np.int64)
+    data = OrdinalData(
+        x, np.ones((480, 1)), zeros[:1], (score > 0).astype(np.int64), participant, zeros, 2, 80, 1
+    )
+    laplace = maximise(LaplaceLikelihood(data), pooled_start(data, False), False)
+    exact = maximise(QuadratureLikelihood(data, 60), laplace.parameters, False).parameters
+    step = laplace_step(data, laplace, False)
+    off = exact.sd[0] - laplace.parameters.sd[0]
+    assert abs(off) > 0.02 * exact.sd[0]
+    assert step[-2] == pytest.approx(off, rel=0.35)
+    assert step[1] == pytest.approx(exact.beta[0] - laplace.parameters.beta[0], rel=0.5)
+
+
+def test_points_of_many_dimensions_find_nothing_where_laplace_is_nearly_exact() -> None:
+    """Many ratings of each participant: a warning would be the points' own error."""
+    from analysis.models.approximation import laplace_step
+    from analysis.models.ordinal_maximum import maximise, pooled_start
+
+    rng = np.random.default_rng(9)
+    n, each = 12, 200
+    participant = np.repeat(np.arange(n), each)
+    z = np.column_stack([np.ones(n * each), rng.choice([-1.0, 1.0], (n * each, 3))])
+    own = rng.normal(0, 1, (n, 4))
+    score = 0.5 * z[:, 1] + (z * own[participant]).sum(axis=1) + rng.logistic(size=n * each)
+    zeros = np.zeros(n * each, np.int64)
+    category = np.searchsorted([-1.5, 0.0, 1.5], score).astype(np.int64)
+    data = OrdinalData(z[:, 1:], z, np.arange(4), category, participant, zeros, 4, n, 1)
+    maximum = maximise(LaplaceLikelihood(data), pooled_start(data, False), False)
+    step, errors = laplace_step(data, maximum, False), np.sqrt(np.diag(maximum.covariance))
+    assert (np.abs(step[3:6]) < 0.03 * errors[3:6]).all()
+    assert (np.abs(step[6:10]) < 0.03 * maximum.parameters.sd[:4]).all()
