@@ -162,8 +162,8 @@ def ordinal_model(analysis: Analysis) -> Section:
     if not every:
         text += (
             f" With more than {MAX_CELLS} cells slopes for every effect take minutes (analysis ordinal "
-            "--slopes all fits them); without them the p of interactions are too small where people differ in "
-            "them."
+            "--slopes all fits them); without them the p of interactions are too small where people "
+            "differ in them."
         )
     if named := _random_factors(analysis):
         text += (

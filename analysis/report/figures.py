@@ -4,7 +4,7 @@ every participant visible behind them. The same data give the same bytes."""
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, product
 from typing import Literal
 
 import matplotlib as mpl
@@ -17,7 +17,9 @@ from scipy import special
 from analysis.plans.result import Analysis
 from analysis.report.captions import in_words
 from analysis.report.pictures import BESIDE, COLOURS, MARKERS, STYLE, new_figure, write_note
-from analysis.within.marginal_means import level_combinations, margin
+from analysis.within.anova import AnovaResult
+from analysis.within.estimates import margin_of
+from analysis.within.marginal_means import margin
 from experiments.error_bars import within_participant_errors
 from experiments.trials.scales import RatedScale, scale_called
 
@@ -68,10 +70,10 @@ _OF_EXPERIMENT: dict[str, tuple[FigureSpec, ...]] = {
 def figures_of(analysis: Analysis) -> tuple[FigureSpec, ...]:
     """The figures of the paper for its experiments; for others each factor, and pairs of factors."""
     known = _OF_EXPERIMENT.get(analysis.name, ())
-    factors = set(analysis.anova.factors)
+    factors = set(analysis.anova.all_factors)
     if known and all({*spec.along, *([spec.colour] if spec.colour else [])} <= factors for spec in known):
         return known
-    names = analysis.anova.factors
+    names = analysis.anova.all_factors
     if len(names) == 1:
         (key,) = _keys([names])
         return (FigureSpec(key, analysis.labels.factor(names[0]), names),)
@@ -104,17 +106,53 @@ def draw(analysis: Analysis, spec: FigureSpec) -> Figure:
         _conditions(axes, analysis, spec)
         _dress(axes, analysis, spec)
         marks = "Points, thin lines and clouds" if spec.style == "points" else "Points and thin lines"
-        said = f"{marks}: participants. Bars: 95% CI within participants (Cousineau-Morey)."
+        said = f"{marks}: participants. {bars_of(analysis)}"
         write_note(figure, f"N = {analysis.n_participants}. {said}", analysis.synthetic)
     return figure
 
 
+def bars_of(analysis: Analysis) -> str:
+    """What the means and error bars of a figure are.
+
+    With groups or covariates they are the estimated marginal means of the table, and their intervals.
+    """
+    if _of_participants_alone(analysis):
+        return "Bars: 95% CI within participants (Cousineau-Morey)."
+    covariates = ", ".join(covariate.name for covariate in analysis.anova.between.covariates)
+    adjusted = f" at the mean of {covariates} (participants' points are not adjusted)" if covariates else ""
+    return f"Means and bars: estimated marginal means{adjusted} and their 95% CI, as in the table."
+
+
+def _of_participants_alone(analysis: Analysis) -> bool:
+    """Whether the design has neither groups nor covariates."""
+    return not analysis.anova.between.factors and not analysis.anova.between.covariates
+
+
+@dataclass(frozen=True)
+class _Shown:
+    """What a figure shows of each condition.
+
+    Attributes
+    ----------
+    values : (N, groups, shades) array
+        Participants' means; NaN where a participant belongs to another group.
+    means, errors : (groups, shades) array
+        Means and half the widths of their intervals.
+    groups, shades : list of str
+        Names along the axis, and of the colors.
+    """
+
+    values: Floats
+    means: Floats
+    errors: Floats
+    groups: list[str]
+    shades: list[str]
+
+
 def _conditions(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
-    values, groups, shades = _arranged(analysis, spec)
+    shown = _arranged(analysis, spec)
+    values, groups, shades = shown.values, shown.groups, shown.shades
     n_groups, n_shades = len(groups), len(shades)
-    reach = float(special.stdtrit(len(values) - 1, 0.975))
-    flat = values.reshape(len(values), -1)
-    errors = reach * np.array(within_participant_errors(flat.tolist())).reshape(n_groups, n_shades)
     offsets = (np.arange(n_shades) - (n_shades - 1) / 2) * _SPREAD / n_shades
     room = _SPREAD / n_shades
     jitter = (
@@ -128,7 +166,8 @@ def _conditions(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
             axes.plot(people, values[:, :, shade].T, color=colour, alpha=0.12, linewidth=0.5, zorder=1)
         for group in range(n_groups):
             if spec.style == "points":
-                _cloud(axes, at[group] + 0.06 * room, values[:, group, shade], 0.38 * room, colour)
+                there = values[~np.isnan(values[:, group, shade]), group, shade]
+                _cloud(axes, at[group] + 0.06 * room, there, 0.38 * room, colour)
             axes.plot(
                 at[group] + jitter,
                 values[:, group, shade],
@@ -141,8 +180,8 @@ def _conditions(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
             )
         axes.errorbar(
             at,
-            values[:, :, shade].mean(axis=0),
-            yerr=errors[:, shade],
+            shown.means[:, shade],
+            yerr=shown.errors[:, shade],
             color=colour,
             marker=MARKERS[shade % len(MARKERS)],
             linestyle="-" if spec.style == "lines" else "none",
@@ -175,22 +214,51 @@ def _density(values: Floats, at: Floats) -> Floats:
     return np.asarray(kernels.sum(axis=1), dtype=np.float64)
 
 
-def _arranged(analysis: Analysis, spec: FigureSpec) -> tuple[Floats, list[str], list[str]]:
-    """Participants' means (N, groups, shades) of the figure's margin, and the names of both."""
-    factors = analysis.anova.factors
+def _arranged(analysis: Analysis, spec: FigureSpec) -> _Shown:
+    """The conditions of the figure's margin: those along the axis, by the levels that have a color."""
+    result = analysis.anova
     named = [*spec.along, *([spec.colour] if spec.colour else [])]
-    members = tuple(sorted(factors.index(name) for name in named))
-    sizes = [len(analysis.anova.levels[m]) for m in members]
-    values: Floats = margin(analysis.anova, members).reshape(-1, *sizes)
-    order = [[factors[m] for m in members].index(name) for name in named]
-    values = np.moveaxis(values, [i + 1 for i in order], range(1, len(order) + 1))
-    along = tuple(factors.index(name) for name in spec.along)
-    groups = [_name(analysis, levels) for levels in level_combinations(analysis.anova, along)]
-    shades = [""]
-    if spec.colour:
-        levels = analysis.anova.levels[factors.index(spec.colour)]
-        shades = [analysis.labels.level(spec.colour, level) for level in levels]
-    return values.reshape(len(values), len(groups), len(shades)), groups, shades
+    of_margin = margin_of(result, named)
+    levels = dict(zip(result.all_factors, result.all_levels, strict=True))
+    sizes = [len(levels[name]) for name in of_margin.names]
+    order = [of_margin.names.index(name) for name in named]
+    members = tuple(m for m, name in enumerate(result.factors) if name in named)
+    own = _by_group(result, [name for name in of_margin.names if name not in result.factors])
+    values = (own[:, :, None] * margin(result, members)[:, None, :]).reshape(-1, *sizes)
+    means = of_margin.means.reshape(sizes)
+    if _of_participants_alone(analysis):
+        flat = values.reshape(len(values), -1).tolist()
+        errors = np.array(within_participant_errors(flat)).reshape(sizes)
+        reach = float(special.stdtrit(len(values) - 1, 0.975))
+    else:
+        errors = of_margin.contrasts(np.eye(means.size))[1].reshape(sizes)
+        reach = float(special.stdtrit(of_margin.df, 0.975))
+    combinations_along = list(product(*(levels[name] for name in spec.along)))
+    groups = [_name(analysis, dict(zip(spec.along, row, strict=True))) for row in combinations_along]
+    shades = (
+        [analysis.labels.level(spec.colour, name) for name in levels[spec.colour]] if spec.colour else [""]
+    )
+    shape = len(groups), len(shades)
+    return _Shown(
+        np.moveaxis(values, [i + 1 for i in order], range(1, len(order) + 1)).reshape(-1, *shape),
+        means.transpose(order).reshape(shape),
+        reach * errors.transpose(order).reshape(shape),
+        groups,
+        shades,
+    )
+
+
+def _by_group(result: AnovaResult, factors: Sequence[str]) -> Floats:
+    """1 in the own group of a participant, NaN in others: (N, groups) of these factors between people."""
+    design = result.between
+    at = [design.factors.index(name) for name in factors]
+    sizes = [len(design.levels[k]) for k in at]
+    own = np.zeros(result.n_participants, np.int64)
+    if at:
+        own = np.ravel_multi_index(tuple(design.codes[:, k] for k in at), sizes).astype(np.int64)
+    marks = np.full((result.n_participants, int(np.prod(sizes, initial=1))), np.nan)
+    marks[np.arange(len(own)), own] = 1.0
+    return marks
 
 
 def _name(analysis: Analysis, levels: dict[str, str]) -> str:

@@ -23,8 +23,12 @@ METHODS = (
     "and named. Effects are tested on orthonormal contrasts of the cell means. Multivariate: Hotelling's T², "
     "exact F on (q, N - q) df. Univariate: corrected by Greenhouse-Geisser and Huynh-Feldt. Marginal means "
     "and their errors come from participants' own marginal means. Pairs are t tests, paired within "
-    "participants. Error bars of figures are 95% intervals within participants (Cousineau 2005, Morey 2008)."
+    "participants."
 )
+
+WITHIN_BARS = " Error bars of figures are 95% intervals within participants (Cousineau 2005, Morey 2008)."
+
+MODEL_BARS = " Figures show the estimated marginal means of the table and their 95% intervals."
 
 
 def contents_of(
@@ -88,21 +92,21 @@ def scripts_of(analysis: Analysis, key: str) -> dict[str, bytes]:
 def methods_of(analysis: Analysis) -> str:
     """How the numbers came about."""
     if not analysis.anova.between.terms[1:]:
-        return METHODS
-    return METHODS + BETWEEN_METHODS.format(kind={2: "II", 3: "III"}[analysis.anova.sum_of_squares])
+        return METHODS + WITHIN_BARS
+    return (
+        METHODS + MODEL_BARS + BETWEEN_METHODS.format(kind={2: "II", 3: "III"}[analysis.anova.sum_of_squares])
+    )
 
 
 def draw_all(analysis: Analysis) -> tuple[Picture, ...]:
     """Draw every figure of the analysis."""
     # matplotlib takes a second to import, which commands that draw nothing need not pay
-    from analysis.report.figures import draw, figures_of
+    from analysis.report.figures import bars_of, draw, figures_of
     from analysis.report.pictures import in_both_formats
 
     pictures = []
     for spec in figures_of(analysis):
         figure = draw(analysis, spec)
-        shown = (
-            f"{spec.title}: mean ratings with within-participant 95% intervals and every participant's mean"
-        )
+        shown = f"{spec.title}: mean ratings and every participant's mean. {bars_of(analysis)}"
         pictures.append(Picture(spec.key, spec.title, shown, *in_both_formats(figure)))
     return tuple(pictures)

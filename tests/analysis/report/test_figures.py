@@ -1,0 +1,85 @@
+"""Figures show the means of the tables, also with groups of unequal size and covariates."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from analysis.cli import app
+from analysis.plans.result import Analysis, analyse_cells
+from analysis.read.long_csv import read_long_table
+from analysis.read.participant_columns import design_of
+from analysis.report.figures import draw, figures_of
+from analysis.within.cell_means import cell_table
+
+GOLDEN = Path(__file__).parents[2] / "golden" / "r" / "between"
+
+
+def analysed(name: str, within: list[str], between: list[str], covariates: list[str]) -> Analysis:
+    data = read_long_table(GOLDEN / f"{name}.csv", "id", "y", within, between=between, covariates=covariates)
+    cells = cell_table(data.rows, "id", "y", within)
+    design = design_of(data.rows, "id", cells.participants, between, covariates)
+    return analyse_cells(cells, name="own", title="", source="", rating="y", between=design)
+
+
+DESIGNS = [
+    (["phase"], ["treatment"], []),
+    (["phase", "hour"], ["treatment", "gender"], ["age"]),
+    (["phase"], [], ["age"]),
+    (["phase"], ["gender"], ["age"]),
+    ([], ["treatment"], ["age"]),
+]
+
+
+@pytest.mark.parametrize(("within", "between", "covariates"), DESIGNS)
+def test_a_figure_has_the_means_and_intervals_of_the_table(within, between, covariates) -> None:
+    analysis = analysed("obk", within, between, covariates)
+    table = {frozenset(m.levels.items()): m for m in analysis.means}
+    specs = figures_of(analysis)
+    shown = {name for spec in specs for name in (*spec.along, spec.colour) if name}
+    assert shown >= {*within[:1], *between[:1]}
+    seen = 0
+    for spec in specs:
+        axes = draw(analysis, spec).axes[0]
+        labels = [text.get_text() for text in axes.get_xticklabels()]
+        for container in axes.containers:
+            line, _, (bars,) = container.lines
+            for x, y, segment in zip(*line.get_data(), bars.get_segments(), strict=True):
+                levels = {spec.along[0]: labels[round(x)]}
+                if spec.colour:
+                    levels[spec.colour] = container.get_label()
+                wanted = table[frozenset(levels.items())]
+                assert y == pytest.approx(wanted.mean)
+                assert sorted(segment[:, 1]) == pytest.approx(wanted.ci)
+                seen += 1
+    assert seen >= 2 * len(specs)
+
+
+def test_a_figure_shows_participants_in_their_own_group_alone() -> None:
+    analysis = analysed("obk", ["phase"], ["treatment"], [])
+    (spec,) = figures_of(analysis)
+    axes = draw(analysis, spec).axes[0]
+    points = [line for line in axes.lines if line.get_marker() == "o" and line.get_markersize() == 2.6]
+    drawn = sum(int(np.isfinite(np.asarray(line.get_ydata(), float)).sum()) for line in points)
+    assert drawn == analysis.n_participants * 3
+
+
+def test_the_caption_says_what_the_bars_are(tmp_path: Path) -> None:
+    arguments = [
+        "anova",
+        str(GOLDEN / "obk.csv"),
+        "--participant",
+        "id",
+        "--rating",
+        "y",
+        "--within",
+        "phase",
+    ]
+    done = CliRunner().invoke(
+        app, [*arguments, "--between", "treatment", "--covariate", "age", "--out", str(tmp_path)]
+    )
+    assert done.exit_code == 0, done.output
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "estimated marginal means at the mean of age" in page
+    assert "Cousineau" not in page
