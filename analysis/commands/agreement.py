@@ -99,9 +99,10 @@ def _save_scores(path: Path, scores: tuple[tuple[str, float], ...], case: str) -
     import csv
 
     from experiments.files import whole_file
+    from experiments.spreadsheet import guarded_row
 
     with whole_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         out = csv.writer(file, lineterminator="\n")
-        out.writerow([case, "score"])
-        out.writerows(scores)
+        out.writerow(guarded_row([case, "score"]))
+        out.writerows(guarded_row(score) for score in scores)
     typer.echo(f"written: {path} ({len(scores)} scale scores, the mean of the items)")

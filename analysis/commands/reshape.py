@@ -29,11 +29,13 @@ def reshape(
     """
     from analysis.read.wide import lengthen
     from experiments.files import check_targets, whole_file
+    from experiments.spreadsheet import guarded_cell, guarded_row
 
     check_targets([out])
     table = lengthen(file, columns, rating)
     with whole_file(out) as temporary:
-        table.rows.to_csv(temporary, index=False, encoding="utf-8", lineterminator="\n")
+        rows = table.rows.rename(columns=guarded_cell).apply(guarded_row)
+        rows.to_csv(temporary, index=False, encoding="utf-8", lineterminator="\n")
     for decision in table.decisions:
         typer.echo(f"- {decision}")
     for factor in table.factors:

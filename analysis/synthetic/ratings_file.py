@@ -9,6 +9,7 @@ import numpy as np
 from analysis.synthetic.synthesise import Synthetic
 from analysis.synthetic.trials import Totals, rating_rows
 from experiments.files import whole_file
+from experiments.spreadsheet import guarded_row
 from experiments.trials.clip_rating.columns import RATINGS
 
 
@@ -33,9 +34,9 @@ def write_ratings(scales: Sequence[Synthetic], out: Path) -> int:
     sums = [Totals(made.scale, made.sums) for made in scales]
     count = 0
     with whole_file(out) as temporary, temporary.open("w", newline="", encoding="utf-8") as handle:
-        writer = csv.DictWriter(handle, header, lineterminator="\n")
-        writer.writeheader()
+        writer = csv.writer(handle, lineterminator="\n")
+        writer.writerow(guarded_row(header))
         for row in rating_rows(first.experiment, first.space, sums, rng):
-            writer.writerow(row)
+            writer.writerow(guarded_row(row[name] for name in header))
             count += 1
     return count

@@ -15,7 +15,7 @@ from server.accounts.audit import record
 from server.accounts.identity import OPERATOR
 from server.cli_common import out, stored_services
 from server.export.extract import ExportOrigin, Extract
-from server.export.formats import CSV_FORMATS, FORMATS, Format, proofed, row_count
+from server.export.formats import CSV_FORMATS, FORMATS, Format, row_count, spreadsheet_pieces
 from server.export.repository import runs_by_origin
 from server.export.scripts import LANGUAGES, script
 from server.studies.lookup import find_study
@@ -54,9 +54,11 @@ def export(
     guard: Annotated[
         bool,
         typer.Option(
-            "--guard", help="Put ' before cells of a CSV that a spreadsheet would run: = + - @, not numbers."
+            "--guard/--no-guard",
+            help="Put ' before each cell of a CSV that a spreadsheet would run as a formula (= + - @, not "
+            "numbers). --no-guard writes every text exactly as it was given: for programs alone.",
         ),
-    ] = False,
+    ] = True,
     scripts: Annotated[
         bool, typer.Option(help="Beside the long CSV, write scripts that analyse it with R and Python.")
     ] = True,
@@ -70,7 +72,7 @@ def export(
 
       server export exp3 --out exp3.csv
 
-      server export exp3 --format wide --bom --guard --out exp3-wide.csv
+      server export exp3 --format wide --bom --out exp3-wide.csv
 
       server export exp3 --format spss-wide --out exp3.sav
 
@@ -81,8 +83,8 @@ def export(
       server export exp3 --series 2 --out exp3-series-2.csv
     """
     beside = ""
-    if (bom or guard) and form not in CSV_FORMATS:
-        raise InputError(f"--bom and --guard are for CSV ({', '.join(CSV_FORMATS)}), not {form}")
+    if (bom or not guard) and form not in CSV_FORMATS:
+        raise InputError(f"--bom and --no-guard are for CSV ({', '.join(CSV_FORMATS)}), not {form}")
     if str(out_file) != "-":
         check_targets([out_file])
     with stored_services() as services, services.database.snapshot() as session:
@@ -94,7 +96,9 @@ def export(
             with services.database.write() as noted:
                 record(noted, None, action, "study", study, what=form, origin=origin)
         try:
-            size = _write(out_file, proofed(FORMATS[form](session, known, extract), form, bom, guard))
+            size = _write(
+                out_file, spreadsheet_pieces(FORMATS[form](session, known, extract), form, bom, guard)
+            )
             if form == "csv" and scripts and str(out_file) != "-":
                 beside = _write_scripts(out_file, extract.definition(session, known))
         except (ValueError, SQLAlchemyError) as error:

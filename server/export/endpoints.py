@@ -19,7 +19,7 @@ from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES, Conflict
 from server.export.converted import convert, write_table
 from server.export.extract import EVERYTHING, ExportOrigin, Extract
-from server.export.formats import CONVERSIONS, FORMATS, Conversion, Format, proofed, row_count
+from server.export.formats import CONVERSIONS, FORMATS, Conversion, Format, row_count, spreadsheet_pieces
 from server.export.identities import check_readable
 from server.export.scripts import ScriptLanguage, script
 from server.identities.sealing import UnreadableError
@@ -42,8 +42,13 @@ ROWS_HEADER = "palpebra-rows"
 """How many rows (CSV: below the header; zip: of ratings; JSON lines: runs) a whole download holds."""
 
 
-Excel = Annotated[
-    bool, Query(description="Begin with a byte order mark, and make cells text that a spreadsheet would run.")
+Excel = Annotated[bool, Query(description="Begin with a byte order mark, by which Excel knows UTF-8.")]
+Guard = Annotated[
+    bool,
+    Query(
+        description="Put an apostrophe before each cell that a spreadsheet would run as a formula. "
+        "False gives every text exactly as it was given: for programs alone."
+    ),
 ]
 Series = Annotated[
     Number | None, Query(description="Data of one data series; without it of all, told apart by a column.")
@@ -52,13 +57,14 @@ Series = Annotated[
 
 @dataclass(frozen=True)
 class Download:
-    """A download that somebody asks for; `excel` is of CSV alone."""
+    """A download that somebody asks for; `excel` and `guard` are of CSV alone."""
 
     services: Services
     identity: Identity
     study: str
     extract: Extract
     excel: bool = False
+    guard: bool = True
 
     def note(self, form: Format) -> None:
         """Note it in the audit log; refused where there is no such study, or no right to this of it."""
@@ -101,7 +107,7 @@ class Download:
             study = find_study(session, self.study, self.identity, "view")
             yield str(row_count(form, session, study, self.extract)).encode()
             export = FORMATS[form](session, study, self.extract)
-            yield from proofed(export, form, bom=self.excel, guard=self.excel)
+            yield from spreadsheet_pieces(export, form, bom=self.excel, guard=self.guard)
 
     def write(self, conversion: Conversion, folder: Path) -> int:
         """Write a table from one snapshot, which ends before the conversion; return its rows."""
@@ -122,8 +128,10 @@ async def _asked(
     return Download(services, identity, study, Extract(origin, series))
 
 
-async def _asked_as_csv(download: Annotated[Download, Depends(_asked)], excel: Excel = False) -> Download:
-    return replace(download, excel=excel)
+async def _asked_as_csv(
+    download: Annotated[Download, Depends(_asked)], excel: Excel = False, guard: Guard = True
+) -> Download:
+    return replace(download, excel=excel, guard=guard)
 
 
 Asked = Annotated[Download, Depends(_asked)]

@@ -7,10 +7,10 @@ from typing import Literal
 
 from sqlalchemy.orm import Session
 
+from experiments.spreadsheet import guarded_csv
 from server.clock import now
 from server.export import codebook, identities, psych_ds, repository, runs
 from server.export.converted import Ending, columns_json, converted
-from server.export.excel import guarded, marked
 from server.export.extract import Extract
 from server.export.pieces import csv_pieces, rating_pieces, whole
 from server.export.ratings_csv import rating_count
@@ -101,13 +101,18 @@ FORMATS: dict[Format, Pieces] = {
 
 
 CSV_FORMATS: tuple[Format, ...] = ("csv", "wide", "runs", "identities")
+BYTE_ORDER_MARK = "\ufeff".encode()
+"""By which Excel knows UTF-8."""
 
 
-def proofed(pieces: Iterable[bytes], form: Format, bom: bool, guard: bool) -> Iterator[bytes]:
-    """The pieces as they are; those of a CSV for a spreadsheet where `bom` or `guard` ask for it."""
+def spreadsheet_pieces(
+    pieces: Iterable[bytes], form: Format, bom: bool = False, guard: bool = True
+) -> Iterator[bytes]:
+    """The pieces of an export; of a CSV, guarded against formulas and after a byte order mark as chosen."""
     if form in CSV_FORMATS:
-        pieces = guarded(pieces) if guard else pieces
-        pieces = marked(pieces) if bom else pieces
+        pieces = guarded_csv(pieces) if guard else pieces
+        if bom:
+            yield BYTE_ORDER_MARK
     yield from pieces
 
 

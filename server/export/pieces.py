@@ -1,7 +1,5 @@
 """Tables as pieces of CSV bytes, so that a download of any length takes constant memory."""
 
-import csv
-import io
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import islice
 from typing import Any, TypeVar
@@ -9,6 +7,7 @@ from typing import Any, TypeVar
 from sqlalchemy.orm import Session
 
 from experiments.errors import InputError
+from experiments.spreadsheet import csv_text
 from server.export.extract import Extract
 from server.export.rating_lines import rating_lines
 from server.export.ratings_csv import factor_names, rating_count, rating_rows, view_of
@@ -37,9 +36,7 @@ def csv_pieces(rows: Iterable[Sequence[Any]]) -> Iterator[bytes]:
     """Rows as CSV in UTF-8, some hundred rows a piece."""
     remaining = iter(rows)
     while batch := list(islice(remaining, ROWS_A_PIECE)):
-        stream = io.StringIO()
-        csv.writer(stream, lineterminator="\n").writerows(batch)
-        yield encoded(stream.getvalue())
+        yield encoded(csv_text(batch))
 
 
 def rating_pieces(session: Session, study: Study, extract: Extract) -> Iterator[bytes]:

@@ -10,6 +10,7 @@ from sqlalchemy.orm import Session
 from experiments.columns import Column
 from experiments.definition import Experiment
 from experiments.definition.dataset import Creator
+from experiments.spreadsheet import guarded_csv
 from experiments.trials import KINDS
 from experiments.trials.scales import scales_of
 from server.export.codebook import markdown, variables_measured
@@ -75,7 +76,7 @@ def dataset_folder(session: Session, study: Study, made: str, extract: Extract) 
         )
     members = (
         *((path, [encoded(text)]) for path, text in texts.items()),
-        *((paths[table.name], csv_pieces(table.with_header())) for table in tables),
+        *((paths[table.name], guarded_csv(csv_pieces(table.with_header()))) for table in tables),
     )
     return Folder(iter(members), paths[tables[0].name], paths["runs"], renamed)
 

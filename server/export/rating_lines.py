@@ -21,7 +21,7 @@ from server.export.repository import Rows, Runs
 from server.models import Study
 
 CLIPS_KEPT = 20_000
-_EMPTY = '""\n'
+_EMPTY = '""\r\n'
 Part = Callable[[Rows], Iterable[str]]
 """The text of one stretch for each of some rows."""
 
@@ -121,12 +121,12 @@ def _text(cells: Iterable[Any]) -> str:
 def csv_texts(rows: Iterable[Iterable[Any]]) -> list[str]:
     """Each row as CSV, to be put beside others, so without the line's end.
 
-    The writer calls `write` once a row. It is told of line ends, or it would not quote them. A line of one
-    empty cell has quotes, which part of a line has not.
+    The writer calls `write` once per row. It quotes the characters of its line end alone, so both are in it.
+    A line of one empty cell has quotes, which part of a line has not.
     """
     lines = _Lines()
-    csv.writer(lines, lineterminator="\n").writerows(rows)
-    return ["" if line == _EMPTY else line[:-1] for line in lines]
+    csv.writer(lines, lineterminator="\r\n").writerows(rows)
+    return ["" if line == _EMPTY else line[:-2] for line in lines]
 
 
 class _Lines(list[str]):

@@ -20,17 +20,26 @@ from server.models import IdentityKey, RecruiterIdentity, StudyRun
 AT_ONCE = 500
 
 
-def keep(session: Session, run: StudyRun, study_key: str, known_as: KnownAs) -> None:
-    """Store who the person of a run is, under a key of its own."""
+def keep(session: Session, run: StudyRun, study_key: str, known_as: KnownAs, identifier: str) -> None:
+    """Store who the person of a run is, under a separate key.
+
+    `identifier` stands for all ways to write the person's id; visits are matched by its keyed hash.
+    """
     sealed = seal(session.info[SIGNING_KEY](), run.public_id, known_as)
     session.add(
         RecruiterIdentity(
             study_run_id=run.id,
-            identifier_hash=identifier_hash(study_key, known_as.identifier),
+            identifier_hash=identifier_hash(study_key, identifier),
             sealed=sealed.content,
         )
     )
     session.add(IdentityKey(study_run_id=run.id, wrapped_key=sealed.wrapped_key))
+
+
+def is_known(session: Session, study_key: str, identifier: str) -> bool:
+    """Whether a visit is kept under the id exactly as it is written here."""
+    same = RecruiterIdentity.identifier_hash == identifier_hash(study_key, identifier)
+    return session.scalar(select(RecruiterIdentity.study_run_id).where(same).limit(1)) is not None
 
 
 def known_as(session: Session, run: StudyRun) -> KnownAs | None:

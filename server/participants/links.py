@@ -212,7 +212,8 @@ def _new_run(
         repository.delete_previews(session, study, now() - keep)
     public_id = new_public_id()
     token = derived_token(services.settings.key, RUN_PURPOSE, public_id)
-    identifier = recruiter_of(link).participant(start.query) or ""
+    recruiter = recruiter_of(link)
+    identifier = returning.settled_id(session, link, recruiter, start.query)
     evidence = _evidence(services, session, origin, start)
     run = StudyRun(
         public_id=public_id,
@@ -235,8 +236,9 @@ def _new_run(
     )
     repository.add_all(session, [run])
     if start.query:
-        parameters = without_signature(recruiter_of(link), start.query)
-        identities.keep(session, run, study.pseudonym_key, KnownAs(identifier, parameters))
+        written = recruiter.participant(start.query) or ""
+        known_as = KnownAs(written, without_signature(recruiter, start.query))
+        identities.keep(session, run, study.pseudonym_key, known_as, identifier)
     if deciding(loaded.experiment) is None:
         group = _group(loaded.experiment, link)
         assign_slot(

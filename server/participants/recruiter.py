@@ -1,5 +1,8 @@
 """Where participants come from and go back to: Prolific, SONA, MTurk, or any other address.
 
+A recruiter's id arrives in an address that anybody can write. It is checked against the form in which that
+recruiter writes its ids, and ids that differ only in case or blanks are one person's.
+
 A study's (or link's) `recruiter` is an object with these keys, all but `kind` optional:
 kind: prolific, sona, mturk or generic. id_parameter: which address parameter names the participant.
 redirect_url: where to go at the end; {code}, {run} and {any address parameter} are filled in.
@@ -13,11 +16,14 @@ signatures); without it addresses are not signed. secret_name: another name make
 """
 
 import re
+import unicodedata
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 from urllib.parse import quote
 
 from pydantic import BaseModel, ConfigDict, StringConstraints
+
+from server.participants.refusals import IdentifierInvalid
 
 Code = Annotated[str, StringConstraints(max_length=100)]
 Address = Annotated[str, StringConstraints(max_length=1000, pattern=r"^(https?://.*)?$")]
@@ -28,6 +34,16 @@ ID_PARAMETERS = {
     "mturk": "workerId",
     "generic": "participant",
 }
+ID_FORMS = {
+    "prolific": (r"[0-9a-f]{24}", "24 letters and digits from 0-9 and a-f"),
+    "sona": (r"[0-9a-z_-]{1,64}", "letters and digits"),
+    "mturk": (r"a[0-9a-z]{7,30}", "the letter A and 8 to 31 letters and digits in all"),
+    "generic": (
+        r"[^\W_][^\x00-\x1f\x7f;]{0,199}",
+        "at most 200 characters without a semicolon, the first a letter or digit",
+    ),
+}
+"""How each recruiter writes its ids, as a pattern of the canonical id and in words."""
 WEB_ADDRESS = r"^(https?://[^/?#{}@\\\s\x00-\x1f\x7f]+([/?#][^\x00-\x1f\x7f]*)?)?$"
 """The host is written out: what an address says of a participant must not decide where others are sent."""
 PROLIFIC_HOME = "https://app.prolific.com/"
@@ -59,8 +75,33 @@ class Recruiter(BaseModel):
         return self.id_parameter or ID_PARAMETERS[self.kind]
 
     def participant(self, parameters: Mapping[str, str]) -> str | None:
-        """The participant's id among the address parameters; None where it is not there."""
+        """The participant's id as the address writes it; None where it is not there."""
         return parameters.get(self.id_name) or None
+
+    def canonical_id(self, parameters: Mapping[str, str]) -> str | None:
+        """The id by which visits of one person are known; None where the address names nobody.
+
+        Raises
+        ------
+        IdentifierInvalid
+            The id is not written as this recruiter writes its ids.
+        """
+        identifier = self.participant(parameters)
+        if identifier is None:
+            return None
+        canonical = self.same_id(identifier)
+        pattern, in_words = ID_FORMS[self.kind]
+        if not re.fullmatch(pattern, canonical.casefold()):
+            raise IdentifierInvalid(
+                f"{self.id_name}: expected {in_words}, got '{identifier[:40]}'. Please open the study again "
+                "with the whole link that you were given."
+            )
+        return canonical
+
+    def same_id(self, identifier: str) -> str:
+        """The one text that stands for all ways to write an id: without blanks, in one case and width."""
+        folded = "".join(unicodedata.normalize("NFKC", identifier).split()).casefold()
+        return folded.upper() if self.kind == "mturk" else folded  # as Mechanical Turk writes them
 
     def code(self, outcome: Literal["complete", "failed_check"], own: str) -> str:
         """The declared code of this outcome, or the run's own."""

@@ -69,6 +69,12 @@ class ResumeCodeWrong(Conflict):
     code = "resume_code_wrong"
 
 
+class IdentifierInvalid(Invalid):
+    """The recruiter's id in the address is not written as that recruiter writes its ids."""
+
+    code = "identifier_invalid"
+
+
 class SignatureMissing(Conflict):
     """Addresses of this study are signed, and this one is not."""
 

@@ -5,6 +5,7 @@ that the page has shown, or by an address that was signed with the study's secre
 visit it is and opens nothing: it stands in addresses, lists and e-mails, and some recruiters count it up.
 """
 
+from collections.abc import Mapping
 from datetime import datetime, timedelta
 
 from sqlalchemy.orm import Session
@@ -12,6 +13,7 @@ from sqlalchemy.orm import Session
 from experiments.definition import Experiment
 from server.clock import now
 from server.context import Services
+from server.identities import repository as identities
 from server.models import NO_SLOT, Link, Study, StudyRun
 from server.participants import repository
 from server.participants.identities import fits, pseudonym, resume_code, run_prefix
@@ -29,10 +31,30 @@ from server.tokens import hash_token
 
 
 def name_of(link: Link, study: Study, identifier: str) -> str | None:
-    """The study's pseudonym of who comes by this link; None where nothing tells people apart."""
+    """The study's pseudonym of the person who comes by this link; None where nothing tells people apart."""
     if link.kind == "personal":
         return pseudonym(study.pseudonym_key, f"link:{link.public_id}")
     return pseudonym(study.pseudonym_key, f"recruiter:{identifier}") if identifier else None
+
+
+def settled_id(session: Session, link: Link, recruiter: Recruiter, parameters: Mapping[str, str]) -> str:
+    """The id by which visits of one person are known; empty where the address names nobody.
+
+    Earlier releases told ids of different case apart: a person who is known under the id exactly as it is
+    written stays known under it. Previews take any id, since nobody is paid or counted by it.
+
+    Raises
+    ------
+    IdentifierInvalid
+        The id is not written as this recruiter writes its ids.
+    """
+    written = recruiter.participant(parameters)
+    if written is None:
+        return ""
+    canonical = recruiter.same_id(written) if link.kind == "preview" else recruiter.canonical_id(parameters)
+    if canonical is None or canonical == written:
+        return written
+    return written if identities.is_known(session, link.study.pseudonym_key, written) else canonical
 
 
 def known_run(
@@ -56,8 +78,8 @@ def _run_of_id(
     signed = is_signed(services.settings.key, link.study.pseudonym_key, recruiter, start.query)
     if recruiter.kind == "generic" and not signed:
         return None
-    identifier = recruiter.participant(start.query)
-    name = name_of(link, link.study, identifier) if identifier else None
+    identifier = settled_id(session, link, recruiter, start.query)
+    name = name_of(link, link.study, identifier)
     other = repository.latest_run(session, link, name) if name else None
     if other is None:
         return None

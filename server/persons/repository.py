@@ -9,6 +9,7 @@ from sqlalchemy.orm import Session
 from server.identities.sealing import identifier_hash
 from server.models import Base, Link, RecruiterIdentity, RunEvent, Study, StudyRun, View, ViewClip
 from server.operations.rows import time_text
+from server.participants.recruiter import Recruiter
 from server.runs.repository import of_personal_link
 from server.text import visible
 
@@ -20,14 +21,18 @@ OF_LINKS = frozenset({"public_id", "kind", "created_at", "label"})
 
 
 def runs_known_as(session: Session, study: Study, identifier: str) -> list[StudyRun]:
-    """The visits to a study under a recruiter's id, found by its keyed hash, erased ones left out."""
-    hashed = identifier_hash(study.pseudonym_key, identifier)
+    """The visits to a study under a recruiter's id, however written, erased ones left out.
+
+    They are found by the keyed hash of the id.
+    """
+    written = {identifier, *(Recruiter(kind=kind).same_id(identifier) for kind in ("generic", "mturk"))}
+    hashed = [identifier_hash(study.pseudonym_key, one) for one in sorted(written)]
     query = select(StudyRun).join(RecruiterIdentity, RecruiterIdentity.study_run_id == StudyRun.id)
     query = query.where(
         StudyRun.study_id == study.id, StudyRun.erased_at.is_(None), StudyRun.origin != "preview"
     )
     return list(
-        session.scalars(query.where(RecruiterIdentity.identifier_hash == hashed).order_by(StudyRun.id))
+        session.scalars(query.where(RecruiterIdentity.identifier_hash.in_(hashed)).order_by(StudyRun.id))
     )
 
 

@@ -1,12 +1,11 @@
 """Links on the dashboard."""
 
-import csv
-import io
 from datetime import timedelta
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Response
 
+from experiments.spreadsheet import guarded_table
 from server.accounts.audit import record
 from server.accounts.permission import Myself, Writer
 from server.clock import now
@@ -102,18 +101,16 @@ def get_signing(
 @router.get("/personal.csv", response_class=Response)
 def download_personal_links(services: ServicesDep, identity: Writer, study: str) -> Response:
     """The personal links as CSV: label, link, runs, complete, group."""
-    stream = io.StringIO()
-    writer = csv.writer(stream)
-    writer.writerow(["label", "url", "runs", "complete", "group"])
+    rows: list[tuple[Any, ...]] = [("label", "url", "runs", "complete", "group")]
     with services.database.read() as session:
         known = find_study(session, study, identity, "run")
         for link, runs, complete in links_with_runs(session, known, LINKS_READ_AT_ONCE, "personal"):
             url = link_url(services.settings.public_url, services.settings.key, link.public_id)
-            writer.writerow([link.label, url, runs, complete, link.group_name])
+            rows.append((link.label, url, runs, complete, link.group_name))
     with services.database.write() as session:
         record(session, identity, "personal links downloaded", "study", study)
     headers = {"content-disposition": f'attachment; filename="{study}-links.csv"'}
-    return Response(stream.getvalue(), media_type="text/csv; charset=utf-8", headers=headers)
+    return Response(guarded_table(rows), media_type="text/csv; charset=utf-8", headers=headers)
 
 
 @router.delete("/{link}", status_code=204)

@@ -13,6 +13,7 @@ import pandas as pd
 from analysis.read.files.cells import Cells
 from analysis.read.files.raggedness import lines_of_rows
 from experiments.errors import InputError
+from experiments.spreadsheet import unguarded_cell
 
 _MARKS = (
     (codecs.BOM_UTF32_LE, "UTF-32"),
@@ -76,7 +77,7 @@ def delimited_header(path: Path) -> tuple[list[str], str]:
         raise InputError(f"{path.name} is not a CSV file: {error}") from error
     if not any(name.strip() for name in header):
         raise InputError(f"{path.name} is empty; expected a header line and one row a trial")
-    return [name.strip() for name in header], separator
+    return [unguarded_cell(name.strip()) for name in header], separator
 
 
 def delimited_cells(path: Path, names: list[str]) -> Cells:
@@ -115,4 +116,9 @@ def _parse(path: Path, separator: str, positions: list[int], width: int) -> pd.D
         raise InputError(f"{path.name}: not a CSV file ({text})") from error
     except UnicodeDecodeError as error:
         raise InputError(f"{path.name} is not UTF-8 text ({error.reason}); save it as CSV UTF-8") from error
-    return frame[positions].copy()
+    chosen = frame[positions].copy()
+    for column in chosen:
+        # An export writes an apostrophe before texts that would run as formulas.
+        if chosen[column].str.contains("'", regex=False).any():
+            chosen[column] = chosen[column].map(unguarded_cell)
+    return chosen

@@ -7737,6 +7737,7 @@ export interface operations {
   parameters: {
    query?: {
     excel?: boolean;
+    guard?: boolean;
     origin?: "participant" | "pilot" | "simulated" | "all";
     series?: number | null;
    };
@@ -7772,6 +7773,7 @@ export interface operations {
   parameters: {
    query?: {
     excel?: boolean;
+    guard?: boolean;
     origin?: "participant" | "pilot" | "simulated" | "all";
     series?: number | null;
    };
@@ -7807,6 +7809,7 @@ export interface operations {
   parameters: {
    query?: {
     excel?: boolean;
+    guard?: boolean;
     origin?: "participant" | "pilot" | "simulated" | "all";
     series?: number | null;
    };

@@ -11,6 +11,22 @@ export interface Table {
   readonly rows: readonly (readonly string[])[];
 }
 
+const NUMBER = /^\s*[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?\s*$/i;
+
+/** The text of a cell with an apostrophe where a spreadsheet would run it as a formula (experiments/spreadsheet.py). */
+export function guardedText(text: string): string {
+  const whole = /^[=+\-@＝＋－＠﹦﹢﹣﹫\t\r\n]/.test(text) && !NUMBER.test(text) ? `'${text}` : text;
+  return whole.replaceAll(/(?<=[;\t])(?=[=+\-@＝＋－＠﹦﹢﹣﹫][\s\w.("'$@+\-={])/g, (_, at: number) =>
+    NUMBER.test(whole.slice(at).split(/[;\t]/)[0] ?? "") ? "" : "'",
+  );
+}
+
+/** The text that `guardedText` was given; any other text as it is. */
+function plainText(text: string): string {
+  const plain = text.replaceAll(/(^|[;\t])'(?=[=+\-@＝＋－＠﹦﹢﹣﹫\t\r\n])/g, "$1");
+  return plain !== text && guardedText(plain) === text ? plain : text;
+}
+
 function fieldsOf(line: string): string[] {
   if (!line.includes('"')) return line.split(",");
   const fields: string[] = [];
@@ -32,8 +48,8 @@ export function parseTable(name: string, text: string): Table {
   }
   return {
     name,
-    header: fieldsOf(first).map((field) => field.trim()),
-    rows: rest.map((line) => fieldsOf(line).map((field) => field.trim())),
+    header: fieldsOf(first).map((field) => plainText(field.trim())),
+    rows: rest.map((line) => fieldsOf(line).map((field) => plainText(field.trim()))),
   };
 }
 
@@ -54,6 +70,7 @@ export function wholeAt(table: Table, row: number, index: number): number {
 
 /** A field as CSV writes it. */
 export function csvField(value: string | number): string {
-  const text = String(value).replaceAll(/[\r\n]+/g, " ");
+  const plain = String(value).replaceAll(/[\r\n]+/g, " ");
+  const text = typeof value === "number" ? plain : guardedText(plain);
   return /[",]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
 }

@@ -35,7 +35,7 @@ def test_an_answer_screens_out_with_a_code_and_the_way_back(
     study = server.add_study(tmp_path / "clips", declared)
     server.start()
     link = server.link(study, "general", recruiter=PROLIFIC)
-    visit = Visit(page, server.address).open(link, "?PROLIFIC_PID=p1").begin(age="70")
+    visit = Visit(page, server.address).open(link, "?PROLIFIC_PID=5f1a9c0e7b2d3c4e5f6a7b8c").begin(age="70")
     page.wait_for_selector("text=Not this time")
     assert axe_violations(page) == []
     assert visit.code() == "OUT"
@@ -43,7 +43,7 @@ def test_an_answer_screens_out_with_a_code_and_the_way_back(
     assert back == "https://app.prolific.com/submissions/complete?cc=OUT"
     assert [row["status"] for row in server.rows(STATUS)] == ["screened_out"]
     assert '"field": "age"' in str(server.rows(REASON))
-    visit.open(link, "?PROLIFIC_PID=p1")  # coming back shows the same, and begins nothing
+    visit.open(link, "?PROLIFIC_PID=5f1a9c0e7b2d3c4e5f6a7b8c")  # coming back begins nothing
     page.wait_for_selector("text=Not this time")
     assert visit.code() == "OUT"
     assert len(server.rows(STATUS)) == 1

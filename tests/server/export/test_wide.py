@@ -10,7 +10,6 @@ from experiments.columns.form_columns import form_columns
 from experiments.load import parse_experiment
 from server.context import Services
 from server.export import wide
-from server.export.excel import guarded_cell
 from server.export.extract import EVERYTHING
 from server.export.ratings_csv import rating_rows
 from server.export.scripts import LANGUAGES, script
@@ -114,24 +113,16 @@ def test_a_spreadsheet_gets_a_mark_and_nothing_it_could_run(
     person = Participant(client, study.link_token).agree()
     evil = '=HYPERLINK("http://example.org";"a")'
     person.request("PUT", "/forms/about", {"answers": {"age": evil}})
-    plain = viewer.get("/studies/short/data/runs.csv").content
+    plain = viewer.get("/studies/short/data/runs.csv?guard=false").content
+    usual = viewer.get("/studies/short/data/runs.csv").content
     safe = viewer.get("/studies/short/data/runs.csv?excel=true").content
     assert not plain.startswith(b"\xef\xbb\xbf")
     assert safe.startswith(b"\xef\xbb\xbf")
     [row] = csv.DictReader(io.StringIO(plain.decode()))
     [guarded] = csv.DictReader(io.StringIO(safe.decode("utf-8-sig")))
     assert row["form_about_age"] == evil
+    assert safe == b"\xef\xbb\xbf" + usual
     assert guarded["form_about_age"] == f"'{evil}"
-
-
-@pytest.mark.parametrize("cell", ["=1", "+1+1", "-1+1", "@SUM(A1)", "\t=1", "\r=1", "-", "+fast"])
-def test_what_a_spreadsheet_would_run_is_text(cell: str) -> None:
-    assert guarded_cell(cell) == f"'{cell}"
-
-
-@pytest.mark.parametrize("cell", ["-1.5", "+2", "1e-3", "", "a=b", "'=1"])
-def test_numbers_and_texts_stay(cell: str) -> None:
-    assert guarded_cell(cell) == cell
 
 
 def test_columns_of_forms_never_share_a_name() -> None:

@@ -10,8 +10,9 @@ from sqlalchemy import inspect, text
 
 from server.context import Services
 from server.identities.repository import known_as
-from server.identities.sealing import KnownAs
+from server.identities.sealing import KnownAs, identifier_hash
 from server.models import IdentityKey, RecruiterIdentity, StudyRun
+from server.participants.identities import pseudonym
 from tests.helpers.admins import Admin
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study
 
@@ -46,6 +47,72 @@ def test_a_recruiters_id_alone_does_not_hand_over_a_visit(
     assert victim.token not in answer.text
     assert victim.run_id not in answer.text
     assert attacker.token == ""
+
+
+@pytest.mark.parametrize(
+    "written", ["sona-40177", "SONA-40177", " Sona-40177 ", "Sona-\u00a040177", "Ｓona-40177"]
+)
+def test_ids_that_differ_in_case_or_blanks_are_one_persons(
+    client: TestClient, link: str, victim: Participant, written: str
+) -> None:
+    answer = Participant(client, link).start(query={"survey_code": written})
+    assert code_of(answer) == (409, "resume_code_needed")
+
+
+def test_somebody_known_by_an_id_as_it_is_written_stays_known_by_it(
+    client: TestClient, link: str, victim: Participant, services: Services
+) -> None:
+    """As earlier releases stored it, who told ids of different case apart."""
+    with services.database.write() as session:
+        run = session.query(StudyRun).filter_by(public_id=victim.run_id).one()
+        key = run.study.pseudonym_key
+        run.participant = pseudonym(key, f"recruiter:{SONA_CODE}")
+        row = session.get_one(RecruiterIdentity, run.id)
+        row.identifier_hash = identifier_hash(key, SONA_CODE)
+    answer = Participant(client, link).start(query={"survey_code": SONA_CODE})
+    assert code_of(answer) == (409, "resume_code_needed")
+
+
+GOOD_IDS = [
+    ("prolific", "PROLIFIC_PID", "5f1a9c0e7b2d3c4e5f6a7b8c"),
+    ("prolific", "PROLIFIC_PID", "5F1A9C0E7B2D3C4E5F6A7B8C"),
+    ("sona", "survey_code", "40177"),
+    ("mturk", "workerId", "A2ZKX7P0Q1W3E5"),
+    ("generic", "participant", "P-01"),
+    ("generic", "participant", "anna.müller+1@example.org"),
+    ("generic", "participant", "参加者7"),
+]
+BAD_IDS = [
+    ("prolific", "PROLIFIC_PID", "p1"),
+    ("prolific", "PROLIFIC_PID", "{{%PROLIFIC_PID%}}"),
+    ("prolific", "PROLIFIC_PID", '=HYPERLINK("http://example.org";"a")'),
+    ("sona", "survey_code", "%SURVEY_CODE%"),
+    ("mturk", "workerId", "${workerId}"),
+    ("generic", "participant", "=1+1"),
+    ("generic", "participant", "＝1+1"),
+    ("generic", "participant", "x;=1+1"),
+    ("generic", "participant", "a" * 201),
+]
+
+
+@pytest.mark.parametrize(("kind", "parameter", "identifier"), GOOD_IDS)
+def test_every_recruiters_own_ids_are_taken(
+    client: TestClient, study: StudyInDatabase, kind: str, parameter: str, identifier: str
+) -> None:
+    person = Participant(client, study.link(recruiter={"kind": kind}))
+    assert person.start(query={parameter: identifier}).status_code == 201
+
+
+@pytest.mark.parametrize(("kind", "parameter", "identifier"), BAD_IDS)
+def test_an_id_that_a_recruiter_does_not_write_begins_nothing(
+    client: TestClient, study: StudyInDatabase, kind: str, parameter: str, identifier: str
+) -> None:
+    person = Participant(client, study.link(recruiter={"kind": kind}))
+    answer = person.start(query={parameter: identifier})
+    assert code_of(answer) == (422, "identifier_invalid")
+    assert parameter in answer.json()["error"]["message"]
+    preview = Participant(client, study.link("preview", recruiter={"kind": kind}))
+    assert preview.start(query={parameter: identifier}).status_code == 201
 
 
 def test_a_finished_visits_code_is_not_shown_for_a_recruiters_id(

@@ -218,7 +218,7 @@ def test_completion_gives_the_same_code_each_time(participant: Participant) -> N
 def test_codes_and_redirects_of_a_recruiter(client: TestClient, study: StudyInDatabase, honest: bool) -> None:
     recruiter = {"kind": "prolific", "code_complete": "GOOD1", "code_failed_check": "BAD1"}
     participant = Participant(client, study.link(recruiter=recruiter))
-    participant.start(query={"PROLIFIC_PID": "a&b"})
+    participant.start(query={"PROLIFIC_PID": "5f1a9c0e7b2d3c4e5f6a7b8c"})
     participant.request("PUT", "/consent", {"agreed": True})
     trials = participant.state()["trials"]
     for trial in [trial for trial in trials if trial["kind"] == "attention"] if not honest else []:

@@ -148,7 +148,7 @@ def test_a_person_is_the_same_by_id_and_by_run(
         # Two visits by the personal link, each under another id: the second and the third visit.
         runs["third"].link_id = runs["second"].link_id
         for name, code in {"first": "a", "second": "a", "third": "b", "preview": "a", "other": "c"}.items():
-            keep(session, runs[name], runs[name].study.pseudonym_key, KnownAs(code))
+            keep(session, runs[name], runs[name].study.pseudonym_key, KnownAs(code), code)
     hers = {people[name].run_id for name in ("first", "second", "third")}
     with services.database.read() as session:
         known = run_of(session, people["first"].run_id).study

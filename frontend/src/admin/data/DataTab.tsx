@@ -52,7 +52,7 @@ export function DataTab() {
     const holdsData = !file.startsWith("analysis.") && file !== "identities.csv" && file !== "codebook.md";
     if (origin !== "participant" && holdsData) options.set("origin", origin);
     if (series !== null && holdsData) options.set("series", String(series));
-    if (excel && file.endsWith(".csv") && file !== "identities.csv") options.set("excel", "true");
+    if (excel && file.endsWith(".csv")) options.set("excel", "true");
     return options.size > 0 ? `?${options.toString()}` : "";
   };
   const option = `${origin === "participant" ? "" : ` --origin ${origin}`}${series === null ? "" : ` --series ${series}`}`;
@@ -72,7 +72,7 @@ export function DataTab() {
         checked={excel}
         onChange={(event) => setExcel(event.currentTarget.checked)}
         label="For Excel"
-        description="CSV files begin with a mark by which Excel knows their letters, and no cell of them can run as a formula. Leave it off for R, Python and analysis run."
+        description="CSV files begin with a mark that shows Excel how letters are encoded. In every CSV file, an apostrophe before = + - @ keeps a text from running as a formula; analysis run removes it again."
       />
       <SealCard study={study} />
       <CapsuleCard study={study} origin={origin === "all" ? "participant" : origin} series={series} />

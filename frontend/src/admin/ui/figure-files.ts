@@ -2,6 +2,8 @@
 
 import * as Plot from "@observablehq/plot";
 
+import { guardedText } from "../../labelling/csv";
+
 type Cell = string | number | null | undefined;
 export type Row = Record<string, Cell>;
 
@@ -76,6 +78,6 @@ export function csvText(rows: readonly Row[]): string {
 function cellText(cell: Cell): string {
   if (cell === null || cell === undefined || Number.isNaN(cell)) return "";
   if (typeof cell === "number") return String(cell);
-  const safe = /^[=+\-@\t\r]/.test(cell) ? `'${cell}` : cell;
+  const safe = guardedText(cell);
   return /[",\r\n]/.test(safe) ? `"${safe.replaceAll('"', '""')}"` : safe;
 }
