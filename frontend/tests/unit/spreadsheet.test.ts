@@ -8,7 +8,7 @@ describe("texts that a spreadsheet would run", () => {
   it.each(FORMULAS)("are guarded and come back: %j", (cell) => {
     expect(guardedText(cell)).toBe(`'${cell}`);
     const written = `a,b\n${csvField(cell)},1\n`;
-    expect(parseTable("t.csv", written).rows[0]?.[0]).toBe(cell.trim() === cell ? cell : guardedText(cell).slice(1));
+    expect(parseTable("t.csv", written).rows[0]?.[0]).toBe(cell);
   });
 
   it.each(["-1.5", "+2", "1e-3", "", "a=b", "well ;-)", "1;-2"])("other texts stay: %j", (cell) => {
