@@ -2,11 +2,11 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 from analysis.pairs.comparisons import LEFT, RIGHT
 from analysis.pairs.likelihood import Counts, Fit, Model
 from analysis.pairs.pairs_result import Goodness
+from analysis.thresholds.deviance import fit_p
 
 Array = NDArray[np.float64]
 
@@ -22,9 +22,7 @@ def goodness_of_fit(model: Model, counts: Counts, fitted: Fit) -> Goodness:
     ratio = np.where(outcomes > 0, outcomes / np.where(expected > 0, expected, 1.0), 1.0)
     deviance = float(2 * np.sum(outcomes * np.log(ratio)))
     df = outcomes.shape[0] * (outcomes.shape[1] - 1) - model.names
-    return Goodness(
-        deviance, df, float(stats.chi2.sf(deviance, df)) if df > 0 else float("nan"), model.order_effect
-    )
+    return Goodness(deviance, df, fit_p(deviance, df, outcomes.sum(axis=1)), model.order_effect)
 
 
 def _unordered(counts: Counts, values: Array) -> Array:

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
 
+from analysis.thresholds.deviance import fit_p
 from analysis.thresholds.likelihood import Interval
 from analysis.thresholds.plane_likelihood import Array, PlaneLikelihood, PlaneShape, Points
 from analysis.thresholds.plane_profiles import BROAD, PlaneProfiles
@@ -149,7 +149,7 @@ def fit_plane(
         value,
         deviance,
         df,
-        float(stats.chi2.sf(deviance, df)) if df > 0 else float("nan"),
+        fit_p(deviance, df, points.n),
         int(points.n.sum()),
         points.n.size,
         falling,

@@ -5,10 +5,23 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special, stats
 
-from analysis.thresholds.likelihood import BOUND, LAPSE_MAX, Array, Interval, Likelihood, Shape, Trials
+from analysis.thresholds.deviance import fit_p, too_few_repeats
+from analysis.thresholds.likelihood import (
+    BOUND,
+    LAPSE_MAX,
+    Array,
+    Interval,
+    Likelihood,
+    Shape,
+    Trials,
+    function,
+)
 from experiments.errors import InputError
 
 NORMAL_95 = float(special.ndtri(0.975))
+
+STEP = 1e-6
+"""How near its ends a function is that has reached them."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +101,13 @@ def fit_threshold(
     location = centre + unit * best[0]
     log_spread = best[1] + (0.0 if shape == "weibull" else float(np.log(unit)))
     lapsed = best[2] if lapse is None else lapse
-    notes = _doubts(trials, location, log_spread, shape, lapsed, lapse is None) + _below(trials, guess)
+    step = _is_step(model, trials, best)
+    notes = _doubts(trials, location, log_spread, shape, lapsed, lapse is None, step) + _below(trials, guess)
+    if trials.x.size > len(best) and too_few_repeats(trials.n):
+        notes.append(
+            f"no fit p: {int(trials.n.sum())} answers at {trials.x.size} levels repeat too few stimuli for a "
+            "test of the fit"
+        )
     low, high = float(trials.x.min()), float(trials.x.max())
     if not low - 3 * (high - low) <= location <= high + 3 * (high - low):
         raise InputError(
@@ -123,7 +142,7 @@ def fit_threshold(
         float(value),
         deviance,
         df,
-        float(stats.chi2.sf(deviance, df)) if df > 0 else float("nan"),
+        fit_p(deviance, df, trials.n),
         int(trials.n.sum()),
         trials.x.size,
         model.falling,
@@ -192,14 +211,33 @@ def _deviance(trials: Trials, p: Array) -> float:
     return float(2 * terms.sum())
 
 
+def _is_step(model: Likelihood, trials: Trials, best: Array) -> bool:
+    """Whether the function is a step: the likelihood never falls as the slope grows.
+
+    Without guesses and lapses that is so where every level but one has answers of one kind alone, the other
+    kind on the other side; else where the fitted function passes between its ends at one level at most.
+    """
+    shares = trials.k / trials.n
+    rising = 1 - shares if model.falling else shares
+    if model.guess == 0 and not model.lapse and best.size == 2:
+        return bool((np.diff(rising) >= 0).all() and ((rising > 0) & (rising < 1)).sum() <= 1)
+    f = function(model.shape, model.trials.x, float(best[0]), float(best[1]))
+    return int(((f > STEP) & (f < 1 - STEP)).sum()) <= 1
+
+
 def _doubts(
-    trials: Trials, location: float, log_spread: float, shape: Shape, lapse: float, fitted: bool
+    trials: Trials,
+    location: float,
+    log_spread: float,
+    shape: Shape,
+    lapse: float,
+    fitted: bool,
+    step: bool,
 ) -> list[str]:
     notes = []
     if not trials.x.min() <= location <= trials.x.max():
         notes.append(f"the threshold {location:.4g} lies outside the levels shown: extrapolated")
-    shares = trials.k / trials.n
-    if np.all((shares == 0) | (shares == 1)):
+    if step:
         notes.append("the answers switch between two levels: the slope has no upper limit")
     if fitted and lapse <= BOUND:
         notes.append("the lapse rate is estimated at its bound 0")

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import optimize, special
 from typer.testing import CliRunner
 
 from analysis.cli import app
@@ -195,3 +196,41 @@ def test_thresholds_have_the_decimals_that_their_error_supports(
     (row,) = (line.split() for line in result.output.splitlines() if line.startswith("all "))
     assert {len(cell.strip("[],").partition(".")[2]) for cell in row[1:6]} == {decimals}, row
     assert float(row[1]) == pytest.approx(2.89 * unit, rel=0.01)
+
+
+@pytest.mark.parametrize("guess", [0.0, 0.5])
+def test_stimuli_without_repeats_bound_the_slope_and_say_nothing_of_the_fit(guess: float) -> None:
+    """The spread is that of an optimiser of its own, and its profile interval is finite."""
+    rng = np.random.default_rng(3)
+    x = np.linspace(-10, 10, 200)
+    k = (rng.uniform(size=200) < guess + (1 - guess) * special.ndtr((x - 0.5) / 3)).astype(float)
+    fit = fit_threshold(Trials(x, np.ones(200), k), "normal", guess, 0.0)
+
+    def negative(values: np.ndarray) -> float:
+        p = guess + (1 - guess) * special.ndtr((x - values[0]) / np.exp(values[1]))
+        return -float(special.xlogy(k, p).sum() + special.xlogy(1 - k, 1 - p).sum())
+
+    free = optimize.minimize(
+        negative, [0.0, 1.0], method="Nelder-Mead", options={"xatol": 1e-8, "fatol": 1e-10}
+    )
+    assert fit.threshold == pytest.approx(free.x[0], abs=1e-4)
+    assert fit.spread == pytest.approx(np.exp(free.x[1]), rel=1e-4)
+    assert fit.spread_ci.low is not None
+    assert fit.spread_ci.high is not None
+    assert not any("upper limit" in note for note in fit.notes)
+    assert np.isnan(fit.p)
+    assert any("no fit p" in note for note in fit.notes)
+
+
+@pytest.mark.parametrize(
+    ("x", "k", "is_step"),
+    [
+        ([1, 2, 3, 4, 5, 6], [0, 0, 0, 1, 1, 1], True),
+        ([1, 2, 3, 4, 5, 6], [0, 0, 1, 0, 1, 1], False),
+        ([1, 2, 3, 4, 5, 6], [1, 1, 1, 0, 0, 0], True),
+    ],
+)
+def test_only_answers_that_change_once_leave_the_slope_without_a_limit(x, k, is_step) -> None:
+    fit = fit_threshold(Trials(np.array(x, float), np.ones(6), np.array(k, float)), "normal", 0.0, 0.0)
+    assert any("no upper limit" in note for note in fit.notes) is is_step
+    assert (fit.spread_ci.low is None) is is_step
