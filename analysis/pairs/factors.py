@@ -82,7 +82,7 @@ def read_item_factors(path: Path) -> ItemFactors:
     InputError
         As `read_text_table`; an item twice; a factor with one level.
     """
-    table = read_text_table(path, None)
+    table = read_text_table(path, None, copies=False)
     if len(table.header) < 2:
         raise InputError(f"{path.name}: expected a column of items and a column a factor, got one column")
     for name in table.header:

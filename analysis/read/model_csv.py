@@ -48,7 +48,7 @@ def read_model_input(
         Unknown columns, a column in two roles, items that are the participants under another name, ratings
         that are no numbers, or no factor.
     """
-    header = read_text_table(path, [participant, rating]).header
+    header = read_text_table(path, [participant, rating], copies=False).header
     exported = "kind" in header and "profile_id" in header
     if not within and exported and not between:
         within = RATINGS.factors_in_header(header)

@@ -31,7 +31,7 @@ def read_runs(path: Path) -> RunEvidence:
         As `read_text_table`: no file, or no columns `run` and `evidence_verdict`.
     """
     names = [column.name for column in EVIDENCE_COLUMNS]
-    rows = read_text_table(path, ["run", VERDICT], names).columns
+    rows = read_text_table(path, ["run", VERDICT], names, copies=False).columns
     runs = rows["run"].astype(str).tolist()
     signals = {name: _numbers(rows[name].astype(str)) for name in names if name in rows.columns}
     return RunEvidence(

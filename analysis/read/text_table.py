@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from analysis.read.copies import row_codes, said_of_copies
 from analysis.read.files.cells import Cells
 from analysis.read.files.open import Reader, reader_of
 from analysis.read.files.programs import program_of, trials_only
@@ -50,13 +51,15 @@ class TextTable:
         return str(self.lines[row]) if self.files is None else f"{self.lines[row]} of {self.files[row]}"
 
 
-def read_text_table(path: Path, needed: Sequence[str] | None, optional: Sequence[str] = ()) -> TextTable:
+def read_text_table(
+    path: Path, needed: Sequence[str] | None, optional: Sequence[str] = (), copies: bool = True
+) -> TextTable:
     """Read the `needed` columns (all must exist; None: every one) and those of `optional` there, as text.
 
     The file may be CSV (comma, semicolon or tab, taken from the header line), an Excel workbook
     (`book.xlsx#Sheet` names a sheet), SPSS, a JSON list of trials, or a Psych-DS folder. Of data of jsPsych,
     PsychoPy and Gorilla only rows count that hold every column wanted. Ids keep their leading zeros, and
-    names like `None` or `NA` stay names.
+    names like `None` or `NA` stay names. A block of rows that is in the file twice is named (`copies`).
 
     Raises
     ------
@@ -83,7 +86,40 @@ def read_text_table(path: Path, needed: Sequence[str] | None, optional: Sequence
     for name in names:
         table.columns[name] = _stripped(table.columns[name])
     _leave_out_empty_rows(table, names)
+    if copies and (said := _copies(table, names)):
+        table.decisions.append(said)
     return table
+
+
+def _copies(table: TextTable, names: Sequence[str]) -> str:
+    """What is said of rows that are copies in every column of the file; those read are compared first."""
+    if not said_of_copies(row_codes(table.columns[list(names)]), _Places(table)):
+        return ""
+    if table.reader is None:
+        return ""
+    every = list(dict.fromkeys(name for name in table.header if name))
+    cells = table.reader.cells(every)
+    place = _row_keys(cells.lines, cells.files)
+    where = pd.Index(place).get_indexer(pd.Index(_row_keys(table.lines, table.files)))
+    return said_of_copies(row_codes(cells.rows.iloc[where]), _Places(table))
+
+
+def _row_keys(lines: NDArray[np.int64], files: NDArray[np.str_] | None) -> list[tuple[str, int]]:
+    names = [""] * len(lines) if files is None else [str(name) for name in files]
+    return list(zip(names, (int(line) for line in lines), strict=True))
+
+
+class _Places(Sequence[str]):
+    """Lines of a table's rows, written when they are asked for."""
+
+    def __init__(self, table: TextTable) -> None:
+        self._table = table
+
+    def __len__(self) -> int:
+        return len(self._table.lines)
+
+    def __getitem__(self, row: Any) -> Any:
+        return self._table.line(int(row))
 
 
 def _source(path: Path) -> str:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from analysis.read.copies import row_codes, said_of_copies
 from analysis.read.files.cells import Cells
 from analysis.read.files.open import reader_of
 from experiments.errors import InputError
@@ -101,7 +102,9 @@ def lengthen(path: Path, pattern: str, rating: str) -> LongTable:
         for name, levels_of_column in levels.items()
     ]
     rows = pd.concat(parts).sort_index(kind="stable").reset_index(drop=True)
-    return LongTable(rows, factors, len(levels), beside, read.decisions)
+    copies = said_of_copies(row_codes(read.rows), [str(line) for line in read.lines])
+    decisions = (*read.decisions, *([copies] if copies else []))
+    return LongTable(rows, factors, len(levels), beside, decisions)
 
 
 def _with_words(read: Cells, beside: Sequence[str]) -> pd.DataFrame:
