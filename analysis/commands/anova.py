@@ -89,6 +89,7 @@ def anova(
     from analysis.plans.result import analyse_cells
     from analysis.read.long_csv import read_long_table
     from analysis.read.participant_columns import design_of
+    from analysis.read.text_table import refuse_ids_once
     from analysis.report.within_contents import contents_of
     from analysis.within.cell_means import cell_table
 
@@ -103,6 +104,8 @@ def anova(
         data = read_long_table(
             file, participant, rating, factors, trial, scale_bounds(scale), groups, covariates
         )
+        if factors:
+            refuse_ids_once(data.rows, participant, data.header, data.source)
         cells = cell_table(data.rows, participant, rating, factors)
         people = cells.participants
         analysis = analyse_cells(

@@ -224,9 +224,12 @@ def _read(
         Factors between participants, covariates, and more groupings.
     """
     from analysis.read.model_csv import read_model_input
+    from analysis.read.text_table import refuse_ids_once
 
     with saying("reading ratings"):
-        return read_model_input(file, participant, rating, names_in(within), names_in(item), *further)
+        data = read_model_input(file, participant, rating, names_in(within), names_in(item), *further)
+    refuse_ids_once(data.rows, participant, data.header, file.name)
+    return data
 
 
 def _show(file: Path, data: "ModelInput", text: str) -> None:

@@ -27,6 +27,7 @@ class LongData:
     source: str
     decisions: tuple[str, ...]
     synthetic: bool = False
+    header: tuple[str, ...] = ()
 
 
 def read_long_table(
@@ -87,7 +88,7 @@ def read_long_table(
         raise InputError(f"{path.name}: no participant has a rating and every covariate")
     rows = table.columns.assign(**{rating: values, **measured})[keep].reset_index(drop=True)
     synthetic = "synthetic" in rows.columns and bool((rows["synthetic"] == "1").any())
-    return LongData(rows, path.name, tuple(table.decisions), synthetic)
+    return LongData(rows, path.name, tuple(table.decisions), synthetic, table.header)
 
 
 def _with_covariate(

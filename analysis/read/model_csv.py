@@ -24,6 +24,7 @@ class ModelInput:
     item: tuple[str, ...]
     decisions: tuple[str, ...]
     synthetic: bool
+    header: tuple[str, ...] = ()
 
 
 def read_model_input(
@@ -85,7 +86,12 @@ def read_model_input(
         raise InputError(f"{path.name}: no row has a rating that counts")
     synthetic = "synthetic" in rows.columns and bool(rows["synthetic"].astype(str).isin(("1", "True")).any())
     return ModelInput(
-        rows[keep].reset_index(drop=True), tuple(within), tuple(item), tuple(decisions), synthetic
+        rows[keep].reset_index(drop=True),
+        tuple(within),
+        tuple(item),
+        tuple(decisions),
+        synthetic,
+        table.header,
     )
 
 

@@ -230,6 +230,37 @@ def texts_required(table: TextTable, name: str, factor: bool = False) -> None:
             table.decisions.append(f"'{other}' and '{text}' of '{name}' differ in case only; kept apart")
 
 
+def refuse_ids_once(rows: pd.DataFrame, name: str, header: Sequence[str], source: str) -> None:
+    """Refuse a column of participants whose every value is in one row only, where some must come again.
+
+    Parameters
+    ----------
+    rows : DataFrame
+        The rows that were read.
+    name : str
+        The column of participants.
+    header : sequence of str
+        All columns of the file; they may look like the cells of a wide table.
+    source : str
+        How the error names the file.
+
+    Raises
+    ------
+    InputError
+        As said above, with the likely cause.
+    """
+    if len(rows) < 2 or rows[name].nunique() < len(rows):
+        return
+    hint = wide_hint([one for one in header if one and one != name])
+    often = hint or (
+        "; is the table wide (one row per person: make it long with analysis reshape), or is this not the "
+        "participant column?"
+    )
+    raise InputError(
+        f"{source}: each value of '{name}' is in one row only, so nothing varies within participants{often}"
+    )
+
+
 def names_in_order(column: "pd.Series[Any]", rows: NDArray[np.bool_]) -> tuple[str, ...]:
     """The names in some rows of a column: in the order of their codes, where they have any, else sorted."""
     there = {str(name) for name in column[rows].unique()}

@@ -128,6 +128,11 @@ def _complete(
         for i in np.flatnonzero(~whole)
     )
     if not whole.any():
+        if counts.reshape(len(counts), -1).sum(axis=1).max() == 1:
+            raise InputError(
+                "each participant is in one row only, so nothing varies within participants: is the table "
+                "wide (one row per person, then see analysis reshape), or is this not the participant column?"
+            )
         _refuse_between_factors(factors, counts)
         first = dropped[0]
         raise InputError(

@@ -138,7 +138,7 @@ def test_anova_of_anyones_table(tmp_path) -> None:
     ("text", "within", "message"),
     [
         ("id,y,face\n1,2,a\n1,3,b\n", "face", "at least 2 complete participants, got 1"),
-        ("id,y,face\n1,2,a\n2,3,a\n", "face", "at least 2 levels of 'face', got 1"),
+        ("id,y,face\n1,2,a\n1,4,a\n2,3,a\n", "face", "at least 2 levels of 'face', got 1"),
         ("id,y,face\n1,2,a\n2,3,b\n", "fase", "did you mean 'face'"),
     ],
 )

@@ -3,7 +3,9 @@
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from analysis.cli import app
 from analysis.read.long_csv import read_long_table
 from analysis.read.text_table import read_text_table
 from analysis.read.wide import lengthen, wide_hint
@@ -81,3 +83,23 @@ def test_columns_that_are_asked_for_are_no_cells_of_a_wide_table(tmp_path) -> No
         read_text_table(path, ["q1", "q2", "q3", "id"])
     with pytest.raises(InputError, match="the table looks wide"):
         read_text_table(path, ["id", "score"])
+
+
+@pytest.mark.parametrize("command", ["anova", "mixed", "ordinal"])
+def test_ids_that_occur_once_are_asked_about_and_not_taken_for_groups(command: str, tmp_path: Path) -> None:
+    long = tmp_path / "long.csv"
+    rows = "\n".join(f"{i},{'ab'[i % 2]},{'xy'[i % 3 % 2]},{i % 5}" for i in range(24))
+    long.write_text(f"id,time,diag,y\n{rows}\n", encoding="utf-8")
+    wide = tmp_path / "wide.csv"
+    rows = "\n".join(f"{i},{i % 3},{i % 4},{i % 5},{i % 7}" for i in range(12))
+    wide.write_text(f"subject,near_NB,near_MB,far_NB,far_MB\n{rows}\n", encoding="utf-8")
+    for file, options, said in (
+        (long, "--participant id --rating y --within time", "is this not the participant column"),
+        (wide, "--participant subject --rating near_NB --within near_MB", "'{factor1}_{factor2}'"),
+    ):
+        done = CliRunner().invoke(app, [command, str(file), *options.split()])
+        output = str(done.exception)
+        assert isinstance(done.exception, InputError)
+        assert "is in one row only" in output
+        assert said in output
+        assert "--between" not in output

@@ -88,7 +88,7 @@ def test_a_cell_nobody_rated_and_a_table_without_complete_participants_are_refus
 
 def test_a_factor_between_participants_is_called_so() -> None:
     with pytest.raises(InputError, match=r"'A' never varies within a participant.*--between A"):
-        cell_table(rows("p1 a x 1\np2 b x 1"), "who", "y", ["A"])
+        cell_table(rows("p1 a x 1\np1 a y 2\np2 b x 1"), "who", "y", ["A"])
 
 
 @pytest.mark.parametrize(
