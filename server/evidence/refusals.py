@@ -1,6 +1,6 @@
 """Why an answer is refused for what comes, or does not come, with it."""
 
-from server.errors import Conflict, Invalid
+from server.errors import ApiError, Conflict, Invalid
 
 
 class TicketMissing(Invalid):
@@ -49,3 +49,16 @@ class DigestDiffers(Invalid):
     """The digest is not that of the trial's clip under its ticket."""
 
     code = "clip_digest_differs"
+
+
+EVIDENCE_REFUSALS: tuple[type[ApiError], ...] = (
+    TicketMissing,
+    TicketInvalid,
+    TicketOfAnotherRun,
+    TicketOfAnotherTrial,
+    TicketExpired,
+    ClipsOutlastTickets,
+    DigestMissing,
+    DigestDiffers,
+)
+"""Refusals of an answer that may not have been given by a person: it is never counted as given."""

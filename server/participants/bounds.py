@@ -6,12 +6,13 @@ from typing import Any
 
 from server.errors import ApiError
 from server.evidence.repository import ANSWER, VIEW
+from server.trials.refused_records import REFUSED
 
 DEVICE_KEYS, DEVICE_BYTES = 200, 32 * 1024
 EVENT_BYTES, EVENTS_A_RUN = 4 * 1024, 20_000
 """A heartbeat every few seconds makes some hundred events an hour."""
 CALIBRATIONS_A_RUN = 100
-SERVER_EVENTS = frozenset({"screened_out", "warned", *ANSWER, *VIEW})
+SERVER_EVENTS = frozenset({"screened_out", "warned", REFUSED, *ANSWER, *VIEW})
 """Types of events that say what the server did: codes and evidence rest on them, so no page may send them."""
 MAX_DEPTH = 8
 

@@ -8,6 +8,7 @@ from experiments.checks import CheckName
 from experiments.trials import KINDS
 from server.models import StudyRun
 from server.participants import repository
+from server.trials.refused_records import refused_trials
 from server.trials.schemas import SeriesPosition, TrialClip, TrialInfo
 from server.trials.series import service as series
 from server.trials.verdict import is_settled
@@ -25,6 +26,7 @@ def trial_list(session: Session, run: StudyRun, loaded: LoadedVersion) -> list[T
     unanswered = unanswered_views(session, run) if begun else {}
     max_repeats = loaded.experiment.playback.max_repeats
     positions = _positions(session, run, loaded)
+    refused = refused_trials(session.connection(), run.id)
     shown, clips = loaded.once(_FirstClips), loaded.once(_Clips)
     trials = []
     for row in repository.trials(session, run):
@@ -32,7 +34,7 @@ def trial_list(session: Session, run: StudyRun, loaded: LoadedVersion) -> list[T
         plays = done.get(index, ())
         settled = any(is_settled(kind, play, verdict, max_repeats) for play, verdict in plays)
         position, closed = positions.get(index, (None, False))
-        settled = settled or closed
+        settled = settled or closed or index in refused
         trials.append(
             TrialInfo(
                 trial_index=index,

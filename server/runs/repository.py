@@ -28,6 +28,7 @@ from server.models import (
     View,
 )
 from server.runs.schemas import Show
+from server.trials.repository import REFUSED
 
 
 def find_run(session: Session, study: Study, public_id: str, *, lock: bool = False) -> StudyRun:
@@ -89,6 +90,15 @@ def answered(session: Session, runs: Sequence[int]) -> dict[int, tuple[int, int]
     query = select(RunTally.study_run_id, RunTally.heat, RunTally.not_good)
     rows = session.execute(query.where(RunTally.study_run_id.in_(runs)))
     return {run: (len(heat) - heat.count("."), not_good) for run, heat, not_good in rows}
+
+
+def refused(session: Session, runs: Sequence[int]) -> dict[int, int]:
+    """Run number -> records that could not be stored, where there are any; for one page of runs."""
+    query = select(RunEvent.study_run_id, func.count()).where(
+        RunEvent.study_run_id.in_(runs), RunEvent.type == REFUSED
+    )
+    rows = session.execute(query.group_by(RunEvent.study_run_id))
+    return {run: number for run, number in rows if run is not None}
 
 
 def plays(session: Session, run: StudyRun) -> list[tuple[Rating, AssignedTrial, VersionClip | None]]:

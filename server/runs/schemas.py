@@ -69,6 +69,7 @@ class RunSummary(BaseModel):
     trials: int
     answered: int
     not_good: int = Field(description="Plays that were flagged or failed.")
+    refused: int = Field(description="Answers and views that could not be stored; the timeline has why.")
     excluded: bool
     exclusion_reason: str | None
     erased_at: datetime | None

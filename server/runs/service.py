@@ -31,15 +31,16 @@ def page(session: Session, study: Study, show: Show, search: str, before: str | 
     runs = repository.page_of_runs(session, study, show, search, last, limit + 1)
     shown = runs[:limit]
     counts = repository.answered(session, [run.id for run in shown])
+    refused = repository.refused(session, [run.id for run in shown])
     are_all = last is None and len(runs) <= limit
     return RunPage(
-        runs=[summary(run, *counts.get(run.id, (0, 0))) for run in shown],
+        runs=[summary(run, *counts.get(run.id, (0, 0)), refused.get(run.id, 0)) for run in shown],
         total=len(shown) if are_all else repository.number_of_runs(session, study, show, search),
         next=shown[-1].public_id if len(runs) > limit else None,
     )
 
 
-def summary(run: StudyRun, answered: int, not_good: int) -> RunSummary:
+def summary(run: StudyRun, answered: int, not_good: int, refused: int) -> RunSummary:
     """One line of the participants page."""
     spent = (run.completed_at or run.last_seen_at) - run.started_at
     return RunSummary(
@@ -57,6 +58,7 @@ def summary(run: StudyRun, answered: int, not_good: int) -> RunSummary:
         trials=run.trials_total,
         answered=answered,
         not_good=not_good,
+        refused=refused,
         excluded=run.excluded,
         exclusion_reason=run.exclusion_reason,
         erased_at=run.erased_at,
@@ -94,7 +96,7 @@ def timeline(session: Session, study: Study, public_id: str) -> Timeline:
     answered = len({rating.trial_index for rating, _, _ in plays})
     not_good = sum(rating.verdict in ("flagged", "failed") for rating, _, _ in plays)
     return Timeline(
-        summary=summary(run, answered, not_good),
+        summary=summary(run, answered, not_good, repository.refused(session, [run.id]).get(run.id, 0)),
         device=run.device,
         consented_at=run.consented_at,
         trials=[_trial(*play) for play in plays],

@@ -13,9 +13,11 @@ EVENT = "screened_out"
 
 
 def failed_checks(connection: Connection, run_id: int, experiment: Experiment) -> int:
-    """Attention checks of a run answered otherwise than asked."""
+    """Attention checks of a run answered otherwise than asked, and those whose answer could not be stored."""
     given = KINDS[experiment.trial.kind].check_response
-    return sum(given(payload) != expected for payload, expected in repository.checks(connection, run_id))
+    wrong = sum(given(payload) != expected for payload, expected in repository.checks(connection, run_id))
+    # Else a script would pass every check by answers that are refused.
+    return wrong + repository.refused_checks(connection, run_id)
 
 
 def by_attention(connection: Connection, run_id: int, experiment: Experiment) -> bool:

@@ -12,6 +12,7 @@ from experiments.trials import KINDS
 from experiments.trials.check import CheckAnswer
 from server.errors import NotFound
 from server.evidence.intake import Answer
+from server.evidence.schemas import RatingEvidence
 from server.tallies.tally import Counted, Play
 from server.tokens import hash_token
 from server.trials import repository
@@ -106,7 +107,7 @@ def row_of(delivery: Delivery, ruling: Ruling) -> dict[str, Any]:
         "time_elapsed": rating.time_elapsed,
         "changes": rating.changes,
         "comment": rating.comment,
-        "answered_at_client": _with_zone(rating.answered_at_client),
+        "answered_at_client": with_zone(rating.answered_at_client),
         **playback,
         "playback": clips and clips.model_dump(exclude_none=True),
         "focus_lost": None if rating.playback.focus_lost is None else rating.playback.focus_lost > 0,
@@ -140,28 +141,51 @@ def play_of(delivery: Delivery, ruling: Ruling) -> Play:
 
 def evidence_of(delivery: Delivery) -> Answer:
     """What judges whether a person answered."""
-    rating, loaded, run = delivery.rating, delivery.loaded, delivery.run
-    rated = rating.answer.given
-    clips = [loaded.clips[ident] for ident in delivery.trial.clips.values()]
-    lengths = {
-        role: loaded.lengths[loaded.clips[ident].sha256] for role, ident in delivery.trial.clips.items()
-    }
-    is_check = isinstance(rating.answer, CheckAnswer)
+    rating = delivery.rating
+    return answer_to(
+        delivery.run,
+        delivery.trial,
+        delivery.loaded,
+        (rating.trial_index, rating.play),
+        delivery.saved_at,
+        rated=rating.answer.given,
+        is_check=isinstance(rating.answer, CheckAnswer),
+        answered_at=with_zone(rating.answered_at_client),
+        evidence=rating.evidence,
+    )
+
+
+def answer_to(
+    run: repository.RunForRating,
+    trial: repository.StoredTrial,
+    loaded: LoadedVersion,
+    which: tuple[int, int],
+    received_at: datetime,
+    *,
+    rated: bool,
+    is_check: bool,
+    answered_at: datetime | None,
+    evidence: RatingEvidence | None,
+) -> Answer:
+    """An answer to a trial as the evidence sees it; `which` is the trial's index and the play."""
+    clips = [loaded.clips[ident] for ident in trial.clips.values()]
+    lengths = {role: loaded.lengths[loaded.clips[ident].sha256] for role, ident in trial.clips.items()}
     shown_ms = max(lengths.values(), default=0.0) if is_check else loaded.experiment.trial.shown_ms(lengths)
     return Answer(
         run=run.id,
         run_id=run.public_id,
         origin=run.origin,
-        trial_index=rating.trial_index,
-        play=rating.play,
+        trial_index=which[0],
+        play=which[1],
         rated=rated,
         clips=tuple((clip.sha256, clip.bytes) for clip in clips),
         clip_ms=shown_ms * rated,
-        received_at=delivery.saved_at,
-        answered_at=_with_zone(rating.answered_at_client),
-        evidence=rating.evidence,
+        received_at=received_at,
+        answered_at=answered_at,
+        evidence=evidence,
     )
 
 
-def _with_zone(moment: datetime | None) -> datetime | None:
+def with_zone(moment: datetime | None) -> datetime | None:
+    """A page's moment, as UTC where it names no zone."""
     return moment if moment is None or moment.tzinfo else moment.replace(tzinfo=UTC)

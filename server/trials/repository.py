@@ -94,6 +94,19 @@ _LATEST = (
     .where(_ratings.c.study_run_id == bindparam("run"), _trials.c.kind == "main")
     .order_by(_ratings.c.id.desc())
 )
+REFUSED = "record_refused"
+"""The event of a record that can never be stored as what it was sent as."""
+_REFUSED = (
+    select(RunEvent.data)
+    .where(RunEvent.study_run_id == bindparam("run"), RunEvent.type == REFUSED)
+    .order_by(RunEvent.id)
+)
+_CHECK_INDICES = select(_trials.c.trial_index).where(
+    _trials.c.study_run_id == bindparam("run"), _trials.c.kind == "attention"
+)
+_REFUSED_ID = select(RunEvent.id).where(
+    RunEvent.study_run_id == bindparam("run"), RunEvent.event_id == bindparam("record")
+)
 _ADD_TALLY = Prepared(insert(_tallies).inline(), ("study_run_id", *COLUMNS))
 _SET_TALLY = Prepared(
     update(_tallies)
@@ -193,6 +206,22 @@ def language(connection: Connection, run: int) -> str:
 def end_run(connection: Connection, run: int, status: str) -> None:
     """Close a run with this status."""
     connection.execute(update(_runs).where(_runs.c.id == run).values(status=status))
+
+
+def refused_records(connection: Connection, run: int) -> list[dict[str, Any]]:
+    """What is stored of a run's records that were refused for good, in the order they came."""
+    return list(connection.scalars(_REFUSED, {"run": run}))
+
+
+def refused_checks(connection: Connection, run: int) -> int:
+    """How many attention checks of a run have an answer that was refused for good."""
+    refused = {data.get("trial_index") for data in refused_records(connection, run)}
+    return len(refused & set(connection.scalars(_CHECK_INDICES, {"run": run}))) if refused else 0
+
+
+def is_refused(connection: Connection, run: int, record_id: str) -> bool:
+    """Whether this record is stored as refused."""
+    return connection.scalar(_REFUSED_ID, {"run": run, "record": record_id}) is not None
 
 
 def add_event(

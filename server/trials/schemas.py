@@ -1,9 +1,18 @@
 """One rating as the page sends it, and the receipt it gets."""
 
+from collections.abc import Set
 from datetime import datetime
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
+from uuid import UUID
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ModelWrapValidatorHandler,
+    StringConstraints,
+    model_validator,
+)
 
 from experiments.checks import CheckName
 from experiments.trials.clip_rating.declaration import MAX_FRAMES_LOGGED
@@ -11,8 +20,10 @@ from experiments.trials.clip_rating.scales import SCALE_NAME
 from experiments.trials.union import AnyAnswer
 from server.evidence.schemas import RatingEvidence
 from server.trials.measures import Count, DisturbanceCounts, FrameTime, Milliseconds, Role
+from server.trials.unknown_values import ANY, IMPOSSIBLE, LEFT_OUT, Path, validated
 from server.views.schemas import ViewState
 
+RATINGS = "/api/run/ratings/"
 RunStatus = Literal["active", "complete", "screened_out", "withdrawn"]
 
 
@@ -74,6 +85,31 @@ class PlaybackLog(BaseModel):
     )
 
 
+_MEASURED: dict[Path, Any] = {
+    **{(name,): None for name in ("rt", "rt_from_first_frame", "time_elapsed", "answered_at_client")},
+    ("changes",): LEFT_OUT,
+    **{
+        ("playback", name): None
+        for name in PlaybackLog.model_fields
+        if name not in ("method", "clip_sha256", "disturbances")
+    },
+    ("playback", "disturbances", ANY): LEFT_OUT,
+    ("playback", "disturbances"): None,
+    ("evidence", "interaction", "press_ms"): None,
+    ("answer", "answers", ANY, "rt"): None,
+    ("answer", "reference_gap_ms"): None,
+    ("answer", "moves"): LEFT_OUT,
+}
+"""What a browser, and not the participant, says of a play, and what is stored where it cannot be."""
+
+
+def _count_unknown(data: Any, unknown: Set[Path]) -> None:
+    playback = data.get("playback")
+    if isinstance(playback, dict):
+        told = playback.get("disturbances")
+        playback["disturbances"] = {**(told if isinstance(told, dict) else {}), IMPOSSIBLE: len(unknown)}
+
+
 class RatingIn(BaseModel):
     """One play of one trial with its answer, whose `kind` is that of the study's trials.
 
@@ -94,6 +130,12 @@ class RatingIn(BaseModel):
     playback: PlaybackLog
     evidence: RatingEvidence | None = None
 
+    @model_validator(mode="wrap")
+    @classmethod
+    def _whatever_was_measured(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        """A number that no browser can have measured is unknown, and counted; the answer is stored."""
+        return validated(data, handler, _MEASURED, _count_unknown)
+
     @model_validator(mode="before")
     @classmethod
     def _of_an_older_page(cls, data: Any) -> Any:
@@ -108,6 +150,25 @@ class RatingIn(BaseModel):
         if isinstance(data["answer"], dict):
             return {**data, "answer": {"kind": "paired_comparison", **data["answer"]}}
         return data
+
+
+class RefusedRecord(BaseModel):
+    """A record that was refused for good, as the page sent it, with the answer that it got."""
+
+    id: UUID = Field(description="Of the record in the page's outbox.")
+    path: Annotated[str, StringConstraints(max_length=300)] = Field(description="Where it was sent.")
+    status: Annotated[int, Field(ge=400, le=499)]
+    code: Annotated[str, StringConstraints(max_length=100)]
+    message: Annotated[str, StringConstraints(max_length=2000)] = ""
+    body: dict[str, Any] = Field(default_factory=dict, description="The record itself.")
+
+    @property
+    def which(self) -> tuple[int, int] | None:
+        """The trial's index and the play, where it is an answer to one."""
+        trial_index, play = self.body.get("trial_index"), self.body.get("play", 1)
+        if not self.path.startswith(RATINGS) or type(trial_index) is not int or type(play) is not int:
+            return None
+        return (trial_index, play) if 0 <= trial_index <= 1_000_000 and 1 <= play <= 100 else None
 
 
 class TrialClip(BaseModel):

@@ -10,6 +10,7 @@ from typing import Literal
 
 from experiments.rules import PlaybackRules
 from experiments.rules.disturbances import Consequence
+from server.trials.unknown_values import IMPOSSIBLE
 
 Verdict = Literal["good", "uncertain", "flagged", "failed"]
 Ruling = tuple[Verdict, str]
@@ -120,6 +121,8 @@ def _flagged(rules: PlaybackRules, playback: Playback, frames: int) -> str:
         return "flagged_late_frames"
     if (playback.longest_gap_ms or 0) > rules.flagged_longest_gap_ms:
         return "flagged_longest_gap_ms"
+    if playback.disturbances.get(IMPOSSIBLE):
+        return IMPOSSIBLE
     if playback.method == "video":
         return "video_fallback" if rules.flag_video_fallback else ""
     if playback.frames_missing is None or playback.frames_seen is None:

@@ -1,13 +1,24 @@
 """Views as the page sends them: when they begin, and once more when they have ended."""
 
+from collections import Counter
+from collections.abc import Set
 from datetime import UTC, datetime
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 from uuid import UUID
 
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, StringConstraints
+from pydantic import (
+    AwareDatetime,
+    BaseModel,
+    ConfigDict,
+    Field,
+    ModelWrapValidatorHandler,
+    StringConstraints,
+    model_validator,
+)
 
 from server.evidence.schemas import ViewEvidence
 from server.trials.measures import Count, DisturbanceCounts, FrameTime, Milliseconds, Role
+from server.trials.unknown_values import ANY, IMPOSSIBLE, LEFT_OUT, Path, validated
 
 # The earliest and latest moments of the calendar have no UTC in it.
 Moment = Annotated[
@@ -63,7 +74,7 @@ class ViewIn(BaseModel):
     play: Annotated[int, Field(ge=1, le=100)] | None = Field(
         default=None, description="The play that it is part of; an older page has one view a play."
     )
-    started_at_client: Moment
+    started_at_client: Moment | None = Field(description="Null where the device's clock cannot be right.")
     ended_at_client: Moment | None = None
     screen: dict[Annotated[str, StringConstraints(max_length=100)], Any] = Field(
         default_factory=dict, max_length=50
@@ -79,11 +90,36 @@ class ViewIn(BaseModel):
     )
 
 
+_MEASURED: dict[Path, Any] = {
+    # As a whole, by its first fault: a showing of which a part is unknown is not asked about by another page.
+    ("views", ANY, "showings"): None,
+    ("views", ANY, "clips", ANY, "drawn"): [],
+    ("views", ANY, "started_at_client"): None,
+    ("views", ANY, "ended_at_client"): None,
+    ("views", ANY, "screen"): LEFT_OUT,
+    ("views", ANY, "disturbances", ANY): LEFT_OUT,
+    ("views", ANY, "disturbances"): LEFT_OUT,
+}
+
+
+def _count_unknown(data: Any, unknown: Set[Path]) -> None:
+    for index, number in Counter(path[1] for path in unknown).items():
+        view = data["views"][int(index)]
+        told = view.get("disturbances")
+        view["disturbances"] = {**(told if isinstance(told, dict) else {}), IMPOSSIBLE: number}
+
+
 class ViewsIn(BaseModel):
     """Up to 100 views; what the server already has is left as it is."""
 
     model_config = ConfigDict(extra="forbid")
     views: list[ViewIn] = Field(max_length=100)
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _whatever_was_measured(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        """A number that no browser can have measured is unknown, and counted; the view is stored."""
+        return validated(data, handler, _MEASURED, _count_unknown)
 
 
 class ViewsSaved(BaseModel):

@@ -15,6 +15,7 @@ from server.models import StudyRun, View, ViewClip
 from server.tokens import hash_token
 from server.trials.delivery import TrialNotInRun
 from server.trials.refusals import ConsentMissing, RunUnknown
+from server.trials.unknown_values import IMPOSSIBLE
 from server.versions import LoadedVersion, Versions
 from server.views import repository
 from server.views.frame_log import packed, unpacked
@@ -159,7 +160,7 @@ def _tickets(
             view.trial_index,
             view.play or view.number,
             length,
-            view.ended_at_client or view.started_at_client,
+            view.ended_at_client or view.started_at_client or moment,
             view.evidence,
         )
         for view, length in zip(views, clip_ms, strict=True)
@@ -175,11 +176,12 @@ def _begun(run: RunOfViews, view: ViewIn, moment: datetime, issued_at: datetime 
         "trial_index": view.trial_index,
         "number": view.number,
         "play": view.play or view.number,
-        "started_at_client": view.started_at_client,
+        # The receipt of the view where the clock cannot be right; IMPOSSIBLE says so.
+        "started_at_client": view.started_at_client or moment,
         "received_at": moment,
         "completed": False,
         "screen": view.screen,
-        "disturbances": {},
+        "disturbances": {} if view.started_at_client else {IMPOSSIBLE: 1},
         "issued_at": issued_at,
     }
 

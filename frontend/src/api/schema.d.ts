@@ -5,6 +5,11 @@ export interface paths {
   };
   put: operations["put_rating"];
  };
+ "/api/run/refused": {
+  parameters: {
+  };
+  post: operations["post_refused"];
+ };
  "/api/run/views": {
   parameters: {
   };
@@ -2406,6 +2411,18 @@ export interface components {
    /** @default 500 */
    gap_ms: number;
   };
+  RefusedRecord: {
+   /** Format: uuid */
+   id: string;
+   path: string;
+   status: number;
+   code: string;
+   /** @default  */
+   message?: string;
+   body?: {
+    [key: string]: unknown;
+   };
+  };
   RehearsalOut: {
    id: string;
    /** @enum {string} */
@@ -2749,6 +2766,7 @@ export interface components {
    trials: number;
    answered: number;
    not_good: number;
+   refused: number;
    excluded: boolean;
    exclusion_reason: string | null;
    erased_at: string | null;
@@ -3509,8 +3527,7 @@ export interface components {
    trial_index: number;
    number: number;
    play?: number | null;
-   /** Format: date-time */
-   started_at_client: string;
+   started_at_client: string | null;
    ended_at_client?: string | null;
    screen?: {
     [key: string]: unknown;
@@ -3844,6 +3861,7 @@ export type RecordedProfile = components['schemas']['RecordedProfile'];
 export type RecoveryCodes = components['schemas']['RecoveryCodes'];
 export type Recruiter = components['schemas']['Recruiter'];
 export type Reference = components['schemas']['Reference'];
+export type RefusedRecord = components['schemas']['RefusedRecord'];
 export type RehearsalOut = components['schemas']['RehearsalOut'];
 export type RehearsalResult = components['schemas']['RehearsalResult'];
 export type RehearsedColumn = components['schemas']['RehearsedColumn'];
@@ -3982,6 +4000,41 @@ export interface operations {
     };
     content: {
      "application/json": components["schemas"]["RatingSaved"];
+    };
+   };
+   422: {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["ErrorBody"];
+    };
+   };
+   "4XX": {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["ErrorBody"];
+    };
+   };
+  };
+ };
+ post_refused: {
+  parameters: {
+  };
+  requestBody: {
+   content: {
+    "application/json": components["schemas"]["RefusedRecord"];
+   };
+  };
+  responses: {
+   202: {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["Received"];
     };
    };
    422: {

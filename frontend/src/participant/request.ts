@@ -39,7 +39,7 @@ export async function request(method: string, path: string, options: RequestOpti
   if (options.token) headers["Authorization"] = `Bearer ${options.token}`;
   if (options.body !== undefined) headers["Content-Type"] = "application/json";
   const init: RequestInit = { method, headers, cache: "no-store", signal: AbortSignal.timeout(options.timeout_ms ?? 10_000) };
-  if (options.body !== undefined) init.body = JSON.stringify(options.body);
+  if (options.body !== undefined) init.body = JSON.stringify(options.body, storable);
   try {
     const response = await fetch((options.base ?? "") + path, init);
     const text = await response.text();
@@ -48,6 +48,11 @@ export async function request(method: string, path: string, options: RequestOpti
   } catch (error) {
     throw new NetworkError(`${method} ${path}: ${String(error)}`);
   }
+}
+
+/** Text without the characters that no database stores: NUL, and halves of characters. */
+function storable(_key: string, value: unknown): unknown {
+  return typeof value === "string" ? value.replace(/\0/g, "").replace(/\p{Surrogate}/gu, "\uFFFD") : value;
 }
 
 function parsed(text: string): unknown {

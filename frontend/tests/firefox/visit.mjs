@@ -1,11 +1,13 @@
-// A whole visit in a real Firefox, by WebDriver BiDi: node visit.mjs FIREFOX ADDRESS_OF_THE_LINK
+// A whole visit in a real Firefox, by WebDriver BiDi: node visit.mjs FIREFOX ADDRESS_OF_THE_LINK [SCRIPT [PAUSE_MS]]
+// SCRIPT runs before the page's own; PAUSE_MS is how long the person looks at each ready screen.
 // Playwright cannot drive Firefox as distributions build it; puppeteer-core can.
 import puppeteer from "puppeteer-core";
 
-const [firefox, address] = process.argv.slice(2);
+const [firefox, address, script = "", pause_ms = "0"] = process.argv.slice(2);
 const browser = await puppeteer.launch({ browser: "firefox", executablePath: firefox, headless: true });
 const page = await browser.newPage();
 const problems = [];
+if (script) await page.evaluateOnNewDocument(script);
 page.on("pageerror", (error) => problems.push(String(error)));
 page.setDefaultTimeout(60_000);
 
@@ -18,6 +20,7 @@ const gone = (handle) => page.waitForFunction((element) => !element.isConnected,
 
 async function rate(key) {
   await see(".ready");
+  await new Promise((resolve) => setTimeout(resolve, Number(pause_ms)));
   await page.keyboard.press(" ");
   const scale = await see(".scale");
   await page.keyboard.press(key);
@@ -26,6 +29,9 @@ async function rate(key) {
 
 try {
   await page.goto(address);
+  // A browser that can only nearly show the study asks whether to go on.
+  await see("h1");
+  while (await page.evaluate(() => document.body.textContent.includes("Before you begin"))) await press(".primary");
   await press(".primary");
   await press(".page > .tick");
   await press(".primary");

@@ -151,3 +151,48 @@ describe("batches and back-off", () => {
     expect(backoff(1, () => 0)).toBe(375);
   });
 });
+
+describe("a record that is refused for good", () => {
+  const rating = "/api/run/ratings/1";
+
+  it.each([400, 403, 404, 409, 413, 422])("is reported in its place and never sent again: %i", async (status) => {
+    const factory = new IDBFactory();
+    const { outbox, store, got } = await opened(factory, [status, "silence", 202]);
+    const sent = await outbox.put("PUT", rating, { trial_index: 1 }, "one");
+    expect((await sent.receipt).accepted).toBe(false);
+    expect(outbox.state.pending).toBe(1);
+    await outbox.drained();
+    expect(paths(got)).toEqual([rating, "/api/run/refused"]);
+    const told = { id: "one", path: rating, status, code: "refused", message: "no", body: { trial_index: 1 } };
+    expect(got[1]?.body).toEqual(told);
+    expect(await store.all()).toEqual([]);
+  });
+
+  it("is not reported again where the report is refused", async () => {
+    const { outbox, store, got } = await opened(new IDBFactory(), [422, 404]);
+    await outbox.put("PUT", rating, {}, "one");
+    await outbox.drained();
+    expect(paths(got)).toEqual([rating, "/api/run/refused"]);
+    expect(await store.all()).toEqual([]);
+  });
+
+  it("keeps its report over a reload", async () => {
+    const factory = new IDBFactory();
+    const silence = Array.from({ length: 50 }, () => "silence" as const);
+    const first = await opened(factory, [422, ...silence], { pause: () => new Promise<void>(() => {}) });
+    await (
+      await first.outbox.put("PUT", rating, { trial_index: 1 }, "one")
+    ).receipt;
+    first.outbox.stop();
+    const second = await opened(factory);
+    await second.outbox.drained();
+    expect(paths(second.got)).toEqual(["/api/run/refused"]);
+  });
+
+  it("leaves what is said of the visit to the page", async () => {
+    const { outbox, got } = await opened(new IDBFactory(), [401]);
+    await outbox.put("PUT", rating, {}, "one");
+    await outbox.drained();
+    expect(paths(got)).toEqual([rating]);
+  });
+});

@@ -86,8 +86,14 @@ def test_a_trial_that_is_not_in_the_run(participant: Participant) -> None:
 
 @pytest.mark.parametrize("field", ["rt", "time_elapsed"])
 @pytest.mark.parametrize("value", [-1, 1e11])
-def test_times_that_cannot_be(participant: Participant, field: str, value: float) -> None:
-    assert error_code(participant.rate(first_main(participant.agree()), **{field: value})) == (422, "invalid")
+def test_times_that_cannot_be_are_unknown_and_flag_the_play(
+    participant: Participant, services: Services, field: str, value: float
+) -> None:
+    answer = participant.rate(first_main(participant.agree()), **{field: value})
+    assert (answer.status_code, answer.json()["receipt"]["rule"]) == (201, "impossible_value")
+    with services.database.read() as session:
+        rating = session.query(Rating).one()
+        assert (getattr(rating, field), rating.disturbances) == (None, {"impossible_value": 1})
 
 
 def test_a_failed_clip_is_wanted_again_and_both_plays_are_kept(

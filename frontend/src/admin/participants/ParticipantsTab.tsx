@@ -95,6 +95,11 @@ function ParticipantCell({ study, run }: { study: string; run: Run }) {
           excluded
         </Badge>
       )}
+      {run.refused > 0 && (
+        <Badge color="orange.9" size="sm" title="Answers or views that could not be stored. Open the participant to read why.">
+          {run.refused} not stored
+        </Badge>
+      )}
       {run.origin !== "participant" && (
         <Badge variant="default" size="sm">
           {run.origin}

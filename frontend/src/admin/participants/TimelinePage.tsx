@@ -88,6 +88,7 @@ export function TimelinePage() {
               ))}
               <Facts title="Device" values={data.device} />
             </Group>
+            <RefusedRecords events={data.events} />
             <TrialTable trials={data.trials} />
             {data.events.length > 0 && (
               <Card withBorder>
@@ -105,6 +106,26 @@ export function TimelinePage() {
         )}
       </Answer>
     </Stack>
+  );
+}
+
+/** Answers and views that the server could not store, with the reason; the participant was not held up by them. */
+function RefusedRecords({ events }: { events: Schemas["TimelineEvent"][] }) {
+  const refused = events.filter(({ type }) => type === "record_refused");
+  if (refused.length === 0) return null;
+  return (
+    <Card withBorder>
+      <Title order={3} size="h5">
+        Not stored: {refused.length}
+      </Title>
+      <Text size="sm">The participant went on without these records. They count as given; the exports do not contain them.</Text>
+      {refused.map(({ received_at, data }, index) => (
+        <Text size="sm" key={`${received_at}${String(index)}`} className="wrap-anywhere">
+          {when(received_at)}: {data["trial_index"] === undefined ? plain(data["path"]) : `trial ${plain(data["trial_index"])}`},{" "}
+          {plain(data["reason"]) || words(plain(data["code"]))} ({plain(data["status"])})
+        </Text>
+      ))}
+    </Card>
   );
 }
 

@@ -3,8 +3,10 @@
  * lasted. Only counts and one median leave the page; which keys were pressed and where is not even kept here.
  */
 import type { Interaction } from "../../api/schema";
+import { within } from "../measured";
 
 const MAX_KEPT = 200;
+const LONGEST_MS = 1e10;
 
 export class InteractionLog {
   private presses = 0;
@@ -29,7 +31,7 @@ export class InteractionLog {
     const summary = {
       presses: this.presses,
       trusted: this.trusted,
-      press_ms: median === null ? null : Math.round(median * 10) / 10,
+      press_ms: within(median, 0, LONGEST_MS) === null ? null : Math.round((median ?? 0) * 10) / 10,
       moves: this.moves,
     };
     this.presses = this.trusted = this.moves = 0;

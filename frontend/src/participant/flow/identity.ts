@@ -2,13 +2,14 @@
 import type { LinkState } from "../../api/schema";
 
 const RECRUITER_KEYS = 20;
+const LONGEST_KEY = 100;
 const LONGEST_VALUE = 200;
 const OWN_KEYS = new Set(["simulate", "lang"]);
 
 /** Recruiter parameters of the address: PROLIFIC_PID, workerId and the like. */
 export function recruiterQuery(search: string): Record<string, string> {
   const entries = [...new URLSearchParams(search)].filter(([key]) => !OWN_KEYS.has(key)).slice(0, RECRUITER_KEYS);
-  return Object.fromEntries(entries.map(([key, value]) => [key.slice(0, LONGEST_VALUE), value.slice(0, LONGEST_VALUE)]));
+  return Object.fromEntries(entries.map(([key, value]) => [key.slice(0, LONGEST_KEY), value.slice(0, LONGEST_VALUE)]));
 }
 
 /** The recruiter's address with the parameters of this page's address in their places. */

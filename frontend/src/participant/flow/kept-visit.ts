@@ -13,6 +13,7 @@ export interface Kept {
   started: RunStarted;
   run: RunState;
 }
+type RefusedRecord = Pick<OutboxItem, "path" | "body">;
 type Write = Pick<OutboxItem, "kind" | "path" | "body">;
 
 const NO_VIEWS = { views_begun: 0, views: [] } satisfies Partial<TrialInfo>;
@@ -75,7 +76,8 @@ function completed(kept: Kept): Kept {
 /** Bring a run up to date with one write: what it says counts as given, whether or not the server has it yet. */
 export function applyWrite(run: RunState, { path, body }: Pick<Write, "path" | "body">, answer: unknown = null): void {
   const [what = "", name = ""] = path.slice(RUN.length).split("/");
-  if (what === "ratings") applyRating(run, body as RatingBody, answer);
+  if (what === "refused") applyRefused(run, body as RefusedRecord);
+  else if (what === "ratings") applyRating(run, body as RatingBody, answer);
   else if (what === "views") applyViews(run.trials, (body as ViewsIn).views);
   else if (what === "forms") run.answered_forms.push(decodeURIComponent(name));
   else if (what === "consent") applyConsent(run, (body as Consent).agreed);
@@ -86,6 +88,15 @@ export function applyWrite(run: RunState, { path, body }: Pick<Write, "path" | "
 function applyConsent(run: RunState, agreed: boolean): void {
   if (agreed) run.consented_at ??= run.server_time;
   else run.status = "withdrawn";
+}
+
+/** An answer that can never be stored is not asked for again. */
+function applyRefused(run: RunState, { path, body }: RefusedRecord): void {
+  const { trial_index, play } = body as Partial<Pick<RatingBody, "trial_index" | "play">>;
+  const trial = path.startsWith(`${RUN}ratings/`) ? run.trials.find((one) => one.trial_index === trial_index) : undefined;
+  if (!trial) return;
+  const plays_done = Math.max(trial.plays_done, play ?? 1);
+  Object.assign(trial, { answered: true, plays_done, plays_wanted: plays_done, views: [] } satisfies Partial<TrialInfo>);
 }
 
 function applyRating(run: RunState, body: RatingBody, answer: unknown): void {

@@ -7,15 +7,18 @@ import type { Outbox } from "../outbox/outbox";
 import type { OutboxItem } from "../outbox/store";
 import { hasWebCodecs } from "../playback/choose";
 import type { ClipPlayer } from "../playback/player";
+import { pixelRatio } from "../measured";
 import { ClipCache } from "../preload/clip-cache";
 import { untilMeasured } from "../screen/refresh-rate";
 import { RunClock } from "../screen/run-clock";
 import { ScreenState } from "../screen/screen-state";
+import { screenShape } from "../screen/size";
 import { RunApi, type Session } from "../session";
 import type { TrialKind } from "../trials/kind";
 import { applyWrite } from "./kept-visit";
 import { owed, Replays } from "./replays";
 
+const LONGEST_AGENT = 1_000;
 const SEND_FIRST_MS = 8_000;
 
 /**
@@ -82,13 +85,12 @@ export function describeDevice(session: Session, storage: boolean): Promise<void
 function sendDevice(session: Session, storage: boolean): Promise<unknown> {
   return session.api.device({
     refresh_rate_hz: session.screen.refresh_rate_hz,
-    user_agent: navigator.userAgent,
+    user_agent: navigator.userAgent.slice(0, LONGEST_AGENT),
     webcodecs: hasWebCodecs(),
     indexed_db: storage,
     touch: navigator.maxTouchPoints > 0,
-    device_pixel_ratio: window.devicePixelRatio,
-    screen_width_px: screen.width,
-    screen_height_px: screen.height,
-    languages: [...navigator.languages],
+    ...screenShape(),
+    device_pixel_ratio: pixelRatio(window.devicePixelRatio),
+    languages: navigator.languages.slice(0, 20),
   });
 }

@@ -33,6 +33,18 @@ export interface OutboxOptions {
   onRefused?: (refused: Refused) => void;
 }
 
+const REFUSED = "/api/run/refused";
+/** Refusals that say something of the visit, not of the record: the page acts on them. */
+const OF_THE_VISIT = ["run_unknown", "run_closed", "consent_missing", "rating_differs", "view_differs"];
+
+/** What tells the server of a record that it, or something on the way to it, will never accept; null where nothing is to be told. */
+function reportOf(item: OutboxItem, { status, code, message }: Refused): OutboxItem | null {
+  const isRecord = item.path.startsWith("/api/run/ratings/") || item.path === "/api/run/views";
+  if (!isRecord || status < 400 || status === 401 || OF_THE_VISIT.includes(code)) return null;
+  const told = { code: code.slice(0, 100), message: message.slice(0, 2000) };
+  return { ...item, method: "POST", path: REFUSED, body: { id: item.id, path: item.path, status, ...told, body: item.body } };
+}
+
 export class Outbox {
   private queue: OutboxItem[] = [];
   private readonly waiting = new Map<string, (outcome: Outcome) => void>();
@@ -163,9 +175,12 @@ export class Outbox {
     // What cannot be removed is sent once more by the next visit, which does no harm.
     const own = batch.items.filter((item) => item.run_id === this.run?.run_id);
     if (outcome.accepted) own.forEach((item) => this.options.onAccepted?.(item, answer.body));
+    const reports = outcome.accepted ? [] : batch.items.flatMap((item) => reportOf(item, outcome.refused) ?? []);
     if (outcome.accepted) await this.onDisk(this.store.remove([...ids]));
+    // Under the id of the record, whose place the report takes: a page that dies in between loses neither.
+    else if (reports.length > 0) for (const report of reports) await this.onDisk(this.store.add(report));
     else for (const item of batch.items) await this.onDisk(this.store.refuse(item, outcome.refused.code));
-    this.queue = this.queue.filter((item) => !ids.has(item.id));
+    this.queue = [...this.queue.filter((item) => !ids.has(item.id)), ...reports].sort((a, b) => a.sequence - b.sequence);
     for (const id of ids) {
       this.waiting.get(id)?.(outcome);
       this.waiting.delete(id);

@@ -1,5 +1,6 @@
 /** From the frames that were drawn to the figures stored with the rating. */
 import type { PlaybackLog } from "../../api/schema";
+import { count, duration, frameLog, offset, within } from "../measured";
 import { shownPeriod, trueRefresh } from "./schedule";
 
 /** Every key of the server's log, with the list of drawn frames. */
@@ -24,13 +25,17 @@ export interface Showing {
   disturbances: Record<string, number>;
   /** Smallest share of the clip inside the window. */
   visible_share: number;
+  /** Frames that the browser presented without reporting when: how many, by the next frame that it reported. */
+  unlogged?: ReadonlyMap<number, number>;
+  /** False where the browser does not report which frames it draws: how many are missing is then unknown. */
+  logs_frames?: boolean;
   /** Mean time between refreshes meanwhile, those missed left out; null where it could not be seen. */
   refresh_ms: number | null;
 }
 
 export interface Screen {
   refresh_rate_hz: number | null;
-  device_pixel_ratio: number;
+  device_pixel_ratio: number | null;
 }
 
 const ASSUMED_REFRESH_MS = 1000 / 60;
@@ -42,24 +47,28 @@ export function playbackRecord(clip_sha256: string | null, showings: Showing[], 
   const believed_ms = screen.refresh_rate_hz ? 1000 / screen.refresh_rate_hz : ASSUMED_REFRESH_MS;
   const first = showings[0];
   const first_drawn = first?.drawn[0];
-  const gaps = showings.flatMap((showing) => gapsOf(showing.drawn));
+  const gaps = showings.flatMap(gapsOf);
+  const is_logged = showings.every(({ logs_frames }) => logs_frames !== false);
+  const logged = (value: () => number): number | null => (is_logged ? count(value()) : null);
   return {
     method: first ? worst(showings) : "none",
     clip_sha256,
     clips: null,
-    key_to_first_frame_ms: first && first_drawn ? round(first_drawn[1] - first.key_at_ms) : null,
-    frames_drawn: sum(showings.map((showing) => distinct(showing.drawn))),
-    frames_late: sum(showings.map((showing) => late(showing, believed_ms))),
-    frames_missing: sum(showings.map((showing) => Math.max(0, showing.frames - distinct(showing.drawn)))),
-    longest_gap_ms: gaps.length ? round(Math.max(...gaps)) : null,
-    clock_gap_ms: greatest(showings.map((showing) => showing.clock_gap_ms)),
-    clock_late_ms: greatest(showings.map((showing) => showing.clock_late_ms)),
-    stalls: sum(showings.map((showing) => showing.stalls)),
-    focus_lost: sum(showings.map((showing) => showing.focus_lost)),
+    key_to_first_frame_ms: first && first_drawn ? duration(first_drawn[1] - first.key_at_ms) : null,
+    frames_drawn: logged(() => sum(showings.map((showing) => distinct(showing)))),
+    frames_late: logged(() => sum(showings.map((showing) => late(showing, believed_ms)))),
+    frames_missing: logged(() => sum(showings.map((showing) => Math.max(0, showing.frames - distinct(showing))))),
+    longest_gap_ms: gaps.length && is_logged ? duration(Math.max(...gaps)) : null,
+    clock_gap_ms: duration(greatest(showings.map((showing) => showing.clock_gap_ms))),
+    clock_late_ms: offset(greatest(showings.map((showing) => showing.clock_late_ms))),
+    stalls: count(sum(showings.map((showing) => showing.stalls))),
+    focus_lost: count(sum(showings.map((showing) => showing.focus_lost))),
     disturbances: disturbancesOf(showings),
-    ...screen,
-    refresh_rate_hz: rateShownAt(showings, screen.refresh_rate_hz),
-    drawn: showings.flatMap(({ drawn, key_at_ms }) => drawn.map(([index, at_ms]): [number, number] => [index, round(at_ms - key_at_ms)])),
+    device_pixel_ratio: within(screen.device_pixel_ratio, 0.01, 100),
+    refresh_rate_hz: within(rateShownAt(showings, screen.refresh_rate_hz), 0, 10_000),
+    drawn: frameLog(
+      showings.flatMap(({ drawn, key_at_ms }) => drawn.map(([index, at_ms]): [number, number] => [index, at_ms - key_at_ms])),
+    ),
   };
 }
 
@@ -83,22 +92,27 @@ function rateShownAt(showings: readonly Showing[], measured_hz: number | null): 
  * Frames drawn more than a refresh away from their time; early ones too, as where a clip ran fast. The refresh is that seen
  * meanwhile; where it is longer than was believed, as on a page that missed some, no frame may be later for that.
  */
-function late({ drawn, fps, refresh_ms }: Showing, believed_ms: number): number {
+function late({ method, drawn, fps, refresh_ms }: Showing, believed_ms: number): number {
   const start = drawn[0];
   if (!start) return 0;
   const period_ms = shownPeriod(1000 / fps, refresh_ms ?? believed_ms);
   const allowed_ms = Math.min(refresh_ms ?? believed_ms, believed_ms) + JITTER_MS;
-  return drawn.filter(([index, at_ms]) => Math.abs(at_ms - start[1] - (index - start[0]) * period_ms) > allowed_ms).length;
+  const began_ms = drawn.map(([index, at_ms]) => at_ms - index * period_ms);
+  // A video element holds its first frame until it runs, for a time of its own: most frames tell when it began to.
+  const clip_at_ms = (method === "video" ? median(began_ms) : began_ms[0]) ?? 0;
+  return began_ms.filter((one) => Math.abs(one - clip_at_ms) > allowed_ms).length;
 }
 
-function gapsOf(drawn: Showing["drawn"]): number[] {
-  return drawn.slice(1).map(([, at_ms], index) => at_ms - (drawn[index]?.[1] ?? at_ms));
+/** Between one frame and the next; those presented in between without a report have their share of the time. */
+function gapsOf({ drawn, unlogged }: Showing): number[] {
+  return drawn.slice(1).map(([index, at_ms], row) => (at_ms - (drawn[row]?.[1] ?? at_ms)) / (1 + (unlogged?.get(index) ?? 0)));
 }
 
-const distinct = (drawn: Showing["drawn"]): number => new Set(drawn.map(([index]) => index)).size;
+const median = (values: number[]): number | undefined => [...values].sort((a, b) => a - b)[Math.floor(values.length / 2)];
+const distinct = ({ drawn, unlogged }: Showing): number =>
+  new Set(drawn.map(([index]) => index)).size + sum([...(unlogged?.values() ?? [])]);
 const sum = (numbers: number[]): number => numbers.reduce((total, number) => total + number, 0);
 /** Null where one of them is: what was not seen once is not known. */
 const greatest = (values: (number | null)[]): number | null =>
-  values.length === 0 || values.includes(null) ? null : round(Math.max(...values.map((value) => value ?? 0)));
-const round = (ms: number): number => Math.round(ms * 100) / 100;
+  values.length === 0 || values.includes(null) ? null : Math.max(...values.map((value) => value ?? 0));
 const worst = (showings: Showing[]): PlaybackMethod => showings.find((showing) => showing.method !== "webcodecs")?.method ?? "webcodecs";

@@ -2,10 +2,13 @@
  * The fallback where WebCodecs is missing: a video element and its frame callbacks. Flagged in the data,
  * because the callbacks miss frames that were shown and say little about when.
  */
+import { absoluteNow } from "./protocol";
+import { count } from "../measured";
 import { ClipBroken, type ClipPlayer, type PlayOptions, type Prepared, type ShownClip } from "./player";
 
 const ASSUMED_FPS = 30;
 const LOAD_LIMIT_MS = 20_000;
+const REFRESH_LIMIT_MS = 1_000;
 
 interface Loaded extends Prepared {
   address: string;
@@ -30,7 +33,9 @@ export class VideoPlayer implements ClipPlayer {
     const probe = document.createElement("video");
     await ready(probe, address);
     const rate = fps ?? ASSUMED_FPS;
-    const loaded = { address, fps: rate, frames: Math.round(probe.duration * rate), width: probe.videoWidth, height: probe.videoHeight };
+    // Some files say nothing of their length, or a wrong one: the trial then knows how many frames there are.
+    const frames = count(probe.duration * rate) ?? 0;
+    const loaded = { address, fps: rate, frames, width: probe.videoWidth, height: probe.videoHeight };
     this.loaded.set(sha256, loaded);
     return loaded;
   }
@@ -47,9 +52,9 @@ export class VideoPlayer implements ClipPlayer {
     if (this.video.src !== clip.address) await ready(this.video, clip.address);
     await new Promise((resolve) => setTimeout(resolve, fixation_ms));
     await kept;
-    const watch = watchFrames(this.video, clip.fps);
-    this.video.currentTime = 0;
-    this.video.style.visibility = "visible";
+    await rewound(this.video);
+    const first_at_ms = await uncovered(this.video);
+    const watch = watchFrames(this.video, clip.fps, first_at_ms);
     await playToEnd(this.video);
     this.video.style.visibility = "hidden";
     return {
@@ -57,7 +62,7 @@ export class VideoPlayer implements ClipPlayer {
       clock_gap_ms: null,
       clock_late_ms: null,
       refresh_ms: null,
-      ended_at_ms: performance.timeOrigin + performance.now(),
+      ended_at_ms: absoluteNow(),
       frames: clip.frames,
       fps: clip.fps,
       ...watch.stop(),
@@ -98,24 +103,71 @@ function playToEnd(video: HTMLVideoElement): Promise<void> {
   });
 }
 
-/** Log frames by requestVideoFrameCallback; where there is none, nothing is claimed to have been drawn. */
-function watchFrames(video: HTMLVideoElement, fps: number): { stop: () => Pick<ShownClip, "drawn" | "stalls"> } {
-  const drawn: [number, number][] = [];
+/** At its first frame, which is drawn: what is uncovered next is the clip's beginning. */
+function rewound(video: HTMLVideoElement): Promise<void> {
+  if (video.currentTime === 0 && !video.ended) return Promise.resolve();
+  return new Promise((resolve, reject) => {
+    const limit = setTimeout(() => reject(new ClipBroken("the video element did not go back to its first frame")), LOAD_LIMIT_MS);
+    video.addEventListener(
+      "seeked",
+      () => {
+        clearTimeout(limit);
+        resolve();
+      },
+      { once: true },
+    );
+    video.currentTime = 0;
+  });
+}
+
+/** Show the first frame; resolves with the time of the refresh that draws it. A hidden page gets no refreshes and does not wait. */
+function uncovered(video: HTMLVideoElement): Promise<number> {
+  video.style.visibility = "visible";
+  return new Promise((resolve) => {
+    const limit = setTimeout(() => resolve(absoluteNow()), REFRESH_LIMIT_MS);
+    requestAnimationFrame(() => {
+      clearTimeout(limit);
+      resolve(absoluteNow());
+    });
+  });
+}
+
+/**
+ * Log frames by requestVideoFrameCallback, whose callbacks begin with the second one: the first is on the screen, paused,
+ * when it is uncovered. Where there is none, it is not known which frames were drawn.
+ */
+function watchFrames(
+  video: HTMLVideoElement,
+  fps: number,
+  first_at_ms: number,
+): { stop: () => Pick<ShownClip, "drawn" | "stalls" | "logs_frames" | "unlogged"> } {
+  const drawn: [number, number][] = [[0, first_at_ms]];
+  const unlogged = new Map<number, number>();
+  let presented: number | null = null;
+  const logs_frames = "requestVideoFrameCallback" in video;
   let stalls = 0;
   let going = true;
   const stalled = (): void => void (stalls += 1);
   const frame: VideoFrameRequestCallback = (_now, metadata) => {
     if (!going) return;
-    drawn.push([Math.round(metadata.mediaTime * fps), performance.timeOrigin + metadata.expectedDisplayTime]);
+    const [index, at_ms] = [Math.round(metadata.mediaTime * fps), performance.timeOrigin + metadata.expectedDisplayTime];
+    // Of the paused first frame the callback has the time at which it was decoded, long before it was uncovered.
+    if (index > 0 && at_ms >= first_at_ms) {
+      // A callback can come too late for its frame: the next one says how many were presented meanwhile.
+      const between = Math.min(index - (drawn.at(-1)?.[0] ?? 0), metadata.presentedFrames - (presented ?? metadata.presentedFrames)) - 1;
+      if (between > 0) unlogged.set(index, between);
+      drawn.push([index, at_ms]);
+    }
+    presented = metadata.presentedFrames;
     video.requestVideoFrameCallback(frame);
   };
-  if ("requestVideoFrameCallback" in video) video.requestVideoFrameCallback(frame);
+  if (logs_frames) video.requestVideoFrameCallback(frame);
   video.addEventListener("waiting", stalled);
   return {
     stop: () => {
       going = false;
       video.removeEventListener("waiting", stalled);
-      return { drawn, stalls };
+      return { drawn, stalls, logs_frames, unlogged };
     },
   };
 }

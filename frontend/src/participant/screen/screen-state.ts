@@ -1,5 +1,6 @@
 /** What is known about this participant's screen, and whether it still holds. */
 import type { CalibrationState } from "../../api/schema";
+import { pixelRatio, pixels, within } from "../measured";
 import { type ScreenChange, screenChange, screenShape, type ScreenShape, zoomed } from "./size";
 
 export class ScreenState {
@@ -23,12 +24,12 @@ export class ScreenState {
   afterZoom(now: ScreenShape = screenShape()): CalibrationState | null {
     if (!this.calibration) return null;
     const px_per_mm = zoomed(this.calibration.px_per_mm, this.calibration, now);
-    const window_size = { window_width_px: window.innerWidth, window_height_px: window.innerHeight };
+    const window_size = { window_width_px: pixels(window.innerWidth), window_height_px: pixels(window.innerHeight) };
     this.calibration = { ...this.calibration, ...now, ...window_size, px_per_mm, occasion: "zoom", recheck_percent: null };
     return this.calibration;
   }
 
-  record(): { refresh_rate_hz: number | null; device_pixel_ratio: number } {
-    return { refresh_rate_hz: this.refresh_rate_hz, device_pixel_ratio: window.devicePixelRatio };
+  record(): { refresh_rate_hz: number | null; device_pixel_ratio: number | null } {
+    return { refresh_rate_hz: within(this.refresh_rate_hz, 0, 10_000), device_pixel_ratio: pixelRatio(window.devicePixelRatio) };
   }
 }

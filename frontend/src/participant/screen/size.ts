@@ -1,4 +1,5 @@
 /** From calibration to the clip's size on this screen, and what a zoom or another screen does to it. */
+import { pixelRatio, pixels, within } from "../measured";
 import type { CalibrationState, TrialInfo } from "../../api/schema";
 
 export interface ScreenShape {
@@ -12,7 +13,12 @@ export type ScreenChange = "none" | "zoom" | "screen";
 const SAME_SHARE = 0.01;
 
 export function screenShape(): ScreenShape {
-  return { device_pixel_ratio: window.devicePixelRatio, screen_width_px: screen.width, screen_height_px: screen.height };
+  // 1 is what a browser without pixel ratios has.
+  return {
+    device_pixel_ratio: pixelRatio(window.devicePixelRatio) ?? 1,
+    screen_width_px: pixels(screen.width),
+    screen_height_px: pixels(screen.height),
+  };
 }
 
 /**
@@ -66,10 +72,10 @@ export function calibrationBody(measured: Measured, distance: Distance, occasion
     recheck_percent: null,
     px_per_mm: Math.round(measured.px_per_mm * 10_000) / 10_000,
     ...screenShape(),
-    window_width_px: window.innerWidth,
-    window_height_px: window.innerHeight,
+    window_width_px: pixels(window.innerWidth),
+    window_height_px: pixels(window.innerHeight),
     // Only a hint: the frame of the window counts in it too.
-    zoom: window.outerWidth ? Math.round((window.outerWidth / window.innerWidth) * 100) / 100 : 1,
+    zoom: within(Math.round((window.outerWidth / window.innerWidth) * 100) / 100, 0.01, 100) ?? 1,
   };
 }
 

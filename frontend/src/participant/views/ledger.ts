@@ -4,6 +4,7 @@
  * another view.
  */
 import type { TrialInfo, ViewIn, ViewState } from "../../api/schema";
+import { clockTime, count, duration, frameLog, offset, pixels, within } from "../measured";
 import { ticketOf } from "../evidence/evidence";
 import { disturbancesOf } from "../playback/record";
 import type { Shown } from "../trials/shared/showing";
@@ -28,7 +29,6 @@ const PATH = "/api/run/views";
 const NOT_KEPT_WAIT_MS = 3_000;
 const INTERRUPTED = { outcome: "interrupted", disturbances: { interrupted: 1 } } as const;
 const RELOADED = "scale_reloaded";
-const round = (ms: number): number => Math.round(ms * 100) / 100;
 
 /** Begin a view of a trial that starts now. */
 export function beginView(session: Session, trial: TrialInfo, play: number): OpenView {
@@ -38,8 +38,8 @@ export function beginView(session: Session, trial: TrialInfo, play: number): Ope
     trial_index: trial.trial_index,
     number: trial.views_begun,
     play,
-    started_at_client: new Date().toISOString(),
-    screen: { ...session.screen.record(), width_px: window.innerWidth, height_px: window.innerHeight },
+    started_at_client: clockTime(),
+    screen: { ...session.screen.record(), width_px: pixels(window.innerWidth), height_px: pixels(window.innerHeight) },
     evidence: ticketOf(session, trial, play),
   };
   return {
@@ -49,7 +49,7 @@ export function beginView(session: Session, trial: TrialInfo, play: number): Ope
         await send(session, { ...view, ...INTERRUPTED });
         throw error;
       }),
-    end: (shown) => send(session, { ...view, ended_at_client: new Date().toISOString(), ...ending(trial, shown) }),
+    end: (shown) => send(session, { ...view, ended_at_client: clockTime(), ...ending(trial, shown) }),
   };
 }
 
@@ -63,16 +63,19 @@ function ending(trial: TrialInfo, shown: readonly RolesShown[]): Partial<ViewIn>
   const showings = shown.map(({ roles, showing }) => ({
     roles: roles as NonNullable<ViewIn["showings"]>[number]["roles"],
     method: showing.method as "webcodecs" | "video",
-    frames: showing.frames,
-    fps: showing.fps,
-    ended_ms: Math.max(0, round(showing.ended_at_ms - showing.key_at_ms)),
-    stalls: showing.stalls,
-    clock_gap_ms: showing.clock_gap_ms,
-    clock_late_ms: showing.clock_late_ms,
-    focus_lost: showing.focus_lost,
-    visible_share: showing.visible_share,
-    refresh_ms: showing.refresh_ms,
+    frames: count(showing.frames) ?? 0,
+    fps: within(showing.fps, 0.001, 1000) ?? 0,
+    ended_ms: duration(showing.ended_at_ms - showing.key_at_ms) ?? -1,
+    stalls: count(showing.stalls) ?? 0,
+    clock_gap_ms: duration(showing.clock_gap_ms),
+    clock_late_ms: offset(showing.clock_late_ms),
+    focus_lost: count(showing.focus_lost) ?? 0,
+    visible_share: within(showing.visible_share, 0, 1),
+    refresh_ms: duration(showing.refresh_ms),
   }));
+  // A showing of which so much is unknown is not one that another page could ask about.
+  if (showings.some(({ fps, ended_ms }) => fps === 0 || ended_ms < 0))
+    return { outcome: "shown", showings: null, clips: seenClips(trial, shown) };
   return { outcome: "shown", showings, clips: seenClips(trial, shown), disturbances: disturbancesOf(shown.map(({ showing }) => showing)) };
 }
 
@@ -81,9 +84,9 @@ function seenClips(trial: TrialInfo, shown: readonly RolesShown[]): NonNullable<
   return trial.clips.map(({ role, clip_sha256, frames }) => {
     const showing = shown.find(({ roles }) => roles.includes(role))?.showing;
     const start = showing?.key_at_ms ?? 0;
-    const log = (showing?.drawn ?? []).map(([index, at_ms]): [number, number] => [Math.min(index, frames - 1), at_ms - start]);
+    const log = frameLog((showing?.drawn ?? []).map(([index, at_ms]): [number, number] => [Math.min(index, frames - 1), at_ms - start]));
     const first = log.filter(([index], row) => row === 0 || log[row - 1]?.[0] !== index);
-    return { role, clip_sha256, drawn: first.map(([index, ms]): [number, number] => [index, round(ms)]) };
+    return { role, clip_sha256, drawn: first };
   });
 }
 
@@ -112,18 +115,19 @@ export function spanOf(showings: readonly Shown[]): Span {
 
 /** Response times from what was shown to the answer, in ms. */
 export function timesOf({ began_at_ms, ended_at_ms }: Span, answered_at_ms: number) {
-  const since = (start: number | undefined): number | null => (start === undefined ? null : round(answered_at_ms - start));
+  const since = (start: number | undefined): number | null => (start === undefined ? null : duration(answered_at_ms - start));
   return { rt: since(ended_at_ms), rt_from_first_frame: since(began_at_ms) };
 }
 
 function restored(view: ViewState): RolesShown[] {
-  const key_at_ms = Date.parse(view.started_at_client);
+  const began_ms = Date.parse(view.started_at_client);
+  const key_at_ms = Number.isNaN(began_ms) ? 0 : began_ms;
   return (view.showings ?? []).map(({ roles, visible_share, refresh_ms, ended_ms, ...measured }, number, { length }) => {
     // Of clips at once the longest one's log has every frame that the clock drew.
     const logs = view.clips.filter(({ role }) => roles.includes(role)).map(({ drawn }) => drawn);
     const log = logs.reduce((longest, one) => (one.length > longest.length ? one : longest), []);
     const drawn = log.map(([index, ms]): [number, number] => [index, key_at_ms + ms]);
-    const kept = { visible_share: visible_share ?? 1, refresh_ms: refresh_ms ?? null, early_keys: 0 };
+    const kept = { visible_share: visible_share ?? 1, refresh_ms: refresh_ms ?? null, early_keys: 0, logs_frames: drawn.length > 1 };
     // The view's own counts are those of all its showings: they are told once.
     const disturbances: Record<string, number> = number === length - 1 ? { ...view.disturbances, [RELOADED]: 1 } : {};
     return { roles, showing: { ...measured, ...kept, drawn, key_at_ms, ended_at_ms: key_at_ms + ended_ms, disturbances } };
@@ -157,7 +161,7 @@ export function applyViews(trials: readonly TrialInfo[], sent: readonly ViewIn[]
       id: view.id,
       number: view.number,
       play,
-      started_at_client: view.started_at_client,
+      started_at_client: view.started_at_client ?? "",
       ended: Boolean(view.outcome ?? view.ended_at_client),
       outcome: view.outcome ?? null,
       showings: view.showings ?? null,

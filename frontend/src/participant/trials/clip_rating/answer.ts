@@ -1,12 +1,13 @@
 /** The answers to one clip as the server is sent them. */
 import type { RatingAnswer, ShownClipRating } from "../../../api/schema";
+import { duration } from "../../measured";
 import type { Rated } from "./scale";
 
 /** `from_ms` is when the clip's last frame was drawn, where it is known. */
 export function answerOf({ answers, at_ms }: Rated, from_ms: number | undefined): RatingAnswer {
   const timed = Object.entries(answers).map(([name, given]) => {
     const at = at_ms[name];
-    const rt = at === undefined || from_ms === undefined ? null : Math.max(0, Math.round((at - from_ms) * 100) / 100);
+    const rt = at === undefined || from_ms === undefined ? null : duration(at - from_ms);
     return [name, { ...given, rt }];
   });
   return { kind: "clip_rating", answers: Object.fromEntries(timed) as RatingAnswer["answers"] };

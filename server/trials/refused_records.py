@@ -1,0 +1,143 @@
+"""Records that can never be stored as what they were sent as: kept with the reason, never asked for again.
+
+A page that asked for such a record again and again would hold its participant for ever. The server checks it
+once more, stores it where it can, and otherwise keeps it as refused: the run can be completed, and the
+experimenter reads why. The rules of evidence hold as for every answer, so that nobody gets a completion code
+for trials that were not watched.
+"""
+
+import json
+from datetime import datetime
+from math import isfinite
+from typing import Any
+
+from pydantic import ValidationError
+from sqlalchemy import Connection
+
+from server.errors import Conflict
+from server.evidence.intake import Intake
+from server.evidence.schemas import RatingEvidence
+from server.tallies.tally import Tally
+from server.tokens import hash_token
+from server.trials import repository
+from server.trials.delivery import TrialNotInRun, answer_to
+from server.trials.refusals import ConsentMissing, RunClosed, RunUnknown
+from server.trials.schemas import RefusedRecord
+from server.versions import Versions
+
+REFUSED = repository.REFUSED
+KEPT_BYTES = 32 * 1024
+MAX_REFUSED = 2_000
+"""More than a run has trials and views."""
+
+
+class TooManyRefused(Conflict):
+    """A run has as many refused records as are kept."""
+
+    code = "too_many_refused"
+
+
+def keep(
+    versions: Versions,
+    intake: Intake,
+    connection: Connection,
+    token: str,
+    record: RefusedRecord,
+    received_at: datetime,
+) -> None:
+    """Keep a record as refused, once; it must bring the evidence that an accepted one would need."""
+    run = repository.run_for_rating(connection, hash_token(token))
+    if run is None:
+        raise RunUnknown("This visit is not known; please open the link you were given again.")
+    if repository.is_refused(connection, run.id, str(record.id)):
+        return
+    if run.consented_at is None:
+        raise ConsentMissing("Nothing is stored before the participant has agreed; send the consent first.")
+    if len(repository.refused_records(connection, run.id)) >= MAX_REFUSED:
+        raise TooManyRefused(f"This visit has {MAX_REFUSED} refused records; no more are kept.")
+    which = record.which
+    if which is not None:
+        _check_answer(versions, intake, connection, run, record, received_at)
+    repository.add_event(
+        connection, run.id, str(record.id), repository.REFUSED, _kept(record, which), received_at
+    )
+
+
+def _check_answer(
+    versions: Versions,
+    intake: Intake,
+    connection: Connection,
+    run: repository.RunForRating,
+    record: RefusedRecord,
+    received_at: datetime,
+) -> None:
+    """Refuse what no answer could be: of a run that is over, of no trial, or without its evidence."""
+    which = record.which or (0, 1)
+    trial_index = which[0]
+    if run.status != "active":
+        raise RunClosed(f"This visit is over ({run.status.replace('_', ' ')}); nothing more is stored.")
+    trial = repository.trial(connection, run.id, trial_index)
+    if trial is None:
+        raise TrialNotInRun(f"Trial {trial_index} is not in this run, which has {run.trials_total} trials.")
+    before = repository.refused_records(connection, run.id)
+    if run.evidence != "asked" or any((one.get("trial_index"), one.get("play")) == which for one in before):
+        return
+    tally = trial.tally or Tally()
+    playback = record.body.get("playback")
+    was_shown = not isinstance(playback, dict) or playback.get("method") != "none"
+    answer = answer_to(
+        run,
+        trial,
+        versions.get(connection, run.version_id),
+        which,
+        received_at,
+        rated=bool(trial.clips) and was_shown,
+        is_check=trial.kind == "check",
+        answered_at=None,
+        evidence=_evidence(record.body),
+    )
+    tally.clip_time = intake.take(connection, answer, tally.clip_time)
+    repository.keep_tally(connection, run.id, tally, is_new=trial.tally is None)
+
+
+def refused_trials(connection: Connection, run: int) -> set[int]:
+    """Trials of a run whose answer was refused for good: nothing more is asked of them."""
+    found = (data.get("trial_index") for data in repository.refused_records(connection, run))
+    return {index for index in found if isinstance(index, int)}
+
+
+def _evidence(body: dict[str, Any]) -> RatingEvidence | None:
+    sent = body.get("evidence")
+    if not isinstance(sent, dict):
+        return None
+    try:
+        return RatingEvidence.model_validate({**sent, "interaction": None})
+    except ValidationError:
+        return None
+
+
+def _kept(record: RefusedRecord, which: tuple[int, int] | None) -> dict[str, Any]:
+    """What is stored: the reason and the record, without what would not fit."""
+    body = _storable({key: value for key, value in record.body.items() if key != "evidence"})
+    if _size(body) > KEPT_BYTES and isinstance(body.get("playback"), dict):
+        body["playback"] = {key: value for key, value in body["playback"].items() if key != "drawn"}
+    if _size(body) > KEPT_BYTES:
+        body = {"left_out_bytes": _size(body)}
+    told = {"path": record.path, "status": record.status, "code": record.code, "reason": record.message}
+    where = {} if which is None else {"trial_index": which[0], "play": which[1]}
+    return {**_storable(told), **where, "record": body}
+
+
+def _storable(value: Any) -> Any:
+    """The same without what a database cannot hold: numbers beyond all bounds, NUL and half characters."""
+    if isinstance(value, dict):
+        return {_storable(str(key)): _storable(one) for key, one in value.items()}
+    if isinstance(value, list):
+        return [_storable(one) for one in value]
+    if isinstance(value, str):
+        return value.replace("\0", "").encode("utf-8", "replace").decode("utf-8")
+    return None if isinstance(value, float) and not isfinite(value) else value
+
+
+def _size(body: dict[str, Any]) -> int:
+    return len(json.dumps(body))
