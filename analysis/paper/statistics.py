@@ -31,15 +31,29 @@ _STATISTIC = re.compile(
     rf"|(?P<z>[zZ])(?= ?= ?-?[\d.])"
     rf") ?= ?(?P<value>{_NUMBER}){_WHOLE}"
 )
-_P = re.compile(rf"(?<![A-Za-z])[pP] ?(?P<sign>[=<>]) ?(?P<p>{_NUMBER}){_WHOLE}")
+_METHODS = (
+    r"(?:Bonferroni|Holm|Tukey|Kramer|HSD|[SŠsš]id[aá]k|Scheff[eé]|Hochberg|Benjamini|FDR|Dunnett?|Games|"
+    r"Newman|Greenhouse|Huynh|bonf|adj|corr|GG|HF)"
+)
+"""Names of corrections that make a p larger than that of its statistic."""
+_P = re.compile(
+    rf"(?<![A-Za-z])[pP](?:[_-]?\{{?(?P<label>{_METHODS}[a-z]*)\}}?)? ?(?P<sign>[=<>]) ?(?P<p>{_NUMBER})"
+    rf"{_WHOLE}",
+    re.IGNORECASE,
+)
 _SCIENTIFIC = re.compile(
     r"(?<![\w.,])(?:(?P<mantissa>\d+(?:\.\d+)?|\.\d+)"
     r"(?: ?[x×·*] ?10 ?\^? ?(?=-)|[eE](?=[-+]?\d))|10 ?\^ ?(?=-))(?P<exponent>[-+]?\d{1,3})(?!\w)"
 )
 _THOUSANDS = re.compile(r"(?<![\d.,])\d{1,3}(?:,\d{3})+\.\d+")
-_CORRECTED_BEFORE = re.compile(r"(?:corrected|adjusted) ?$", re.IGNORECASE)
-_CORRECTED_AFTER = re.compile(r"^ ?[,(]? ?(?:[A-Za-zŠš]+[- ])?(?:corrected|adjusted)\b", re.IGNORECASE)
-_ONE_TAILED = re.compile(r"one-(?:tailed|sided)", re.IGNORECASE)
+_CORRECTION = re.compile(rf"\b(?:(?:un)?corrected|(?:un)?adjusted|correction|{_METHODS})\b", re.IGNORECASE)
+_ONE_TAILED = re.compile(r"\b(?:one|1)[-‐‑– ]?(?:tail(?:ed)?|sided?)\b|\bdirectional\b", re.IGNORECASE)
+_ALL_ONE_TAILED = re.compile(
+    r"\b(?:tests?|comparisons?|hypothes[ei]s|p[- ]?values?)\b[^.;]{0,60}\b(?:were|was|are|is)\b[^.;]{0,30}"
+    r"\b(?:one|1)[-‐‑– ]?(?:tailed|sided)",
+    re.IGNORECASE,
+)
+_SENTENCE_END = re.compile(r"[.!?]\s+(?=[A-Z(])|\n\n")
 _ETA = re.compile(
     rf"(?P<before>partial |generali[sz]ed )?(?:η|eta)(?P<after> squared|[- ]?2 ?p|[- ]?2| ?p ?2)?"
     rf" ?= ?(?P<eta>{_NUMBER})"
@@ -102,11 +116,13 @@ def check_text(text: str) -> TextCheck:
     """Read and check every statistic of `text` (plain signs, see `analysis.paper.document.plain`)."""
     text = _plain_numbers(text)
     matches = list(_STATISTIC.finditer(text))
+    all_one_tailed = bool(_ALL_ONE_TAILED.search(text))
     statistics, covered = [], []
     for match, following in zip_longest(matches, matches[1:]):
         end = min(match.end() + REACH, following.start() if following else len(text))
         tail = own_clause(text[match.end() : end].split("\n\n")[0])
-        reported, used = _reported(match, tail)
+        before = _SENTENCE_END.split(text[max(0, match.start() - REACH) : match.start()])[-1]
+        reported, used = _reported(match, tail, before, all_one_tailed)
         statistics.append(reported)
         covered.append((match.start(), match.end() + used))
     covered += [match.span() for match in _LEVEL.finditer(text)]
@@ -126,15 +142,15 @@ def _plain_numbers(text: str) -> str:
     )
 
 
-def _reported(match: re.Match[str], tail: str) -> tuple[ReportedStatistic, int]:
+def _reported(
+    match: re.Match[str], tail: str, before: str, all_one_tailed: bool
+) -> tuple[ReportedStatistic, int]:
+    """One statistic with the clause after it; `before` is its sentence as far as the statistic."""
     kind = next(k for k in KINDS if match[k])
     df = tuple(match[g] for g in ("f1", "f2", "t1", "c1", "r1") if match[g])
     p, eta = _P.search(tail), _ETA.search(tail) if kind == "F" else None
     allowed = p_range(kind, df, match["value"])
-    if p and kind in ("t", "r", "z") and _ONE_TAILED.search(tail[max(0, p.start() - NEAR) : p.end() + NEAR]):
-        allowed = (allowed[0] / 2, allowed[1] / 2)
-    if p and _is_corrected(p, tail):
-        allowed = (allowed[0], 1.0)  # a correction makes p larger, by how much the text does not say
+    allowed = _best(p, _readings(p, kind, df, allowed, tail, before, all_one_tailed)) if p else allowed
     problems = [
         *(_p_problems(p, allowed) if p else ()),
         *(_eta_problems(df, match["value"], eta) if eta else ()),
@@ -161,8 +177,41 @@ def _reported(match: re.Match[str], tail: str) -> tuple[ReportedStatistic, int]:
     return reported, used
 
 
-def _is_corrected(p: re.Match[str], tail: str) -> bool:
-    return bool(_CORRECTED_BEFORE.search(tail[: p.start()]) or _CORRECTED_AFTER.search(tail[p.end() :]))
+def _readings(
+    p: re.Match[str],
+    kind: Kind,
+    df: tuple[str, ...],
+    allowed: tuple[float, float],
+    tail: str,
+    before: str,
+    all_one_tailed: bool,
+) -> list[tuple[float, float]]:
+    """The ranges of p that the words about a statistic allow, the likeliest first.
+
+    A one-sided p is half of the two-sided one, or the rest to 1 where the effect has the other sign; a
+    correction makes p larger, by how much the text does not say. Words next to the p decide; those earlier
+    in the sentence, or about all tests, may mean another statistic and only add a reading.
+    """
+    near = tail[max(0, p.start() - NEAR) : p.end() + NEAR]
+    one_sample = kind in ("t", "r", "z") or (kind in ("F", "chi2") and float(df[0]) == 1)
+    halves = [(allowed[0] / 2, allowed[1] / 2), (1 - allowed[1] / 2, 1 - allowed[0] / 2)]
+    ranges = [allowed]
+    if one_sample and _ONE_TAILED.search(near):
+        ranges = halves
+    elif one_sample and (all_one_tailed or _ONE_TAILED.search(before)):
+        ranges = [allowed, *halves]
+    if p["label"] or _is_corrected(near) or _is_corrected(before):
+        return [(low, 1.0) for low, _ in ranges]
+    return ranges
+
+
+def _best(p: re.Match[str], ranges: list[tuple[float, float]]) -> tuple[float, float]:
+    """The first range that the printed p fits, else the first."""
+    return next((one for one in ranges if not list(_p_problems(p, one))), ranges[0])
+
+
+def _is_corrected(text: str) -> bool:
+    return any(not match[0].lower().startswith("un") for match in _CORRECTION.finditer(text))
 
 
 def _p_problems(p: re.Match[str], allowed: tuple[float, float]) -> Iterator[str]:

@@ -298,3 +298,45 @@ def test_a_line_may_end_within_a_statistic(tmp_path: Path, suffix: str, at: str)
     checked = check_text(read_document(path))
     (one,) = checked.statistics
     assert (one.p, one.effect_size, one.verdict, checked.unread) == ("= .004", ".24", "consistent", ())
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "t(20) = 2.60, p = .051 (Bonferroni)",
+        "t(20) = 2.60, p = .051 (Holm)",
+        "t(20) = 2.60, p = .051, Tukey HSD",
+        "t(20) = 2.60, Tukey-corrected p = .043",
+        "t(20) = 2.60, p = .043, Tukey-corrected",
+        "t(20) = 2.60, Holm-Bonferroni-adjusted p = .051",
+        "t(20) = 2.60, p_Tukey = .043",
+        "t(20) = 2.60, padj = .051",
+        "After Bonferroni correction, A differed from B, t(20) = 2.60, p = .051.",
+        "F(2, 40) = 3.40, p = .051 (Greenhouse-Geisser)",
+        "t(20) = 1.80, p = .043, one-sided test",
+        "t(20) = 1.80, p = .043 (1-tailed)",
+        "t(20) = 1.80, one sided p = .043",
+        "A one-sided t test showed a difference, t(20) = 1.80, p = .043.",
+        "All tests were one-tailed. A differed from B, t(20) = 1.80, p = .043.",
+        "F(1, 20) = 3.24, p = .043, one-sided",
+        "t(20) = -1.80, p = .957, one-sided",
+    ],
+)
+def test_corrected_and_one_sided_tests_are_no_errors(text: str) -> None:
+    (found,) = check_text(text).statistics
+    assert found.verdict == "consistent", found.problems
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "t(20) = 2.60, p = .001 (Bonferroni)",
+        "t(20) = 2.60, uncorrected p = .051",
+        "t(20) = 1.80, p = .020, one-sided",
+        "We used Bonferroni correction for pairs. A differed from B, t(20) = 2.60, p = .051.",
+        "A one-sided t test showed a difference. B did not, t(20) = 1.80, p = .043.",
+    ],
+)
+def test_words_about_something_else_excuse_no_error(text: str) -> None:
+    (found,) = check_text(text).statistics
+    assert found.verdict in ("inconsistent", "decision")
