@@ -23,6 +23,9 @@ COLLAPSED = 0.01
 class Projection:
     """Recovered quality of the items (j,) with its SE, bias and inconsistency of the people (i,).
 
+    The SE is P.910's, of each item: the standard deviation (divided by n) of its n votes without the biases,
+    over the root of n; NaN for one vote.
+
     Attributes
     ----------
     held : (i,) bool
@@ -46,7 +49,9 @@ class Projection:
     converged: bool
 
 
-def alternating_projection(scores: Array) -> Projection:
+def alternating_projection(
+    scores: Array, counts: Array | None = None, squares: Array | None = None
+) -> Projection:
     r"""Fit the model of Li et al. (2020, Electronic Imaging, HVEI-131),
 
     .. math::
@@ -65,7 +70,9 @@ def alternating_projection(scores: Array) -> Projection:
     Parameters
     ----------
     scores : (i, j) array
-        Votes, NaN where a person did not see an item.
+        Votes, NaN where a person did not see an item; means of votes where `counts` are given.
+    counts, squares : (i, j) array, optional
+        How many votes each mean is of, and the sum of their squared distances from it: every vote counts.
 
     Returns
     -------
@@ -88,7 +95,9 @@ def alternating_projection(scores: Array) -> Projection:
             iterations=0,
             converged=True,
         )
-    fitted = _projected(scores[people][:, items])
+    alone = np.ones_like(scores) if counts is None else counts
+    apart = np.zeros_like(scores) if squares is None else squares
+    fitted = _projected(*(values[people][:, items] for values in (scores, alone, apart)))
     return Projection(
         _put(fitted.quality, items, np.nan),
         _put(fitted.quality_se, items, np.nan),
@@ -108,22 +117,23 @@ def _put(values: NDArray[Any], at: Flags, beside: float) -> NDArray[Any]:
     return whole
 
 
-def _projected(scores: Array) -> Projection:
-    """The same where everybody has two votes or more."""
+def _projected(scores: Array, counts: Array, squares: Array) -> Projection:
+    """The same where everybody has voted on two items or more."""
     seen = np.isfinite(scores)
     middle = float(np.nanmean(scores))
     unit = float(np.nanmax(scores) - np.nanmin(scores)) or 1.0
     votes = np.where(seen, (scores - middle) / unit, 0.0)
+    number, apart = np.where(seen, counts, 0.0), np.where(seen, squares, 0.0) / unit**2
     person_groups, groups = _tied(seen)
     held = np.zeros(len(votes), dtype=bool)
     while True:
-        fit = _weighted(votes, seen, person_groups, held)
-        common = _common(fit.residual, seen)
+        fit = _weighted(votes, number, apart, person_groups, held)
+        common = _common(fit.residual, number, apart)
         fallen = (fit.spread <= COLLAPSED * common) & ~held
         if not fallen.any() or common == 0:
             break
         held |= fallen
-    error = np.divide(1.0, np.sqrt(fit.weight.sum(axis=0)))
+    error = _errors(votes - fit.bias[:, None], number, apart)
     return Projection(
         fit.quality * unit + middle,
         error * unit,
@@ -143,36 +153,44 @@ class _Fit:
     bias: Array
     residual: Array
     spread: Array
-    weight: Array
     iterations: int
     converged: bool
 
 
-def _weighted(votes: Array, seen: Flags, groups: Codes, held: Flags) -> _Fit:
+def _errors(unbiased: Array, number: Array, apart: Array) -> Array:
+    """Standard errors (j,) of items from means without biases, their numbers of votes and spreads."""
+    n = number.sum(axis=0)
+    mean = (unbiased * number).sum(axis=0) / n
+    variance = ((unbiased - mean) ** 2 * number + apart).sum(axis=0) / n
+    return np.where(n > 1, np.sqrt(variance / n), np.nan)
+
+
+def _weighted(votes: Array, number: Array, apart: Array, groups: Codes, held: Flags) -> _Fit:
     """Alternate until the qualities stand still; people `held` are weighted by the common inconsistency."""
-    quality = votes.sum(axis=0) / seen.sum(axis=0)
+    of_person, seen = number.sum(axis=1), number > 0
+    quality = (votes * number).sum(axis=0) / number.sum(axis=0)
     iterations, change = 0, np.inf
     while True:
         iterations += 1
-        bias = np.sum((votes - quality) * seen, axis=1) / seen.sum(axis=1)
+        bias = np.sum((votes - quality) * number, axis=1) / of_person
         bias -= (np.bincount(groups, weights=bias) / np.bincount(groups))[groups]
         residual = (votes - quality - bias[:, None]) * seen
-        centred = (residual - (residual.sum(axis=1) / seen.sum(axis=1))[:, None]) * seen
-        spread = np.sqrt((centred**2).sum(axis=1) / seen.sum(axis=1))
-        common = _common(residual, seen)
+        centred = residual - ((residual * number).sum(axis=1) / of_person)[:, None]
+        spread = np.sqrt((centred**2 * number + apart).sum(axis=1) / of_person)
+        common = _common(residual, number, apart)
         # so small that it decides alone, which is seen and held afterwards, and yet divides nothing by zero
         used = np.maximum(np.where(held, common, spread), max(COLLAPSED**2 * common, SMALLEST))
-        weight = seen / used[:, None] ** 2
+        weight = number / used[:, None] ** 2
         updated = np.sum((votes - bias[:, None]) * weight, axis=0) / weight.sum(axis=0)
         change = float(np.linalg.norm(updated - quality))
         quality = updated
         if change < CHANGE_MAX or iterations == ITERATIONS_MAX:
-            return _Fit(quality, bias, residual, spread, weight, iterations, change < CHANGE_MAX)
+            return _Fit(quality, bias, residual, spread, iterations, change < CHANGE_MAX)
 
 
-def _common(residual: Array, seen: Flags) -> float:
+def _common(residual: Array, number: Array, apart: Array) -> float:
     """Root mean square of all residuals; 0 where they are those of rounding."""
-    common = float(np.sqrt(np.sum(residual**2) / seen.sum()))
+    common = float(np.sqrt(np.sum(residual**2 * number + apart) / number.sum()))
     return common if common > CHANGE_MAX else 0.0
 
 

@@ -28,10 +28,14 @@ Repeats = Literal["mean", "votes"]
 
 @dataclass(frozen=True, eq=False)
 class Votes:
-    """Votes by person and item: means (people, items), NaN where none, and how many votes each rests on."""
+    """Votes by person and item: means (people, items), NaN where none, and how many votes each rests on.
+
+    `squares` (people, items) are the sums of squared distances of votes from these means.
+    """
 
     scores: Array
     counts: Array
+    squares: Array
     people: tuple[str, ...]
     items: tuple[str, ...]
     all_votes: tuple[Array, ...]
@@ -103,9 +107,12 @@ def read_votes(path: Path, item: str, participant: str, rating: str) -> Votes:
     np.add.at(totals, (person, which), values[keep])
     np.add.at(counts, (person, which), 1.0)
     scores = np.divide(totals, counts, out=np.full_like(totals, np.nan), where=counts > 0)
+    squares = np.zeros_like(totals)
+    np.add.at(squares, (person, which), (values[keep] - scores[person, which]) ** 2)
     return Votes(
         scores,
         counts,
+        squares,
         tuple(str(one) for one in people),
         items,
         tuple(values[keep][which == index] for index in range(len(items))),
@@ -122,7 +129,8 @@ def fit_opinion(votes: Votes, repeats: Repeats = "mean") -> OpinionResult:
     ----------
     votes : Votes
     repeats : {"mean", "votes"}
-        A person's repeated votes on an item count as their mean (n is people) or each by itself (n is votes).
+        A person's repeated votes on an item count as their mean (n is people) or each by itself (n is votes),
+        in the opinion scores and in the recovered ones.
 
     Raises
     ------
@@ -134,7 +142,8 @@ def fit_opinion(votes: Votes, repeats: Repeats = "mean") -> OpinionResult:
             f"{votes.source}: expected two people and two items or more, got {len(votes.people)} and "
             f"{len(votes.items)}"
         )
-    model = alternating_projection(votes.scores)
+    each = (votes.counts, votes.squares) if repeats == "votes" else ()
+    model = alternating_projection(votes.scores, *each)
     decisions = list(votes.decisions)
     if np.any(votes.counts > 1):
         word = "a person's mean counts once" if repeats == "mean" else "every vote counts"

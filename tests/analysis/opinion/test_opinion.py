@@ -97,3 +97,35 @@ def test_codes_for_missing_are_named(tmp_path: Path) -> None:
     told = " ".join(CliRunner().invoke(app, call).output.split())
     assert "'score' holds -99" in told
     assert "they count: correct them or leave them empty" in told
+
+
+def test_repeated_votes_reach_the_recovered_scores() -> None:
+    """R, vote by vote."""
+    theirs = REFERENCE["repeated"]
+    votes = read_votes(FOLDER / "repeated.csv", "clip", "id", "score")
+    each, mean = fit_opinion(votes, "votes"), fit_opinion(votes)
+    np.testing.assert_allclose([item.recovered for item in each.items], theirs["psi"], rtol=1e-6)
+    np.testing.assert_allclose([item.recovered_se for item in each.items], theirs["se"], rtol=1e-6)
+    np.testing.assert_allclose([one.bias for one in each.participants], theirs["bias"], atol=1e-6)
+    np.testing.assert_allclose(
+        [one.inconsistency for one in each.participants], theirs["inconsistency"], rtol=1e-6
+    )
+    assert [item.recovered for item in mean.items] != pytest.approx(theirs["psi"], rel=1e-3)
+
+
+PUBLISHED = Path(__file__).parents[4] / "shared/data/published"
+
+
+@pytest.mark.skipif(not PUBLISHED.exists(), reason="../shared/data/published is not here")
+@pytest.mark.parametrize(
+    ("file", "reference"),
+    [
+        ("p910-reference/long.csv", "p910-reference/published.json"),
+        ("bt500-reference/small_long.csv", "bt500-reference/reference_small.json"),
+    ],
+)
+def test_the_error_of_each_item_is_that_of_the_published_reference(file: str, reference: str) -> None:
+    theirs = json.loads((PUBLISHED / reference).read_text(encoding="utf-8"))
+    ours = fit_opinion(read_votes(PUBLISHED / file, "item", "person", "rating"), "votes")
+    np.testing.assert_allclose([item.recovered_se for item in ours.items], theirs["sos_j"], atol=1e-9)
+    np.testing.assert_allclose([item.recovered for item in ours.items], theirs["mos_j"], atol=1e-7)

@@ -11,12 +11,22 @@ data$score <- round(pmin(5, pmax(1, quality[match(data$clip, clips)] + bias[matc
 data <- data[-c(5, 40, 77), ]
 write.csv(data, file.path(folder, "votes.csv"), row.names = FALSE, quote = FALSE)
 items <- lapply(split(data$score, data$clip), function(u) { t <- t.test(u); list(mos = mean(u), sd = sd(u), n = length(u), low = t$conf.int[1], high = t$conf.int[2]) })
-i <- match(data$id, people); j <- match(data$clip, clips); u <- data$score
-psi <- tapply(u, j, mean)
-for (step in 1:5000) {
-  delta <- tapply(u - psi[j], i, mean); delta <- delta - mean(delta)
-  r <- u - psi[j] - delta[i]; ups <- sqrt(tapply(r, i, function(z) mean((z - mean(z))^2)))
-  w <- 1 / ups[i]^2; psi <- tapply(w * (u - delta[i]), j, sum) / tapply(w, j, sum)
+subject_model <- function(data) {
+  i <- match(data$id, people); j <- match(data$clip, clips); u <- data$score
+  psi <- tapply(u, j, mean)
+  for (step in 1:5000) {
+    delta <- tapply(u - psi[j], i, mean); delta <- delta - mean(delta)
+    r <- u - psi[j] - delta[i]; ups <- sqrt(tapply(r, i, function(z) mean((z - mean(z))^2)))
+    w <- 1 / ups[i]^2; psi <- tapply(w * (u - delta[i]), j, sum) / tapply(w, j, sum)
+  }
+  # P.910: the standard deviation (over n) of an item's votes without the biases, over the root of n
+  se <- tapply(u - delta[i], j, function(e) sqrt(mean((e - mean(e))^2) / length(e)))
+  list(psi = unname(c(psi)), se = unname(c(se)), bias = unname(c(delta)), inconsistency = unname(c(ups)))
 }
-write(toJSON(list(R = R.version.string, items = items, psi = unname(c(psi)), se = unname(c(1 / sqrt(tapply(1 / ups[i]^2, j, sum)))),
-  bias = unname(c(delta)), inconsistency = unname(c(ups))), digits = 14, auto_unbox = TRUE), file.path(folder, "reference.json"))
+# votes given again, for some of them and not alike: each counts
+again <- data[sample(nrow(data), 60), ]
+again$score <- pmin(5, pmax(1, again$score + sample(-1:1, 60, TRUE)))
+repeated <- rbind(data, again)
+write.csv(repeated, file.path(folder, "repeated.csv"), row.names = FALSE, quote = FALSE)
+write(toJSON(c(list(R = R.version.string, items = items), subject_model(data), list(repeated = subject_model(repeated))),
+  digits = 14, auto_unbox = TRUE), file.path(folder, "reference.json"))
