@@ -6,7 +6,7 @@ from pathlib import Path
 import pandas as pd
 
 from experiments.errors import InputError, nearest
-from stimuli_builder.blinks.column_names import eye_pair
+from stimuli_builder.blinks.column_names import eye_pair, is_of_lids
 from stimuli_builder.blinks.csv_table import few
 from stimuli_builder.blinks.times import is_time
 from stimuli_builder.blinks.validity import CONFIDENCE_COLUMN, is_validity
@@ -41,6 +41,9 @@ def choose_columns(table: pd.DataFrame, named: Sequence[str], path: Path) -> tup
     measures = [name for name in candidates if not _is_presence(table[name])]
     if len(measures) == 1 or len(candidates) == 1:
         return measures or candidates, []
+    lids = [name for name in measures if is_of_lids(name)]
+    if len(lids) == 2 and eye_pair(lids) is not None:
+        measures = lids
     if len(measures) == 2 and eye_pair(measures) is not None:
         eyes = " and ".join(f"'{name}'" for name in measures)
         return measures, [f"{path.name}: {eyes} are taken as the two eyes; --column NAME takes another"]

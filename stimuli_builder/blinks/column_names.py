@@ -23,8 +23,14 @@ _NO_SIDE_BEFORE = re.compile(r"[0-9]+|squared")
 _CLOSURES = frozenset({"closure", "closedness", "au45"})
 _SHUT = frozenset({"blink", "closed"})
 """Words of columns that are high where the lids are shut: ARKit's eyeBlinkLeft, OpenFace's AU45_r."""
-_OPENINGS = frozenset({"distance", "ear", "gap", "opening", "aperture", "fissure", "height", "px", "mm"})
+_OPENINGS = frozenset(
+    {"distance", "ear", "gap", "opening", "aperture", "openness", "fissure", "height", "px", "mm"}
+)
 """Words of a distance, by which blink and closed say only what it was measured for: blink_ear, closed_px."""
+
+
+_LIDS = frozenset({"ear", "aperture", "openness", "fissure", "closure", "closedness", "au45", "eyeblink"})
+"""Words of lids alone, by which a tracker's two columns are known among those of pupils and gaze."""
 
 
 def words_of(column: str) -> list[str]:
@@ -61,6 +67,12 @@ def _side(word: str) -> Eye | None:
     """The eye of one word in small letters."""
     sided = _SIDED.fullmatch(word)
     return _SIDES.get(word if sided is None else sided["first"] or sided["last"])
+
+
+def is_of_lids(column: str) -> bool:
+    """Whether a column's name says that it is the opening or closure of an eye, not a pupil or a gaze."""
+    words = words_of(column)
+    return not _LIDS.isdisjoint({*words, *("".join(pair) for pair in pairwise(words))})
 
 
 def is_high_when_shut(column: str) -> bool:

@@ -7,6 +7,7 @@ from typing import Any
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from experiments.counted import counted
 from stimuli_builder.blinks.review import Review
@@ -20,7 +21,7 @@ HEADERS = ("blinks", "/min", "complete", "rejected", "down", "up", "total", "clo
 
 def print_blinks(summaries: Sequence[dict[str, Any]], lost: Sequence[Review], *, closed_given: bool) -> None:
     """Print the table of all columns, and below it what was left out and seen besides."""
-    console = Console()
+    console = Console(markup=False, highlight=False)  # names of columns are no markup: left [mm]
     table = Table(box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
     table.add_column("column", no_wrap=True)
     for header in HEADERS:
@@ -30,7 +31,11 @@ def print_blinks(summaries: Sequence[dict[str, Any]], lost: Sequence[Review], *,
         medians = [_median(row[name], 0) for name in ("down_ms", "up_ms", "duration_ms")]
         counts = [str(row["blinks"]), f"{row['rate_per_minute']:.1f}", str(row["complete"])]
         table.add_row(
-            shortened(row["column"]), *counts, str(row["rejected"]), *medians, _median(row["closure"], 2)
+            Text(shortened(row["column"])),
+            *counts,
+            str(row["rejected"]),
+            *medians,
+            _median(row["closure"], 2),
         )
     console.print(table)
     for row in summaries:
@@ -71,7 +76,7 @@ def _column_lines(row: dict[str, Any], *, closed_given: bool) -> list[str]:
 def print_written(blinks: int, written: Iterable[Path | None]) -> None:
     """Print how many blinks there are in all columns, and the files that were written."""
     paths = ", ".join(str(path) for path in written if path is not None)
-    Console().print(f"{counted(blinks, 'blink')}; wrote {paths}")
+    Console(markup=False, highlight=False).print(f"{counted(blinks, 'blink')}; wrote {paths}")
 
 
 def _median(spread: Mapping[str, float], digits: int) -> str:

@@ -28,8 +28,8 @@ from stimuli_builder.blinks.series import BlinkSeries, scaled_frames
 LID_FILTER_FRAMES = 10
 PLAUSIBLE_MS = (120, 600)
 """Median durations that are believed: 330 ms is usual."""
-USUAL_CLOSING_MS = (55, 140)
-USUAL_SPEED = (15, 28)
+USUAL_CLOSING_MS = (45, 120)
+USUAL_SPEED = (14, 26.5)
 """Peak closing velocity over amplitude, per second (main sequence). A rate off by a factor of two puts it and
 the closing time outside, on opposite sides; a person seldom has both there."""
 TELLING_FPS = 60
@@ -117,7 +117,7 @@ def _moved(series: BlinkSeries, blink: LabelledBlink, edges: tuple[int, int] | N
         )
     event = blink.event
     if event is not None:
-        event = replace(event, onset_s=onset / series.fps, end_s=end / series.fps)
+        event = replace(event, onset_s=onset / series.fps, end_s=end / series.fps, fit=None, is_moved=True)
     return replace(blink, onset=onset, end=end, event=event)
 
 
@@ -164,7 +164,7 @@ def _rate_doubt(eyes: Sequence[EyeBlinks]) -> str:
 
     Both eyes have one rate, so that the blinks of all columns are looked at together.
     """
-    blinks = [blink for eye in eyes for blink in eye.blinks]
+    blinks = [blink for eye in eyes for blink in eye.blinks if blink.plausible]
     if not blinks:
         return ""
     fps = eyes[0].series.fps

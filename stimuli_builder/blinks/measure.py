@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
 from experiments.errors import InputError
+from stimuli_builder.blinks.events.lid_event import LidEvent
 from stimuli_builder.blinks.label_options import LabelOptions
 from stimuli_builder.blinks.labelling import LabelledBlink, RefusedMinimum
 from stimuli_builder.blinks.profile import PROFILE_FPS, Array
@@ -16,17 +17,24 @@ from stimuli_builder.blinks.series import BlinkSeries, box_filter, scaled_frames
 COMPLETE_FROM = 0.95
 """Closure from which a blink counts as complete: less is left open than the closed reference is sure of."""
 DEEPEST_SHARE = 0.25
+PLAUSIBLE_PHASES_MS = ((15.0, 400.0), (30.0, 1000.0), (60.0, 1300.0))
+"""Closing, opening and duration within which a blink's phases are believed: wider than those of patients and
+of sleepy people (Caffier et al. 2003; VanderWerf et al. 2003)."""
+KNOWN_SHARE = 0.25
+"""A duration of which more than this part is uncertain (one standard error) is not believed."""
 
 
 @dataclass(frozen=True)
 class MeasuredBlink:
     """One row of the blinks table; frames are the series' own, distances in its unit.
 
-    The closure takes the line from the onset to the end as open (0) and the recording's closed level as
-    closed (1). Velocities are of the filtered distance, in its unit a second. `amplitude` is the fall from
-    the open level to the minimum, `closure` the greatest closure. `rest_before` and `rest_after` tell how
-    far the resting eye was open before and after: closure against the wider of the two. `probability` and
-    the closed phase are the classifier's, and NaN by the paper's rule; with it, times lie between frames.
+    The closure takes the line between the resting levels before and after as open (0) and the recording's
+    closed level as closed (1). Velocities are of the filtered distance, in its unit per second. `amplitude`
+    is the fall from the open level to the minimum, of the fitted curve where there is one, `closure` the
+    greatest closure. `rest_before` and `rest_after` give how far the resting eye was open before and after:
+    closure against the wider of the two. `probability` and the closed phase are the classifier's, and NaN by
+    the paper's rule; with it, times lie between frames. The errors are one standard error of each phase, by
+    the fit of the phases.
     """
 
     number: int
@@ -56,6 +64,10 @@ class MeasuredBlink:
     probability: float = float("nan")
     closed_from_s: float = float("nan")
     closed_to_s: float = float("nan")
+    down_error_ms: float = float("nan")
+    up_error_ms: float = float("nan")
+    duration_error_ms: float = float("nan")
+    plausible: bool = True
 
 
 def closed_level(smooth: Array, blinks: Sequence[LabelledBlink], given: float | None = None) -> float:
@@ -114,9 +126,10 @@ def measure_blinks(
         return [], []
     smooth = smoothed(series, options)
     closed = closed_level(smooth, blinks, closed_distance)
-    fit = [blink for blink in blinks if closed < min(smooth[blink.onset], smooth[blink.end])]
+    levels = [open_levels(smooth, blink) for blink in blinks]
+    fit = [blink for blink, around in zip(blinks, levels, strict=True) if closed < min(around)]
     if not fit and closed_distance is not None:
-        widest = max(float(smooth[blink.onset]) for blink in blinks)
+        widest = max(before for before, _ in levels)
         raise not_below(closed, f"any blink of '{series.column}'", widest)
     reason = f"it begins or ends no further open than the closed distance {closed:.3g}"
     refused = [RefusedMinimum(blink.minimum, reason) for blink in blinks if blink not in fit]
@@ -138,11 +151,16 @@ def _measure(
     complete_from: float,
 ) -> MeasuredBlink:
     fps, least = series.fps, float(smooth[blink.minimum])
-    open_distance = float(open_line(smooth, blink.onset, blink.end)(blink.minimum))
-    closure = min(1.0, (open_distance - least) / (open_distance - closed))
     onset_s, minimum_s, end_s = _times(blink, fps)
+    open_distance = float(np.interp(minimum_s, [onset_s, end_s], open_levels(smooth, blink)))
+    amplitude = open_distance - least
+    closure = min(1.0, amplitude / (open_distance - closed))
     before, after = _rests(smooth, blink, fps, closed)
     event = blink.event
+    if event is not None and event.fit is not None:
+        amplitude = event.fit.fallen
+    errors_ms = (np.nan,) * 3 if event is None else _errors_ms(event)
+    phases_ms = ((minimum_s - onset_s) * 1000, (end_s - minimum_s) * 1000, (end_s - onset_s) * 1000)
     return MeasuredBlink(
         number=number,
         column=series.column,
@@ -154,13 +172,13 @@ def _measure(
         end_s=end_s,
         down_frames=blink.minimum - blink.onset,
         up_frames=blink.end - blink.minimum,
-        down_ms=(minimum_s - onset_s) * 1000,
-        up_ms=(end_s - minimum_s) * 1000,
-        duration_ms=(end_s - onset_s) * 1000,
+        down_ms=phases_ms[0],
+        up_ms=phases_ms[1],
+        duration_ms=phases_ms[2],
         open_distance=open_distance,
         minimum_distance=least,
         closed_distance=closed,
-        amplitude=open_distance - least,
+        amplitude=amplitude,
         closure=closure,
         complete=closure >= complete_from,
         peak_closing_velocity=float(-velocity[blink.onset : blink.minimum + 1].min()),
@@ -171,7 +189,35 @@ def _measure(
         probability=float("nan") if event is None else event.probability,
         closed_from_s=float("nan") if event is None else event.closed_from_s,
         closed_to_s=float("nan") if event is None else event.closed_to_s,
+        down_error_ms=errors_ms[0],
+        up_error_ms=errors_ms[1],
+        duration_error_ms=errors_ms[2],
+        plausible=_plausible(phases_ms, errors_ms[2], by_fit=event is not None and not event.is_moved),
     )
+
+
+def _errors_ms(event: LidEvent) -> tuple[float, float, float]:
+    fit = event.fit
+    if fit is None:
+        return np.nan, np.nan, np.nan
+    return fit.down_error_s * 1000, fit.up_error_s * 1000, fit.duration_error_s * 1000
+
+
+def _plausible(phases_ms: tuple[float, float, float], error_ms: float, *, by_fit: bool) -> bool:
+    """Whether lids move so: phases within `PLAUSIBLE_PHASES_MS`, and by the fit known well enough."""
+    inside = all(low <= ms <= high for ms, (low, high) in zip(phases_ms, PLAUSIBLE_PHASES_MS, strict=True))
+    return inside and (not by_fit or error_ms <= KNOWN_SHARE * phases_ms[2])
+
+
+def open_levels(smooth: Array, blink: LabelledBlink) -> tuple[float, float]:
+    """Distance of the resting lid before and after a blink: by the fit of its phases, else at its edges.
+
+    A fitted blink begins where 5% of its amplitude is gone, so that its edges lie below the open level.
+    """
+    event = blink.event
+    if event is not None and event.fit is not None:
+        return event.fit.open_before, event.fit.open_after
+    return float(smooth[blink.onset]), float(smooth[blink.end])
 
 
 def _times(blink: LabelledBlink, fps: float) -> tuple[float, float, float]:

@@ -60,12 +60,15 @@ def series_figure(eyes: Sequence[EyeBlinks], rejected: set[tuple[str, int]]) -> 
     duration_s = max(eye.smooth.size / eye.series.fps for eye in eyes)
     row_s = max(SECONDS_A_ROW, duration_s / MAX_ROWS)
     rows = max(1, int(np.ceil(duration_s / row_s - 0.05)))
+    top = max((float(np.nanmax(eye.smooth)) for eye in eyes if np.isfinite(eye.smooth).any()), default=0.0)
+    top = top or 1.0  # columns of zeros have no height
     figure = _figure(12, 0.8 + 1.5 * rows)
     grid = figure.subplots(rows, 1, squeeze=False)[:, 0]
     for row, axes in enumerate(grid):
         stop_s = duration_s if row == rows - 1 else (row + 1) * row_s
         for position, eye in enumerate(eyes):
-            _series_row(axes, eye, row * row_s, stop_s, position, rejected)
+            _series_row(axes, eye, row * row_s, stop_s, position, rejected, top)
+        axes.set_ylim(-0.03 * top, 1.12 * top)
         axes.set_xlim(row * row_s, stop_s if rows == 1 else max(stop_s, (row + 1) * row_s))
         axes.spines[["top", "right"]].set_visible(False)
     unit = "px" if eyes[0].series.is_px else "as recorded"
@@ -77,16 +80,21 @@ def series_figure(eyes: Sequence[EyeBlinks], rejected: set[tuple[str, int]]) -> 
 
 
 def _series_row(
-    axes: "Axes", eye: EyeBlinks, start_s: float, stop_s: float, position: int, rejected: set[tuple[str, int]]
+    axes: "Axes",
+    eye: EyeBlinks,
+    start_s: float,
+    stop_s: float,
+    position: int,
+    rejected: set[tuple[str, int]],
+    top: float,
 ) -> None:
+    """One row of one eye; `top` is the greatest distance of all eyes, so that each is seen whole."""
     colour = (BLUE, AMBER, GREEN, GREY)[position % 4]
     fps = eye.series.fps
     first, last = int(start_s * fps), min(int(np.ceil(stop_s * fps)) + 1, eye.smooth.size)
     step = max(1, (last - first) // 6000)
     frames = np.arange(first, last, step)
     axes.plot(frames / fps, eye.smooth[first:last:step], color=colour, lw=0.9, label=eye.series.column)
-    top = float(np.nanmax(eye.smooth)) or 1.0  # a column of zeros has no height
-    axes.set_ylim(-0.03 * top, 1.12 * top)
     for blink in eye.blinks:
         if blink.end_s <= start_s or blink.onset_s >= stop_s:
             continue

@@ -118,7 +118,7 @@ def _write(job: BlinksJob, labelled: _Labelled) -> list[Path | None]:
 def label_recording(job: BlinksJob) -> list[EyeBlinks]:
     """Label every column of the job; an unlikely rate is told.
 
-    A recording without a blink is refused, or told where a report is asked for, which says so too.
+    A recording without a blink is a result too: a warning says why, and the tables are empty.
     """
     given = read_series(
         job.series,
@@ -132,10 +132,7 @@ def label_recording(job: BlinksJob) -> list[EyeBlinks]:
         sys.stderr.write(f"note: {note}\n")
     eyes = _blinks_of_all(job, given)
     if not any(eye.blinks for eye in eyes):
-        why = why_no_blink(eyes[0], job.options)
-        if job.more.report is None:
-            raise InputError(f"{why}; --report FILE writes a report that says so")
-        sys.stderr.write(f"warning: {why}\n")
+        sys.stderr.write(f"warning: {why_no_blink(eyes[0], job.options)}\n")
     for doubt in rate_doubts(eyes):
         sys.stderr.write(f"warning: {doubt}\n")
     return eyes

@@ -19,6 +19,9 @@ from stimuli_builder.blinks.profile import Array
 from stimuli_builder.blinks.times import (
     MAX_BRIDGED_MS,
     RESAMPLED,
+    TIMES,
+    are_uneven,
+    refuse_other_rate,
     resampled,
     series_fps,
     with_time_s,
@@ -27,6 +30,9 @@ from stimuli_builder.blinks.tracked_lid import tracked_lower_lid
 from stimuli_builder.blinks.validity import unseen_rows
 
 PAPER_FPS = 300
+EYE_COLUMNS = frozenset({"left_distance_px", "right_distance_px"})
+SIDES = "left and right are sides of the picture (the left eye is the person's right, unless it is mirrored)"
+"""A track knows the picture, not whether the camera mirrored it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,17 +181,23 @@ def read_series(
     """
     table, times_note = read_table(path), ""
     if fps is None or resample:
-        # A rate that was given stands by itself: columns of these names hold other things too.
         table, times_note = with_time_s(table, path)
+    elif "time_s" not in table.columns:
+        refuse_other_rate(table, fps, path)
     chosen, left_out = choose_columns(table, columns, path)
     if resample and "time_s" not in table.columns:
         raise InputError(f"{path.name} has no column time_s: --resample needs the time of every frame")
+    if not resample and TIMES in table.attrs and are_uneven(table):
+        # Stamps of a camera or tracker: their steps differ by nature, unlike the even ones of a time_s.
+        resample, times_note = True, f"{times_note}; uneven, so brought to an even rate"
     rate = series_fps(table, fps, path, uneven=resample)
     unseen, notes = unseen_rows(table, chosen, path)
     notes = [times_note, *left_out, *notes, *_set_openings(table, chosen, path, inverted, unseen, rate)]
     if resample:
         table, unseen, note = resampled(table, chosen, rate, path, unseen)
         notes.append(note)
+    if any(name in EYE_COLUMNS for name in chosen):
+        notes.append(f"{path.name}: {SIDES}")
     said = tuple(note for note in (str(table.attrs.get(NOTE, "")), *notes) if note)
     eyes = [
         make_series(table, name, rate, path, allow_gaps=allow_gaps, unseen=unseen[name]) for name in chosen

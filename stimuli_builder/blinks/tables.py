@@ -30,10 +30,10 @@ BLINK_COLUMNS = {
     "down_ms": "length of the closing phase in ms",
     "up_ms": "length of the opening phase in ms",
     "duration_ms": "onset to end in ms",
-    "open_distance": "open level at the minimum: the line from onset to end, in the unit of the series",
+    "open_distance": "open level at the minimum, between the levels at rest before and after it",
     "minimum_distance": "filtered distance at the minimum",
     "closed_distance": "distance taken as lid contact in this column",
-    "amplitude": "open_distance - minimum_distance",
+    "amplitude": "fall from the open level to the minimum, of the fitted curve where there is one",
     "closure": "greatest closure, 0 open to 1 closed",
     "complete": "true where the closure reaches the limit for a complete blink",
     "peak_closing_velocity": "greatest speed of closing, in the unit of the series a second",
@@ -44,6 +44,10 @@ BLINK_COLUMNS = {
     "probability": "the classifier's probability that it is a blink; empty by the paper's rule",
     "closed_from_s": "start of the closed phase (95% of the amplitude reached), in seconds; likewise",
     "closed_to_s": "end of the closed phase",
+    "down_error_ms": "standard error of down_ms by the fit of the phases; empty by the paper's rule",
+    "up_error_ms": "standard error of up_ms; likewise",
+    "duration_error_ms": "standard error of duration_ms; likewise",
+    "plausible": "false where no lid has such phases, or they are too uncertain: not in medians and spreads",
     "partner": "number of the other eye's blink of the same moment; empty where only one eye blinked",
     "partner_lag_ms": "onset of this blink minus its partner's",
     "partner_closure": "greatest closure of this blink minus its partner's",
@@ -91,7 +95,8 @@ def blinks_frame(
     numbers = [field.name for field in fields(MeasuredBlink) if field.type in (float, "float")]
     numbers += ["partner_lag_ms", "partner_closure"]
     frame["partner"] = frame["partner"].astype("Int64")
-    frame[["complete", "accepted"]] = frame[["complete", "accepted"]].astype(bool)  # of no rows too
+    truths = ["complete", "plausible", "accepted"]
+    frame[truths] = frame[truths].astype(bool)  # of no rows too
     frame[numbers] = frame[numbers].astype(float).round(6)
     return frame
 
@@ -138,7 +143,8 @@ def summarise(eye_blinks: EyeBlinks, frame: pd.DataFrame, profiles: Sequence[Bli
     series = eye_blinks.series
     rows = frame[frame["accepted"] & (frame["column"] == series.column)]
     minutes = eye_blinks.seconds / 60
-    durations, closures = rows["duration_ms"].to_numpy(), rows["closure"].to_numpy()
+    believed = rows[rows["plausible"]]
+    durations, closures = believed["duration_ms"].to_numpy(), believed["closure"].to_numpy()
     return {
         "column": series.column,
         "fps": round(series.fps, 4),
@@ -152,6 +158,7 @@ def summarise(eye_blinks: EyeBlinks, frame: pd.DataFrame, profiles: Sequence[Bli
         "missing_frames": series.missing_frames,
         "rate_per_minute": round(len(rows) / minutes, 3),
         "complete": int(rows["complete"].sum()),
+        "implausible": int((~rows["plausible"]).sum()),
         **_spreads(rows),
         "duration_histogram": duration_histogram(durations),
         "amplitude_histogram": amplitude_histogram(closures),
@@ -160,14 +167,15 @@ def summarise(eye_blinks: EyeBlinks, frame: pd.DataFrame, profiles: Sequence[Bli
 
 
 def _spreads(rows: pd.DataFrame) -> dict[str, dict[str, float]]:
-    """Spread of every measure of blinks, by the summary's name of it."""
+    """Spread of every measure of blinks, by the summary's name of it; of plausible blinks alone."""
+    every, rows = rows, rows[rows["plausible"]]
     closing, opening = rows["peak_closing_velocity"], rows["peak_opening_velocity"]
     measures = {name: rows[name] for name in ("duration_ms", "down_ms", "up_ms", "closure")} | {
         "opening_to_closing_velocity": opening / closing,
         "peak_velocity_to_amplitude_per_s": closing / rows["amplitude"],
     }
     spreads = {name: _spread(values.to_numpy()) for name, values in measures.items()}
-    return spreads | {"interval_s": _spread(np.diff(rows["minimum_s"].to_numpy()))}
+    return spreads | {"interval_s": _spread(np.diff(every["minimum_s"].to_numpy()))}
 
 
 def _asymmetry(eye_blinks: EyeBlinks) -> dict[str, Any] | None:

@@ -1,5 +1,6 @@
 """When the frames of a series were taken: its rate, times that are uneven, and holes in them."""
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -16,8 +17,23 @@ MAX_BRIDGED_MS = 1000 / 30
 """Longest gap that is filled by a straight line: ten frames of the paper's, the filter's width."""
 TIMES = "times"
 """Under this name a table keeps which of its columns time_s is from."""
-TIME_NAMES = frozenset({"time", "times", "timems", "timestamp", "timestamps", "timestampms"})
+TIME_NAME = re.compile(r"(?:time|timestamp)(?P<unit>s|ms|us|µs|μs|ns|sec|seconds|milliseconds|nanoseconds)?")
 """Letters of their names; of a unit s says nothing, as the steps tell it."""
+STATED = {
+    "ms": "ms",
+    "milliseconds": "ms",
+    "us": "µs",
+    "µs": "µs",
+    "μs": "µs",
+    "ns": "ns",
+    "nanoseconds": "ns",
+}
+"""Units that a name of times states, by the letters that state them."""
+TIMECODE = "timecode"
+_TIMECODE = re.compile(r"(\d+):(\d+):(\d+)[:;](\d+(?:\.\d+)?)")
+"""Hours, minutes, seconds, frames and parts of one, as Live Link Face writes them."""
+TOLD_FPS = (10, 10_000)
+"""Rates that may be given."""
 RESAMPLED = "resampled"
 """So marked, a table's rows are no lines of its file."""
 UNITS = (("s", 1.0, 0.9), ("ms", 1e-3, 200.0), ("µs", 1e-6, 2e5), ("ns", 1e-9, np.inf))
@@ -46,32 +62,93 @@ def with_time_s(table: pd.DataFrame, path: Path) -> tuple[pd.DataFrame, str]:
     name = next((one for one in table.columns if is_time(one)), None)
     if name is None:
         return table, ""
-    times = pd.to_numeric(table[name], errors="coerce").to_numpy(dtype=np.float64)
-    steps = np.diff(times)
-    if not steps.size or not np.isfinite(steps).all() or (steps == 1).all():
-        got = "counts frames" if steps.size and (steps == 1).all() else "is not a number in every row"
-        raise InputError(f"{path.name}: '{name}' {got}; expected times: give the recording's rate with --fps")
-    unit, part = ("ms", 1e-3) if _letters(name).endswith("ms") else _unit(float(np.median(steps)))
-    made = table.assign(time_s=times * part)
+    if _letters(name) == TIMECODE:
+        times_s, unit = _timecode_s(table[name], path), "hours:minutes:seconds:frames"
+    else:
+        times_s, unit = _times_s(table[name], path)
+    made = table.assign(time_s=times_s)
     made.attrs = table.attrs | {TIMES: name}
     return made, f"{path.name}: times are from '{name}', in {unit}"
 
 
+def _times_s(column: pd.Series, path: Path) -> tuple[Array, str]:
+    """Seconds of a column of times, and the unit it is in: the one its name states, else by its steps."""
+    numbers = pd.to_numeric(column, errors="coerce")
+    # Nanoseconds since 1970 have more digits than a float: the first is taken off before.
+    times = (numbers - numbers.iloc[0] if numbers.dtype.kind in "iu" else numbers).to_numpy(dtype=np.float64)
+    steps = np.diff(times)
+    if not steps.size or not np.isfinite(steps).all() or (steps == 1).all():
+        got = "counts frames" if steps.size and (steps == 1).all() else "is not a number in every row"
+        raise InputError(
+            f"{path.name}: '{column.name}' {got}; expected times: give the recording's rate with --fps"
+        )
+    parts = {unit: part for unit, part, _ in UNITS}
+    unit = STATED.get(_stated_unit(str(column.name))) or _unit(float(np.median(steps)))
+    return np.asarray(times * parts[unit]), unit
+
+
+def _timecode_s(column: pd.Series, path: Path) -> Array:
+    """Seconds of time codes; frames are counted in the base at which they return to 0.
+
+    The base is measured: a take of 30 frames a second may count them in a base of 60.
+    """
+    codes = [_TIMECODE.fullmatch(str(cell).strip()) for cell in column]
+    if not all(codes) or len(codes) < 2:
+        row = next((number for number, one in enumerate(codes) if one is None), 0)
+        got = f"got '{column.iloc[row]}' in line {line_of(path, row)}" if len(codes) else "got no row"
+        raise InputError(f"{path.name}: '{column.name}' must hold time codes as 01:02:03:04.5, {got}")
+    cells = np.array([one.groups() for one in codes if one], dtype=np.float64)
+    seconds, frames = cells[:, :3] @ [3600, 60, 1], cells[:, 3]
+    steps, turns = np.diff(frames), np.diff(seconds)
+    within, across = steps[turns == 0], turns == 1
+    usual = float(np.median(within)) if within.size else 1.0
+    base = float(np.median(usual - steps[across])) if across.any() else float(frames.max() + usual)
+    return np.asarray(seconds + frames / max(1.0, round(base)))
+
+
 def is_time(column: str) -> bool:
-    """Whether a column's name is one of times: time, Time (s), time_ms, timestamp, timestamp_ms."""
-    return _letters(column) in TIME_NAMES
+    """Whether a column's name is one of times: time, Time (s), time_ms, timestamp [ns], Timecode."""
+    letters = _letters(column)
+    return letters == TIMECODE or TIME_NAME.fullmatch(letters) is not None
+
+
+def _stated_unit(column: str) -> str:
+    named = TIME_NAME.fullmatch(_letters(column))
+    return "" if named is None else named["unit"] or ""
 
 
 def _letters(column: str) -> str:
     return "".join(letter for letter in column.lower() if letter.isalnum())
 
 
-def _unit(step: float) -> tuple[str, float]:
-    """Name and seconds of the unit in which a usual step is one of a recording, of 5 frames a second or more.
+def _unit(step: float) -> str:
+    """The unit in which a usual step is one of a recording, of 5 frames a second or more.
 
     Only seconds may be slower, so that a recording of 5 frames a second is told as what it is.
     """
-    return next((unit, part) for unit, part, below in UNITS if step < below)
+    return next(unit for unit, _, below in UNITS if step < below)
+
+
+def refuse_other_rate(table: pd.DataFrame, fps: float, path: Path) -> None:
+    """Refuse a rate that contradicts the table's own times, where it has any that are times.
+
+    A column named as times may hold something else: what cannot be read as times says nothing of the rate.
+    """
+    try:
+        timed, _ = with_time_s(table, path)
+        measured = _measured_fps(timed, path, uneven=True) if "time_s" in timed.columns else None
+    except InputError:
+        return
+    if measured is not None and TOLD_FPS[0] <= measured <= TOLD_FPS[1]:
+        _refuse_contradiction(fps, measured, timed, path)
+
+
+def _refuse_contradiction(fps: float, measured: float, table: pd.DataFrame, path: Path) -> None:
+    if abs(fps / measured - 1) > 0.01:
+        raise InputError(
+            f"--fps {fps:g} contradicts {path.name}, whose {_name(table)} runs at {measured:.2f}; "
+            "leave --fps out"
+        )
 
 
 def series_fps(table: pd.DataFrame, fps: float | None, path: Path, *, uneven: bool = False) -> float:
@@ -85,19 +162,24 @@ def series_fps(table: pd.DataFrame, fps: float | None, path: Path, *, uneven: bo
             f"{path.name} has no column time_s (it has {few(list(table.columns))}); expected a "
             "track, or lid distances: give the recording's rate with --fps"
         )
-    if fps is not None and not (np.isfinite(fps) and 10 <= fps <= 10_000):
+    if fps is not None and not (np.isfinite(fps) and TOLD_FPS[0] <= fps <= TOLD_FPS[1]):
         raise InputError(f"the rate must lie between 10 and 10000 frames a second, got --fps {fps:g}")
-    if fps is not None and measured is not None and abs(fps / measured - 1) > 0.01:
-        raise InputError(
-            f"--fps {fps:g} contradicts {path.name}, whose {_name(table)} runs at {measured:.2f}; "
-            "leave --fps out"
-        )
+    if fps is not None and measured is not None:
+        _refuse_contradiction(fps, measured, table, path)
     rate = measured if measured is not None else fps
     if rate is None or rate < 10:
         raise InputError(
             f"{path.name}: at {rate:.3g} frames a second no blink can be seen; 10 or more are needed"
         )
     return rate
+
+
+def are_uneven(table: pd.DataFrame) -> bool:
+    """Whether the steps of `time_s`, which increase, differ by more than a constant rate's, rounded."""
+    times = pd.to_numeric(table["time_s"], errors="coerce").to_numpy(dtype=np.float64)
+    steps = np.diff(times)
+    rising = steps.size > 0 and bool(np.isfinite(steps).all() and (steps > 0).all())
+    return rising and bool((np.abs(steps - np.median(steps)) > _allowed_s(times, steps)).any())
 
 
 def _measured_fps(table: pd.DataFrame, path: Path, *, uneven: bool) -> float:

@@ -8,14 +8,15 @@ import numpy as np
 from stimuli_builder.blinks.column_names import eye_pair
 from stimuli_builder.blinks.events.apart import apart
 from stimuli_builder.blinks.events.asymmetry import Asymmetry, asymmetry
-from stimuli_builder.blinks.events.candidates import RIPPLE, Candidate, candidate_at
+from stimuli_builder.blinks.events.candidates import LEVELS, RIPPLE, Candidate, candidate_at, crossing
 from stimuli_builder.blinks.events.generated import CLASSES, CLOSED_EYE_S
 from stimuli_builder.blinks.events.levels import Depth
-from stimuli_builder.blinks.events.lid_event import LidEvent
+from stimuli_builder.blinks.events.lid_event import LidEvent, PhaseFit
 from stimuli_builder.blinks.events.long_closure import with_long_closures
 from stimuli_builder.blinks.events.pieces import Piece, looked_at, partners
+from stimuli_builder.blinks.events.resting import Rest, bounds_of, rests_about
 from stimuli_builder.blinks.events.second_look import second_look
-from stimuli_builder.blinks.events.template import Timing, timing_of
+from stimuli_builder.blinks.events.template import CLOSED, Timing, timing_of
 from stimuli_builder.blinks.events.winks import with_winks
 from stimuli_builder.blinks.profile import Array
 from stimuli_builder.blinks.series import BlinkSeries
@@ -30,6 +31,14 @@ STILL_CLOSED = 0.8
 gaze shift down comes back to where the gaze leaves it, and the template takes that for its closed phase."""
 HALF_A_BLINK_S = 0.5
 """A lid that closes or opens in a blink has reached the level it came from, or goes to, within this time."""
+SHUT_DEPTH, GLITCH_S = 0.8, 0.06
+"""Part of the depth of an eye's blinks, and time at half height, from which a dip is never nothing."""
+HELD = ("squint", "gaze_shift", "closed_eye")
+RIPPLE_SHARE = 0.6
+"""Part of a dip by which a blink rises above the rests next to it; less is a blink on a lowered lid, or a lid
+that is held and trembles."""
+SURE_OF_A_RIPPLE = 0.6
+"""Probability from which such a rise is a blink all the same; blinks on a lowered lid have more than 0.99."""
 ONE_BLINK_S = 0.2
 """Two dips closer than this are one blink seen twice by a noisy tracker; the likelier one stays."""
 
@@ -123,24 +132,43 @@ def _recognised(look: _Look, eye: BlinkSeries, side: Asymmetry | None) -> Recogn
 def _judged(piece: Piece, probabilities: Array, fps: float) -> _Told:
     """What each dip of a piece is, by its probabilities (dips, kinds)."""
     told = _Told([], {}, [])
-    for candidate, row in zip(piece.candidates, probabilities, strict=True):
+    bounds = bounds_of(piece.candidates, piece.depth)
+    for candidate, row, bound in zip(piece.candidates, probabilities, bounds, strict=True):
         shares = dict(zip(CLASSES, row.tolist(), strict=True))
         sure = shares["blink"] >= LEAST_PROBABILITY
         likeliest = "blink" if sure else max(shares, key=shares.__getitem__)
+        if likeliest == "nothing" and _shuts(candidate, piece):
+            likeliest = max(HELD, key=shares.__getitem__)
         if likeliest == "nothing":
             continue
         explained = shares["blink"] < BLINK_TO_SQUINT * shares["squint"]
         if _cut(candidate, piece.depth):
             told.cut.extend([piece.start + candidate.peak] if likeliest == "blink" and not explained else [])
             continue
-        kind, timing = _phases(likeliest, sure, candidate, piece.depth)
-        event = _event(kind, shares[likeliest], candidate, timing, piece.start, fps)
+        kind, timing = _phases(likeliest, sure, candidate, piece.depth, bound)
+        if kind == "blink" and _is_ripple(timing, candidate, shares["blink"]):
+            kind, timing = max(HELD, key=shares.__getitem__), _crossed(candidate, fps)
+            likeliest = kind
+        event = _event(kind, shares[likeliest], candidate, timing, piece)
         told.events.append(event)
         if kind == "blink" and explained:
             timing = _crossed(candidate, fps)
-            squint = _event("squint", shares["squint"], candidate, timing, piece.start, fps)
+            squint = _event("squint", shares["squint"], candidate, timing, piece)
             told.squints[event.frame] = squint
     return told
+
+
+def _shuts(candidate: Candidate, piece: Piece) -> bool:
+    """Whether a dip goes as deep as the eye's blinks, for longer than a glitch: some event."""
+    held_s = (candidate.right[1] - candidate.left[1]) / piece.depth.fps
+    return candidate.prominence >= SHUT_DEPTH * piece.deep and held_s >= GLITCH_S
+
+
+def _is_ripple(timing: Timing, candidate: Candidate, probability: float) -> bool:
+    """Whether a dip is a lid that is held and trembles: not surely a blink, and little above its rests."""
+    if timing.fitted is None or probability >= SURE_OF_A_RIPPLE:
+        return False
+    return timing.fitted.amplitude < RIPPLE_SHARE * candidate.prominence
 
 
 def _listed(told: _Told) -> list[LidEvent]:
@@ -154,11 +182,13 @@ def _listed(told: _Told) -> list[LidEvent]:
     return listed
 
 
-def _phases(kind: str, sure: bool, candidate: Candidate, depth: Depth) -> tuple[str, Timing]:
+def _phases(
+    kind: str, sure: bool, candidate: Candidate, depth: Depth, bounds: tuple[int, int]
+) -> tuple[str, Timing]:
     """Phases of a dip; a blink is a closed eye where they say so."""
     if kind != "blink":
         return kind, _crossed(candidate, depth.fps)
-    timing = _timed(candidate, depth)
+    timing = _timed(candidate, depth, bounds)
     if timing.closed_s < CLOSED_EYE_S:
         return kind, timing
     above = _above_its_shoulders(timing, candidate, depth) if sure else None
@@ -188,11 +218,27 @@ def _above_its_shoulders(timing: Timing, candidate: Candidate, depth: Depth) -> 
     return candidate_at(depth, peak, prominence)
 
 
-def _timed(candidate: Candidate, depth: Depth) -> Timing:
+def _timed(candidate: Candidate, depth: Depth, bounds: tuple[int, int]) -> Timing:
     """Phases of a blink by the template, or by its crossings where the template slid off the dip."""
-    timing = timing_of(candidate, depth)
+    rests = rests_about(candidate, depth, bounds)
+    timing = timing_of(candidate, depth, rests)
     inside = candidate.left[1] <= timing.minimum_s * depth.fps <= candidate.right[1]
-    return timing if inside else _crossed(candidate, depth.fps)
+    onset, end = timing.onset_s * depth.fps, timing.end_s * depth.fps
+    seen = rests[0].far - 1 <= onset and end <= rests[1].far + 1
+    falls = timing.fitted is not None and timing.fitted.amplitude > 0
+    return timing if inside and seen and falls else _crossed_to(candidate, rests, depth)
+
+
+def _crossed_to(candidate: Candidate, rests: tuple[Rest, Rest], depth: Depth) -> Timing:
+    """Phases of a blink that no template fits: the crossings of its way from one rest and to the other."""
+    fps, peak = depth.fps, candidate.peak
+    sides = []
+    for step, rest in zip((-1, 1), rests, strict=True):
+        way = candidate.depth - rest.level
+        levels = [rest.level + part * way for part in (LEVELS[0], CLOSED)]
+        sides.append([crossing(depth, peak, level, step) / fps for level in levels])
+    before, after = sides
+    return Timing(before[0], before[1], peak / fps, after[1], after[0])
 
 
 def _crossed(candidate: Candidate, fps: float) -> Timing:
@@ -204,25 +250,39 @@ def _crossed(candidate: Candidate, fps: float) -> Timing:
         candidate.peak / fps,
         right[2] / fps,
         right[0] / fps,
-        candidate.depth,
-        0.0,
     )
 
 
-def _event(
-    kind: str, probability: float, candidate: Candidate, timing: Timing, start: int, fps: float
-) -> LidEvent:
-    shift = start / fps
+def _event(kind: str, probability: float, candidate: Candidate, timing: Timing, piece: Piece) -> LidEvent:
+    shift = piece.start / piece.depth.fps
     return LidEvent(
         kind=kind,
         probability=probability,
-        frame=start + candidate.peak,
+        frame=piece.start + candidate.peak,
         onset_s=max(0.0, timing.onset_s) + shift,
         closed_from_s=max(0.0, timing.closed_from_s) + shift,
         minimum_s=timing.minimum_s + shift,
         closed_to_s=timing.closed_to_s + shift,
         end_s=timing.end_s + shift,
         depth=candidate.depth,
+        fit=_fit_of(timing, piece.depth),
+    )
+
+
+def _fit_of(timing: Timing, depth: Depth) -> PhaseFit | None:
+    """Levels and errors of fitted phases in the unit of the series; None where no curve was fitted."""
+    if timing.fitted is None:
+        return None
+
+    def opening(time_s: float) -> float:
+        return float(depth.opening[min(max(0, round(time_s * depth.fps)), depth.opening.size - 1)])
+
+    before, after = timing.fitted.before, timing.fitted.after
+    return PhaseFit(
+        (1 - before) * opening(timing.onset_s),
+        (1 - after) * opening(timing.end_s),
+        timing.fitted.amplitude * opening(timing.minimum_s),
+        *timing.fitted.errors_s,
     )
 
 

@@ -9,13 +9,15 @@ stays and opens, how deep it goes, and the open level before and after.
 import json
 from dataclasses import dataclass
 from functools import cache
+from math import sqrt
 from pathlib import Path
 
 import numpy as np
 from scipy.optimize import least_squares
 
-from stimuli_builder.blinks.events.candidates import Candidate
+from stimuli_builder.blinks.events.candidates import Candidate, crossing
 from stimuli_builder.blinks.events.levels import Depth
+from stimuli_builder.blinks.events.resting import Rest
 from stimuli_builder.blinks.profile import Array
 
 FORMS = Path(__file__).with_name("template.json")
@@ -23,13 +25,19 @@ EDGE = 0.05
 """A blink lasts from 5% of its amplitude on the way down to 95% recovery."""
 CLOSED = 0.95
 """The closed phase is where 95% of the amplitude is reached."""
-BEFORE_S, AFTER_S = 0.25, 0.45
 FITTED_FPS = 300
 """Faster series are averaged down to about this rate for the fit; it has seven numbers to find."""
 GOOD_MISFIT = 0.06
 """A fit this close needs no second start."""
+OUTSIDE_S = 0.01
+"""A blink does not reach beyond the rests next to it: by so much more costs as one standard deviation."""
 MISFIT = 0.03
 """Part of the amplitude by which a real blink leaves the template, beside noise."""
+
+FORM_MEAN = np.array([0.0, 0.0, 0.5, 0.5])
+FORM_SD = np.array([0.2, 0.2, 0.5, 0.5])
+"""Usual forms of closing and opening and their spread: the logarithm of a power of time, and the part of a
+smooth step in the form. People's lids differ; one fixed form made phases of other lids 10-20 ms too long."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,16 +57,30 @@ class Forms:
 
 
 @dataclass(frozen=True)
+class Fitted:
+    """The fitted curve of a blink, as depths: amplitude, resting levels before and after, misfit.
+
+    `misfit` is the root mean square distance from the samples as part of the amplitude; `errors_s` are the
+    standard errors of closing, opening and the whole in seconds.
+    """
+
+    amplitude: float
+    before: float
+    after: float
+    misfit: float
+    errors_s: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
 class Timing:
-    """Phases of one blink in seconds from the first sample of its series; `amplitude` is a depth."""
+    """Phases of one blink in seconds from the first sample of its series; `fitted` where a curve was."""
 
     onset_s: float
     closed_from_s: float
     minimum_s: float
     closed_to_s: float
     end_s: float
-    amplitude: float
-    misfit: float
+    fitted: Fitted | None = None
 
     @property
     def closed_s(self) -> float:
@@ -73,86 +95,175 @@ def shipped_forms() -> Forms:
     return Forms(*(np.array(document[name]) for name in ("closing", "opening", "log_s", "log_sd")))
 
 
-def timing_of(candidate: Candidate, depth: Depth, forms: Forms | None = None) -> Timing:
-    """Fit the template about one dip.
+def timing_of(
+    candidate: Candidate, depth: Depth, rests: tuple[Rest, Rest], forms: Forms | None = None
+) -> Timing:
+    """Fit the template about one dip, between the rests before and after it.
 
-    Minimises sum_k ((r_k - b_k - A T(t_k)) / s)^2 + sum_j ((log p_j - m_j) / sd_j)^2 over the start and the
-    phases p of the template T; its amplitude A and the open levels b before and after follow linearly.
+    Minimises sum_k ((r_k - b_k - A T(t_k)) / s)^2 + sum_j ((log p_j - m_j) / sd_j)^2 over the start, the
+    phases and the forms p of the template T, which keeps between the far ends of the rests; its amplitude A
+    and the resting levels b before and after follow linearly.
     """
     forms = forms or shipped_forms()
-    times, values = _window(candidate, depth)
-    scale = max(depth.noise, MISFIT * candidate.prominence)
-    grid = np.linspace(0, 1, forms.closing.size)
+    times, values = _window(rests, depth)
+    level = max(rest.level for rest in rests)
+    rise = max(candidate.depth - level, 1e-3)
+    problem = _Fit(times, values, max(depth.noise / sqrt(_step(depth)), MISFIT * rise), forms)
+    measured, usual = _starts(candidate, rests, depth, forms)
+    best = problem.solve(measured)
+    if problem.misfit(best) > GOOD_MISFIT:
+        again = problem.solve(usual)
+        best = again if problem.cost(again) < problem.cost(best) else best
+    return problem.timing(best)
 
-    def curve(p: Array) -> Array:
-        down, hold, up = np.exp(p[1:])
-        since = times - p[0]
-        falling = np.interp(since / down, grid, forms.closing)
-        rising = np.interp((since - down - hold) / up, grid, forms.opening)
+
+class _Fit:
+    """Least squares of the template to one dip; parameters are the start, logarithms of the phases, forms."""
+
+    def __init__(self, times: Array, values: Array, scale: float, forms: Forms) -> None:
+        self.times, self.values, self.scale, self.forms = times, values, scale, forms
+        self.mean = np.concatenate([forms.log_s, FORM_MEAN])
+        self.sd = np.concatenate([forms.log_sd, FORM_SD])
+
+    def curves(self, p: Array) -> Array:
+        """(fits, n) template of each row of parameters."""
+        since = self.times[None] - p[:, :1]
+        down, hold, up = (np.exp(column)[:, None] for column in p[:, 1:4].T)
+        falling = _shaped(self.forms.closing, since / down, p[:, 4:5], p[:, 6:7])
+        rising = _shaped(self.forms.opening, (since - down - hold) / up, p[:, 5:6], p[:, 7:8])
         return np.asarray(np.where(since <= down + hold, falling, 1 - rising))
 
-    def solved(p: Array) -> tuple[Array, Array]:
-        form = curve(p)
-        share = np.clip((times - p[0]) / np.exp(p[1:]).sum(), 0, 1)
-        columns = np.stack([form, 1 - share, share], axis=1)
-        weights, *_ = np.linalg.lstsq(columns, values, rcond=None)
-        return columns @ weights, weights
+    def solved(self, p: Array) -> tuple[Array, Array]:
+        """(fits, n) fitted values and (fits, 3) amplitude and levels of each row of parameters."""
+        share = np.clip((self.times[None] - p[:, :1]) / np.exp(p[:, 1:4]).sum(1, keepdims=True), 0, 1)
+        columns = np.stack([self.curves(p), 1 - share, share], axis=2)
+        square = np.einsum("fni,fnj->fij", columns, columns) + 1e-9 * np.eye(3)
+        weights = np.linalg.solve(square, np.einsum("fni,n->fi", columns, self.values)[..., None])[..., 0]
+        return np.einsum("fni,fi->fn", columns, weights), weights
 
-    def rest(p: Array) -> Array:
-        return np.concatenate([(solved(p)[0] - values) / scale, (p[1:] - forms.log_s) / forms.log_sd])
+    def rest(self, p: Array) -> Array:
+        """(fits, residuals) what is minimised."""
+        fitted, _ = self.solved(p)
+        ends = p[:, 0] + np.exp(p[:, 1:4]).sum(1)
+        outside = np.stack([self.times[0] - p[:, 0], ends - self.times[-1]], axis=1)
+        return np.concatenate(
+            [
+                (fitted - self.values) / self.scale,
+                (p[:, 1:] - self.mean) / self.sd,
+                np.maximum(outside, 0) / OUTSIDE_S,
+            ],
+            axis=1,
+        )
 
-    measured, usual = _starts(candidate, depth, forms)
-    best = least_squares(rest, measured, method="trf", max_nfev=40)
-    if _misfit(*solved(best.x), values) > GOOD_MISFIT:
-        again = least_squares(rest, usual, method="trf", max_nfev=40)
-        best = again if again.cost < best.cost else best
-    fitted, weights = solved(best.x)
-    misfit = _misfit(fitted, weights, values)
-    return _timing(best.x, forms, float(weights[0]), misfit)
+    def slope(self, p: Array) -> Array:
+        """(residuals, parameters) derivative of `rest`, all its differences at once."""
+        steps = np.full(p.size, 1e-4)
+        moved = np.concatenate([p[None], p[None] + np.diag(steps), p[None] - np.diag(steps)])
+        rest = self.rest(moved)
+        return np.asarray(((rest[1 : p.size + 1] - rest[p.size + 1 :]) / (2 * steps[:, None])).T)
+
+    def solve(self, start: Array) -> Array:
+        """The parameters of the best fit near a start."""
+
+        def rest(p: Array) -> Array:
+            return np.asarray(self.rest(p[None])[0])
+
+        return np.asarray(least_squares(rest, start, jac=self.slope, method="trf", max_nfev=40).x)
+
+    def cost(self, p: Array) -> float:
+        """What is minimised, summed."""
+        return float((self.rest(p[None]) ** 2).sum())
+
+    def misfit(self, p: Array) -> float:
+        """Root mean square distance of the curve from the samples, as part of its amplitude."""
+        fitted, weights = self.solved(p[None])
+        return float(np.sqrt(np.mean((fitted[0] - self.values) ** 2)) / max(abs(float(weights[0, 0])), 1e-6))
+
+    def edges(self, p: Array) -> Array:
+        """(fits, 5) onset, closed phase, its middle and end of each row of parameters."""
+        down, hold, up = np.exp(p[:, 1:4]).T
+        turn = p[:, 0] + down
+        return np.stack(
+            [
+                p[:, 0] + down * _reached(self.forms.closing, EDGE, p[:, 4], p[:, 6]),
+                p[:, 0] + down * _reached(self.forms.closing, CLOSED, p[:, 4], p[:, 6]),
+                turn + hold / 2,
+                turn + hold + up * _reached(self.forms.opening, 1 - CLOSED, p[:, 5], p[:, 7]),
+                turn + hold + up * _reached(self.forms.opening, 1 - EDGE, p[:, 5], p[:, 7]),
+            ],
+            axis=1,
+        )
+
+    def timing(self, p: Array) -> Timing:
+        """The phases, levels and errors of a fit."""
+        _, weights = self.solved(p[None])
+        amplitude, before, after = weights[0].tolist()
+        onset, closed_from, minimum, closed_to, end = self.edges(p[None])[0].tolist()
+        return Timing(
+            onset,
+            closed_from,
+            minimum,
+            closed_to,
+            end,
+            Fitted(amplitude, before, after, self.misfit(p), self.errors(p)),
+        )
+
+    def errors(self, p: Array) -> tuple[float, float, float]:
+        """Standard errors of closing, opening and the whole in seconds, by the slope of what is minimised."""
+        slope = self.slope(p)
+        covariance = np.linalg.pinv(slope.T @ slope)
+        moved = p[None] + np.concatenate([1e-4 * np.eye(p.size), -1e-4 * np.eye(p.size)])
+        edges = self.edges(moved)
+        by = (edges[: p.size] - edges[p.size :]) / 2e-4
+        phases = np.stack([by[:, 2] - by[:, 0], by[:, 4] - by[:, 2], by[:, 4] - by[:, 0]])
+        variance = np.einsum("ip,pq,iq->i", phases, covariance, phases)
+        down, up, whole = np.sqrt(np.maximum(variance, 0)).tolist()
+        return down, up, whole
 
 
-def _misfit(fitted: Array, weights: Array, values: Array) -> float:
-    """Root mean square distance of the curve from the samples, as part of its amplitude."""
-    return float(np.sqrt(np.mean((fitted - values) ** 2)) / max(abs(float(weights[0])), 1e-6))
+def _shaped(form: Array, share: Array, bend: Array, mixed: Array) -> Array:
+    """A form of the template over shares of its phase, bent in time and mixed with a smooth step."""
+    x = np.clip(share, 0, 1) ** np.exp(bend)
+    nodes = x * (form.size - 1)
+    low = np.minimum(nodes.astype(np.intp), form.size - 2)
+    measured = form[low] + (nodes - low) * (form[low + 1] - form[low])
+    return np.asarray((1 - mixed) * measured + mixed * (1 - np.cos(np.pi * x)) / 2)
 
 
-def _timing(p: Array, forms: Forms, amplitude: float, misfit: float) -> Timing:
-    start, (down, hold, up) = float(p[0]), np.exp(p[1:])
-    grid = np.linspace(0, 1, forms.closing.size)
-
-    def reached(form: Array, level: float) -> float:
-        return float(np.interp(level, form, grid))
-
-    turn = start + down
-    return Timing(
-        onset_s=start + down * reached(forms.closing, EDGE),
-        closed_from_s=start + down * reached(forms.closing, CLOSED),
-        minimum_s=float(turn + hold / 2),
-        closed_to_s=float(turn + hold + up * reached(forms.opening, 1 - CLOSED)),
-        end_s=float(turn + hold + up * reached(forms.opening, 1 - EDGE)),
-        amplitude=amplitude,
-        misfit=misfit,
-    )
+def _reached(form: Array, level: float, bend: Array, mixed: Array) -> Array:
+    """(fits,) share of the phase at which each bent and mixed form reaches a level."""
+    shares = np.linspace(0, 1, 401)
+    grid = _shaped(form, shares[None], np.zeros((bend.size, 1)), mixed[:, None])
+    at = np.array([np.interp(level, np.maximum.accumulate(row), shares) for row in grid])
+    return np.asarray(at ** np.exp(-bend))
 
 
-def _window(candidate: Candidate, depth: Depth) -> tuple[Array, Array]:
-    """Samples about a dip, thinned by averaging where the series is fast."""
-    fps = depth.fps
-    first = max(0, int(candidate.left[0] - BEFORE_S * fps))
-    last = min(depth.raw.size, int(candidate.right[0] + AFTER_S * fps) + 2)
-    step = max(1, round(fps / FITTED_FPS))
+def _step(depth: Depth) -> int:
+    """Frames that are averaged for the fit."""
+    return max(1, round(depth.fps / FITTED_FPS))
+
+
+def _window(rests: tuple[Rest, Rest], depth: Depth) -> tuple[Array, Array]:
+    """Samples between the far ends of two rests, thinned by averaging where the series is fast."""
+    fps, step = depth.fps, _step(depth)
+    first, last = rests[0].far, rests[1].far + 1
     count = max(1, (last - first) // step)
     values: Array = depth.raw[first : first + count * step].reshape(count, step).mean(1)
     times = (first + (step - 1) / 2 + step * np.arange(count)) / fps
     return np.asarray(times, np.float64), np.asarray(values, np.float64)
 
 
-def _starts(candidate: Candidate, depth: Depth, forms: Forms) -> list[Array]:
-    """Where the fit begins: phases from the crossings, and the usual ones about the peak."""
-    fps = depth.fps
-    down = max((candidate.left[2] - candidate.left[0]) / fps * 1.5, 0.03)
-    up = max((candidate.right[0] - candidate.right[2]) / fps * 1.6, 0.05)
-    hold = max((candidate.right[2] - candidate.left[2]) / fps - 0.04, 0.004)
-    measured = np.array([candidate.left[2] / fps - 0.85 * down, *np.log([down, hold, up])])
-    usual = np.array([candidate.peak / fps - float(np.exp(forms.log_s[0])), *forms.log_s])
+def _starts(candidate: Candidate, rests: tuple[Rest, Rest], depth: Depth, forms: Forms) -> list[Array]:
+    """Where the fit begins: phases from the crossings of the way to either rest, and the usual ones."""
+    fps, peak = depth.fps, candidate.peak
+    at = {}
+    for step, rest in zip((-1, 1), rests, strict=True):
+        way = candidate.depth - rest.level
+        for part in (0.2, 0.85):
+            at[step, part] = crossing(depth, peak, rest.level + part * way, step) / fps
+    down = max((at[-1, 0.85] - at[-1, 0.2]) * 1.5, 0.03)
+    up = max((at[1, 0.2] - at[1, 0.85]) * 1.6, 0.05)
+    hold = max(at[1, 0.85] - at[-1, 0.85] - 0.04, 0.004)
+    measured = np.array([at[-1, 0.85] - 0.85 * down, *np.log([down, hold, up]), *FORM_MEAN])
+    usual = np.array([peak / fps - float(np.exp(forms.log_s[0])), *forms.log_s, *FORM_MEAN])
     return [measured, usual]

@@ -106,11 +106,6 @@ def test_a_decision_about_a_blink_that_is_gone_is_told_and_kept(stimuli, series_
     ("arguments", "message"),
     [
         (["--column", "gap_x"], "did you mean"),
-        (["--column", "gap_l", "--fps", "30"], "is the column right, and --fps"),
-        (
-            ["--column", "gap_l", "--fps", "300", "--preset", "velocity", "--minimum-depth", "0.999999"],
-            "no blink in column",
-        ),
         (["--column", "gap_l", "--fps", "300", "--minimum-depth", "0.5"], "add --preset velocity"),
         (["--column", "gap_l", "--fps", "300", "--resample"], "no column time_s"),
         (["--column", "gap_l", "--fps", "300", "--preset", "papr"], "did you mean 'paper'"),
@@ -317,14 +312,14 @@ def test_a_blink_that_a_gap_cuts_is_told_by_its_frame_and_not_as_too_shallow(sti
     table.to_csv(series_file, index=False)
     out = tmp_path / "b.csv"
     ended = stimuli("blinks", series_file, "--column", "gap_l", "--fps", 300, "--out", out, "--allow-gaps")
-    assert (ended.code, ended.err.count("\n")) == (2, 1)
+    assert (ended.code, ended.err.count("\n")) == (0, 1)
     told = re.search(
         r"1 dip could not be measured, the first at frame (\d+): its beginning or end", ended.err
     )
     assert told
     assert abs(int(told[1]) - lowest) < 8
     assert "deepest dip" not in ended.err
-    assert not out.exists()
+    assert len(pd.read_csv(out)) == 0
 
 
 def test_long_names_leave_the_figures_their_width(stimuli, series_file, tmp_path, monkeypatch):

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 
 from experiments.errors import InputError
+from stimuli_builder.blinks.export.arkit import timecode
 from stimuli_builder.blinks.profile import Array
 from stimuli_builder.blinks.series import read_series
 
@@ -137,3 +138,56 @@ def test_a_gap_of_a_resampled_series_is_told_by_its_time(tmp_path: Path) -> None
     values[120:180] = np.nan
     with pytest.raises(InputError, match=r"from 1\.98\d s on|from 2\.00\d s on"):
         read_series(written(tmp_path / "s.csv", np.arange(400) / 60, values), resample=True)
+
+
+@pytest.mark.parametrize(
+    ("name", "stamps"),
+    [
+        ("timestamp", np.arange(400) / 120),
+        ("timestamp [ns]", 1_760_676_790_465_965_534 + np.arange(400) * 8_333_333),
+        ("time_ms", np.arange(400) * 1000 / 120),
+        ("Timecode", [f"10:00:{n // 120:02d}:{n % 120:02d}.000" for n in range(400)]),
+        ("time_s", np.arange(400) / 120),
+    ],
+)
+def test_a_rate_that_contradicts_any_time_stamps_is_refused(tmp_path: Path, name: str, stamps) -> None:
+    values = np.linspace(20, 21, 400)
+    pd.DataFrame({name: stamps, "gap": values}).to_csv(tmp_path / "s.csv", index=False)
+    with pytest.raises(InputError, match=r"--fps 240 contradicts s.csv, whose .* runs at 120"):
+        read_series(tmp_path / "s.csv", ["gap"], 240)
+    assert read_series(tmp_path / "s.csv", ["gap"], 120)[0].fps == pytest.approx(120, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "factor", "unit"),
+    [("timestamp [ns]", 1e9, "ns"), ("Timestamp (us)", 1e6, "µs"), ("timestamp[ms]", 1e3, "ms")],
+)
+def test_the_unit_that_a_name_of_times_states_holds(
+    tmp_path: Path, name: str, factor: float, unit: str
+) -> None:
+    stamps = (1.76e9 * factor + np.arange(400) / 200 * factor).astype(np.int64)
+    pd.DataFrame({name: stamps, "gap": np.linspace(20, 21, 400)}).to_csv(tmp_path / "s.csv", index=False)
+    (series,) = read_series(tmp_path / "s.csv")
+    assert series.fps == pytest.approx(200, rel=1e-4)
+    assert series.notes[0] == f"s.csv: times are from '{name}', in {unit}"
+
+
+@pytest.mark.parametrize(("fps", "base"), [(30, 60), (60, 60), (30, 30), (24, 24), (120, 120)])
+def test_a_time_code_is_read_in_the_base_in_which_it_counts(tmp_path: Path, fps: int, base: int) -> None:
+    step = base // fps
+    stamps = [f"23:59:{n // fps:02d}:{n % fps * step:02d}.250" for n in range(fps * 4)]
+    pd.DataFrame({"Timecode": stamps, "eyeBlinkLeft": np.linspace(0, 0.5, fps * 4)}).to_csv(
+        tmp_path / "s.csv", index=False
+    )
+    (series,) = read_series(tmp_path / "s.csv", ["eyeBlinkLeft"])
+    assert series.fps == pytest.approx(fps, rel=1e-3)
+
+
+@pytest.mark.parametrize("fps", [24.0, 29.97, 30.0, 59.94, 60.0])
+def test_time_codes_of_our_own_export_are_read(tmp_path: Path, fps: float) -> None:
+    stamps = [timecode(n, fps) for n in range(round(6 * fps))]
+    values = np.linspace(0, 0.5, len(stamps))
+    pd.DataFrame({"Timecode": stamps, "eyeBlinkLeft": values}).to_csv(tmp_path / "s.csv", index=False)
+    (series,) = read_series(tmp_path / "s.csv", ["eyeBlinkLeft"])
+    assert series.fps == pytest.approx(fps, rel=2e-3)
+    assert series.distance.size == pytest.approx(len(stamps), abs=1)
