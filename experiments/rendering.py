@@ -8,9 +8,10 @@ from pydantic import AfterValidator, Field, model_validator
 from experiments.base import Declaration
 from experiments.errors import did_you_mean
 
-PROFILES = ("real", "model", "SL", "AL", "SL_ease", "AL_ease")
-"""Built-in blink profiles: recorded, PCA model, and the four textbook curves (symmetric or asymmetric,
-linear or eased). Any other value names a CSV file of closure samples beside the experiment's TOML."""
+PROFILES = ("real", "phases", "model", "SL", "AL", "SL_ease", "AL_ease")
+"""Built-in blink profiles: recorded, drawn phase by phase, PCA model, and the four textbook curves (symmetric
+or asymmetric, linear or eased). Any other value names a CSV file of closure samples next to the experiment's
+TOML."""
 
 
 def _known_profile(value: str) -> str:
@@ -47,8 +48,9 @@ class RenderSettings(Declaration):
     your own; a list of them is short for a last factor `character` with a level each. Left out, it is the
     retired `photorealistic`, so that old declarations keep their meaning."""
     profile: ProfileName = "real"
-    """Blink profile: recorded (`real`), of the PCA model (`model`), a textbook curve (`SL`, `AL`, `SL_ease`,
-    `AL_ease`: symmetric or asymmetric, linear or eased), or a CSV file of closure (0 open, 1 closed)."""
+    """Blink profile: recorded (`real`), made from recordings phase by phase (`phases`), of the paper's PCA
+    model, which closes too little (`model`), a textbook curve (`SL`, `AL`, `SL_ease`, `AL_ease`: symmetric or
+    asymmetric, linear or eased), or a CSV file of closure (0 open, 1 closed)."""
     duration_frames: DurationFrames | None = None
     """Length of the blink, in frames at `duration_frames_fps`, whatever rate the clip has; left out (and
     `duration_ms` too), blinks keep their recorded length."""

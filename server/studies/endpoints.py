@@ -16,9 +16,11 @@ from server.studies.definition_schemas import (
     EditedDefinition,
     JudgedEdit,
 )
+from server.studies.launch_checks import launch_checks
 from server.studies.schemas import (
     ChangeSettings,
     ChangeStatus,
+    LaunchCheck,
     NewStudy,
     NewVersion,
     ShippedExperiment,
@@ -103,6 +105,13 @@ def change_status(services: ServicesDep, identity: Writer, study: str, body: Cha
     with services.database.write() as session:
         service.change_status(session, study, body.revision, body.status, identity)
     return get_study(services, identity, study)
+
+
+@router.get("/studies/{study}/launch-checks")
+def list_launch_checks(services: ServicesDep, identity: Viewer, study: str) -> list[LaunchCheck]:
+    """What to look at before the study goes live."""
+    with services.database.read() as session:
+        return launch_checks(session, study, identity)
 
 
 @router.put("/studies/{study}/settings")

@@ -65,6 +65,14 @@ class ChangeSettings(RequestBody):
     recruiter: Recruiter | None
 
 
+class LaunchCheck(BaseModel):
+    """Something to look at before a study goes live."""
+
+    kind: str = Field(description="What was checked.")
+    blocks: bool = Field(description="The study cannot go live like this.")
+    text: str = Field(description="What was found and what to do, in a sentence.")
+
+
 class SeriesOut(BaseModel):
     """Versions of a study that measure the same; only their answers may be pooled."""
 

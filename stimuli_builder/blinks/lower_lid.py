@@ -10,7 +10,7 @@ VERTICAL_RANGE_MM = (0.5, 1.0)
 HORIZONTAL_RANGE_MM = (1.4, 5.0)
 
 
-def lower_lid(profile: BlinkProfile) -> tuple[Array, Array]:
+def lower_lid(profile: BlinkProfile, closure: Array | None = None) -> tuple[Array, Array]:
     """Vertical and horizontal displacement of the lower lid during a blink, in mm.
 
     Measured where a track gave it. Else from physiology: a blink slides the lower lid 1.4-5 mm towards the
@@ -18,6 +18,13 @@ def lower_lid(profile: BlinkProfile) -> tuple[Array, Array]:
     the motion). The peaks for a complete blink are drawn from these ranges, the horizontal one evenly on a
     log scale, by the profile's name: the same profile always moves alike. Both follow the closure; the
     nasal slide lags it by some 10 ms, and nothing moves while the eye is open.
+
+    Parameters
+    ----------
+    closure : (n,) array, optional
+        The profile's closure with the open eye before and after it, in which the lagging slide comes to rest;
+        without it the profile's own samples, at whose end the slide is still on its way. Not for a measured
+        lower lid.
 
     Returns
     -------
@@ -29,7 +36,8 @@ def lower_lid(profile: BlinkProfile) -> tuple[Array, Array]:
     rng = np.random.default_rng(crc32(profile.profile_id.encode()))
     vertical_peak_mm = rng.uniform(*VERTICAL_RANGE_MM)
     horizontal_peak_mm = float(np.exp(rng.uniform(*np.log(HORIZONTAL_RANGE_MM))))
-    return vertical_peak_mm * profile.closure, horizontal_peak_mm * _lagged(profile.closure, profile.fps)
+    shown = profile.closure if closure is None else closure
+    return vertical_peak_mm * shown, horizontal_peak_mm * _lagged(shown, profile.fps)
 
 
 def _lagged(closure: Array, fps: int, time_constant_ms: float = 10.0) -> Array:

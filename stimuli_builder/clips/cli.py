@@ -2,7 +2,7 @@
 
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,6 +12,7 @@ import typer
 from experiments.errors import InputError
 
 if TYPE_CHECKING:
+    from experiments.level_leaks import LevelLeak
     from stimuli_builder.clips.build import Progress, Report
 
 ExperimentName = Annotated[
@@ -51,9 +52,14 @@ Check a folder of clips against its manifest: presence, hashes, frame counts, ti
 The opening of each eye is measured in the decoded pixels of every frame and compared with its closure curve.
 Clips whose character has changed since, or is not here, are checked for the rest alone.
 
+A warning names every feature other than the factor by which a level can be recognized: where the lids rest at
+the start and end, length, picture size, brightness. --levels lists all of them.
+
 Examples:
 
   stimuli verify clips/exp3
+
+  stimuli verify clips/mine --levels
 """
 
 
@@ -141,6 +147,9 @@ def _print_report(report: "Report", out: Path) -> None:
 def verify_command(
     folder: Annotated[Path, typer.Argument(help="Folder with manifest.json.", show_default=False)],
     characters: Annotated[Path | None, typer.Option(help="Folder that holds characters of your own.")] = None,
+    levels: Annotated[
+        bool, typer.Option("--levels", help="List how well each feature of the clips tells levels apart.")
+    ] = False,
 ) -> None:
     """Check built clips."""
     from stimuli_builder.clips.verify import verify
@@ -162,6 +171,19 @@ def verify_command(
             f"at most {verdict.worst_opening_mm:.2f} mm from the curve"
         )
     print(f"{verdict.clips} clips: hashes, frames and timing are right; {measured}")
+    if levels:
+        _print_leaks(verdict.leaks)
+    for leak in verdict.leaks:
+        if leak.reported:
+            print(f"warning: {leak}", file=sys.stderr)
+
+
+def _print_leaks(leaks: "Sequence[LevelLeak]") -> None:
+    """One line per factor and feature: the share of clips that the feature guesses right, and p."""
+    print("factor, feature: share of the best level's clips and of the others guessed right (p)")
+    for leak in leaks:
+        shown = f"{leak.right:.2f} and {leak.others:.2f}, {leak.clips} clips (p {leak.p_value:.2g})"
+        print(f"  {leak.factor}, {leak.feature}: {leak.level} {shown}{' *' if leak.reported else ''}")
 
 
 @contextmanager

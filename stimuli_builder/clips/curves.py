@@ -125,9 +125,11 @@ def clip_curve(
             f"of {frames} frames; ask for a longer clip"
         )
 
+    def held(values: Array) -> Array:
+        return np.pad(values, (onset, total - end), mode="edge")
+
     def laid(values: Array) -> Array:
-        held = np.pad(values, (onset, total - end), mode="edge")
-        return np.round(held, DECIMALS)
+        return np.round(held(values), DECIMALS)
 
     curve = ClipCurve(
         closure=laid(profile.closure),
@@ -138,7 +140,11 @@ def clip_curve(
     )
     if lower == "none":
         return curve
-    vertical, horizontal = (laid(signal) for signal in lower_lid(profile))
+    if profile.lower_up_mm is not None and profile.lower_nasal_mm is not None:
+        vertical, horizontal = laid(profile.lower_up_mm), laid(profile.lower_nasal_mm)
+    else:
+        signals = lower_lid(profile, held(profile.closure))
+        vertical, horizontal = (np.round(signal, DECIMALS) for signal in signals)
     still = np.zeros(total)
     return replace(
         curve,

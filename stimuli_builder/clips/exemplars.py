@@ -8,7 +8,8 @@ from pathlib import Path
 from experiments.errors import InputError
 from experiments.rendering import RenderSettings
 from stimuli_builder.blinks.blink_model import BlinkModel, default_model
-from stimuli_builder.blinks.library import load_library, recorded_rests
+from stimuli_builder.blinks.library import load_library
+from stimuli_builder.blinks.phase_model import PhaseModel
 from stimuli_builder.blinks.profile import BlinkProfile, resample
 from stimuli_builder.blinks.textbook import TEXTBOOK_KINDS, TextbookKind, textbook_profile
 from stimuli_builder.clips.curves import amplitude_of
@@ -87,6 +88,8 @@ def _blink(
     if kind == "model":
         rng = generator("model", seed, family, number)
         return (_paired_model() if separate else default_model()).sample(rng=rng), False
+    if kind == "phases":
+        return _drawn_by_phases(family, number, seed, separate), False
     for textbook in TEXTBOOK_KINDS:
         if kind == textbook:
             return _textbook(textbook, settings, family, number, seed), False
@@ -99,16 +102,27 @@ def _blink(
 def _textbook(
     kind: TextbookKind, settings: RenderSettings, family: str, number: int, seed: int
 ) -> BlinkProfile:
-    """A textbook blink between resting levels drawn from the recordings (see decision 0151)."""
-    rests = recorded_rests()
-    drawn = generator("rests", seed, family).permutation(len(rests))
-    start, end = (float(level) for level in rests[drawn[(number - 1) % len(rests)]])
+    """A textbook blink that begins and ends at rest, as recorded and modelled ones do (decision 0975)."""
     rng = generator("textbook", seed, family, number)
     recorded = load_library()[int(rng.integers(len(load_library())))]
     peak = 1.0 if settings.amplitude == "full" else float(recorded.closure.max())
     duration = _frames_30fps(settings) or recorded.duration_frames_30fps
-    start, end = min(start, 0.9 * peak), min(end, 0.9 * peak)
-    return textbook_profile(kind, duration, start_level=start, end_level=end, peak_closure=peak)
+    return textbook_profile(kind, duration, peak_closure=peak)
+
+
+def _drawn_by_phases(family: str, number: int, seed: int, separate: bool) -> BlinkProfile:
+    if separate:
+        raise InputError(
+            "profile 'phases' gives blinks of one eye; expected eyes = 'alike', or profile 'real' or 'model' "
+            "for eyes that move apart"
+        )
+    rng = generator("phases", seed, family, number)
+    return _phase_model().sample(None, rng, profile_id=f"phases-{seed}-{family}-{number}")
+
+
+@lru_cache(maxsize=1)
+def _phase_model() -> PhaseModel:
+    return PhaseModel.fit(load_library())
 
 
 @lru_cache(maxsize=1)

@@ -18,8 +18,8 @@ from stimuli_builder.clips.state import RENDER_KEY, BuildState
 CONVENTIONS = (
     "closure: 300 samples a second, 0 open, 1 closed, over the whole clip; output frame k at 30 fps stands "
     "at sample 10 k + 5 and with motion blur is the mean of samples 10 k to 10 k + 9 in linear light",
-    "an exemplar of a textbook profile differs from the others in its sub-frame onset and in its resting "
-    "levels, both as drawn from the recorded blinks",
+    "an exemplar of a textbook profile differs from the others in its sub-frame onset; every built-in "
+    "profile begins and ends with open eyes at rest (closure 0)",
 )
 
 
@@ -97,11 +97,11 @@ def _clip(clip: PlannedClip, state: BuildState, seed: int) -> Clip:
         profile=curve.profile_id,
         profile_repeated=clip.repeated,
         duration_frames=None if settings.performance else curve.duration_frames,
-        onset_frame=_onset_frame(curve, settings),
-        closure=_samples(curve.closure),
-        closure_other=_samples(curve.closure_other),
-        lower_vertical_mm=_samples(curve.lower_vertical_mm),
-        lower_horizontal_mm=_samples(curve.lower_horizontal_mm),
+        onset_frame=clip_onset_frame(curve, settings),
+        closure=clip_samples(curve.closure),
+        closure_other=clip_samples(curve.closure_other),
+        lower_vertical_mm=clip_samples(curve.lower_vertical_mm),
+        lower_horizontal_mm=clip_samples(curve.lower_horizontal_mm),
         blinks_s=curve.blinks_s,
         inputs={
             RENDER_KEY: job.input_hash,
@@ -137,11 +137,12 @@ def moved_mm(clip: PlannedClip) -> dict[str, str]:
     return said
 
 
-def _samples(signal: Array | None) -> tuple[float, ...]:
+def clip_samples(signal: Array | None) -> tuple[float, ...]:
+    """A signal as the manifest holds it; empty where there is none."""
     return () if signal is None else tuple(signal.tolist())
 
 
-def _onset_frame(curve: ClipCurve, settings: RenderSettings) -> int | None:
+def clip_onset_frame(curve: ClipCurve, settings: RenderSettings) -> int | None:
     """Where the blink begins, or the first of a performance; None where nobody blinks."""
     if settings.performance and not curve.blinks_s:
         return None

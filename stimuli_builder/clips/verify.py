@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import InputError
+from experiments.level_leaks import BRIGHTNESS, LevelLeak, Value, level_leaks
 from experiments.manifest import MANIFEST_NAME, CheckClip, Clip, file_sha256, place_of, read_manifest
 from stimuli_builder.clips.build import Progress, silent
 from stimuli_builder.clips.characters import fingerprint, geometry, shipped_names
@@ -38,13 +39,34 @@ class Verdict:
 
     `opening_checked` counts the clips whose eyelid opening was measured in the pixels; clips of a
     character that has changed since, or that is not here, cannot be measured. `worst_opening_mm` is the
-    largest distance between measured and promised opening.
+    largest distance between measured and promised opening. `leaks` holds what tells the levels of a factor
+    apart, for every feature of the clips.
     """
 
     clips: int
     findings: tuple[Finding, ...]
     opening_checked: int
     worst_opening_mm: float
+    leaks: tuple[LevelLeak, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class DecodedClip:
+    """What the pictures of a clip show.
+
+    Attributes
+    ----------
+    opening_mm : (frames, eyes) array
+        Empty where no meter was given.
+    brightness : tuple of float
+        Mean luma of the first and of the last frame, 0 to 255.
+    problems : list of str
+        What is wrong with number, size and timing of the frames.
+    """
+
+    opening_mm: NDArray[np.float64]
+    brightness: tuple[float, float]
+    problems: list[str]
 
 
 def verify(folder: Path, beside: Path | None = None, progress: Progress = silent) -> Verdict:
@@ -59,17 +81,24 @@ def verify(folder: Path, beside: Path | None = None, progress: Progress = silent
     clips = sorted(manifest.files, key=lambda clip: (clip.inputs.get("character", ""), clip.width_px))
     meters = _Meters(beside)
     findings: list[Finding] = []
+    brightness: dict[str, tuple[float, float]] = {}
     checked, worst = 0, 0.0
     for number, clip in enumerate(clips, start=1):
-        problems, error_mm = _check(clip, folder, meters)
+        problems, error_mm = _check(clip, folder, meters, brightness)
         findings += [Finding(clip, problem) for problem in problems]
         if error_mm is not None:
             checked, worst = checked + 1, max(worst, error_mm)
         progress(number, len(clips))
-    return Verdict(len(clips), tuple(findings), checked, worst)
+    measured: dict[str, dict[str, Value]] = {
+        name: {sha256: round(both[end], 1) for sha256, both in brightness.items()}
+        for end, name in enumerate(BRIGHTNESS)
+    }
+    return Verdict(len(clips), tuple(findings), checked, worst, level_leaks(manifest.clips, measured))
 
 
-def _check(clip: Clip | CheckClip, folder: Path, meters: "_Meters") -> tuple[list[str], float | None]:
+def _check(
+    clip: Clip | CheckClip, folder: Path, meters: "_Meters", brightness: dict[str, tuple[float, float]]
+) -> tuple[list[str], float | None]:
     path = folder / clip.file
     if not path.is_file():
         return [f"missing from {folder}"], None
@@ -80,9 +109,12 @@ def _check(clip: Clip | CheckClip, folder: Path, meters: "_Meters") -> tuple[lis
     except (InputError, ValueError) as error:
         return [f"its inputs in the {MANIFEST_NAME} cannot be read ({error})"], None
     try:
-        measured, problems = _decoded(path, clip, meter)
+        decoded = _decoded(path, clip, meter)
     except (av.error.FFmpegError, InputError, ValueError) as error:
         return [f"cannot be decoded ({error})"], None
+    measured, problems = decoded.opening_mm, decoded.problems
+    if isinstance(clip, Clip):
+        brightness[clip.sha256] = decoded.brightness
     if problems or meter is None or isinstance(clip, CheckClip):
         return problems, None
     try:
@@ -100,24 +132,27 @@ def _check(clip: Clip | CheckClip, folder: Path, meters: "_Meters") -> tuple[lis
     return problems, worst
 
 
-def _decoded(
-    path: Path, clip: Clip | CheckClip, meter: OpeningMeter | None
-) -> tuple[NDArray[np.float64], list[str]]:
-    """(frames, eyes) opening in mm, frame after frame, and what is wrong with number, size and timing."""
+def _decoded(path: Path, clip: Clip | CheckClip, meter: OpeningMeter | None) -> DecodedClip:
+    """Decode a clip frame by frame."""
     measured: list[NDArray[np.float64]] = []
     times: list[Fraction | None] = []
+    ends: list[Any] = []
     with av.open(str(path)) as container:
         stream: Any = container.streams.video[0]
         fits = (stream.width, stream.height) == (clip.width_px, clip.height_px)
         for frame in container.decode(stream):
             times.append(None if frame.pts is None else frame.pts * frame.time_base)
+            ends = [*ends[:1], frame]
             if meter is not None and fits:
                 luma = frame.to_ndarray(format="yuv420p")[: frame.height]
                 measured.append(meter.measured_mm(luma[None])[0])
         problems = list(_timing_problems(stream, times, clip))
     if not times:
         raise InputError("no frame")
-    return np.array(measured), problems
+    first, last = (
+        float(frame.to_ndarray(format="yuv420p")[: frame.height].mean()) for frame in (ends[0], ends[-1])
+    )
+    return DecodedClip(np.array(measured), (first, last), problems)
 
 
 def _timing_problems(stream: Any, times: list[Fraction | None], clip: Clip | CheckClip) -> Iterator[str]:

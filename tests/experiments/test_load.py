@@ -42,7 +42,7 @@ EXP1 = locate("exp1").read_text(encoding="utf-8")
         ("title =", "title ", 3, "not valid TOML"),
         ('name = "cartoon"', 'name = "photorealistic"', None, "'photorealistic' stands twice"),
         ('name = "blur"', 'name = "response"', None, "has the name of a ratings column"),
-        ('profile = "model"', 'profile = "modle"', None, "expected one of real, model"),
+        ('profile = "phases"', 'profile = "phasse"', None, "expected one of real, phases"),
     ],
 )
 def test_a_wrong_definition_names_line_and_remedy(old: str, new: str, line: int | None, message: str) -> None:

@@ -23,6 +23,12 @@ export const sealQuery = (study: string) =>
     queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/seal", { params: { path: { study } } })),
   });
 
+export const launchChecksQuery = (study: string) =>
+  queryOptions({
+    queryKey: ["study", study, "launch-checks"],
+    queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/launch-checks", { params: { path: { study } } })),
+  });
+
 export const clipsQuery = (study: string) =>
   queryOptions({
     queryKey: ["clips", study],

@@ -333,6 +333,11 @@ export interface paths {
   };
   put: operations["change_status"];
  };
+ "/api/admin/studies/{study}/launch-checks": {
+  parameters: {
+  };
+  get: operations["list_launch_checks"];
+ };
  "/api/admin/studies/{study}/settings": {
   parameters: {
   };
@@ -1671,6 +1676,11 @@ export interface components {
   };
   LanguageChange: {
    language: string;
+  };
+  LaunchCheck: {
+   kind: string;
+   blocks: boolean;
+   text: string;
   };
   LeaveOut: {
    file: string;
@@ -3788,6 +3798,7 @@ export type InvitationState = components['schemas']['InvitationState'];
 export type JudgedEdit = components['schemas']['JudgedEdit'];
 export type KeyDifference = components['schemas']['KeyDifference'];
 export type LanguageChange = components['schemas']['LanguageChange'];
+export type LaunchCheck = components['schemas']['LaunchCheck'];
 export type LeaveOut = components['schemas']['LeaveOut'];
 export type Level = components['schemas']['Level'];
 export type LevelChoices = components['schemas']['LevelChoices'];
@@ -6565,6 +6576,39 @@ export interface operations {
     };
     content: {
      "application/json": components["schemas"]["StudyDetail"];
+    };
+   };
+   422: {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["ErrorBody"];
+    };
+   };
+   "4XX": {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["ErrorBody"];
+    };
+   };
+  };
+ };
+ list_launch_checks: {
+  parameters: {
+   path: {
+    study: string;
+   };
+  };
+  responses: {
+   200: {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["LaunchCheck"][];
     };
    };
    422: {

@@ -12,6 +12,8 @@ from stimuli_builder.blinks.profile import Array, BlinkProfile
 
 INTERVAL_MEDIAN_S = 3.4
 INTERVAL_LOG_SD = 0.87
+REST_S = 0.1
+"""Open eye after a blink in which its lagging signals come to rest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +62,8 @@ def make_curve(
     frames = np.arange(minima[-1] + int(np.ceil(tail * fps - 1e-9)) + 1)
     tracks = np.zeros((4, frames.size))
     for profile, minimum in zip(profiles, minima, strict=True):
-        up, nasal = lower_lid(profile)
+        # The nasal slide lags the lids: it comes to rest after the blink's last sample.
+        up, nasal = lower_lid(profile, _with_rest(profile))
         other = profile.closure if profile.closure_other is None else profile.closure_other
         position = (frames - minimum) * profile.fps / fps + profile.minimum_index
         for track, values in zip(tracks, (profile.closure, other, up, nasal), strict=True):
@@ -70,6 +73,13 @@ def make_curve(
     names = tuple((p.profile_id, round(onset, 4)) for p, onset in zip(profiles, onsets, strict=True))
     left, right, up, nasal = np.round(tracks, 6)
     return AnimationCurve(fps, left, right, up, nasal, names)
+
+
+def _with_rest(profile: BlinkProfile) -> Array | None:
+    """The closure and the open eye after it; None where the lower lid was measured with the blink."""
+    if profile.lower_up_mm is not None:
+        return None
+    return np.pad(profile.closure, (0, round(REST_S * profile.fps)), mode="edge")
 
 
 def _minimum_frames(

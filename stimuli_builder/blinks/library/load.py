@@ -6,12 +6,10 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from experiments.errors import InputError
 from stimuli_builder.blinks.csv_table import read_table
 from stimuli_builder.blinks.library.recordings import LIBRARY_FOLDER
-from stimuli_builder.blinks.profile import Array, BlinkProfile
+from stimuli_builder.blinks.profile import BlinkProfile
 from stimuli_builder.blinks.profile_table import read_profile_table
 
 
@@ -28,11 +26,6 @@ def load_library(*, paired: bool = False) -> tuple[BlinkProfile, ...]:
 @lru_cache(maxsize=1)
 def _shipped() -> tuple[BlinkProfile, ...]:
     return read_profiles(LIBRARY_FOLDER / "profiles.csv", LIBRARY_FOLDER / "closures.csv")
-
-
-def recorded_rests() -> Array:
-    """(n, 2) closure of the resting eye before and after each shipped eye profile, to vary made blinks by."""
-    return np.array([[profile.rest_before, profile.rest_after] for profile in load_library()])
 
 
 def read_profiles(profiles_csv: Path, closures_csv: Path) -> tuple[BlinkProfile, ...]:

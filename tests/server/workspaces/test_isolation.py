@@ -44,6 +44,7 @@ NEEDED: dict[Right, set[str]] = {
         "POST versions/check",
         "GET versions/{number}",
         "GET clips",
+        "GET launch-checks",
         "GET originals/{sha256}",
         "GET originals/{sha256}/frame-map.csv",
         "GET monitor",

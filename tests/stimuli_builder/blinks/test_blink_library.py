@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from experiments.errors import InputError
-from stimuli_builder.blinks.library import LIBRARY_FOLDER, load_library, recorded_rests
+from stimuli_builder.blinks.library import LIBRARY_FOLDER, load_library
 from stimuli_builder.blinks.library.build import recorded_profiles, write_model, write_profiles
 from stimuli_builder.blinks.library.recordings import read_recordings
 
@@ -29,13 +29,6 @@ def test_every_profile_begins_and_ends_open():
         assert profile.closure[0] == profile.closure[-1] == 0
         assert profile.closure[profile.minimum_index] == pytest.approx(profile.closure.max(), abs=0.01)
         assert 5 < profile.duration_frames_30fps < 20
-
-
-def test_rests_are_those_of_the_eye_profiles():
-    rests = recorded_rests()
-    assert rests.shape == (len(load_library()), 2)
-    assert (rests >= 0).all()
-    assert rests.max() < 0.2
 
 
 def test_every_recording_is_declared_with_its_source_and_licence():

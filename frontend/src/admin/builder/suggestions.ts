@@ -5,7 +5,7 @@ import { type Data, keyName, listAt, type Path, tableAt, textAt } from "./data";
 const KNOWN: Record<string, string[]> = {
   languages: ["en", "de"],
   "render.character": ["alder@8", "birch@6", "cedar@4", "hazel@5", "cartoon"],
-  "render.profile": ["real", "model", "SL", "AL", "SL_ease", "AL_ease"],
+  "render.profile": ["real", "phases", "model", "SL", "AL", "SL_ease", "AL_ease"],
 };
 const FACTORS = ["exemplars.own_per", "blocks.split_by", "analysis.factors", "analysis.pairs", "trial.pairs.factor"];
 const CELLS = ["trial.reference.cell", "trial.pairs.cells.cell", "trial.pairs.cells.other"];

@@ -1,17 +1,27 @@
-/** What cannot be done any more once participants have begun, and who can be none. */
+/** What to look at before participants can begin, and what cannot be done any more afterwards. */
 
-import { Text } from "@mantine/core";
+import { Alert, Stack, Text } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
-import { sealQuery, studyQuery } from "../queries";
+import { launchChecksQuery, sealQuery, studyQuery } from "../queries";
 import { TurnedAway } from "./TurnedAway";
 
 export function BeforeOpening({ study, status }: { study: string; status: string }) {
   const design = useQuery(studyQuery(study)).data?.design;
   const seal = useQuery(sealQuery(study)).data;
+  const checks = useQuery(launchChecksQuery(study)).data ?? [];
   const canBeSealed = status === "live" && seal?.sealed_at === null && seal.participants === 0;
   return (
     <>
+      {checks.length > 0 && (
+        <Stack gap="xs" mt="sm">
+          {checks.map(({ kind, blocks, text }) => (
+            <Alert key={`${kind} ${text}`} color={blocks ? "red" : "yellow"} title={blocks ? "Fix this first" : "Check this first"}>
+              <Text size="sm">{text}</Text>
+            </Alert>
+          ))}
+        </Stack>
+      )}
       {canBeSealed && (
         <Text size="sm" mt="sm">
           The plan is not sealed: that can only be done before the first participant, under{" "}
