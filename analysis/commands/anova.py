@@ -8,6 +8,7 @@ import typer
 
 from analysis.commands.output import (
     JsonOption,
+    LevelsOption,
     VerifyOption,
     check_folder,
     names_in,
@@ -67,6 +68,7 @@ def anova(
     robust: Annotated[
         bool, typer.Option("--robust", help="Add permutation tests, aligned ranks and trimmed means.")
     ] = False,
+    levels: LevelsOption = None,
     contrast: Annotated[
         list[str] | None,
         typer.Option(help="Weights of a factor's levels in their order: face:1,-1,0. Repeatable."),
@@ -92,6 +94,7 @@ def anova(
     from analysis.read.text_table import refuse_ids_once
     from analysis.report.within_contents import contents_of
     from analysis.within.cell_means import cell_table
+    from analysis.within.level_codes import in_given_order
 
     factors, groups, covariates = names_in(within), names_in(between), names_in(covariate)
     if not [*factors, *groups, *covariates]:
@@ -104,6 +107,8 @@ def anova(
         data = read_long_table(
             file, participant, rating, factors, trial, scale_bounds(scale), groups, covariates
         )
+        rows, ordered = in_given_order(data.rows, levels or ())
+        data = replace(data, rows=rows, decisions=(*data.decisions, *ordered))
         if factors:
             refuse_ids_once(data.rows, participant, data.header, data.source)
         cells = cell_table(data.rows, participant, rating, factors)

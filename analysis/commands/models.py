@@ -1,13 +1,13 @@
 """`analysis mixed` and `analysis ordinal`."""
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from analysis.commands.output import JsonOption, names_in, save_json, saying, show_tables
+from analysis.commands.output import JsonOption, LevelsOption, names_in, save_json, saying, show_tables
 
 if TYPE_CHECKING:
     from analysis.read.model_csv import ModelInput
@@ -107,6 +107,7 @@ def mixed(
         bool,
         typer.Option("--intervals", help="Add profile likelihood intervals of coefficients and SDs."),
     ] = False,
+    levels: LevelsOption = None,
     json: JsonOption = None,
 ) -> None:
     """Linear mixed model: participants crossed with clips, slopes, Satterthwaite or Kenward-Roger tests.
@@ -130,7 +131,7 @@ def mixed(
     )
 
     groups, numbers, further = names_in(between), names_in(covariate), names_in(random)
-    data = _read(file, participant, rating, within, item, groups, numbers, further)
+    data = _read(file, participant, rating, within, item, levels, groups, numbers, further)
     with saying("fitting") as say:
         result = fit_mixed(
             data.rows,
@@ -178,6 +179,7 @@ def ordinal(
             max=100,
         ),
     ] = None,
+    levels: LevelsOption = None,
     json: JsonOption = None,
 ) -> None:
     """Cumulative-link (ordinal) mixed model: logit, flexible thresholds, crossed effects, slopes.
@@ -199,7 +201,7 @@ def ordinal(
     )
 
     groups, numbers = names_in(between), names_in(covariate)
-    data = _read(file, participant, rating, within, item, groups, numbers)
+    data = _read(file, participant, rating, within, item, levels, groups, numbers)
     clips = data.item if quadrature in (None, 1) or item else ()
     with saying("fitting"):
         result = fit_ordinal(
@@ -214,22 +216,32 @@ def ordinal(
 
 
 def _read(
-    file: Path, participant: str, rating: str, within: str, item: str, *further: list[str]
+    file: Path,
+    participant: str,
+    rating: str,
+    within: str,
+    item: str,
+    levels: list[str] | None,
+    *further: list[str],
 ) -> "ModelInput":
     """What a model is fitted to, from a file of any kind that is read.
 
     Parameters
     ----------
+    levels : list of str or None
+        Orders of levels.
     further : list of str
         Factors between participants, covariates, and more groupings.
     """
     from analysis.read.model_csv import read_model_input
     from analysis.read.text_table import refuse_ids_once
+    from analysis.within.level_codes import in_given_order
 
     with saying("reading ratings"):
         data = read_model_input(file, participant, rating, names_in(within), names_in(item), *further)
     refuse_ids_once(data.rows, participant, data.header, file.name)
-    return data
+    rows, ordered = in_given_order(data.rows, levels or ())
+    return replace(data, rows=rows, decisions=(*data.decisions, *ordered))
 
 
 def _show(file: Path, data: "ModelInput", text: str) -> None:

@@ -27,6 +27,12 @@ VerifyOption = Annotated[
     bool,
     typer.Option("--verify-with-r", help="Let R compute the report's tables anew, and compare."),
 ]
+LevelsOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="Order of a factor's levels (else by name, numbers by value): time=before,after. Repeatable."
+    ),
+]
 JsonOption = Annotated[
     Path | None, typer.Option(help="Write every number to this JSON file.", callback=_writable)
 ]

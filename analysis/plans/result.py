@@ -10,7 +10,7 @@ from analysis.within.between import BetweenDesign, no_groups
 from analysis.within.cell_means import CellTable, name_cells
 from analysis.within.contrast_tests import Contrast, Equivalence, contrasts_of, equivalence, trends
 from analysis.within.marginal_means import MarginalMean, marginal_means
-from analysis.within.pairwise import Pair, one_factor_pairs, pairs_of
+from analysis.within.pairwise import Pair, one_factor_pairs, pairs_of, quoted
 from analysis.within.simple_effects import SimpleEffect, simple_effects
 
 if TYPE_CHECKING:
@@ -48,18 +48,18 @@ class Labels:
         return self.effect(parts) + space + contrast if self.factors.keys() >= set(parts) else name
 
     def cell(self, levels: Mapping[str, str]) -> str:
-        """Labels of the levels, by the names of their factors."""
-        return ", ".join(self.level(factor, name) for factor, name in levels.items())
+        """Labels of the levels by their factors, which are named where a label holds a comma."""
+        labels = {factor: self.level(factor, name) for factor, name in levels.items()}
+        if len(labels) > 1 and any("," in label for label in labels.values()):
+            return ", ".join(f"{self.factor(factor)}={quoted(label)}" for factor, label in labels.items())
+        return ", ".join(labels.values())
 
-    def pair(self, effect: str, level_a: str, level_b: str) -> str:
-        """Two levels of a margin, where ':' joins the names of several factors and of their levels."""
-        if effect in self.factors or not self.factors:
-            return f"{self.factor(effect)}: {self.level(effect, level_a)} - {self.level(effect, level_b)}"
-        factors = effect.split(":")
-        first, second = (
-            self.cell(dict(zip(factors, level.split(":"), strict=True))) for level in (level_a, level_b)
-        )
-        return f"{self.effect(factors)}: {first} - {second}"
+    def pair(self, cell_a: Mapping[str, str], cell_b: Mapping[str, str]) -> str:
+        """Two cells of a margin, each factor's level by its name."""
+        texts = [self.cell(cell_a), self.cell(cell_b)]
+        if any(" - " in text for text in texts):
+            texts = [f'"{text}"' for text in texts]
+        return f"{self.effect(tuple(cell_a))}: {' - '.join(texts)}"
 
 
 def labels_of(experiment: "Experiment") -> Labels:

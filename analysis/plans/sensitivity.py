@@ -185,7 +185,7 @@ def bayes_factors(analysis: Analysis) -> Section:
     rows = []
     for pair in (p for p in analysis.pairs if p.effect in names):
         bf = pair.bayes_factor
-        name = analysis.labels.pair(pair.effect, pair.level_a, pair.level_b)
+        name = analysis.labels.pair(pair.cell_a, pair.cell_b)
         rows.append((name, fixed(pair.t), _factor(bf), _factor(1 / bf if bf else bf), _in_words(bf)))
     header = ("Margin: pair", "t", "BF₁₀", "BF₀₁", "Evidence")
     table = Table(

@@ -27,7 +27,7 @@ def pairs_table(analysis: Analysis) -> Table:
     """Paired comparisons of every margin of one factor (and of two where asked for)."""
     rows = tuple(
         (
-            analysis.labels.pair(p.effect, p.level_a, p.level_b),
+            analysis.labels.pair(p.cell_a, p.cell_b),
             fixed(p.difference),
             interval(p.ci),
             fixed(p.t),
@@ -91,7 +91,7 @@ def equivalence_table(analysis: Analysis) -> Table:
     """Two one-sided tests of every pair against the declared bounds."""
     rows = tuple(
         (
-            analysis.labels.pair(e.effect, e.level_a, e.level_b),
+            analysis.labels.pair(e.cell_a, e.cell_b),
             fixed(e.difference),
             interval(e.ci),
             p_value(e.p_lower),

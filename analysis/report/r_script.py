@@ -151,9 +151,9 @@ def _pairs(analysis: Analysis, names: dict[str, str]) -> str:
     rows, margins = [], _margins(analysis)
     for pair in analysis.pairs:
         factors = margins[pair.effect]
-        codes = {":".join(cell): code for cell, code in _cells(analysis, factors).items()}
+        codes = _cells(analysis, factors)
         numbers = (pair.difference, pair.se, pair.df, pair.t, pair.p, *pair.ci)
-        cells = (codes[pair.level_a], codes[pair.level_b])
+        cells = [codes[tuple(cell[name] for name in factors)] for cell in (pair.cell_a, pair.cell_b)]
         rows.append([_in_r(factors, names), *cells, *map(r_number, numbers)])
     return as_csv(rows).strip()
 

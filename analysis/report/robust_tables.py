@@ -81,7 +81,7 @@ def _pairs(analysis: Analysis, companions: Companions) -> Table:
 
 def _pair_cells(analysis: Analysis, pair: TrimmedPair) -> tuple[str, ...]:
     return (
-        analysis.labels.pair(pair.effect, pair.level_a, pair.level_b),
+        analysis.labels.pair({pair.effect: pair.level_a}, {pair.effect: pair.level_b}),
         fixed(pair.difference),
         fixed(pair.se, 3),
         fixed(pair.t),

@@ -49,6 +49,8 @@ class Equivalence:
     p_upper: float
     p: float
     ci: tuple[float, float]
+    cell_a: dict[str, str]
+    cell_b: dict[str, str]
 
 
 def contrasts_of(
@@ -146,6 +148,8 @@ def equivalence(
                 p_upper=upper,
                 p=max(lower, upper),
                 ci=(pair.difference - reach, pair.difference + reach),
+                cell_a=pair.cell_a,
+                cell_b=pair.cell_b,
             )
         )
     return tuple(tests)

@@ -60,6 +60,47 @@ def level_codes(
     return lookup[codes], names
 
 
+def in_given_order(rows: pd.DataFrame, given: Sequence[str]) -> tuple[pd.DataFrame, tuple[str, ...]]:
+    """The rows with levels in the order given, and what is said of it.
+
+    Parameters
+    ----------
+    rows : DataFrame
+        Columns of text.
+    given : sequence of str
+        `column=first,second,third`, or with `|` between levels that hold a comma.
+
+    Raises
+    ------
+    InputError
+        Text of another form, an unknown column, levels that are not exactly those of the column.
+    """
+    said = []
+    for text in given:
+        name, equals, listed = text.partition("=")
+        name = name.strip()
+        order = [level.strip() for level in listed.split("|" if "|" in listed else ",")]
+        if not equals or not all(order):
+            raise InputError(f"--levels should be like time=before,after,later, got '{text}'")
+        if name not in rows.columns:
+            raise InputError(
+                f"--levels: no factor is called '{name}'{did_you_mean(name, map(str, rows.columns))}"
+            )
+        there = natural_order([str(level) for level in rows[name].unique()])
+        for level in order:
+            if level not in there:
+                raise InputError(
+                    f"--levels: '{level}' is not a level of '{name}'{did_you_mean(level, there)}"
+                )
+        lacking = [level for level in there if level not in order]
+        if lacking or len(set(order)) < len(order):
+            named = f"; {', '.join(lacking)} missing" if lacking else ""
+            raise InputError(f"--levels: expected each level of '{name}' once ({', '.join(there)}){named}")
+        rows = rows.assign(**{name: pd.Categorical(rows[name].astype(str), order, ordered=True)})
+        said.append(f"levels of '{name}' in the order given: {', '.join(order)}")
+    return rows, tuple(said)
+
+
 def _in_order(column: pd.Series, texts: Sequence[str]) -> list[str]:
     """The names that a column holds: as its own categories are ordered, where they are."""
     if isinstance(column.dtype, pd.CategoricalDtype) and column.dtype.ordered:

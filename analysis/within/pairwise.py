@@ -1,5 +1,7 @@
 """Paired comparisons of the levels of a margin, with Bonferroni and Holm adjustment."""
 
+import json
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -25,7 +27,8 @@ class Pair:
     Adjusted for the pairs of the margin: Bonferroni, Holm, Sidak, Tukey, false discovery rate.
     `dz` divides by the SD of the difference, pooled over groups; between groups it is Cohen's d, over the
     pooled SD of participants' means, and NaN where both group and level differ, as `bayes_factor` (JZS) is.
-    Levels of a margin of several factors are joined with ':'.
+    `cell_a` and `cell_b` name each factor's level; `level_a` and `level_b` are the same as text: the level,
+    or several joined by ':', with the names of their factors where a level holds a ':' itself.
     """
 
     effect: str
@@ -45,19 +48,36 @@ class Pair:
     dz: float
     dz_ci: tuple[float, float]
     bayes_factor: float
+    cell_a: dict[str, str]
+    cell_b: dict[str, str]
 
 
 def pairs_of(result: AnovaResult, factors: Sequence[str], confidence: float = 0.95) -> tuple[Pair, ...]:
     """All pairs of levels of the margin of `factors` (names, any order)."""
     margin = margin_of(result, factors)
-    names = [":".join(levels.values()) for levels in margin.combinations]
+    cells = margin.combinations
+    names = cell_texts(cells)
     pairs = list(combinations(range(len(names)), 2))
     weights = np.zeros((len(pairs), len(names)))
     for row, (a, b) in enumerate(pairs):
         weights[row, a], weights[row, b] = 1.0, -1.0
-    labels = [(names[a], names[b]) for a, b in pairs]
+    labels = [((names[a], cells[a]), (names[b], cells[b])) for a, b in pairs]
     scale = float(np.abs(result.y).max())
     return _tested(effect_name(margin.names), labels, margin, weights, scale, confidence)
+
+
+def cell_texts(cells: Sequence[dict[str, str]]) -> list[str]:
+    """A text for each cell of a margin, all different: levels joined by ':' where none holds one."""
+    if len(cells[0]) == 1:
+        return [level for cell in cells for level in cell.values()]
+    if not any(":" in level for cell in cells for level in cell.values()):
+        return [":".join(cell.values()) for cell in cells]
+    return [", ".join(f"{factor}={quoted(level)}" for factor, level in cell.items()) for cell in cells]
+
+
+def quoted(level: str) -> str:
+    """A level as text that no separator cuts: in quotation marks where it holds one."""
+    return json.dumps(level, ensure_ascii=False) if re.search(r'[,="]', level) else level
 
 
 def one_factor_pairs(result: AnovaResult, confidence: float = 0.95) -> tuple[Pair, ...]:
@@ -67,7 +87,7 @@ def one_factor_pairs(result: AnovaResult, confidence: float = 0.95) -> tuple[Pai
 
 def _tested(
     effect: str,
-    labels: list[tuple[str, str]],
+    labels: list[tuple[tuple[str, dict[str, str]], tuple[str, dict[str, str]]]],
     margin: Margin,
     weights: Floats,
     scale: float,
@@ -85,8 +105,8 @@ def _tested(
     return tuple(
         Pair(
             effect=effect,
-            level_a=a,
-            level_b=b,
+            level_a=a[0],
+            level_b=b[0],
             difference=float(estimate[i]),
             se=float(se[i]),
             t=float(t[i]),
@@ -102,6 +122,8 @@ def _tested(
             dz_ci=(float(sizes[i, 0]), float(sizes[i, 1])),
             # as many differences of this SD have this standard error: N, or n1 n2 / (n1 + n2) of two groups
             bayes_factor=bayes_factor(float(t[i]), float(scale_of_t[i]) ** -2.0, margin.df),
+            cell_a=a[1],
+            cell_b=b[1],
         )
         for i, (a, b) in enumerate(labels)
     )

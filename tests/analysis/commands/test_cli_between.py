@@ -198,3 +198,40 @@ def test_slopes_that_a_group_of_one_does_not_tell_are_named(tmp_path) -> None:
         "'age:group' is determined by the other groups and covariates; leave --covariate-by-group out"
         in str(result.exception)
     )
+
+
+@pytest.mark.parametrize("command", ["anova", "mixed"])
+def test_the_order_of_levels_is_the_one_that_was_asked_for(command: str, tmp_path: Path) -> None:
+    out = tmp_path / "o.json"
+    arguments = [command, str(OBK), "--participant", "id", "--rating", "y", "--within", "phase"]
+    arguments += ["--between", "treatment", "--json", str(out)]
+    orders = ["--levels", "phase=pre,post,fup", "--levels", "treatment=control|B|A"]
+    done = CliRunner().invoke(app, [*arguments, *orders])
+    assert done.exit_code == 0, done.output
+    assert "levels of 'phase' in the order given: pre, post, fup" in " ".join(done.output.split())
+    data = json.loads(out.read_text())
+    if command == "anova":
+        assert data["levels"]["phase"] == ["pre", "post", "fup"]
+        assert data["between"][0]["levels"] == ["control", "B", "A"]
+        by_name = {(p["level_a"], p["level_b"]): p["difference"] for p in data["pairwise"]}
+        assert ("pre", "post") in by_name
+        means = {m["levels"]["phase"]: m["mean"] for m in data["marginal_means"] if m["effect"] == "phase"}
+        assert by_name["pre", "post"] == pytest.approx(means["pre"] - means["post"])
+    else:
+        names = [c["name"] for c in data["coefficients"]]
+        assert names[1:5] == ["treatment[control]", "treatment[B]", "phase[pre]", "phase[post]"]
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("phase=pre,pst,fup", "did you mean 'post'"),
+        ("phase=pre,fup", "post missing"),
+        ("phase=pre,post,fup,pre", "once"),
+        ("fase=pre", "did you mean 'phase'"),
+        ("phase", "should be like"),
+    ],
+)
+def test_an_order_that_is_not_one_of_the_levels_is_refused(given: str, said: str) -> None:
+    done = anova(OBK, "--within", "phase", "--levels", given)
+    assert said in str(done.exception)

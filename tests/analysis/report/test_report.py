@@ -107,7 +107,7 @@ def test_json_has_the_promised_keys_and_no_nan(analysis) -> None:
     assert {"mauchly", "eta_sq_partial", "eta_sq_partial_ci", "eta_sq_generalized"} <= set(effect)
     assert set(data["marginal_means"][0]) == {"effect", "levels", "mean", "se", "ci"}
     assert set(data["pairwise"][0]) == {
-        *("effect", "level_a", "level_b", "difference", "se", "t", "df", "p"),
+        *("effect", "level_a", "level_b", "cell_a", "cell_b", "difference", "se", "t", "df", "p"),
         *("p_bonferroni", "p_holm", "p_sidak", "p_tukey", "p_fdr", "ci", "dz", "dz_ci", "bayes_factor"),
     }
     assert data["n_participants"] == 20

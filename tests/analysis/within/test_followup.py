@@ -158,3 +158,29 @@ def test_the_interval_of_dz_puts_t_at_both_tails() -> None:
         low, high = (bound * np.sqrt(14) for bound in pair.dz_ci)
         assert stats.nct.cdf(pair.t, pair.df, low) == pytest.approx(0.975, abs=1e-6)
         assert stats.nct.cdf(pair.t, pair.df, high) == pytest.approx(0.025, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        (["implied", "implied:other"], ["other:x", "x"]),
+        (["1", "1:2"], ["2:3", "3"]),
+        (["a", "a, b"], ["b, c", "c"]),
+        (["a=1", "a"], ["b", "1, b"]),
+        (['q"', "q"], ["x,", "x"]),
+        (["a - b", "a"], ["c", "b - c"]),
+    ],
+)
+def test_names_of_cells_tell_them_apart_whatever_the_levels_hold(first: list[str], second: list[str]) -> None:
+    from analysis.plans.result import Labels
+
+    rng = np.random.default_rng(7)
+    y = rng.normal(size=(9, 2, 2))
+    result = within_anova(y, ["one", "two"], [first, second])
+    pairs = pairs_of(result, ["one", "two"])
+    assert len(pairs) == 6
+    assert len({(pair.level_a, pair.level_b) for pair in pairs}) == 6
+    assert len({name for pair in pairs for name in (pair.level_a, pair.level_b)}) == 4
+    assert len({Labels().pair(pair.cell_a, pair.cell_b) for pair in pairs}) == 6
+    cells = {tuple(cell.items()) for pair in pairs for cell in (pair.cell_a, pair.cell_b)}
+    assert cells == {(("one", a), ("two", b)) for a in first for b in second}
