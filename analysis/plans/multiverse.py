@@ -10,8 +10,11 @@ from typing import Protocol
 
 from analysis.plans.exclusions import Exclusions, judged
 from analysis.plans.prepared import Prepared
+from analysis.plans.result import plans_multivariate
 from analysis.within.anova import AnovaResult
 from analysis.within.cell_means import CellTable
+from analysis.within.effects import Effect
+from analysis.within.simple_effects import first_p, first_test, reports_multivariate
 from experiments.definition import Experiment
 from experiments.errors import InputError
 
@@ -88,25 +91,33 @@ def multiverse(prepared: Prepared, analyse: Analyse) -> Multiverse:
     """
     experiment, universes, failed = prepared.experiment, list[Universe](), 0
     effects: tuple[tuple[str, ...], ...] = ()
-    choose = _Choice(prepared, analyse)
+    choose, multivariate = _Choice(prepared, analyse), False
     for applied in _choices(len(experiment.exclusions)):
         try:
             anova, n_ratings = choose(applied)
         except InputError:
             failed += 1
             continue
-        effects = effects or tuple(effect.factors for effect in anova.effects)
+        if not effects:
+            effects = tuple(effect.factors for effect in anova.effects)
+            multivariate = reports_multivariate(anova, plans_multivariate(experiment))
         tests = [anova.effect(":".join(factors)) for factors in effects]
         universes.append(
             Universe(
                 applied,
                 anova.n_participants,
                 n_ratings,
-                tuple(test.univariate.p_gg for test in tests),
-                tuple(test.eta_sq_partial for test in tests),
+                tuple(first_p(test, multivariate) for test in tests),
+                tuple(_size(test, multivariate) for test in tests),
             )
         )
     return Multiverse(rule_names(experiment), effects, tuple(universes), failed)
+
+
+def _size(effect: Effect, multivariate: bool) -> float:
+    """Partial eta squared of the test reported first."""
+    test = first_test(effect, multivariate)
+    return effect.eta_sq_partial if test is None else test.eta_sq_partial
 
 
 def _choices(n_rules: int) -> Iterator[tuple[bool, ...]]:

@@ -52,9 +52,10 @@ def _table(analysis: Analysis, result: Multiverse) -> Table:
         )
         for i, factors in enumerate(result.effects)
     )
+    kind = "Multivariate tests." if analysis.multivariate_first else "p by Greenhouse-Geisser."
     people = [universe.n_participants for universe in result.universes]
     header = ("Effect", "p as declared", "p", f"significant at {share(SIGNIFICANCE, 2)}", "partial η²")
-    notes = (f"N = {_range([str(min(people)), str(max(people))])}. p by Greenhouse-Geisser.",)
+    notes = (f"N = {_range([str(min(people)), str(max(people))])}. {kind}",)
     title = caption("Tests under other exclusions", analysis.name, analysis.synthetic)
     return Table("multiverse", title, header, rows, 1, notes)
 

@@ -11,7 +11,7 @@ from analysis.within.cell_means import CellTable, name_cells
 from analysis.within.contrast_tests import Contrast, Equivalence, contrasts_of, equivalence, trends
 from analysis.within.marginal_means import MarginalMean, marginal_means
 from analysis.within.pairwise import Pair, one_factor_pairs, pairs_of, quoted
-from analysis.within.simple_effects import SimpleEffect, simple_effects
+from analysis.within.simple_effects import SimpleEffect, reports_multivariate, simple_effects
 
 if TYPE_CHECKING:
     from analysis.plans.exclusions import Exclusions
@@ -97,6 +97,11 @@ class Analysis:
     robust: "Companions | None" = None
 
     @property
+    def multivariate_first(self) -> bool:
+        """Whether the F reported first is the multivariate one: `reports_multivariate`."""
+        return reports_multivariate(self.anova, plans_multivariate(self.experiment))
+
+    @property
     def n_participants(self) -> int:
         """Participants in the tests."""
         return self.anova.n_participants
@@ -143,7 +148,7 @@ def analyse_cells(
         pairs=pairs,
         decisions=(*decisions, *cell_decisions(cells), *group_decisions(anova)),
         labels=labels or Labels(),
-        simple_effects=simple_effects(anova),
+        simple_effects=simple_effects(anova, planned=plans_multivariate(experiment)),
         trends=trends(anova),
         contrasts=tuple(
             contrast
@@ -154,6 +159,11 @@ def analyse_cells(
         experiment=experiment,
         exclusions=exclusions,
     )
+
+
+def plans_multivariate(experiment: "Experiment | None") -> bool:
+    """Whether a study plans multivariate tests; tables without a declaration do."""
+    return experiment is None or experiment.analysis.statistic == "multivariate"
 
 
 def cell_decisions(cells: CellTable) -> tuple[str, ...]:

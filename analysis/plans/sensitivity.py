@@ -13,6 +13,7 @@ from analysis.report.contents import Section
 from analysis.report.formats import Table
 from analysis.report.numbers import DASH, fixed, p_value
 from analysis.report.r_models import model_files
+from analysis.within.simple_effects import first_p
 from experiments.errors import InputError
 
 MAX_RATINGS = 50_000
@@ -91,10 +92,15 @@ def mixed_model(analysis: Analysis) -> Section:
     for effect in result.effects:
         ours = analysis.anova.effect(effect.effect)
         df = f"{effect.df_effect}, {fixed(effect.df_error, 1)}"
-        cells = (fixed(effect.f_value, 3), df, p_value(effect.p_value), p_value(ours.univariate.p_gg))
+        cells = (
+            fixed(effect.f_value, 3),
+            df,
+            p_value(effect.p_value),
+            p_value(first_p(ours, analysis.multivariate_first)),
+        )
         holds = (holds_for(effect.effect, random, random_slopes),) if random else ()
         rows.append((analysis.labels.effect(ours.factors), *cells, *holds))
-    header = ("Effect", "F", "df", "p", "p of the ANOVA (GG)", *(("holds for",) if random else ()))
+    header = ("Effect", "F", "df", "p", "p of the ANOVA", *(("holds for",) if random else ()))
     notes = (f"Model: {result.formula}.", *notes_of(result, analysis.labels))
     table = Table(
         "mixed",
@@ -140,10 +146,10 @@ def ordinal_model(analysis: Analysis) -> Section:
             fixed(effect.chi2, 3),
             str(effect.df),
             p_value(effect.p_value),
-            p_value(ours.univariate.p_gg),
+            p_value(first_p(ours, analysis.multivariate_first)),
         )
         rows.append((analysis.labels.effect(ours.factors), *cells))
-    header = ("Effect", "χ²", "df", "p", "p of the ANOVA (GG)")
+    header = ("Effect", "χ²", "df", "p", "p of the ANOVA")
     thresholds = ", ".join(fixed(value) for value in result.thresholds)
     notes = (f"Model: {result.formula}.", f"Thresholds: {thresholds}.", *notes_of(result, analysis.labels))
     table = Table(

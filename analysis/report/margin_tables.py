@@ -4,7 +4,7 @@ from analysis.plans.result import Analysis
 from analysis.report.formats import Table
 from analysis.report.numbers import fixed, interval, p_value, share
 from analysis.report.table_cells import test_cells, title_of
-from analysis.within.simple_effects import SIGNIFICANCE
+from analysis.within.simple_effects import SIGNIFICANCE, first_test
 
 
 def means_table(analysis: Analysis) -> Table:
@@ -51,10 +51,9 @@ def simple_effects_table(analysis: Analysis) -> Table:
     """Simple effects of significant interactions."""
     rows = []
     for simple in analysis.simple_effects:
-        m = simple.test.multivariate
-        exact = m is not None and m.exact
-        f, df, p = test_cells(simple.test, exact)
-        size = m.eta_sq_partial if m is not None and exact else simple.test.eta_sq_partial
+        m = first_test(simple.test, analysis.multivariate_first)
+        f, df, p = test_cells(simple.test, analysis.multivariate_first)
+        size = simple.test.eta_sq_partial if m is None else m.eta_sq_partial
         label = f"{analysis.labels.factor(simple.of)} at {analysis.labels.cell(simple.at)}"
         rows.append((label, f, df, p, p_value(simple.p_holm), share(size)))
     notes = (

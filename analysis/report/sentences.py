@@ -9,7 +9,7 @@ from analysis.report.table_cells import corrected_df
 from analysis.report.tables import uses_multivariate
 from analysis.within.effects import Effect
 from analysis.within.multivariate_tests import MultivariateTest
-from analysis.within.simple_effects import SIGNIFICANCE
+from analysis.within.simple_effects import SIGNIFICANCE, first_p
 from analysis.within.univariate import UnivariateTest
 
 
@@ -48,9 +48,7 @@ def statistics_in_brief(analysis: Analysis, effect: Effect) -> str:
 
 
 def _p(effect: Effect, multivariate: bool) -> float:
-    if multivariate and effect.multivariate is not None:
-        return effect.multivariate.p_value
-    return effect.univariate.p_gg
+    return first_p(effect, multivariate)
 
 
 def _statistics(effect: Effect, multivariate: bool) -> str:

@@ -4,6 +4,7 @@ from analysis.plans.result import Analysis
 from analysis.report.captions import caption
 from analysis.report.numbers import fixed, p_value
 from analysis.within.effects import Effect
+from analysis.within.simple_effects import first_test
 from analysis.within.univariate import UnivariateTest
 
 
@@ -14,8 +15,8 @@ def title_of(analysis: Analysis, what: str) -> str:
 
 def test_cells(effect: Effect, multivariate: bool) -> tuple[str, str, str]:
     """F, df and p of an effect: multivariate, or univariate as Greenhouse and Geisser correct it."""
-    if multivariate and effect.multivariate is not None:
-        m = effect.multivariate
+    m = first_test(effect, multivariate)
+    if m is not None:
         return fixed(m.f_value), f"{m.df_effect}, {m.df_error}", p_value(m.p_value)
     u = effect.univariate
     return fixed(u.f_value), corrected_df(u), p_value(u.p_gg)

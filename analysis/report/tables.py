@@ -54,9 +54,7 @@ def paper_table(analysis: Analysis) -> Table:
 
 def uses_multivariate(analysis: Analysis) -> bool:
     """Whether the table's tests are multivariate: where planned, if every effect has an exact one."""
-    planned = analysis.experiment is None or analysis.experiment.analysis.statistic == "multivariate"
-    tests = [effect.multivariate for effect in analysis.anova.effects]
-    return planned and all(test is not None and test.exact for test in tests)
+    return analysis.multivariate_first
 
 
 def _factor_rows(analysis: Analysis, factor: str, multivariate: bool, spread: bool) -> list[tuple[str, ...]]:

@@ -21,8 +21,10 @@ BETWEEN_METHODS = (
 METHODS = (
     "Cell means are unweighted means of a participant's trials; participants with an empty cell are dropped "
     "and named. Effects are tested on orthonormal contrasts of the cell means. Multivariate: Hotelling's T², "
-    "exact F on (q, N - q) df. Univariate: corrected by Greenhouse-Geisser and Huynh-Feldt. Marginal means "
-    "and their errors come from participants' own marginal means. Pairs are t tests, paired within "
+    "exact F on (q, N - q) df. Univariate: corrected by Greenhouse-Geisser and Huynh-Feldt. The F reported "
+    "first is the multivariate one where every effect has an exact one and the plan does not name the "
+    "univariate one; else it is the univariate one with Greenhouse-Geisser's df, for all effects. Marginal "
+    "means and their errors come from participants' own marginal means. Pairs are t tests, paired within "
     "participants."
 )
 

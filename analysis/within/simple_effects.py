@@ -11,6 +11,7 @@ from analysis.within.adjustments import holm
 from analysis.within.anova import AnovaResult
 from analysis.within.contrasts import orthonormal_basis
 from analysis.within.effects import Effect, effects_of
+from analysis.within.multivariate_tests import MultivariateTest
 from analysis.within.strata import Hypothesis, above_noise, error_stratum
 from experiments.errors import InputError
 
@@ -92,37 +93,56 @@ def _within_scores(result: AnovaResult, of: str, at: Mapping[str, str]) -> tuple
 
 
 def simple_effects(
-    result: AnovaResult, interactions: tuple[str, ...] | None = None
+    result: AnovaResult, interactions: tuple[str, ...] | None = None, planned: bool = True
 ) -> tuple[SimpleEffect, ...]:
     """Simple effects of the named interactions; of every significant one where none is named.
+
+    Which F counts is that of `reports_multivariate`, for all of them; `planned` is as there.
 
     Raises
     ------
     InputError
         A name that is no effect, or an effect of one factor or with a covariate.
     """
+    multivariate = reports_multivariate(result, planned)
     if interactions is None:
-        chosen = [e for e in result.effects if _is_interaction(result, e) and main_p(e) < SIGNIFICANCE]
+        found = [effect for effect in result.effects if _is_interaction(result, effect)]
+        chosen = [effect for effect in found if first_p(effect, multivariate) < SIGNIFICANCE]
     else:
         chosen = [result.effect(name) for name in interactions]
         for effect in chosen:
             if not _is_interaction(result, effect):
                 raise InputError(f"'{effect.effect}' is no interaction of factors; it has no simple effects")
-    return tuple(simple for effect in chosen for simple in _of_interaction(result, effect))
+    return tuple(simple for effect in chosen for simple in _of_interaction(result, effect, multivariate))
 
 
 def _is_interaction(result: AnovaResult, effect: Effect) -> bool:
     return len(effect.factors) > 1 and set(effect.factors) <= set(result.all_factors)
 
 
-def main_p(effect: Effect) -> float:
-    """p of the exact multivariate test where there is one, else Greenhouse-Geisser's."""
-    if effect.multivariate is not None and effect.multivariate.exact:
-        return effect.multivariate.p_value
-    return effect.univariate.p_gg
+def reports_multivariate(result: AnovaResult, planned: bool = True) -> bool:
+    """Whether the F reported first, everywhere, is the multivariate one: the one rule of all reports.
+
+    It is where a study does not plan the univariate one (`planned`), and each effect has an exact
+    multivariate test; else every F is the univariate one with Greenhouse and Geisser's df.
+    """
+    tests = [effect.multivariate for effect in result.effects]
+    return planned and all(test is not None and test.exact for test in tests)
 
 
-def _of_interaction(result: AnovaResult, effect: Effect) -> list[SimpleEffect]:
+def first_test(effect: Effect, multivariate: bool) -> MultivariateTest | None:
+    """The multivariate test where it is the one reported first; None where the univariate one is."""
+    test = effect.multivariate
+    return test if multivariate and test is not None and test.exact else None
+
+
+def first_p(effect: Effect, multivariate: bool) -> float:
+    """p of the test reported first."""
+    test = first_test(effect, multivariate)
+    return effect.univariate.p_gg if test is None else test.p_value
+
+
+def _of_interaction(result: AnovaResult, effect: Effect, multivariate: bool) -> list[SimpleEffect]:
     levels = dict(zip(result.all_factors, result.all_levels, strict=True))
     effects: list[SimpleEffect] = []
     for of in effect.factors:
@@ -131,7 +151,7 @@ def _of_interaction(result: AnovaResult, effect: Effect) -> list[SimpleEffect]:
         if len(places) > MAXIMUM_PLACES:
             continue
         tests = [simple_effect(result, of, at) for at in places]
-        p = np.array([main_p(test) for test in tests])
+        p = np.array([first_p(test, multivariate) for test in tests])
         effects += [
             SimpleEffect(effect.effect, of, at, test, float(one), float(adjusted))
             for at, test, one, adjusted in zip(places, tests, p, holm(p), strict=True)

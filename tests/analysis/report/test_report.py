@@ -5,6 +5,7 @@ import re
 from html.parser import HTMLParser
 
 import numpy as np
+import pandas as pd
 import pytest
 from matplotlib.collections import PolyCollection
 
@@ -20,6 +21,7 @@ from analysis.report.json_output import as_data
 from analysis.report.latex import as_latex, latex_text
 from analysis.report.numbers import apa_p, fixed, interval, p_value, share, sum_text
 from analysis.report.sentences import sentences
+from analysis.report.table_cells import corrected_df
 from analysis.report.tables import all_tables, paper_table
 from analysis.report.within_contents import contents_of
 from analysis.report.write import self_check, write_report
@@ -222,3 +224,31 @@ def test_the_note_under_a_figure_names_what_is_drawn(analysis: Analysis) -> None
         has_clouds = bool(figure.axes[0].findobj(PolyCollection))
         assert ("clouds" in figure.get_supxlabel()) is has_clouds
         assert has_clouds is (spec.style == "points")
+
+
+@pytest.mark.parametrize("people", [5, 14])
+def test_one_f_is_reported_first_everywhere(people: int) -> None:
+    """Five people have no multivariate test of the interaction (6 contrasts): every F is univariate then."""
+    from analysis.plans.result import analyse_cells
+    from analysis.report.margin_tables import simple_effects_table
+    from analysis.report.sentences import effect_p
+    from analysis.report.tables import paper_table
+    from analysis.within.cell_means import cell_table
+
+    rng = np.random.default_rng(12)
+    y = rng.normal(size=(people, 4, 3)) + 1.5 * np.arange(3) * np.arange(4)[:, None]
+    rows = [(p, "wxyz"[a], "klm"[b], y[p, a, b]) for p, a, b in np.ndindex(y.shape)]
+    cells = cell_table(pd.DataFrame(rows, columns=["p", "a", "b", "y"]), "p", "y", ["a", "b"])
+    made = analyse_cells(cells, name="own", title="", source="", rating="y")
+    several = people > 6
+    assert ("multivariate" in paper_table(made).notes[0]) is several
+    for effect in made.anova.effects:
+        m, u = effect.multivariate, effect.univariate
+        assert effect_p(made, effect) == (m.p_value if several else u.p_gg)
+    assert made.simple_effects
+    printed = simple_effects_table(made).rows
+    for simple, row in zip(made.simple_effects, printed, strict=True):
+        m, u = simple.test.multivariate, simple.test.univariate
+        assert simple.p_value == (m.p_value if several else u.p_gg)
+        q = u.df_effect
+        assert row[2] == (f"{q}, {people - q}" if several else corrected_df(u))

@@ -13,7 +13,7 @@ from analysis.within.bayes_factor import PRIOR_SCALE
 from analysis.within.between import between_design
 from analysis.within.contrast_tests import contrasts_of, equivalence, polynomial_weights, trends
 from analysis.within.pairwise import one_factor_pairs, pairs_of
-from analysis.within.simple_effects import main_p, simple_effect, simple_effects
+from analysis.within.simple_effects import first_p, reports_multivariate, simple_effect, simple_effects
 from analysis.within.studentized_range import range_tail
 from experiments.errors import InputError
 
@@ -82,7 +82,7 @@ def test_simple_effects_within_are_one_way_anovas_of_the_slice() -> None:
 
 
 def test_significant_interactions_are_taken_apart_both_ways_with_holm() -> None:
-    assert main_p(RESULT.effect("duration:face")) < 0.05
+    assert first_p(RESULT.effect("duration:face"), reports_multivariate(RESULT)) < 0.05
     found = simple_effects(RESULT)
     assert [(s.of, tuple(s.at.values())) for s in found][:3] == [("duration", (f,)) for f in "abc"]
     assert len(found) == 3 + 4
