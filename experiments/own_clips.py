@@ -14,6 +14,7 @@ from experiments.errors import InputError, did_you_mean
 from experiments.factor_names import TAKES, name_and_prefix
 from experiments.level_order import in_order
 from experiments.name_patterns import FIELD, NamePattern
+from experiments.text_tables import separator_of
 from experiments.trials import reserved_names
 
 Placed = dict[str, tuple[dict[str, str], int]]
@@ -36,7 +37,9 @@ def levels_from_table(text: str, files: Iterable[str]) -> Placed:
 
 
 def _read_table(text: str, files: Iterable[str]) -> Placed:
-    reader = csv.DictReader(io.StringIO(text.lstrip("\ufeff")), delimiter=_delimiter(text))
+    reader = csv.DictReader(
+        io.StringIO(text.lstrip("\ufeff")), delimiter=separator_of(text.partition("\n")[0])
+    )
     columns = [name for name in (reader.fieldnames or []) if name]
     if "file" not in columns or len(columns) < 2:
         raise InputError(
@@ -59,11 +62,6 @@ def _read_table(text: str, files: Iterable[str]) -> Placed:
     if missing := sorted(known - set(rows)):
         raise InputError(f"{len(missing)} clips have no row in the table, the first is '{missing[0]}'")
     return _numbered(rows)
-
-
-def _delimiter(text: str) -> str:
-    first = text.partition("\n")[0]
-    return max(",;\t", key=first.count)
 
 
 def levels_from_names(pattern: str, files: Iterable[str]) -> Placed:

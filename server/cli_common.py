@@ -14,7 +14,7 @@ from server.db import checked_url
 from server.migrate import current_revision, known_revision, upgrade
 from server.settings import KEY_LENGTH_MIN, Settings
 
-out = Console(soft_wrap=True, highlight=False)
+out = Console(soft_wrap=True, highlight=False, markup=False)
 Word = TypeVar("Word", bound=str)
 
 

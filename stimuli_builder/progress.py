@@ -30,12 +30,12 @@ class SpeedColumn(ProgressColumn):
 def frame_progress() -> Progress:
     """Progress of a job counted in frames."""
     return Progress(
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         SpeedColumn(),
         TimeRemainingColumn(),
-        console=Console(stderr=True),
+        console=Console(stderr=True, markup=False),
         disable=not sys.stderr.isatty(),
     )
 
@@ -43,7 +43,14 @@ def frame_progress() -> Progress:
 @contextmanager
 def step_progress(description: str, total: int) -> Iterator[Callable[[], None]]:
     """Progress of a job of a few long steps; call what is yielded after each."""
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), disable=not sys.stderr.isatty()) as progress:
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+    )
+    with Progress(
+        *columns, console=Console(stderr=True, markup=False), disable=not sys.stderr.isatty()
+    ) as progress:
         task = progress.add_task(description, total=total)
         yield lambda: progress.advance(task)

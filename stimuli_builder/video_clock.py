@@ -46,7 +46,7 @@ def read_clock(path: Path, container: Any, stream: Any) -> Clock:
     """
     stamps, tick_s, reached_s = _packets(path, container, stream)
     declared = int(stream.frames or 0)
-    if declared and len(stamps) < declared:
+    if declared and len(stamps) < declared and _held_frames(path) < declared:
         raise DamagedFileError(
             f"{path}: truncated, it declares {declared} frames and holds {len(stamps)}; copy the file again"
         )
@@ -58,6 +58,18 @@ def read_clock(path: Path, container: Any, stream: Any) -> Clock:
             "copy the file again"
         )
     return clock
+
+
+def _held_frames(path: Path) -> int:
+    """How many frames the first video stream of a file holds, those too that an edit list hides.
+
+    A trimmed MP4 or MOV keeps whole groups of pictures, and its edit list says which of them are shown.
+    """
+    try:
+        with av.open(str(path), options={"ignore_editlist": "1"}) as container:
+            return sum(1 for packet in container.demux(video=0) if packet.size)
+    except (av.error.FFmpegError, ValueError):
+        return 0
 
 
 def clock_of(stamps: Stamps, tick_s: float, usual_step_s: float) -> Clock:

@@ -132,10 +132,11 @@ def _say_model(script: str) -> None:
 def saying(what: str) -> Iterator[Callable[[str], None]]:
     """A spinner on a terminal, silence elsewhere; gives a function that says which step is being taken."""
     from rich.console import Console
+    from rich.text import Text
 
-    console = Console(stderr=True)
+    console = Console(stderr=True, markup=False)
     if not console.is_terminal:
         yield lambda _: None
         return
-    with console.status(what) as status:
-        yield lambda step: status.update(f"{what}: {step}")
+    with console.status(Text(what)) as status:
+        yield lambda step: status.update(Text(f"{what}: {step}"))

@@ -47,7 +47,7 @@ def create(
             service.create_account(session, name, password, one_of(ROLES, role, "the role"))
     except ApiError as error:
         raise InputError(error.message) from error
-    Console().print(f"account '{name}' ({role}) created")
+    Console(markup=False).print(f"account '{name}' ({role}) created")
 
 
 @app.command("link")
@@ -63,7 +63,7 @@ def link(
     with migrated_services() as services:
         _, token = invitations.invite(services.database, known, label, None)
         address = invitation_url(services.settings.public_url, token)
-    Console(soft_wrap=True).print(address, highlight=False)
+    Console(soft_wrap=True, markup=False).print(address, highlight=False)
 
 
 @account_app.command("reset-password")

@@ -54,7 +54,7 @@ def capsule(
       analysis verify exp3-capsule.zip
     """
     check_targets([out_file])
-    with stored_services() as services, Console(stderr=True).status("capsule") as status:
+    with stored_services() as services, Console(stderr=True, markup=False).status("capsule") as status:
         with services.database.write() as session:
             known = find_study(session, study, OPERATOR, "view")
             about = Extract(origin, series).definition(session, known).dataset

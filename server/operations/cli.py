@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 from rich.table import Column, Table
+from rich.text import Text
 
 from server.cli_common import out
 from server.context import open_services
@@ -17,7 +18,7 @@ from server.settings import Settings
 
 FILE_WIDTH = 1_000
 """Characters: wider than any finding."""
-MARKS = {"ok": "[green]ok[/]", "warning": "[yellow]warning[/]", "failed": "[red]failed[/]"}
+COLORS = {"ok": "green", "warning": "yellow", "failed": "red"}
 
 
 def register(parent: typer.Typer) -> None:
@@ -45,9 +46,11 @@ def doctor(
         whole = (Column(name, overflow="fold") for name in ("found", "what to do"))
         table = Table("", "what", *whole, box=None, pad_edge=False)
         for finding in findings:
-            table.add_row(MARKS[finding.verdict], finding.subject, finding.state, finding.advice)
+            table.add_row(
+                Text(finding.verdict, COLORS[finding.verdict]), finding.subject, finding.state, finding.advice
+            )
         # In a file or a pipe a path is whole on its line; a terminal's own width is for eyes.
-        (out if out.is_terminal else Console(width=FILE_WIDTH, highlight=False)).print(table)
+        (out if out.is_terminal else Console(width=FILE_WIDTH, highlight=False, markup=False)).print(table)
     if any(finding.verdict == "failed" for finding in findings):
         raise typer.Exit(1)
 

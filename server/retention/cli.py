@@ -39,7 +39,7 @@ def retention(
     with stored_services() as services:
         shown = _previews(services, study)
         if not shown:
-            out.print("no study declares a period; see \\[retention] of the declaration")
+            out.print("no study declares a period; see [retention] of the declaration")
         elif dry_run:
             for preview in shown:
                 out.print(_line(preview), soft_wrap=True)

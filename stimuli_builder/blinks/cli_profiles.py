@@ -52,7 +52,7 @@ def list_profiles() -> None:
         lengths = [str(profile.down_frames), str(profile.up_frames), f"{profile.duration_frames_30fps:.1f}"]
         closure = f"{profile.closure.max():.2f}"
         table.add_row(profile.profile_id, profile.eye or "", *lengths, closure, profile.recording)
-    console = Console()
+    console = Console(markup=False)
     console.print(table)
     pairs = len(load_library(paired=True))
     console.print(

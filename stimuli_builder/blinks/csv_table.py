@@ -8,17 +8,23 @@ from typing import Any
 
 import pandas as pd
 
+from experiments.counted import counted
 from experiments.errors import InputError
+from experiments.text_tables import HEAD_BYTES, separator_of, utf8_stream
 
 NOTE = "note"
 """Key of `DataFrame.attrs` under which a table says how it was read; absent where that is plain."""
 MAX_NAMED = 6
+FIRST_LINES = 40
+"""Lines in which other programs' files are recognized."""
+COMMENTS = ("#", "%")
+"""Lines that begin so, above the header, are comments."""
+EYELINK = ("** converted from", "** date:", "** type: edf")
+_FIELDS = re.compile(r"Expected (\d+) fields in line (\d+), saw (\d+)")
 _SEPARATORS = {";": "semicolons", "\t": "tabs"}
 _POINT_OR_WHOLE = re.compile(r"[+-]?[0-9]*([.][0-9]+|(?<=[0-9])[.]?)([eE][+-]?[0-9]+)?")
 _COMMA_OR_WHOLE = re.compile(r"[+-]?[0-9]*(,[0-9]+|(?<=[0-9]))([eE][+-]?[0-9]+)?")
 _THOUSANDS = re.compile(r"[+-]?[0-9]{1,3}(,[0-9]{3})+")
-FIRST_BYTES = 1 << 16
-"""What is looked at for the header line."""
 
 
 def read_table(path: Path, *, alone: str = "", as_written: bool = False) -> pd.DataFrame:
@@ -45,15 +51,17 @@ def read_table(path: Path, *, alone: str = "", as_written: bool = False) -> pd.D
     InputError
         A folder, no UTF-8 text, or no table with rows.
     """
-    header = _header(path).strip()
+    skipped, header = _header(path)
+    header = header.strip()
     headless = bool(alone and _POINT_OR_WHOLE.fullmatch(header))
     one_column = headless or header.strip('"') == (alone or None)
-    separator = ";" if one_column else _separator(header)
+    separator = ";" if one_column else separator_of(header)
     options: dict[str, Any] = {"header": None, "names": [alone]} if headless else {}
+    options |= {"skiprows": skipped} if skipped else {}
     if as_written:
         options |= {"dtype": str, "keep_default_na": False, "na_values": [""], "skip_blank_lines": False}
     table = _cells(path, sep=separator, **options)
-    said = []
+    said = [f"{counted(skipped, 'line')} of comment above the header skipped"] if skipped else []
     if separator in _SEPARATORS and not one_column:
         said.append(f"columns parted by {_SEPARATORS[separator]}")
     if example := _read_decimal_commas(table, separator):
@@ -69,9 +77,10 @@ def _cells(path: Path, **options: Any) -> pd.DataFrame:
         with warnings.catch_warnings():
             warnings.simplefilter("error", pd.errors.ParserWarning)
             # Else a field too many makes the first column an index, and shifts the others under its name.
-            table: pd.DataFrame = pd.read_csv(
-                path, skipinitialspace=True, index_col=False, encoding="utf-8-sig", **options
-            )
+            with utf8_stream(path) as stream:
+                table: pd.DataFrame = pd.read_csv(
+                    stream, skipinitialspace=True, index_col=False, encoding="utf-8-sig", **options
+                )
     except pd.errors.ParserWarning as error:
         raise InputError(
             f"{path}: rows have more fields than the header names columns; numbers with decimal commas want "
@@ -79,8 +88,10 @@ def _cells(path: Path, **options: Any) -> pd.DataFrame:
         ) from error
     except UnicodeDecodeError as error:
         raise InputError(f"{path} is not UTF-8 text ({error.reason}); save it as CSV UTF-8") from error
-    except (pd.errors.ParserError, pd.errors.EmptyDataError) as error:
-        raise InputError(f"{path}: expected a CSV table with a header line ({str(error).strip()})") from error
+    except pd.errors.ParserError as error:
+        raise InputError(f"{path}: {_why_not_parsed(str(error))}") from error
+    except pd.errors.EmptyDataError as error:
+        raise InputError(f"{path}: expected a CSV table with a header line, got no column") from error
     table.columns = table.columns.astype(str).str.strip()
     if table.empty:
         raise InputError(f"{path}: the table has a header but no rows")
@@ -92,9 +103,11 @@ def line_of(path: Path, row: int) -> int:
 
     For messages: the file is read again.
     """
-    lines = path.read_text(encoding="utf-8-sig", errors="replace").split("\n")
-    blank = " \r" if "\t" in _header(path) else " \t\r"
-    written = [number for number, line in enumerate(lines, start=1) if line.strip(blank)]
+    with utf8_stream(path) as stream:
+        lines = stream.read().decode("utf-8-sig", "replace").split("\n")
+    skipped, header = _header(path)
+    blank = " \r" if "\t" in header else " \t\r"
+    written = [n for n, line in enumerate(lines, start=1) if n > skipped and line.strip(blank)]
     return written[row + 1] if row + 1 < len(written) else row + 2
 
 
@@ -104,30 +117,55 @@ def few(names: Sequence[str]) -> str:
     return ", ".join(names[:MAX_NAMED]) + (f" and {rest} more" if rest > 0 else "")
 
 
-def _header(path: Path) -> str:
-    """The first line that is not blank; the rest of a long recording is read once, by pandas."""
+def _why_not_parsed(message: str) -> str:
+    """What a parser's message means for the person's file."""
+    numbers = _FIELDS.search(message)
+    if numbers is None:
+        return "expected a CSV table with a header line; a double quote may be open: close it or delete it"
+    expected, line, got = numbers.groups()
+    return (
+        f"line {line} has {got} fields, the header line {expected}; the first line must name the columns: "
+        "delete lines above it"
+    )
+
+
+def _header(path: Path) -> tuple[int, str]:
+    """How many lines of comment come first, and the first other line that is not blank."""
     if path.is_dir():
         raise InputError(f"{path}: expected a CSV file, this is a folder; name a file in it")
     try:
-        with path.open("rb") as content:
-            start = content.read(FIRST_BYTES)
+        with utf8_stream(path) as content:
+            start = content.read(HEAD_BYTES)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})") from error
-    if b"\0" in start:
-        raise InputError(f"{path} is not UTF-8 text (it holds null bytes); save it as CSV UTF-8")
     try:
-        lines = start.decode("utf-8-sig", "strict" if len(start) < FIRST_BYTES else "ignore").split("\n")
+        lines = start.decode("utf-8-sig", "strict" if len(start) < HEAD_BYTES else "ignore").split("\n")
     except UnicodeDecodeError as error:
         raise InputError(f"{path} is not UTF-8 text ({error.reason}); save it as CSV UTF-8") from error
-    header = next((line for line in lines if line.strip()), None)
-    if header is None:
-        raise InputError(f"{path} is empty; expected a CSV table with a header line")
-    return header
+    _refuse_other_formats(lines, path)
+    comments = 0
+    for number, line in enumerate(lines):
+        if line.startswith(COMMENTS):
+            comments = number + 1
+        elif line.strip():
+            return comments, line
+    raise InputError(f"{path} is empty; expected a CSV table with a header line")
 
 
-def _separator(header: str) -> str:
-    unquoted = re.sub(r'"[^"]*"', "", header)
-    return max(",;\t", key=unquoted.count)
+def _refuse_other_formats(lines: Sequence[str], path: Path) -> None:
+    """Refuse files of other programs that hold no column of lid distances, and say what to do."""
+    written = [line.strip() for line in lines if line.strip()][:FIRST_LINES]
+    first = [re.split(r"[,;\t]", line)[0].strip().strip('"').lower() for line in written]
+    if any(word.startswith(EYELINK) for word in first) or path.suffix.lower() == ".asc":
+        raise InputError(
+            f"{path}: this is an EyeLink recording (gaze and pupil), expected a CSV table with a column of "
+            "lid distances; track the lids in a video with 'stimuli track'"
+        )
+    if first[:2] == ["scorer", "bodyparts"] or first[:3] == ["scorer", "individuals", "bodyparts"]:
+        raise InputError(
+            f"{path}: this is a DeepLabCut table of points, expected a column of lid distances; write the "
+            "distance between a point of the upper and one of the lower lid into a CSV with one header line"
+        )
 
 
 def _read_decimal_commas(table: pd.DataFrame, separator: str) -> str:

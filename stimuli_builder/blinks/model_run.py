@@ -67,7 +67,7 @@ def training_profiles(tables: Sequence[Path], eyes: str = "auto") -> list[BlinkP
 
 
 def _report_fit(model: BlinkModel, count: int) -> None:
-    console = Console()
+    console = Console(markup=False)
     table = Table("component", "variance", "cumulative", "sd of coefficient", box=SIMPLE_HEAD)
     for index, share in enumerate(model.explained):
         total = float(model.explained[: index + 1].sum())
@@ -102,7 +102,7 @@ def sample_blinks(
     write_profile_table(out, made)
     frames = [profile.duration_frames_30fps for profile in made]
     closures = [float(profile.closure.max()) for profile in made]
-    Console().print(
+    Console(markup=False).print(
         f"{counted(count, 'blink')} of {min(frames):.1f} to {max(frames):.1f} frames at 30 fps, "
         f"closure {min(closures):.2f} to {max(closures):.2f}; wrote {out}"
     )
@@ -134,7 +134,7 @@ def textbook_blinks(out: Path, duration: float, plot: Path | None) -> None:
         title = f"{duration:g} frames at 30 fps"
         save_figure(profiles_figure([replace(model, source="model"), *made], title), plot)
     write_profile_table(out, made)
-    Console().print(f"{len(made)} textbook curves of {duration:g} frames at 30 fps; wrote {out}")
+    Console(markup=False).print(f"{len(made)} textbook curves of {duration:g} frames at 30 fps; wrote {out}")
 
 
 @dataclass(frozen=True)
@@ -171,7 +171,7 @@ def export_curve(job: ExportJob) -> None:
     text = write_curve(job.format_name, curve, job.names)
     with whole_text(job.out) as stream:
         stream.write(text)
-    Console().print(
+    Console(markup=False).print(
         f"{counted(len(curve.blinks), 'blink')}, {counted(curve.left.size, 'frame')} at {rate:g} fps; "
         f"wrote {job.out}"
     )

@@ -14,7 +14,7 @@ from stimuli_builder.blinks.column_names import is_high_when_shut
 from stimuli_builder.blinks.csv_table import NOTE, line_of, read_table
 from stimuli_builder.blinks.gaps import bridge_gaps
 from stimuli_builder.blinks.inverted import opening_of
-from stimuli_builder.blinks.not_measured import without_what_is_not_measured
+from stimuli_builder.blinks.not_measured import NOT_SEEN, without_what_is_not_measured
 from stimuli_builder.blinks.profile import Array
 from stimuli_builder.blinks.times import (
     MAX_BRIDGED_MS,
@@ -216,6 +216,12 @@ def _set_openings(
     """Make openings of the chosen columns, NaN where nothing was measured, and note such rows as unseen."""
     notes = []
     given = {column: np.where(unseen[column], np.nan, _numbers(table, column, path)) for column in chosen}
+    for column, values in given.items():
+        missing = _not_measured(values)
+        if missing.any():
+            notes.append(f"{path.name}: '{column}' is -1 on {missing.sum():,} frames: {NOT_SEEN}")
+            given[column] = np.where(missing, np.nan, values)
+            unseen[column] = unseen[column] | missing
     times_s = np.arange(len(table)) / fps
     if "time_s" in table.columns:
         times_s = table["time_s"].to_numpy(dtype=np.float64) - float(table["time_s"].iloc[0])
@@ -230,6 +236,15 @@ def _set_openings(
         unseen[column] = unseen[column] | (np.isfinite(opening) & table[column].isna().to_numpy())
         notes += [note, *lost]
     return notes
+
+
+def _not_measured(values: Array) -> NDArray[np.bool_]:
+    """(n,) where a column holds -1, by which trackers (PupilEXT) say that they measured nothing.
+
+    A column with other negative numbers is no such column.
+    """
+    negative = values < 0
+    return negative & bool((values[negative] == -1).all())
 
 
 def _is_inverted(column: str, inverted: bool | None) -> bool | None:

@@ -24,7 +24,7 @@ def baking(name: str) -> Iterator[Report]:
         yield _lines(name)
         return
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),

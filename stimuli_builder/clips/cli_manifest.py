@@ -44,6 +44,7 @@ def manifest_command(
     """Write the manifest of somebody's own clips."""
     from experiments.load import load_experiment
     from experiments.own_clips import levels_from_names, levels_from_table
+    from experiments.text_tables import whole_text_of
     from stimuli_builder.clips.own_levels import understood
     from stimuli_builder.clips.own_manifest import clip_names, write_own_manifest
 
@@ -55,7 +56,7 @@ def manifest_command(
     elif table is not None:
         if not table.is_file():
             raise InputError(f"no file {table}; expected a CSV with a column 'file' and one a factor")
-        placed = levels_from_table(table.read_text(encoding="utf-8-sig"), names)
+        placed = levels_from_table(whole_text_of(table), names)
     print(*understood(placed, pattern), sep="\n", flush=True)
     declared = load_experiment(experiment) if experiment else None
     with _looking_into(len(placed)) as report:
@@ -71,7 +72,9 @@ def _looking_into(total: int) -> Iterator[Callable[[int], None]]:
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    columns = (TextColumn("videos"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), disable=not sys.stderr.isatty()) as progress:
+    columns = (TextColumn("videos", markup=False), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(
+        *columns, console=Console(stderr=True, markup=False), disable=not sys.stderr.isatty()
+    ) as progress:
         task = progress.add_task("videos", total=total)
         yield lambda done: progress.update(task, completed=done)

@@ -6,15 +6,17 @@ from typing import Any
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from experiments.counted import counted
 
 
 def print_plan(plan: dict[str, Any]) -> None:
     """Print what `summary` found."""
-    console = Console(highlight=False)
+    console = Console(highlight=False, markup=False)
     console.print(
-        f"[bold]{plan['name']}[/bold]  {plan['title']}  ({counted(plan['participants'], 'participant')})"
+        Text(plan["name"], "bold"),
+        f" {plan['title']}  ({counted(plan['participants'], 'participant')})",
     )
     factors = Table("factor", "levels", box=SIMPLE_HEAD)
     for factor in plan["factors"]:

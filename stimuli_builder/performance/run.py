@@ -66,12 +66,14 @@ def write_performance(job: PerformanceJob) -> None:
         stream.write(text)
     spoken_s = sum(one.end_s - one.start_s for one in stretches)
     heard = f"{spoken_s:.1f} s of speech in {len(stretches)} stretches; " if stretches else ""
-    Console().print(
+    Console(markup=False).print(
         f"{heard}{counted(len(done.blinks), 'blink')} in {duration_s:.1f} s, {done.left.size} frames at "
         f"{job.fps:g} fps; wrote {job.out}"
     )
     if job.source is not None and not stretches:
-        Console(stderr=True).print(f"{job.source}: nobody speaks; the blinks are those of '{job.state}'")
+        Console(stderr=True, markup=False).print(
+            f"{job.source}: nobody speaks; the blinks are those of '{job.state}'"
+        )
 
 
 def animation_curve(done: Performance) -> AnimationCurve:

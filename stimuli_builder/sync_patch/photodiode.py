@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import InputError
+from experiments.text_tables import separator_of, whole_text_of
 
 UP, DOWN = 0.6, 0.4
 """Share of the way from dark to light at which the field counts as light, or as dark again."""
@@ -46,8 +47,8 @@ def read_trace(path: Path) -> Trace:
     """Read a CSV of two columns with a line of names: time in ms, value."""
     if not path.is_file():
         raise InputError(f"{path}: expected a CSV of a photodiode, found none; check the path")
-    with path.open(encoding="utf-8-sig", newline="") as file:
-        lines = list(csv.reader(file))[1:]
+    text = whole_text_of(path)
+    lines = list(csv.reader(text.splitlines(), delimiter=separator_of(text.partition("\n")[0])))[1:]
     try:
         rows = np.array([[float(cell) for cell in line[:2]] for line in lines if line], np.float64)
     except ValueError as error:

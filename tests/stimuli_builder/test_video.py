@@ -140,3 +140,53 @@ def test_a_reader_that_stops_early_ends_its_thread(tmp_path):
     next(reader)
     reader.close()
     assert not [thread for thread in threading.enumerate() if thread.name == "decoder"]
+
+
+def trimmed(source, path, hidden, fps=25):
+    """The same packets with the first frames hidden by an edit list, as phones and editors trim."""
+    with (
+        av.open(str(source)) as given,
+        av.open(str(path), "w", options={"avoid_negative_ts": "disabled", "use_editlist": "1"}) as made,
+    ):
+        stream = given.streams.video[0]
+        copied = made.add_stream_from_template(stream)
+        for packet in given.demux(stream):
+            if packet.size:
+                shift = int(Fraction(hidden, fps) / packet.time_base)
+                packet.pts, packet.dts, packet.stream = packet.pts - shift, packet.dts - shift, copied
+                made.mux(packet)
+    return path
+
+
+@pytest.mark.parametrize("name", ["a.mp4", "a.mov"])
+@pytest.mark.parametrize("hidden", [1, 4, 11])
+def test_frames_that_an_edit_list_hides_do_not_make_a_file_truncated(tmp_path, name, hidden):
+    whole = write(tmp_path / f"whole-{name}", count=60, fps=25)
+    path = trimmed(whole, tmp_path / name, hidden)
+    with av.open(str(path)) as container:
+        assert container.streams.video[0].frames == 60  # what the file declares
+    info = scan_video(path)
+    assert info.frame_count == 60 - hidden
+    assert info.times_s[0] == 0
+    assert info.fps == pytest.approx(25)
+    assert not info.damaged
+    pictures = list(frames(path))
+    assert len(pictures) == info.frame_count
+    assert np.array_equal(pictures[0], list(frames(whole))[hidden])
+
+
+def test_a_trimmed_file_that_breaks_off_is_still_truncated(tmp_path):
+    path = trimmed(write(tmp_path / "whole.mov", count=60, fps=25), tmp_path / "a.mov", 4)
+    fast = tmp_path / "fast.mov"
+    with (
+        av.open(str(path), options={"ignore_editlist": "1"}) as given,
+        av.open(str(fast), "w", options={"movflags": "faststart"}) as made,
+    ):
+        copied = made.add_stream_from_template(given.streams.video[0])
+        for packet in given.demux(video=0):
+            if packet.size:
+                packet.stream = copied
+                made.mux(packet)
+    fast.write_bytes(fast.read_bytes()[: int(0.7 * fast.stat().st_size)])
+    with pytest.raises(InputError, match="truncated"):
+        scan_video(fast)

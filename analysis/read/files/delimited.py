@@ -1,11 +1,9 @@
 """CSV and its kin: comma, semicolon or tab, taken from the header line."""
 
-import codecs
 import csv
 import warnings
-from io import BytesIO, TextIOWrapper
+from io import TextIOWrapper
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 import pandas as pd
@@ -14,60 +12,15 @@ from analysis.read.files.cells import Cells
 from analysis.read.files.raggedness import lines_of_rows
 from experiments.errors import InputError
 from experiments.spreadsheet import unguarded_cell
-
-_MARKS = (
-    (codecs.BOM_UTF32_LE, "UTF-32"),
-    (codecs.BOM_UTF32_BE, "UTF-32"),
-    (codecs.BOM_UTF16_LE, "UTF-16"),
-    (codecs.BOM_UTF16_BE, "UTF-16"),
-)
-"""Byte order marks of encodings that spreadsheets write beside UTF-8, the longer first."""
-
-_HEAD = 1 << 16
-"""Bytes in which one line or more ends, in nearly every table."""
-
-
-def utf8(path: Path) -> BinaryIO:
-    """The file as UTF-8, opened; one whose byte order mark says UTF-16 or 32 is encoded anew.
-
-    Lines that end in a carriage return alone, as of old Macs and of Excel's "CSV (Macintosh)", end in a line
-    feed instead, for which the rows are counted.
-
-    Raises
-    ------
-    InputError
-        A text that is not what its mark says, or UTF-16 without one.
-    """
-    with path.open("rb") as file:
-        start = file.read(_HEAD)
-    encoding = next((name for mark, name in _MARKS if start.startswith(mark)), None)
-    if b"\0" in start[:4] and encoding is None:
-        raise InputError(
-            f"{path.name} holds null bytes, as UTF-16 text without a byte order mark does; "
-            "save it as CSV UTF-8"
-        )
-    if encoding is None:
-        if b"\r" not in start or b"\n" in start:
-            return path.open("rb")
-        return BytesIO(_with_line_feeds(path.read_bytes()))
-    try:
-        return BytesIO(_with_line_feeds(path.read_bytes().decode(encoding).encode()))
-    except UnicodeDecodeError as error:
-        raise InputError(
-            f"{path.name} is not {encoding} text ({error.reason}); save it as CSV UTF-8"
-        ) from error
-
-
-def _with_line_feeds(data: bytes) -> bytes:
-    return data if b"\n" in data else data.replace(b"\r", b"\n")
+from experiments.text_tables import separator_of, utf8_stream
 
 
 def delimited_header(path: Path) -> tuple[list[str], str]:
     """Names of the columns, and the separator."""
     try:
-        with TextIOWrapper(utf8(path), encoding="utf-8-sig", newline="") as lines:
+        with TextIOWrapper(utf8_stream(path), encoding="utf-8-sig", newline="") as lines:
             first = lines.readline()
-            separator = max(",;\t", key=first.count)
+            separator = separator_of(first)
             lines.seek(0)
             rows = csv.reader(lines, delimiter=separator)
             header = next(rows, [])
@@ -83,7 +36,7 @@ def delimited_header(path: Path) -> tuple[list[str], str]:
 def delimited_cells(path: Path, names: list[str]) -> Cells:
     """The columns `names` of a CSV file; rows of unequal length are refused."""
     header, separator = delimited_header(path)
-    with utf8(path) as file:
+    with utf8_stream(path) as file:
         lines = lines_of_rows(file, separator, len(header), path.name)[1:]
     frame = _parse(path, separator, [header.index(name) for name in names], len(header))
     frame.columns = pd.Index(names)
@@ -94,7 +47,7 @@ def delimited_cells(path: Path, names: list[str]) -> Cells:
 
 def _parse(path: Path, separator: str, positions: list[int], width: int) -> pd.DataFrame:
     try:
-        with warnings.catch_warnings(), utf8(path) as file:
+        with warnings.catch_warnings(), utf8_stream(path) as file:
             warnings.simplefilter("error")
             frame = pd.read_csv(
                 file,

@@ -39,14 +39,11 @@ class Rest:
         The frames nearest to the dip and furthest from it.
     level : float
         Depth at which the lid rests.
-    is_found : bool
-        False where the lid did not rest before the next dip or the end of the piece.
     """
 
     near: int
     far: int
     level: float
-    is_found: bool
 
 
 def rests_about(candidate: Candidate, depth: Depth, bounds: tuple[int, int]) -> tuple[Rest, Rest]:
@@ -85,10 +82,10 @@ def _rest(candidate: Candidate, depth: Depth, bound: int, step: int) -> Rest:
     near = _first_rest(values, width, noise)
     if near is None:
         lowest = int(np.argmin(values))
-        return Rest(peak + step * lowest, peak + step * lowest, float(values[lowest]), is_found=False)
+        return Rest(peak + step * lowest, peak + step * lowest, float(values[lowest]))
     far = _end_of_rest(values, near, width, max(width, round(REST_TO_S[side] * fps)), noise)
     level = float(np.median(values[near : far + 1]))
-    return Rest(peak + step * near, peak + step * far, level, is_found=True)
+    return Rest(peak + step * near, peak + step * far, level)
 
 
 def _smooth_noise(depth: Depth) -> float:

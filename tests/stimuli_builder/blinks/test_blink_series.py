@@ -107,7 +107,7 @@ GOOD = [0.3] * 400
             240,
             "no value on 60 frames from line 101",
         ),
-        ("frame,a", [range(400), [0.3] * 399 + [-1.0]], ["a"], 240, "negative"),
+        ("frame,a", [range(400), [0.3] * 399 + [-2.0]], ["a"], 240, "negative"),
         ("time_s,a", [np.arange(400) / 240, GOOD], ["a"], 100, "contradicts"),
         ("time_s,a", [[*np.arange(399) / 240, 9.0], GOOD], ["a"], None, r"uneven \(line 401\)"),
         ("time_s,a", [[*np.arange(399) / 240, 0.0], GOOD], ["a"], None, "increase"),

@@ -1,10 +1,11 @@
 """Series as spreadsheets and other programs write them, and files that are none."""
 
+import numpy as np
 import pandas as pd
 import pytest
 
 from experiments.errors import InputError
-from stimuli_builder.blinks.csv_table import NOTE, read_table
+from stimuli_builder.blinks.csv_table import NOTE, line_of, read_table
 from stimuli_builder.blinks.series import read_series
 
 
@@ -156,3 +157,63 @@ def test_blank_lines_are_counted_as_lines(tmp_path, separator):
     (tmp_path / "s.csv").write_text("\n".join([f"time_s{separator}EAR", *lines]), encoding="utf-8")
     with pytest.raises(InputError, match=r"uneven \(line 302\)"):
         read_series(tmp_path / "s.csv", ["EAR"])
+
+
+def test_a_recording_in_utf_16_is_labelled(stimuli, tmp_path) -> None:
+    times = np.arange(1200) / 120
+    value = 10 * (1 - np.exp(-(((times % 3 - 1.5) / 0.06) ** 2)))
+    text = pd.DataFrame({"time_s": times, "Lidöffnung": value}).to_csv(index=False, sep="\t")
+    (tmp_path / "s.txt").write_bytes(text.encode("utf-16"))
+    ended = stimuli("blinks", tmp_path / "s.txt", "--out", tmp_path / "b.csv")
+    assert ended.code == 0, ended.err
+    assert len(pd.read_csv(tmp_path / "b.csv")) == 3
+
+
+ASC = (
+    "** CONVERTED FROM a.edf using edfapi 4.2\n** DATE: Sat Nov 28\nMSG\t1 !MODE\n1234\t500.1\t400.2\n"
+)
+DEEPLABCUT = "scorer,net,net,net\nbodyparts,upper,upper,upper\ncoords,x,y,likelihood\n0,1.5,2.5,0.9\n"
+TITLED = "Recording of Monday\nName,Value\na,b,c,d,e\n1,2,3,4,5\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("a.asc", ASC, "EyeLink recording"),
+        ("a.txt", ASC, "EyeLink recording"),
+        ("a.csv", DEEPLABCUT, "DeepLabCut table of points"),
+        ("a.csv", TITLED, "line 2 has 2 fields, the header line 1|line 3 has 5 fields"),
+    ],
+)
+def test_files_of_other_programs_are_refused_by_what_they_are(tmp_path, name, content, said):
+    (tmp_path / name).write_text(content, encoding="utf-8")
+    with pytest.raises(InputError, match=said) as caught:
+        read_table(tmp_path / name)
+    assert "\n" not in str(caught.value)
+    for word in ("tokeniz", "pandas", "C error"):
+        assert word not in str(caught.value)
+
+
+@pytest.mark.parametrize("mark", ["#", "%"])
+def test_comments_above_the_header_are_skipped_and_lines_counted_with_them(tmp_path, mark):
+    path = tmp_path / "a.tsv"
+    path.write_text(f"{mark} rate\t60\n{mark}\n\ntime_s\tgap\n0\t1.5\n0.1\t2.5\n", encoding="utf-8")
+    table = read_table(path)
+    assert list(table.columns) == ["time_s", "gap"]
+    assert table["gap"].to_list() == [1.5, 2.5]
+    assert line_of(path, 1) == 6
+    assert "2 lines of comment" in table.attrs["note"]
+
+
+@pytest.mark.parametrize("length", [3, 40, 200])
+def test_minus_one_is_a_frame_that_was_not_measured(tmp_path, length):
+    values = np.linspace(20.0, 21.0, 1200)
+    values[500 : 500 + length] = -1
+    pd.DataFrame({"time_s": np.arange(1200) / 120, "gap": values}).to_csv(tmp_path / "s.csv", index=False)
+    (series,) = read_series(tmp_path / "s.csv")
+    assert np.nanmin(series.distance) > 19
+    assert any(f"'gap' is -1 on {length} frames" in note for note in series.notes)
+    values[100] = -3
+    pd.DataFrame({"time_s": np.arange(1200) / 120, "gap": values}).to_csv(tmp_path / "s.csv", index=False)
+    with pytest.raises(InputError, match="negative distances"):
+        read_series(tmp_path / "s.csv")
