@@ -16,7 +16,7 @@ from scipy import special
 
 from analysis.plans.result import Analysis
 from analysis.report.captions import in_words
-from analysis.report.pictures import BESIDE, COLOURS, MARKERS, STYLE, new_figure, write_note
+from analysis.report.pictures import BESIDE, COLOURS, MARKERS, STYLE, new_figure, wrapped, write_note
 from analysis.within.anova import AnovaResult
 from analysis.within.estimates import margin_of
 from analysis.within.marginal_means import margin
@@ -27,6 +27,8 @@ Floats = NDArray[np.float64]
 
 MAX_KEY = 200
 """Characters of a figure's key; names of files may have 255 bytes."""
+LEGEND_CHARACTERS, TITLE_CHARACTERS, HEIGHT_CHARACTERS, AXIS_CHARACTERS = 22, 62, 52, 72
+"""Characters in a line of the legend, of titles, of the axis of ratings, of all names along the axis."""
 _CLOUD_STEPS = 60
 
 _SPREAD = 0.62
@@ -191,10 +193,10 @@ def _conditions(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
             markeredgewidth=0.5,
             capsize=3.2,
             elinewidth=1.3,
-            label=shades[shade],
+            label=wrapped(shades[shade], LEGEND_CHARACTERS),
             zorder=3,
         )
-    axes.set_xticks(range(n_groups), groups)
+    axes.set_xticks(range(n_groups), [wrapped(name, AXIS_CHARACTERS // n_groups) for name in groups])
 
 
 def _cloud(axes: Axes, x: float, values: Floats, width: float, colour: str) -> None:
@@ -280,13 +282,15 @@ def _asked(what: str, scale: RatedScale, language: str) -> str:
 
 
 def _dress(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
-    axes.set_title(spec.title, fontsize=10, loc="left")
-    axes.set_xlabel(" × ".join(analysis.labels.factor(name) for name in spec.along))
-    axes.set_ylabel(analysis.rating)
+    axes.set_title(wrapped(spec.title, TITLE_CHARACTERS), fontsize=10, loc="left")
+    along = " × ".join(analysis.labels.factor(name) for name in spec.along)
+    axes.set_xlabel(wrapped(along, TITLE_CHARACTERS))
+    axes.set_ylabel(wrapped(analysis.rating, HEIGHT_CHARACTERS))
     if analysis.experiment is not None:
         scale = scale_called(analysis.experiment, None if analysis.rating == "response" else analysis.rating)
         what = "Rating" if analysis.rating == "response" else in_words(scale.name)
-        axes.set_ylabel(_asked(what, scale, analysis.experiment.languages[0]))
+        asked = _asked(what, scale, analysis.experiment.languages[0])
+        axes.set_ylabel(wrapped(asked, HEIGHT_CHARACTERS))
         margin = (scale.maximum - scale.minimum) / 30
         axes.set_ylim(scale.minimum - margin, scale.maximum + margin)
         if scale.type == "points":
@@ -294,5 +298,5 @@ def _dress(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
     axes.grid(axis="y", linewidth=0.4, alpha=0.5)
     axes.set_axisbelow(True)
     if spec.colour:
-        title = analysis.labels.factor(spec.colour)
+        title = wrapped(analysis.labels.factor(spec.colour), LEGEND_CHARACTERS)
         axes.legend(title=title, frameon=False, fontsize=8, title_fontsize=8, **BESIDE)

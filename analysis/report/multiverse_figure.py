@@ -8,7 +8,16 @@ from matplotlib.axes import Axes
 
 from analysis.plans.result import Analysis
 from analysis.report.contents import Picture
-from analysis.report.pictures import BESIDE, COLOURS, MARKERS, STYLE, in_both_formats, new_figure, write_note
+from analysis.report.pictures import (
+    BESIDE,
+    COLOURS,
+    MARKERS,
+    STYLE,
+    in_both_formats,
+    new_figure,
+    wrapped,
+    write_note,
+)
 from analysis.within.simple_effects import SIGNIFICANCE
 
 if TYPE_CHECKING:
@@ -16,6 +25,10 @@ if TYPE_CHECKING:
 
 SMALLEST = 1e-4
 """Smaller p are drawn here."""
+
+LEGEND_CHARACTERS, RULE_CHARACTERS = 26, 24
+LINE_INCHES = 0.13
+"""Height of a line of 7 points."""
 
 MAX_EFFECTS = len(COLOURS)
 """Of more effects those with the smallest p as declared are drawn; the table has all."""
@@ -25,14 +38,17 @@ def multiverse_picture(analysis: Analysis, result: "Multiverse") -> Picture:
     """Draw p of the effects above a dot for each rule that was applied; choices ordered by who remains."""
     order = sorted(result.universes, key=lambda u: (u.n_participants, u.n_ratings, u.applied), reverse=True)
     with mpl.rc_context(STYLE):
-        figure = new_figure(7.2, 3.2 + 0.22 * len(result.rules))
-        upper, lower = figure.subplots(
-            2, 1, sharex=True, height_ratios=[3, max(0.25 * len(result.rules), 0.5)]
-        )
         p = np.array([universe.p_values for universe in order])
         drawn = _drawn(p[[universe.declared for universe in order]][0])
-        _tests(upper, p[:, drawn], [analysis.labels.effect(result.effects[i]) for i in drawn])
-        _rules(lower, np.array([universe.applied for universe in order]), result.rules)
+        names = [wrapped(analysis.labels.effect(result.effects[i]), LEGEND_CHARACTERS) for i in drawn]
+        rules = [wrapped(name.replace("_", " "), RULE_CHARACTERS) for name in result.rules]
+        # as high as the lines of the legend, and of the names of rules, need
+        above = max(2.4, LINE_INCHES * 1.25 * sum(_lines(name) for name in names) + 0.3)
+        below = max(0.4, sum(LINE_INCHES * _lines(rule) + 0.1 for rule in rules))
+        figure = new_figure(7.2, above + below + 0.8)
+        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[above, below])
+        _tests(upper, p[:, drawn], names)
+        _rules(lower, np.array([universe.applied for universe in order]), rules)
         declared = next(at for at, universe in enumerate(order) if universe.declared)
         for axes in (upper, lower):
             axes.axvline(declared, color="#999999", linewidth=5, alpha=0.25, zorder=0)
@@ -53,6 +69,10 @@ def multiverse_picture(analysis: Analysis, result: "Multiverse") -> Picture:
 def _drawn(p_declared: np.ndarray) -> list[int]:
     """Positions of the effects to draw, in the order of the table."""
     return sorted(np.argsort(p_declared, kind="stable")[:MAX_EFFECTS].tolist())
+
+
+def _lines(text: str) -> int:
+    return text.count("\n") + 1
 
 
 def _tests(axes: Axes, p: np.ndarray, names: list[str]) -> None:
@@ -77,10 +97,10 @@ def _tests(axes: Axes, p: np.ndarray, names: list[str]) -> None:
     axes.legend(**BESIDE, frameon=False, fontsize=7)
 
 
-def _rules(axes: Axes, applied: np.ndarray, names: tuple[str, ...]) -> None:
+def _rules(axes: Axes, applied: np.ndarray, names: list[str]) -> None:
     column, rule = np.nonzero(applied)
     axes.plot(column, rule, linestyle="none", marker="o", markersize=3.5, color="#333333")
-    axes.set_yticks(range(len(names)), [name.replace("_", " ") for name in names], fontsize=7)
+    axes.set_yticks(range(len(names)), names, fontsize=7)
     axes.set_ylim(len(names) - 0.5, -0.5)
     axes.set_xticks([])
     axes.spines["bottom"].set_visible(False)

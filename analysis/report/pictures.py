@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from io import BytesIO
+from textwrap import wrap
 from typing import Any
 
 import matplotlib as mpl
@@ -24,6 +25,9 @@ STYLE: dict[Any, Any] = {
     "axes.linewidth": 0.8,
     "text.parse_math": False,  # `$` in a level's name is a sign of money, not the start of a formula
 }
+NOTE_CHARACTERS = 18
+"""Characters of a note (7 points) in an inch."""
+LEAST_CHARACTERS = 6
 BESIDE: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0)}
 
 
@@ -34,9 +38,20 @@ def new_figure(width: float = 7.2, height: float = 4.4) -> Figure:
     return figure
 
 
+def wrapped(text: str, characters: int) -> str:
+    """The text in lines of at most so many characters, each of its own lines by itself."""
+    lines = [
+        piece
+        for line in text.split("\n")
+        for piece in wrap(line, max(characters, LEAST_CHARACTERS), break_on_hyphens=False) or [""]
+    ]
+    return "\n".join(lines)
+
+
 def write_note(figure: Figure, note: str, synthetic: bool, what: str = "ratings") -> None:
     """A note below the figure, under a mark where no person gave the data."""
     mark = f"SYNTHETIC DATA: no person gave these {what}.\n" if synthetic else ""
+    note = wrapped(note, int(NOTE_CHARACTERS * figure.get_figwidth()))
     figure.supxlabel(mark + note, fontsize=7, color="#8a1c1c" if synthetic else "#555555")
 
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from docx.table import Table as Grid
     from docx.table import _Cell, _Row
     from docx.text.paragraph import Paragraph
+    from docx.text.run import Run
 
 
 EPOCH = datetime(2000, 1, 1, tzinfo=UTC)
@@ -135,17 +136,78 @@ def _add_section(document: "Document", section: Section, level: int, synthetic: 
 
 
 def _add_picture(document: "Document", picture: Picture, synthetic: bool) -> None:
+    """A figure with its alternative text, a numbered caption, and a note that says what it shows."""
     from docx.shared import Cm
 
-    document.add_picture(BytesIO(picture.png), width=Cm(WIDTH_CM))
+    number = len(document.inline_shapes) + 1
+    shape = document.add_picture(BytesIO(picture.png), width=Cm(WIDTH_CM))
+    caption = _sayable(picture.caption) + (" (synthetic data)" if synthetic else "")
+    shown = _sayable(picture.alt) + (" Synthetic data." if synthetic else "")
+    properties = shape._inline.docPr
+    properties.set("name", f"Figure {number}")
+    properties.set("title", caption)
+    properties.set("descr", shown)
     document.paragraphs[-1].paragraph_format.keep_with_next = True
-    document.add_paragraph(
-        _sayable(picture.caption) + (" (synthetic data)" if synthetic else ""), style="Caption"
-    )
+    _add_caption(document, "Figure", number, caption, keep_with_next=True)
+    said = shown.removeprefix(f"{_sayable(picture.caption)}: ")
+    _add_note(document, said[:1].upper() + said[1:])
+
+
+def _add_caption(document: "Document", label: str, number: int, text: str, keep_with_next: bool) -> None:
+    """A caption with a number that Word counts (a SEQ field), so that it can be referred to and updated."""
+    paragraph = document.add_paragraph(style="Caption")
+    paragraph.add_run(f"{label} ")
+    for kind in ("begin", "instruction", "separate", "number", "end"):
+        run = paragraph.add_run(str(number) if kind == "number" else "")
+        if kind == "instruction":
+            _append(run, "w:instrText", f" SEQ {label} \\* ARABIC ")
+        elif kind != "number":
+            _append(run, "w:fldChar", "", fldCharType=kind)
+    paragraph.add_run(f". {text}")
+    paragraph.paragraph_format.keep_with_next = keep_with_next
+
+
+def _append(run: "Run", name: str, text: str, **attributes: str) -> None:
+    """An element inside a run that python-docx has no name for."""
+    from docx.oxml import OxmlElement
+    from docx.oxml.ns import qn
+
+    element = OxmlElement(name)
+    if text:
+        element.text = text
+        element.set(qn("xml:space"), "preserve")
+    for key, value in attributes.items():
+        element.set(qn(f"w:{key}"), value)
+    run._r.append(element)
+
+
+def _add_note(document: "Document", text: str) -> None:
+    """A note under a table or a figure, as APA has it."""
+    paragraph = document.add_paragraph(style="Body Text 3")
+    paragraph.add_run("Note. ").italic = True
+    _add_runs(paragraph, pieces(signed(text)))
+
+
+def _describe(grid: "Grid", table: Table) -> None:
+    """Alternative text of a table: its title, and what its rows and columns are."""
+    columns = ", ".join(name for name in table.header if name)
+    said = f"{len(table.rows)} rows; columns: {columns}."
+    for name, value in (("tblCaption", _sayable(table.title)), ("tblDescription", _sayable(said))):
+        _set_property(grid, name, value)
+
+
+def _set_property(grid: "Grid", name: str, value: str) -> None:
+    from docx.oxml import OxmlElement
+    from docx.oxml.ns import qn
+
+    element = OxmlElement(f"w:{name}")
+    element.set(qn("w:val"), value)
+    grid._tbl.tblPr.append(element)
 
 
 def _add_table(document: "Document", table: Table) -> None:
-    document.add_paragraph(_sayable(table.title), style="Caption").paragraph_format.keep_with_next = True
+    number = len(document.tables) + 1
+    _add_caption(document, "Table", number, _sayable(table.title), keep_with_next=True)
     grid = document.add_table(rows=1 + len(table.rows), cols=len(table.header), style="Light List")
     head = heading_pieces([_sayable(text) for text in table.header])
     body = [
@@ -159,8 +221,9 @@ def _add_table(document: "Document", table: Table) -> None:
         for position, (cell, split) in enumerate(zip(cells.cells, row, strict=True)):
             _fill(cell, split, right=position >= table.text_columns)
     _lay_out(grid, widths_cm(table, WIDTH_CM), bool(table.notes))
-    for note in table.notes:
-        _add_runs(document.add_paragraph(style="Body Text 3"), pieces(signed(_sayable(note))))
+    _describe(grid, table)
+    if table.notes:
+        _add_note(document, _sayable(" ".join(table.notes)))
     document.add_paragraph()
 
 

@@ -1,16 +1,19 @@
 """Figures show the means of the tables, also with groups of unequal size and covariates."""
 
+from dataclasses import replace
 from pathlib import Path
 
+import matplotlib as mpl
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from analysis.cli import app
-from analysis.plans.result import Analysis, analyse_cells
+from analysis.plans.result import Analysis, Labels, analyse_cells
 from analysis.read.long_csv import read_long_table
 from analysis.read.participant_columns import design_of
 from analysis.report.figures import draw, figures_of
+from analysis.report.pictures import STYLE
 from analysis.within.cell_means import cell_table
 
 GOLDEN = Path(__file__).parents[2] / "golden" / "r" / "between"
@@ -83,3 +86,62 @@ def test_the_caption_says_what_the_bars_are(tmp_path: Path) -> None:
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "estimated marginal means at the mean of age" in page
     assert "Cousineau" not in page
+
+
+def assert_texts_are_whole(figure) -> None:
+    """Every text that is drawn lies inside the picture, and no two texts of the legend or an axis overlap."""
+    figure.canvas.draw()
+    renderer = figure.canvas.get_renderer()
+    frame = figure.bbox
+    for text in figure.findobj(lambda one: hasattr(one, "get_text") and one.get_visible()):
+        if not text.get_text().strip():
+            continue
+        box = text.get_window_extent(renderer)
+        assert box.x0 >= frame.x0 - 1, text.get_text()
+        assert box.x1 <= frame.x1 + 1, text.get_text()
+        assert box.y0 >= frame.y0 - 1, text.get_text()
+        assert box.y1 <= frame.y1 + 1, text.get_text()
+    for axes in figure.axes:
+        assert axes.get_window_extent(renderer).width > frame.width / 4
+        legend = axes.get_legend()
+        if legend is not None:
+            assert not legend.get_window_extent(renderer).overlaps(
+                axes.get_window_extent(renderer).shrunk(0.99, 1)
+            )
+
+
+def test_texts_of_a_figure_are_whole_whatever_their_length() -> None:
+    analysis = analysed("obk", ["phase", "hour"], ["treatment", "gender"], ["age"])
+    words = "a long name of a condition that somebody wrote"
+    factors = {name: f"{words} ({name})" for name in analysis.anova.all_factors}
+    levels = {
+        (name, level): f"{level} {words}"
+        for name, own in zip(analysis.anova.all_factors, analysis.anova.all_levels, strict=True)
+        for level in own
+    }
+    named = replace(analysis, labels=Labels(factors, levels))
+    for spec in figures_of(named):
+        assert_texts_are_whole(draw(named, spec))
+
+
+@pytest.mark.parametrize("n_rules", [1, 6])
+def test_labels_of_the_multiverse_figure_are_whole(n_rules: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    from analysis.plans.multiverse import Multiverse, Universe
+    from analysis.report import multiverse_figure
+
+    analysis = analysed("obk", ["phase", "hour"], [], [])
+    effects = tuple(("a long factor name", f"another long factor {k}", "and a third one") for k in range(8))
+    rules = tuple(
+        f"exclude_participants_that_answered_too_{k}_quickly_in_most_trials" for k in range(n_rules)
+    )
+    universes = tuple(
+        Universe(tuple(j >= k for j in range(n_rules)), 20 - k, 400 - k, (0.02,) * 8, (0.1,) * 8)
+        for k in range(n_rules + 1)
+    )
+    drawn = []
+    monkeypatch.setattr(
+        multiverse_figure, "in_both_formats", lambda figure: drawn.append(figure) or (b"", b"")
+    )
+    multiverse_figure.multiverse_picture(analysis, Multiverse(rules, effects, universes, 0))
+    with mpl.rc_context(STYLE):
+        assert_texts_are_whole(drawn[0])

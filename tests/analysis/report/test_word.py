@@ -5,6 +5,7 @@ from zipfile import ZipFile
 
 import docx
 import pytest
+from docx.oxml.ns import qn
 
 from analysis.plans.clip_rating import PLAN, READING, contents
 from analysis.plans.prepare import prepare
@@ -92,3 +93,59 @@ def test_no_clock_is_in_the_file(report) -> None:
 def test_only_symbols_before_a_number_are(text, symbols) -> None:
     assert [piece for piece, is_symbol in pieces(text) if is_symbol] == symbols
     assert "".join(piece for piece, _ in pieces(text)) == text
+
+
+def fields(paragraph) -> list[str]:
+    return [text.text for text in paragraph._p.iter(qn("w:instrText"))]
+
+
+def test_captions_are_numbered_by_word_and_each_figure_and_table_has_alternative_text(report) -> None:
+    _, folder = report
+    document = docx.Document(str(folder / "report.docx"))
+    captions = [paragraph for paragraph in document.paragraphs if paragraph.style.name == "Caption"]
+    for label, count in (("Table", len(document.tables)), ("Figure", len(document.inline_shapes))):
+        own = [paragraph for paragraph in captions if paragraph.text.startswith(f"{label} ")]
+        assert len(own) == count > 0
+        for number, paragraph in enumerate(own, start=1):
+            assert paragraph.text.startswith(f"{label} {number}. ")
+            assert len(paragraph.text) > len(f"{label} {number}. ")
+            assert fields(paragraph) == [f" SEQ {label} \\* ARABIC "]
+            kinds = [mark.get(qn("w:fldCharType")) for mark in paragraph._p.iter(qn("w:fldChar"))]
+            assert kinds == ["begin", "separate", "end"]
+    assert len(captions) == len(document.tables) + len(document.inline_shapes)
+    for shape in document.inline_shapes:
+        properties = shape._inline.docPr
+        assert len(properties.get("descr")) > 30
+        assert properties.get("title")
+    for table in document.tables:
+        (caption,) = table._tbl.tblPr.iter(qn("w:tblCaption"))
+        (said,) = table._tbl.tblPr.iter(qn("w:tblDescription"))
+        assert caption.get(qn("w:val"))
+        assert f"{len(table.rows) - 1} rows" in said.get(qn("w:val"))
+
+
+def test_notes_begin_as_such_and_stand_under_what_they_are_of(report) -> None:
+    said, folder = report
+    document = docx.Document(str(folder / "report.docx"))
+    notes = [paragraph for paragraph in document.paragraphs if paragraph.style.name == "Body Text 3"]
+    assert notes
+    for note in notes:
+        assert note.text.startswith("Note. ")
+        assert note.runs[0].italic
+        before = note._p.getprevious()
+        is_table = before.tag == qn("w:tbl")
+        assert is_table or "Figure" in "".join(text.text or "" for text in before.iter(qn("w:t")))
+    first = said.parts[0].tables[0]
+    assert any(first.notes[0][:30] in note.text for note in notes)
+
+
+def test_the_file_is_one_that_the_schema_allows(report) -> None:
+    """Properties of a table in the order that Word wants: it refuses or repairs a file with another."""
+    _, folder = report
+    document = docx.Document(str(folder / "report.docx"))
+    order = ["tblStyle", "tblpPr", "tblOverlap", "bidiVisual", "tblStyleRowBandSize", "tblStyleColBandSize"]
+    order += ["tblW", "jc", "tblCellSpacing", "tblInd", "tblBorders", "shd", "tblLayout", "tblCellMar"]
+    order += ["tblLook", "tblCaption", "tblDescription"]
+    for table in document.tables:
+        names = [child.tag.split("}")[1] for child in table._tbl.tblPr]
+        assert names == sorted(names, key=order.index)
