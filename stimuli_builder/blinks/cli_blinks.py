@@ -14,7 +14,8 @@ CLASSIFIER = "classifier"
 EXAMPLES = """
 Label the blinks of a series (eye aspect ratio or distance) or of a track, and measure them.
 
-The series is a CSV with a column of distances; a track's distance columns are found by themselves. Columns of
+The series is a CSV with a column of distances; a track's distance columns are found by themselves (left and
+right are sides of the picture: left is the person's right eye, unless it is mirrored). Columns of
 closure (eyeBlinkLeft, AU45_r) are turned round. Blinks,
 squints, gaze shifts and closed eyes are told apart at any rate from 15 to 1,000 frames a second.
 BLINKS.csv gets a row a blink; the blinks' profiles (closure at 300 fps) and a table of all events are

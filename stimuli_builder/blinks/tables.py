@@ -18,7 +18,7 @@ from stimuli_builder.blinks.review import Review
 
 BLINK_COLUMNS = {
     "number": "number of the blink in its column, from 1",
-    "column": "column of the series",
+    "column": "column of the series; left and right of a track are sides of the picture",
     "onset_frame": "frame where the eye begins to close",
     "minimum_frame": "frame of the least inter-eyelid distance",
     "end_frame": "frame where the eye has come to rest again",

@@ -22,7 +22,8 @@ steadily than in a sharp one, and covers may be there for most of the time."""
 BESIDE = 0.75
 """Part of the limit above which a look belongs to a cover that the look before or after it shows: some
 textures are read nearly as steadily, at times, as an eye that blinks."""
-COVERED = "{} covered: lids are drawn wherever one is looked for"
+COVERED = "{} covered, shut tightly or turned away: its lids are not read steadily"
+"""What an unsteady contour can mean: it tells a hand from neither lids pressed shut nor an averted gaze."""
 NAMES = {(True,): "eye", (True, False): "left eye", (False, True): "right eye", (True, True): "both eyes"}
 
 

@@ -143,3 +143,14 @@ def test_a_word_in_a_series_that_is_to_be_resampled_is_named(tmp_path: Path) -> 
     path = _write(tmp_path / "series.csv", "time_s,a", [np.arange(400) / 240, values])
     with pytest.raises(InputError, match=r"must hold numbers, got 'lost' in line 8"):
         read_series(path, ["a"], resample=True)
+
+
+def test_left_and_right_of_a_track_are_said_to_be_the_pictures(tmp_path):
+    times = np.arange(600) / 60
+    table = {"time_s": times, "left_distance_px": 20 + np.sin(times), "right_distance_px": 20 + np.cos(times)}
+    pd.DataFrame(table).to_csv(tmp_path / "t.csv", index=False)
+    assert all("sides of the picture" in " ".join(eye.notes) for eye in read_series(tmp_path / "t.csv"))
+    pd.DataFrame({"time_s": times, "EAR_l": table["left_distance_px"]}).to_csv(
+        tmp_path / "s.csv", index=False
+    )
+    assert "sides of the picture" not in " ".join(read_series(tmp_path / "s.csv")[0].notes)

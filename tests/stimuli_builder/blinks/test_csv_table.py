@@ -169,9 +169,7 @@ def test_a_recording_in_utf_16_is_labelled(stimuli, tmp_path) -> None:
     assert len(pd.read_csv(tmp_path / "b.csv")) == 3
 
 
-ASC = (
-    "** CONVERTED FROM a.edf using edfapi 4.2\n** DATE: Sat Nov 28\nMSG\t1 !MODE\n1234\t500.1\t400.2\n"
-)
+ASC = "** CONVERTED FROM a.edf using edfapi 4.2\n** DATE: Sat Nov 28\nMSG\t1 !MODE\n1234\t500.1\t400.2\n"
 DEEPLABCUT = "scorer,net,net,net\nbodyparts,upper,upper,upper\ncoords,x,y,likelihood\n0,1.5,2.5,0.9\n"
 TITLED = "Recording of Monday\nName,Value\na,b,c,d,e\n1,2,3,4,5\n"
 

@@ -129,11 +129,11 @@ def test_eyes_that_stay_are_not_covered_in_a_sharp_picture_or_a_poor_one(spread)
 @pytest.mark.parametrize(
     ("covers", "eyes", "words"),
     [
-        ([(0, range(5, 9))], 1, "eye covered: "),
-        ([(0, range(5, 9))], 2, "left eye covered: "),
-        ([(1, range(5, 6))], 2, "right eye covered: "),
-        ([(0, range(5, 9)), (1, range(5, 9))], 2, "both eyes covered: "),
-        ([(0, range(5, 32)), (1, range(5, 32))], 2, "both eyes covered: "),
+        ([(0, range(5, 9))], 1, "eye covered, shut tightly or turned away: "),
+        ([(0, range(5, 9))], 2, "left eye covered, shut tightly or turned away: "),
+        ([(1, range(5, 6))], 2, "right eye covered, shut tightly or turned away: "),
+        ([(0, range(5, 9)), (1, range(5, 9))], 2, "both eyes covered, shut tightly or turned away: "),
+        ([(0, range(5, 32)), (1, range(5, 32))], 2, "both eyes covered, shut tightly or turned away: "),
     ],
 )
 def test_covers_are_told_however_brief_or_long_and_on_all_eyes_at_once(covers, eyes, words):
