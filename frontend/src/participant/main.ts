@@ -14,12 +14,15 @@ import { type Beginning, startPage, titleOf } from "./flow/start-page";
 import { IndexedDbStore } from "./outbox/indexed-db";
 import { MemoryStore, type OutboxStore } from "./outbox/store";
 import { loadModule } from "../ui/load-module";
+import { withinTime } from "./time-limit";
 import { claimTab } from "./screen/one-tab";
 import { AnswersMissing } from "./screens/finish";
 import { showNotice } from "./screens/notice";
 
 /** How often the end may lead back to what is missing, before the page says that something is wrong. */
 const RETURNS = 3;
+/** A database that takes longer is blocked: answers then go to the server one by one. */
+const OPEN_LIMIT_MS = 5_000;
 /** What is known when the link has answered, or an earlier visit answers for it. */
 export interface Entry {
   root: HTMLElement;
@@ -65,7 +68,7 @@ async function visit(entry: Entry): Promise<void> {
     (await loadRefusal()).showRefusal(root, t, link.status, "", wayBack(t, link));
     return;
   }
-  const store: OutboxStore = await IndexedDbStore.open().catch(() => new MemoryStore());
+  const store: OutboxStore = await withinTime(() => IndexedDbStore.open(), OPEN_LIMIT_MS).catch(() => new MemoryStore());
   const device = await abilities(store.durable);
   const list = findings(device, link.gates);
   const turned = async (closed: GateFinding): Promise<void> =>
@@ -151,7 +154,7 @@ function showProblem(root: HTMLElement, t: Translate, error: unknown): void {
   const returns = Number(counted?.getItem(RETURNED) ?? 0);
   if (error instanceof AnswersMissing && counted && returns < RETURNS) {
     counted.setItem(RETURNED, String(returns + 1));
-    return location.reload();
+    if (counted.getItem(RETURNED) === String(returns + 1)) return location.reload();
   }
   const reload = { label: t("reload"), press: () => location.reload() };
   showNotice(root, { title: t("problem_title"), text: t("problem", { detail: String(error) }), actions: [reload] });

@@ -26,6 +26,7 @@ const FILES = __FILES__;
 const PAGE = "/run/offline";
 const NAME = `palpebra page ${FILES.join(" ")}`;
 const WAIT_MS = 8_000;
+const CACHE_WAIT_MS = 2_000;
 
 async function keep(): Promise<void> {
   const page = await fetch(PAGE, { cache: "no-store" });
@@ -46,8 +47,14 @@ async function forgetOlder(): Promise<void> {
   await Promise.all(names.filter((name) => name.startsWith("palpebra page") && name !== NAME).map((name) => caches.delete(name)));
 }
 
+/** The copy, where there is one that can be read in time: a denied or hanging cache must not keep the page away. */
+function copyOf(what: RequestInfo): Promise<Response | undefined> {
+  const late = new Promise<undefined>((resolve) => setTimeout(resolve, CACHE_WAIT_MS));
+  return Promise.race([(async () => caches.match(what, { ignoreVary: true }))().catch(() => undefined), late]);
+}
+
 async function page(request: Request): Promise<Response> {
-  const kept = await caches.match(PAGE);
+  const kept = await copyOf(PAGE);
   if (!kept) return fetch(request);
   const late = new Promise<null>((resolve) => setTimeout(() => resolve(null), WAIT_MS));
   const answer = await Promise.race([fetch(request).catch(() => null), late]);
@@ -56,7 +63,7 @@ async function page(request: Request): Promise<Response> {
 }
 
 async function file(request: Request): Promise<Response> {
-  return (await caches.match(request, { ignoreVary: true })) ?? fetch(request);
+  return (await copyOf(request)) ?? fetch(request);
 }
 
 scope.addEventListener("install", (event) => event.waitUntil(keep()));

@@ -1,5 +1,7 @@
 /** Keys pressed anywhere on the page, without repeats, modifiers, and what belongs to a field being typed in. */
 
+import { digitValue } from "./digits";
+
 const TYPING = "input, textarea, select, [contenteditable]";
 const PRESSABLE = "button, a[href], summary, [role=button]";
 
@@ -17,8 +19,31 @@ export function listenKeys(handler: (event: KeyboardEvent) => void, signal: Abor
   document.addEventListener("keydown", listener, { signal });
 }
 
-export function isStartKey(event: KeyboardEvent): boolean {
-  return event.key === " " || event.key === "Enter";
+type Key = Pick<KeyboardEvent, "key" | "code" | "shiftKey">;
+/** What a key is called while an input method has it, or where a browser does not know it. */
+const ONE = /^.$/u;
+const OTHER_LETTER = /^\p{L}$/u;
+const UNNAMED = ["Process", "Unidentified", "Dead", ""];
+
+/**
+ * What a key means on every layout: digits of any script are 0 to 9, as is the top row where it writes something else
+ * (AZERTY, Czech); a key that an input method has, or a letter of another script, is the one of its place.
+ */
+export function keyOf({ key, code, shiftKey }: Key): string {
+  const digit = digitValue(key);
+  if (digit !== null) return String(digit);
+  const [, top, numpad, letter] = /^(?:Digit(\d)|Numpad(\d)|Key([A-Z]))$/.exec(code) ?? [];
+  const unnamed = UNNAMED.includes(key);
+  if (top && (unnamed || (!shiftKey && ONE.test(key)))) return top;
+  if (numpad && unnamed) return numpad;
+  if (letter && (unnamed || (OTHER_LETTER.test(key) && !/[a-z]/i.test(key)))) return letter.toLowerCase();
+  if (key === "\u3000" || (unnamed && code === "Space")) return " ";
+  if (unnamed && (code === "Enter" || code === "NumpadEnter")) return "Enter";
+  return unnamed && code.startsWith("Arrow") ? code : key;
+}
+
+export function isStartKey(event: Key): boolean {
+  return [" ", "Enter"].includes(keyOf(event));
 }
 
 /** From its press to its release a key clicks nothing, whatever has the focus by then. */
@@ -26,7 +51,8 @@ export function clickNothing(press: KeyboardEvent): void {
   press.preventDefault();
   const held = new AbortController();
   const later = (event: KeyboardEvent): void => {
-    if (event.key !== press.key) return;
+    // By its place: an input method names a key otherwise when it goes up.
+    if (press.code ? event.code !== press.code : event.key !== press.key) return;
     // A release can go to another window: the next press is a new one.
     if (event.type === "keyup" || !event.repeat) held.abort();
     if (event.type === "keyup" || event.repeat) event.preventDefault();

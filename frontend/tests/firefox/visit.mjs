@@ -1,10 +1,15 @@
-// A whole visit in a real Firefox, by WebDriver BiDi: node visit.mjs FIREFOX ADDRESS_OF_THE_LINK [SCRIPT [PAUSE_MS]]
-// SCRIPT runs before the page's own; PAUSE_MS is how long the person looks at each ready screen.
+// A whole visit in a real Firefox, by WebDriver BiDi: node visit.mjs FIREFOX ADDRESS_OF_THE_LINK [SCRIPT [PAUSE_MS [PREFERENCES]]]
+// PREFERENCES are Firefox's own settings, as JSON. SCRIPT runs before the page's own; PAUSE_MS is how long the person looks at each ready screen.
 // Playwright cannot drive Firefox as distributions build it; puppeteer-core can.
 import puppeteer from "puppeteer-core";
 
-const [firefox, address, script = "", pause_ms = "0"] = process.argv.slice(2);
-const browser = await puppeteer.launch({ browser: "firefox", executablePath: firefox, headless: true });
+const [firefox, address, script = "", pause_ms = "0", preferences = "{}"] = process.argv.slice(2);
+const browser = await puppeteer.launch({
+  browser: "firefox",
+  executablePath: firefox,
+  headless: true,
+  extraPrefsFirefox: JSON.parse(preferences),
+});
 const page = await browser.newPage();
 const problems = [];
 if (script) await page.evaluateOnNewDocument(script);

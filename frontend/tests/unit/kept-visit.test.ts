@@ -34,7 +34,7 @@ const rating = (trial_index: number, play = 1) => ({
 });
 
 function kept(storage = new FakeStorage(), begun: Kept | null = visit()): [KeptVisit, FakeStorage] {
-  const keeping = new KeptVisit("key", storage as unknown as Storage);
+  const keeping = new KeptVisit("key", storage);
   if (begun) keeping.begin(begun);
   return [keeping, storage];
 }

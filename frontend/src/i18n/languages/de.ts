@@ -16,6 +16,9 @@ export const messages: Messages = {
   declined: "Die Studie endet hier. Es wurden keine Antworten gespeichert. Sie können diese Seite schließen.",
   saving: "Wird gespeichert …",
   saving_busy: "Der Server ist gerade überlastet. Ihre Antworten sind auf diesem Gerät sicher und werden gesendet, sobald er Zeit hat.",
+  saving_in_page:
+    "Ihre letzte Antwort ist noch nicht gespeichert. Lassen Sie diese Seite offen: Sie wird gesendet, sobald der Server erreichbar ist.",
+  saving_wait: "Das dauert etwas länger als sonst. Bitte lassen Sie diese Seite offen.",
   saving_offline:
     "Gerade besteht keine Verbindung. Ihre Antworten sind auf diesem Gerät sicher und werden gesendet, sobald sie wieder da ist.",
   not_saved: "Der Server hat das nicht angenommen: {message}",

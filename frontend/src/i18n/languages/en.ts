@@ -17,6 +17,8 @@ export const messages = {
   declined: "The study ends here. No answers have been stored. You can close this page.",
   saving: "Saving …",
   saving_busy: "The server is busy at the moment. Your answers are safe on this device and will be sent as soon as it has time.",
+  saving_in_page: "Your last answer is not saved yet. Keep this page open: it is sent as soon as the server can be reached.",
+  saving_wait: "This takes a little longer than usual. Please keep this page open.",
   saving_offline: "There is no connection at the moment. Your answers are safe on this device and will be sent as soon as it is back.",
   not_saved: "The server did not accept this: {message}",
 

@@ -17,6 +17,9 @@ export const messages: Messages = {
   saving: "Guardando …",
   saving_busy:
     "El servidor está ocupado en este momento. Sus respuestas están seguras en este dispositivo y se enviarán en cuanto quede libre.",
+  saving_in_page:
+    "Su última respuesta aún no está guardada. Deje esta página abierta: se enviará en cuanto se pueda contactar con el servidor.",
+  saving_wait: "Esto tarda un poco más de lo habitual. Deje esta página abierta, por favor.",
   saving_offline: "En este momento no hay conexión. Sus respuestas están seguras en este dispositivo y se enviarán en cuanto vuelva.",
   not_saved: "El servidor no lo ha aceptado: {message}",
 

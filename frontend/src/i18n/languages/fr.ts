@@ -17,6 +17,9 @@ export const messages: Messages = {
   saving: "Enregistrement …",
   saving_busy:
     "Le serveur est occupé pour le moment. Vos réponses sont en sécurité sur cet appareil et seront envoyées dès qu’il sera libre.",
+  saving_in_page:
+    "Votre dernière réponse n’est pas encore enregistrée. Gardez cette page ouverte : elle sera envoyée dès que le serveur sera joignable.",
+  saving_wait: "Cela prend un peu plus de temps que d’habitude. Veuillez garder cette page ouverte.",
   saving_offline:
     "Il n’y a pas de connexion pour le moment. Vos réponses sont en sécurité sur cet appareil et seront envoyées dès qu’elle sera rétablie.",
   not_saved: "Le serveur n’a pas accepté cela : {message}",

@@ -17,6 +17,9 @@ export const messages: Messages = {
   saving: "Salvataggio …",
   saving_busy:
     "Il server è occupato in questo momento. Le Sue risposte sono al sicuro su questo dispositivo e saranno inviate appena sarà libero.",
+  saving_in_page:
+    "La Sua ultima risposta non è ancora salvata. Tenga aperta questa pagina: verrà inviata appena il server sarà raggiungibile.",
+  saving_wait: "Ci vuole un po’ più del solito. Tenga aperta questa pagina, per favore.",
   saving_offline:
     "In questo momento non c’è connessione. Le Sue risposte sono al sicuro su questo dispositivo e saranno inviate appena tornerà.",
   not_saved: "Il server non lo ha accettato: {message}",

@@ -16,6 +16,8 @@ export const messages: Messages = {
   declined: "Het onderzoek eindigt hier. Er zijn geen antwoorden opgeslagen. U kunt deze pagina sluiten.",
   saving: "Opslaan …",
   saving_busy: "De server is op dit moment bezet. Uw antwoorden zijn veilig op dit apparaat en worden verstuurd zodra hij vrij is.",
+  saving_in_page: "Uw laatste antwoord is nog niet opgeslagen. Houd deze pagina open: het wordt verstuurd zodra de server bereikbaar is.",
+  saving_wait: "Dit duurt iets langer dan normaal. Houd deze pagina open.",
   saving_offline: "Er is op dit moment geen verbinding. Uw antwoorden zijn veilig op dit apparaat en worden verstuurd zodra die terug is.",
   not_saved: "De server heeft dit niet aanvaard: {message}",
 

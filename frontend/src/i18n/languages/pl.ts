@@ -16,6 +16,9 @@ export const messages: Messages = {
   declined: "Badanie kończy się tutaj. Nie zapisano żadnych odpowiedzi. Można zamknąć tę stronę.",
   saving: "Zapisywanie …",
   saving_busy: "Serwer jest w tej chwili zajęty. Odpowiedzi są bezpieczne na tym urządzeniu i zostaną wysłane, gdy tylko będzie wolny.",
+  saving_in_page:
+    "Ostatnia odpowiedź nie jest jeszcze zapisana. Proszę nie zamykać tej strony: odpowiedź zostanie wysłana, gdy tylko serwer będzie dostępny.",
+  saving_wait: "Trwa to trochę dłużej niż zwykle. Proszę nie zamykać tej strony.",
   saving_offline: "W tej chwili nie ma połączenia. Odpowiedzi są bezpieczne na tym urządzeniu i zostaną wysłane, gdy tylko wróci.",
   not_saved: "Serwer tego nie przyjął: {message}",
 

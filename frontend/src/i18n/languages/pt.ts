@@ -17,6 +17,9 @@ export const messages: Messages = {
   saving: "A guardar …",
   saving_busy:
     "O servidor está ocupado neste momento. As suas respostas estão seguras neste dispositivo e serão enviadas assim que ele estiver livre.",
+  saving_in_page:
+    "A sua última resposta ainda não foi guardada. Mantenha esta página aberta: será enviada assim que o servidor estiver acessível.",
+  saving_wait: "Isto demora um pouco mais do que o habitual. Mantenha esta página aberta, por favor.",
   saving_offline: "Neste momento não há ligação. As suas respostas estão seguras neste dispositivo e serão enviadas assim que ela voltar.",
   not_saved: "O servidor não aceitou isto: {message}",
 

@@ -16,6 +16,8 @@ export const messages: Messages = {
   declined: "研究到此结束。没有保存任何回答。您可以关闭此页面。",
   saving: "正在保存 …",
   saving_busy: "服务器目前繁忙。您的回答已安全保存在此设备上，一有空闲就会发送。",
+  saving_in_page: "您的最后一个回答尚未保存。请保持此页面打开：一旦能连接到服务器，就会发送。",
+  saving_wait: "这比平时稍慢一些。请保持此页面打开。",
   saving_offline: "目前没有网络连接。您的回答已安全保存在此设备上，连接恢复后会立即发送。",
   not_saved: "服务器没有接受：{message}",
 

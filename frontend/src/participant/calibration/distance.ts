@@ -2,6 +2,7 @@
  * Viewing distance by the blind spot ("virtual chinrest", Li, Joo, Yeatman & Reinecke 2020,
  * doi:10.1038/s41598-019-57204-1): with the left eye on the square, a dot going left vanishes at 13.5 degrees.
  */
+import { plainNumber } from "../../ui/digits";
 import { h, uniqueId } from "../../ui/element";
 import { isStartKey, listenKeys } from "../../ui/keys";
 import { button, showPage, statusLine } from "../../ui/page";
@@ -124,7 +125,7 @@ async function typed(session: Session, display: HTMLElement): Promise<Distance> 
   for (;;) {
     footer.replaceChildren();
     await choose(session, footer, [{ label: t("continue"), value: true }]);
-    const distance_mm = Number(input.value.trim().replace(",", ".")) * 10;
+    const distance_mm = Number(plainNumber(input.value).replace(",", ".")) * 10;
     if (distance_mm >= NEAREST_MM && distance_mm <= FURTHEST_MM) return asTyped(Math.round(distance_mm));
     fault.textContent = t("distance_bad", { minimum: NEAREST_MM / 10, maximum: FURTHEST_MM / 10 });
   }

@@ -1,4 +1,5 @@
 /** A line of known pixels to be measured, or of known millimetres to be checked. */
+import { plainNumber } from "../../ui/digits";
 import type { Translate } from "../../i18n";
 import { h, uniqueId } from "../../ui/element";
 import { randomStart } from "./spread";
@@ -42,7 +43,7 @@ export function lengthField(t: Translate): LengthField {
   return {
     element,
     value() {
-      const length = Number(input.value.trim().replace(",", "."));
+      const length = Number(plainNumber(input.value).replace(",", "."));
       const good = length >= SHORTEST_MM && length <= LONGEST_MM;
       fault.textContent = good ? "" : t("ruler_bad", { minimum: SHORTEST_MM, maximum: LONGEST_MM });
       return good ? length : null;

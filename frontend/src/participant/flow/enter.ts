@@ -6,8 +6,8 @@ import { runTimeline, type SimulationMode } from "../jspsych";
 import type { Entry } from "../main";
 import { Outbox } from "../outbox/outbox";
 import type { OutboxStore } from "../outbox/store";
-import { choosePlayer } from "../playback/choose";
-import { emptied } from "../screens/notice";
+import { choosePlayer, hasWebCodecs } from "../playback/choose";
+import { emptied, showNotice } from "../screens/notice";
 import type { Session } from "../session";
 import { loadKind } from "../trials";
 import { saveInterrupted } from "../trials/save-rating";
@@ -24,6 +24,7 @@ import { timeline } from "./timeline";
 import { watch } from "./watchers";
 
 /** Under this name the tab counts how often the end led back to what was missing. */
+const SEEN_MS = 1_500;
 export const RETURNED = "palpebra returns";
 
 /** From a started run to its timeline: what an earlier page left is sent, or counted, first. */
@@ -45,7 +46,9 @@ export async function enter(
   identity.keepTab();
   const checks = run.checks ? await loadKind("motion_check") : kind;
   await loadMessages(run.language);
-  const player = await choosePlayer(run.display);
+  // A worker that is blocked says nothing for a while: the page says what it waits for.
+  const wait = setTimeout(() => showNotice(root, { title: t("preload_title"), text: t("saving_wait") }), SEEN_MS);
+  const player = await choosePlayer(run.display).finally(() => clearTimeout(wait));
   const session = openSession({ root, link, run, kind, checks, player, outbox, unsent });
   setLanguage(run.language);
   setScales(run.display.right_to_left_scales);
@@ -65,6 +68,7 @@ export async function enter(
     },
     { once: true },
   );
+  if (hasWebCodecs() && player.method === "video") session.events.add("unsupported", { reason: "gate_video", worker: "blocked" });
   for (const { reason } of warnings) session.events.add(reason === "gate_storage" ? "storage_blocked" : "unsupported", { reason });
   if (kept) session.events.add("offline", { loaded_without_server: true });
   if (run.resumable_until) serveOffline();

@@ -3,6 +3,8 @@ import type { LinkState } from "../../api/schema";
 
 const RECRUITER_KEYS = 20;
 const LONGEST_KEY = 100;
+const LONGEST_CODE = 60;
+const UUID = /^[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}$/i;
 const LONGEST_VALUE = 200;
 const OWN_KEYS = new Set(["simulate", "lang"]);
 
@@ -25,7 +27,7 @@ export function storageKey(what: string, link_token: string, search: string): st
 
 export class Identity {
   private readonly key: string;
-  private readonly storage: Storage | null;
+  private readonly storage: SafeStorage | null;
   private own: string | null = null;
 
   /** A preview belongs to its tab; people recruited by name share no run even on one computer. */
@@ -48,49 +50,32 @@ export class Identity {
 
   /** True where this tab has shown the visit before: who reloads it is the same person. */
   get isOfThisTab(): boolean {
-    try {
-      return storageOf("sessionStorage")?.getItem(`${this.key} tab`) === this.read();
-    } catch {
-      return false;
-    }
+    return storageOf("sessionStorage")?.getItem(`${this.key} tab`) === this.read();
   }
 
+  /** Where it is full or blocked the next page asks again. */
   keepTab(): void {
-    try {
-      storageOf("sessionStorage")?.setItem(`${this.key} tab`, this.client_id());
-    } catch {
-      // Full or blocked: the next page asks again.
-    }
+    storageOf("sessionStorage")?.setItem(`${this.key} tab`, this.client_id());
   }
 
   client_id(): string {
     const known = this.read();
     if (known) return known;
     const fresh = uuid();
+    // Where nothing is kept the visit lasts as long as this page.
     this.own = fresh;
-    try {
-      this.storage?.setItem(this.key, fresh);
-    } catch {
-      // Full or blocked: the visit then lasts as long as this page.
-    }
+    this.storage?.setItem(this.key, fresh);
     return fresh;
   }
 
   /** The resume code that was entered here: the visit belongs to another browser's client id. */
   get code(): string | null {
-    try {
-      return this.storage?.getItem(`${this.key} code`) ?? null;
-    } catch {
-      return null;
-    }
+    return this.storage?.getItem(`${this.key} code`)?.slice(0, LONGEST_CODE) ?? null;
   }
 
+  /** Where it is full or blocked the code is asked for again. */
   keepCode(code: string): void {
-    try {
-      this.storage?.setItem(`${this.key} code`, code);
-    } catch {
-      // Full or blocked: the code is then asked for again.
-    }
+    this.storage?.setItem(`${this.key} code`, code);
   }
 
   forget(): void {
@@ -100,11 +85,9 @@ export class Identity {
   }
 
   private read(): string | null {
-    try {
-      return this.storage?.getItem(this.key) ?? this.own;
-    } catch {
-      return this.own;
-    }
+    const kept = this.storage?.getItem(this.key) ?? null;
+    // What is kept may have been damaged: the server would refuse it for ever.
+    return kept !== null && UUID.test(kept) ? kept : this.own;
   }
 }
 
@@ -118,10 +101,24 @@ function uuid(): string {
     .replace(/^(.{8})(.{4})(.{4})(.{4})/, "$1-$2-$3-$4-");
 }
 
-export function storageOf(name: "localStorage" | "sessionStorage"): Storage | null {
-  try {
-    return window[name];
-  } catch {
-    return null;
-  }
+/** What is kept of a site, as far as the browser lets it be: its methods never throw. */
+export type SafeStorage = Pick<Storage, "getItem" | "setItem" | "removeItem">;
+
+/** Null where the browser has none, or denies it. What is full keeps nothing new. */
+export function storageOf(name: "localStorage" | "sessionStorage"): SafeStorage | null {
+  const attempt = <Value>(work: () => Value): Value | null => {
+    try {
+      return work();
+    } catch {
+      return null;
+    }
+  };
+  // Deleted, as by an extension, it is undefined; its methods may be missing or denied one by one.
+  const storage = attempt(() => window[name] as Storage | undefined);
+  if (!storage) return null;
+  return {
+    getItem: (key) => attempt(() => storage.getItem(key)),
+    setItem: (key, value) => void attempt(() => storage.setItem(key, value)),
+    removeItem: (key) => void attempt(() => storage.removeItem(key)),
+  };
 }

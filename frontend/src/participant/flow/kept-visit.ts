@@ -6,6 +6,7 @@ import type { CalibrationState, Consent, LinkState, Receipt, RunStarted, RunStat
 import { applyViews } from "../views/ledger";
 import type { RatingBody } from "../trials/rating";
 import { applyNext, nextOf } from "../trials/shared/next-trials";
+import type { SafeStorage } from "./identity";
 import type { OutboxItem } from "../outbox/store";
 
 export interface Kept {
@@ -24,7 +25,7 @@ export class KeptVisit {
 
   constructor(
     private readonly key: string,
-    private readonly storage: Storage | null,
+    private readonly storage: SafeStorage | null,
   ) {}
 
   /** The visit kept here; null where there is none, or where the server must be asked before going on. */

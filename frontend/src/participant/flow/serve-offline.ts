@@ -2,6 +2,10 @@
 
 export function serveOffline(): void {
   // Private windows and some settings have none: a reload then needs the server.
-  if (!("serviceWorker" in navigator)) return;
-  void navigator.serviceWorker.register("/service-worker.js", { scope: "/run/" }).catch(() => {});
+  try {
+    if (!("serviceWorker" in navigator)) return;
+    void Promise.resolve(navigator.serviceWorker.register("/service-worker.js", { scope: "/run/" })).catch(() => {});
+  } catch {
+    // Denied with the cookies.
+  }
 }

@@ -5,6 +5,7 @@
  * be repeated without harm, because the server stores each id once.
  */
 import { BUSY, isTemporary, NetworkError, refusalOf, request, type Answer, type Refused } from "../request";
+import { withinTime } from "../time-limit";
 import { backoff } from "./backoff";
 import { events, type Batch, nextBatch } from "./batch";
 import type { OutboxItem, OutboxStore } from "./store";
@@ -15,6 +16,7 @@ export interface Sent {
   receipt: Promise<Outcome>;
 }
 export interface OutboxState {
+  /** Answers that the server has not acknowledged. */
   pending: number;
   failures: number;
   /** The last try reached a server that was busy: the connection is good. */
@@ -26,6 +28,7 @@ export interface OutboxOptions {
   send?: Send;
   /** Waiting, so that tests need not wait. */
   pause?: (ms: number) => Promise<void>;
+  disk_limit_ms?: number;
   onChange?: (state: OutboxState) => void;
   /** A write of this run was accepted; called before it is forgotten. */
   onAccepted?: (item: OutboxItem, body: unknown) => void;
@@ -33,6 +36,12 @@ export interface OutboxOptions {
   onRefused?: (refused: Refused) => void;
 }
 
+/** A disk that takes longer is as good as none. */
+const DISK_LIMIT_MS = 5_000;
+/** What a participant calls an answer: a rating or a form, whether or not it was refused; not the views of its clips. */
+const isAnswer = ({ path, body }: OutboxItem): boolean =>
+  ANSWERS.some((of) => path.startsWith(of) || (path === REFUSED && (body as { path?: string }).path?.startsWith(of)));
+const ANSWERS = ["/api/run/ratings/", "/api/run/forms/"];
 const REFUSED = "/api/run/refused";
 /** Refusals that say something of the visit, not of the record: the page acts on them. */
 const OF_THE_VISIT = ["run_unknown", "run_closed", "consent_missing", "rating_differs", "view_differs"];
@@ -69,13 +78,14 @@ export class Outbox {
   }
 
   get state(): OutboxState {
-    return { pending: this.queue.filter((item) => item.kind === "write").length, failures: this.failures, busy: this.busy };
+    return { pending: this.queue.filter(isAnswer).length, failures: this.failures, busy: this.busy };
   }
 
   /** Take up what an earlier visit left unsent, and begin to send. */
   async open(run_id: string, token: string): Promise<void> {
     this.run = { run_id, token };
-    const left = await this.store.all();
+    const left: OutboxItem[] = [];
+    await this.onDisk(async () => void left.push(...(await this.store.all())));
     this.sequence = left.reduce((last, item) => Math.max(last, item.sequence), this.sequence);
     // A newer token of the same run replaces the one an item was kept with.
     this.queue = left.map((item) => (item.run_id === run_id ? { ...item, token } : item));
@@ -125,7 +135,7 @@ export class Outbox {
     if (!this.run) throw new Error("expected an open outbox, got one without a run; call open() first");
     this.sequence += 1;
     const kept: OutboxItem = { ...item, ...this.run, sequence: this.sequence };
-    await this.onDisk(this.store.add(kept));
+    await this.onDisk(() => this.store.add(kept));
     this.queue.push(kept);
     this.changed();
     void this.sendAll();
@@ -176,10 +186,10 @@ export class Outbox {
     const own = batch.items.filter((item) => item.run_id === this.run?.run_id);
     if (outcome.accepted) own.forEach((item) => this.options.onAccepted?.(item, answer.body));
     const reports = outcome.accepted ? [] : batch.items.flatMap((item) => reportOf(item, outcome.refused) ?? []);
-    if (outcome.accepted) await this.onDisk(this.store.remove([...ids]));
+    if (outcome.accepted) await this.onDisk(() => this.store.remove([...ids]));
     // Under the id of the record, whose place the report takes: a page that dies in between loses neither.
-    else if (reports.length > 0) for (const report of reports) await this.onDisk(this.store.add(report));
-    else for (const item of batch.items) await this.onDisk(this.store.refuse(item, outcome.refused.code));
+    else if (reports.length > 0) for (const report of reports) await this.onDisk(() => this.store.add(report));
+    else for (const item of batch.items) await this.onDisk(() => this.store.refuse(item, outcome.refused.code));
     this.queue = [...this.queue.filter((item) => !ids.has(item.id)), ...reports].sort((a, b) => a.sequence - b.sequence);
     for (const id of ids) {
       this.waiting.get(id)?.(outcome);
@@ -194,11 +204,15 @@ export class Outbox {
     await Promise.race([sleep(ms), woken]);
   }
 
-  private onDisk(work: Promise<void>): Promise<void> {
-    return work.catch((error: unknown) => {
+  /** Once it has failed, or has not answered in time, the disk is left alone: nobody waits for it at each answer. */
+  private async onDisk(work: () => Promise<void>): Promise<void> {
+    if (this.storeFailed) return;
+    try {
+      await withinTime(work, this.options.disk_limit_ms ?? DISK_LIMIT_MS);
+    } catch (error) {
       console.warn("the browser keeps nothing any more", error);
       this.storeFailed = true;
-    });
+    }
   }
 
   private changed(): void {

@@ -30,7 +30,12 @@ type Display = Pick<RunState["display"], "background" | "sync_patch">;
 /** The fallback is fetched only where it is needed: by a browser without a decoder, or one to which the worker never comes. */
 export async function choosePlayer({ background, sync_patch }: Display): Promise<ClipPlayer> {
   const worker = hasWebCodecs() ? await startedWorker().catch(() => null) : null;
-  if (worker) return new WorkerPlayer(worker, background, sync_patch);
+  try {
+    if (worker) return new WorkerPlayer(worker, background, sync_patch);
+  } catch (error) {
+    // A canvas that cannot be handed over, as where an extension guards canvases.
+    console.warn("clips are played by the video element", error);
+  }
   const { VideoPlayer } = await loadModule(() => import("./video-player"));
   return new VideoPlayer();
 }

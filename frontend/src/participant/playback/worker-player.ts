@@ -4,8 +4,8 @@ import { ClipBroken, type ClipPlayer, type Part, type PlayOptions, type Prepared
 import type { FromWorker, Request, ToWorker } from "./protocol";
 
 const DECODE_LIMIT_MS = 20_000;
-const START_LIMIT_MS = 20_000;
-const MAX_STARTS = 6;
+const START_LIMIT_MS = 10_000;
+const MAX_STARTS = 4;
 
 interface Waiting {
   resolve: (message: FromWorker) => void;
@@ -22,13 +22,15 @@ function layoutShown(): Promise<void> {
 export async function startedWorker(): Promise<Worker> {
   for (let failures = 1; failures <= MAX_STARTS; failures++) {
     const worker = new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
-    const has_started = await new Promise<boolean>((resolve) => {
-      worker.onmessage = () => resolve(true);
-      worker.onerror = () => resolve(false);
-      setTimeout(resolve, START_LIMIT_MS, false);
+    const outcome = await new Promise<"started" | "lost" | "silent">((resolve) => {
+      worker.onmessage = () => resolve("started");
+      worker.onerror = () => resolve("lost");
+      setTimeout(resolve, START_LIMIT_MS, "silent");
     });
-    if (has_started) return worker;
+    if (outcome === "started") return worker;
     worker.terminate();
+    // A worker that is blocked says nothing: another one would not either.
+    if (outcome === "silent") break;
     await new Promise((resolve) => setTimeout(resolve, backoff(failures)));
   }
   throw new ClipBroken("the worker could not be started");

@@ -29,12 +29,13 @@
     // Others' scripts, an extension's for one, are lost without harm.
     if (event.target.nodeName !== "SCRIPT" || event.target.src.indexOf("/assets/") < 0 || !tell(away)) return;
     lost = true;
-    var loads = 3;
+    var loads;
     try {
       loads = Number(sessionStorage.loads || 0);
       sessionStorage.loads = (loads + 1) % 4;
     } catch (denied) {
-      // Nothing can be counted: by hand.
+      // Nothing can be counted, or nothing more is kept: by hand.
+      loads = 3;
     }
     if (loads < 3)
       setTimeout(function () {

@@ -45,7 +45,7 @@ async function complete(session: Session, display: HTMLElement, token: string): 
   showPage(display, { title: t("finishing_title"), body: [count] });
   const tell = setInterval(() => {
     const { pending, failures } = session.outbox.state;
-    count.textContent = (pending ? t("finishing_wait", { count: pending }) : "") + (failures > 1 ? ` ${trouble(session)}` : "");
+    count.textContent = (pending ? t("finishing_wait", { count: pending }) : t("saving")) + (failures > 1 ? ` ${trouble(session)}` : "");
   }, 500);
   await session.outbox.drained();
   const done = await completed(token);

@@ -7,6 +7,7 @@ import { placed } from "../flow/placed";
 import { plugin, OBJECT, STRING, type PluginClass } from "../jspsych";
 import type { Session } from "../session";
 import { typeOf } from "./fields/field";
+import { keepDraft } from "./form-draft";
 import { fieldView, type FieldView, type FormAnswers } from "./question";
 import { isSaving, saveShown, setSaving, stopButton } from "./support";
 
@@ -53,6 +54,7 @@ function showForm(session: Session, display: HTMLElement, form: Form, eyebrow: s
     const answers = answersOf(views);
     void saveShown(session, status, session.api.form(form.name, answers)).then((outcome) => {
       if (!outcome.accepted) return setSaving(go, false);
+      draft.forget();
       placed(session.run, outcome.body);
       done({ answers });
     });
@@ -69,6 +71,7 @@ function showForm(session: Session, display: HTMLElement, form: Form, eyebrow: s
     },
     ...views.map((view) => view.element),
   );
+  const draft = keepDraft(body, session.run.run_id, form.name);
   const mended = (): void => {
     if (!body.querySelector(".fault:not(:empty)")) alert.textContent = "";
   };

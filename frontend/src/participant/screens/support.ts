@@ -58,7 +58,25 @@ function isInSight(element: Element): boolean {
 export function trouble({ outbox, t }: Pick<Session, "outbox" | "t">): string {
   const { failures, busy } = outbox.state;
   if (failures === 0 && navigator.onLine) return "";
+  // What is not on this device must not be called safe there.
+  if (!outbox.durable) return t("saving_in_page");
   return t(busy ? "saving_busy" : "saving_offline");
+}
+
+/** Wait for what must be with the server before the page goes on, and say so where it takes long: nothing else moves meanwhile. */
+export async function waitShown<Value>(session: Session, work: Promise<Value>): Promise<Value> {
+  const line = h("p", { class: "waiting", role: "status" });
+  const began = performance.now();
+  const tell = setInterval(() => {
+    if (!line.isConnected) session.root.append(line);
+    if (performance.now() - began > SLOW_MS) say(line, trouble(session) || session.t("saving"));
+  }, LOOK_MS);
+  try {
+    return await work;
+  } finally {
+    clearInterval(tell);
+    line.remove();
+  }
 }
 
 /** Wait for the server's answer to a write and say so in `status` where it takes long. */

@@ -4,6 +4,7 @@ import { evidenceFor } from "../evidence/evidence";
 import type { RatingBody } from "./rating";
 import type { Outcome } from "../outbox/outbox";
 import { sourcesOf } from "../screens/preload";
+import { waitShown } from "../screens/support";
 import { receiptOf, type Session } from "../session";
 import { applyNext, nextOf } from "./shared/next-trials";
 
@@ -23,7 +24,7 @@ export async function saveRating(session: Session, trial: TrialInfo, body: Ratin
     if (warning) session.warnings.push(warning);
     if (!outcome.accepted && outcome.refused.code === "rating_differs") session.root.dispatchEvent(new CustomEvent("taken-over"));
   });
-  if (!session.outbox.durable) await handled;
+  if (!session.outbox.durable) await waitShown(session, handled);
 }
 
 /** A play whose view was broken off has no answer; the trial comes once more at the end of its block. */

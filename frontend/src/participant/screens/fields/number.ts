@@ -1,11 +1,15 @@
 /** A whole number within limits. */
 import { h } from "../../../ui/element";
+import { plainNumber } from "../../../ui/digits";
 import type { TypeOfField } from "./field";
 
 export const type: TypeOfField<"number"> = {
   control({ field: { minimum, maximum }, t, id }) {
     const node = h("input", { id, type: "text", inputmode: "numeric", autocomplete: "off", class: "short" });
-    const answer = (): number | null => (node.value.trim() === "" ? null : Number(node.value.trim()));
+    const answer = (): number | null => {
+      const text = plainNumber(node.value);
+      return text === "" ? null : Number(text);
+    };
     const fault = (): string | null => {
       const value = answer();
       const good = value === null || (Number.isInteger(value) && value >= minimum && value <= maximum);

@@ -2,7 +2,7 @@
 import type { RatingAnswer, ShownClipRating } from "../../../api/schema";
 import { pick, type Translate } from "../../../i18n";
 import { h, uniqueId } from "../../../ui/element";
-import { listenKeys } from "../../../ui/keys";
+import { keyOf, listenKeys } from "../../../ui/keys";
 import { MeantPress } from "../../../ui/meant-press";
 import { button } from "../../../ui/page";
 import { loadWidgets, makeWidget, type Scale, type Widget } from "./widget";
@@ -139,9 +139,10 @@ class ScalesView {
   }
 
   private pressed(event: KeyboardEvent): void {
-    if (event.key === "Enter") return this.finish();
+    const key = keyOf(event);
+    if (key === "Enter") return this.finish();
     const block = this.current();
-    const value = block?.widget.pressed(event.key) ?? null;
+    const value = block?.widget.pressed(key) ?? null;
     if (!block || value === null) return;
     this.choose(block, value, event.timeStamp);
     const next = this.blocks.find(({ chosen }) => !chosen);

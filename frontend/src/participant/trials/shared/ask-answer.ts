@@ -1,6 +1,6 @@
 /** The answers below a clip as buttons, each with its number, chosen by press or key. */
 import { h, uniqueId } from "../../../ui/element";
-import { listenKeys } from "../../../ui/keys";
+import { keyOf, listenKeys } from "../../../ui/keys";
 import { MeantPress } from "../../../ui/meant-press";
 
 interface Choice<Name extends string> {
@@ -59,7 +59,8 @@ export function askAnswer<Name extends string>(container: HTMLElement, options: 
     );
     container.replaceChildren(question, group);
     listenKeys((event) => {
-      const name = keyed(event.key.length === 1 ? event.key.toLowerCase() : event.key);
+      const key = keyOf(event);
+      const name = keyed(key.length === 1 ? key.toLowerCase() : key);
       if (!name) return;
       event.preventDefault();
       choose(name, event.timeStamp);

@@ -1,14 +1,13 @@
 /** Which keys mean what on the scale. */
+import { digitValue } from "../../../ui/digits";
 import type { Points } from "../../../api/schema";
 
 type Range = Pick<Points, "minimum" | "maximum">;
 
 /** The value a key stands for, or null. 0 means ten on a scale that ends there and does not begin at zero. */
 export function valueOf(key: string, { minimum, maximum }: Range): number | null {
-  // Arabic keyboards have digits of their own.
-  const arabic = "٠١٢٣٤٥٦٧٨٩".indexOf(key);
-  if (!/^\d$/.test(key) && arabic < 0) return null;
-  const digit = arabic < 0 ? Number(key) : arabic;
+  const digit = digitValue(key);
+  if (digit === null) return null;
   if (digit >= minimum && digit <= maximum) return digit;
   return digit === 0 && minimum > 0 && maximum === 10 ? 10 : null;
 }
