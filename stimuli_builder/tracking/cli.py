@@ -93,8 +93,9 @@ def track(
     Without labels a face detector finds the eyes and trains the model (its environment, 270 MB, is made at
     first use); labels placed by hand (--labels) are more exact.
 
-    Writes one row a frame: frame, time_s, x01, y01 ... x18, y18, left_distance_px, right_distance_px (sides of the picture; with
-    --one-eye 9 points and distance_px), residual, iterations, error_px, e01 ... e18, status, reason. A frame
+    Writes one row a frame: frame, time_s, x01, y01 ... x18, y18, left_distance_px, right_distance_px (sides
+    of the picture: left is the person's right eye, unless it is mirrored; with --one-eye 9 points and
+    distance_px), residual, iterations, error_px, e01 ... e18, status, reason. A frame
     that cannot be fitted has empty points, the status 'lost' and its reason; one that may be wrong is
     'doubtful'.
 
