@@ -29,6 +29,12 @@ def refuse_unknown_columns(rows: pd.DataFrame, terms: ModelTerms) -> None:
     for name in (*named, *nested):
         if name not in rows.columns:
             raise InputError(f"no column is called '{name}'{did_you_mean(name, map(str, rows.columns))}")
+    for name in (*terms.within, *terms.between):
+        if ":" in name:
+            raise InputError(
+                f"the factor '{name}' has a ':' in its name, which separates the factors of an interaction; "
+                "rename the column"
+            )
     if rows.empty:
         raise InputError("there are no ratings to analyse; the table has a header but no rows")
 
