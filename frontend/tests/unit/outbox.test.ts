@@ -196,3 +196,26 @@ describe("a record that is refused for good", () => {
     expect(paths(got)).toEqual([rating]);
   });
 });
+
+describe("what is still to be sent", () => {
+  it("is counted in answers, not in records", async () => {
+    const silence = Array.from({ length: 50 }, () => "silence" as const);
+    const { outbox } = await opened(new IDBFactory(), silence, { pause: () => new Promise<void>(() => {}) });
+    for (const path of ["/api/run/views", "/api/run/ratings/1", "/api/run/views", "/api/run/ratings/2", "/api/run/stage"])
+      await outbox.put("PUT", path, {});
+    expect(outbox.state.pending).toBe(2);
+  });
+});
+
+describe("a disk that says nothing", () => {
+  it("is left alone, and the answer is sent from memory", async () => {
+    const { send, got } = server();
+    const silent = (): Promise<never> => new Promise(() => {});
+    const store = { durable: true, add: silent, all: silent, remove: silent, refuse: silent };
+    const outbox = new Outbox(store, { send, pause: noPause, disk_limit_ms: 1 });
+    await outbox.open("run", "token");
+    const sent = await outbox.put("PUT", "/api/run/ratings/1", {});
+    expect((await sent.receipt).accepted).toBe(true);
+    expect([outbox.durable, paths(got)]).toEqual([false, ["/api/run/ratings/1"]]);
+  });
+});
