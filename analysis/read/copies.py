@@ -55,9 +55,22 @@ def copied_block(codes: Codes) -> tuple[int, int, int] | None:
         block = codes[start : start + length]
         distinct = len(np.unique(block))
         varied = distinct >= 0.7 * length if length < MANY else distinct >= FEWEST // 2
-        if length >= FEWEST and varied and surprise[start : start + length].sum() > UNLIKELY + 2 * np.log(n):
+        unlikely = surprise[start : start + length].sum() > UNLIKELY + 2 * np.log(n)
+        if length >= FEWEST and varied and unlikely and _beyond_chance(lengths, length, len(equal)):
             best = start + distance, start, length
     return best
+
+
+def _beyond_chance(lengths: Codes, longest: int, places: int) -> bool:
+    """Whether a run of equal rows is longer than those at this distance lead to expect.
+
+    Ratings of one person in the same conditions agree often at a distance of one round of conditions. How
+    often is what the short runs show; a copy is a long run among few of them.
+    """
+    long = 2 * lengths >= longest
+    left = places - int(lengths[long].sum())
+    rate = (int(lengths[~long].sum()) + 1) / (max(left, 0) + 2)
+    return bool(longest * -np.log(rate) > UNLIKELY + np.log(places))
 
 
 def _distances(codes: Codes) -> list[int]:

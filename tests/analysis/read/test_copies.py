@@ -91,3 +91,8 @@ def test_ratings_that_agree_by_chance_are_no_copies(seed: int) -> None:
     people = pd.DataFrame({"p": np.repeat(np.arange(15), 24), "c": np.tile(["a", "b", "c"], 120)})
     people["y"] = rng.integers(1, 6, len(people))
     assert copied_block(row_codes(people)) is None
+    many = pd.DataFrame({"p": np.repeat(np.arange(300), 200), "c": np.tile(["a", "b", "c", "d"], 15_000)})
+    many["y"] = rng.integers(1, 6, len(many))
+    assert copied_block(row_codes(many)) is None
+    thrice = pd.concat([many[:200]] * 3)
+    assert copied_block(row_codes(thrice)) == (200, 0, 200)
