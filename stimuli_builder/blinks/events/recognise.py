@@ -224,7 +224,7 @@ def _timed(candidate: Candidate, depth: Depth, bounds: tuple[int, int]) -> Timin
     timing = timing_of(candidate, depth, rests)
     inside = candidate.left[1] <= timing.minimum_s * depth.fps <= candidate.right[1]
     onset, end = timing.onset_s * depth.fps, timing.end_s * depth.fps
-    seen = rests[0].far - 1 <= onset and end <= rests[1].far + 1
+    seen = rests[0].far <= onset and end <= rests[1].far + 1
     falls = timing.fitted is not None and timing.fitted.amplitude > 0
     return timing if inside and seen and falls else _crossed_to(candidate, rests, depth)
 
