@@ -66,27 +66,8 @@ lock: ## resolve the Python dependencies again, with hashes: what runs, what tes
 	@$(BIN)/python tools/split_locks.py build/server.lock requirements.lock deploy/s3.lock
 	@$(BIN)/python tools/check_lock_files.py
 
-bench: setup-test ## speed, memory and accuracy, as figures and ratios (long)
-	@$(BIN)/python -m pytest tests/bench -o python_files='bench_*.py' --benchmark-only --benchmark-columns=min,median,rounds -s
-	@PYTHONPATH=. $(BIN)/python tests/bench/bench_tracking.py
-	@for size in 960x360 1920x720; do PYTHONPATH=. $(BIN)/python tests/bench/clip_memory.py $$size; done
-	@PYTHONPATH=. $(BIN)/python tests/bench/performance_memory.py
-	@PYTHONPATH=. $(BIN)/python tests/bench/addon_fill.py
-	@PYTHONPATH=. $(BIN)/python tests/bench/models_against_r.py
-	@PYTHONPATH=. $(BIN)/python tests/bench/bench_server.py
-	@PYTHONPATH=. $(BIN)/python tests/bench/bench_study_creation.py
-	@PYTHONPATH=. $(BIN)/python tests/bench/before_and_after.py
-	@PYTHONPATH=. $(BIN)/python tests/bench/bench_evidence.py
-	@PYTHONPATH=. $(BIN)/python tests/bench/bench_workers.py
-	@PYTHONPATH=. $(BIN)/python tests/bench/bench_labels.py
-	@PYTHONPATH=. $(BIN)/python tests/bench/bench_lid_events.py $(BLINK_SERIES)
-	@PYTHONPATH=. $(BIN)/python tests/bench/bench_stated_error.py
-	@PYTHONPATH=. $(BIN)/python tests/bench/bench_label_free.py
-	@PYTHONPATH=. $(BIN)/python tests/bench/bench_label_error.py
-	@PYTHONPATH=. $(BIN)/python tests/bench/bench_track_speed.py
-	@PYTHONPATH=. $(BIN)/python tests/bench/bench_reflections.py
-	@test -z "$(FACEKIT)" || PYTHONPATH=. $(BIN)/python tests/bench/bench_rendered_tracks.py $(FACEKIT)
-	@test -z "$(FACEKIT)" || PYTHONPATH=. $(BIN)/python tests/bench/face_quality.py cedar@4 $(FACEKIT)
+bench: setup-test ## speed, memory and accuracy, as figures and ratios (long); goes on after a failure and lists it
+	@PYTHONPATH=. FACEKIT="$(FACEKIT)" BLINK_SERIES="$(BLINK_SERIES)" $(BIN)/python tools/benches.py $(BENCH)
 
 screenshots: setup-test ## make the pictures of README and docs anew (needs the clips of `make run`)
 	@$(BIN)/python tools/screenshots.py

@@ -18,6 +18,7 @@ from server.accounts.people import invitation_url
 from server.cli_common import migrated_services, out
 from server.context import Services
 from server.logs import logging_configuration
+from server.operations.erasures import begin_ledger
 from server.operations.metrics import MULTIPROCESS_VARIABLE
 from server.operations.modes import close_to_others
 from server.protocol import BoundedHttp
@@ -28,6 +29,8 @@ from server.studies.repository import open_studies
 GRACE_S = 20
 WORKER_START_S = 60
 """A worker silent for so long is replaced; on a busy machine starting alone takes more than the usual 5 s."""
+TRUSTED_PROXIES = "FORWARDED_ALLOW_IPS"
+"""Addresses of proxies whose X-Forwarded-For is believed; uvicorn reads it. None are without it."""
 KEEP_ALIVE_S = 75
 """Longer than a trial lasts, so that a rater keeps one connection, and than proxies keep theirs idle."""
 
@@ -56,6 +59,7 @@ def run(
     settings = Settings()
     with migrated_services(settings) as services:
         close_to_others(settings)
+        begin_ledger(settings)
         services.settings.key  # noqa: B018 - made now, once, before workers ask for it
         if welcome:
             _welcome(services)
@@ -74,6 +78,8 @@ def run(
             timeout_graceful_shutdown=GRACE_S,
             timeout_keep_alive=KEEP_ALIVE_S,
             timeout_worker_healthcheck=WORKER_START_S,
+            # uvicorn by itself believes what anybody on this machine says of the sender's address.
+            proxy_headers=TRUSTED_PROXIES in os.environ,
         )
 
 

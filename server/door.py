@@ -33,6 +33,7 @@ BODY_S = 30.0
 UPLOAD_IDLE_S, UPLOAD_GRACE_S, UPLOAD_BYTES_PER_S = 30.0, 60.0, 16 * 1024
 UPLOADS = "/api/admin/uploads"
 _MORE_FILES = re.compile(rf"{UPLOADS}/[0-9a-f]+/files/?")
+_NUL = re.compile(rb"%00|\0")
 ADMIN, ACCOUNTLESS = "/api/admin/", ("/api/admin/session", "/api/admin/invitations/")
 RUN = "/api/run/"
 Kind = Literal["anonymous", "run", "admin", "upload"]
@@ -192,6 +193,10 @@ def _check_head(scope: Scope) -> None:
     if len(scope["query_string"]) > QUERY_BYTES:
         raise AddressTooLong(
             f"The address is too long: at most {QUERY_BYTES >> 10} KiB after its ? are read."
+        )
+    if "\0" in scope["path"] or _NUL.search(scope["query_string"]):
+        raise TextNotStorable(
+            "The request was refused: its address holds a NUL, which no text here can hold."
         )
     if len(scope["headers"]) > MAX_HEADERS:
         raise TooManyHeaders(f"The request has too many headers: at most {MAX_HEADERS} are read.")

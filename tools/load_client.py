@@ -15,7 +15,9 @@ from server.simulation.person import Person, Rater
 from tools.load_connection import Connection
 
 RETRY_S = 0.2
-GIVE_UP_S = 120.0
+LONGEST_PAUSE_S = 5.0
+GIVE_UP_S = 1800.0
+"""A bound for the whole program, far beyond any wait: a page tries as long as it has answers to send."""
 NEEDED = ("trial_index", "kind", "check", "plays_done", "prompt", "clips", "clip_sha256", "frames", "fps")
 
 
@@ -103,8 +105,8 @@ class LoadRater:
     async def insist(
         self, method: str, path: str, body: Any = None, *, keep: bool = True
     ) -> tuple[int, bytes]:
-        """As a page does: the same request again until it is answered by less than 500."""
-        ends = time.monotonic() + GIVE_UP_S
+        """As a page does: the same request again until it is answered by less than 500, pausing longer."""
+        ends, pause = time.monotonic() + GIVE_UP_S, RETRY_S
         while time.monotonic() < ends:
             try:
                 status, content = await self.connection.call(method, path, body, keep=keep)
@@ -113,6 +115,7 @@ class LoadRater:
             except OSError:
                 pass
             self.tally.retries += 1
-            await asyncio.sleep(RETRY_S)
+            await asyncio.sleep(pause)
+            pause = min(2 * pause, LONGEST_PAUSE_S)
         self.tally.given_up += 1
         return 599, b""

@@ -84,13 +84,25 @@ OPERATOR: Final = Operator()
 
 
 def check_origin(request: Request, services: Services) -> None:
-    """Refuse a change that another site's page asks for with this browser's cookie."""
+    """Refuse a change that another site's page asks for with this browser's cookie.
+
+    Every browser says where a change comes from, by Origin or by Sec-Fetch-Site. With a session's cookie a
+    request that says neither is refused: something removed them on its way. Programs use an API token.
+    """
     if request.method in ("GET", "HEAD", "OPTIONS"):
         return
     origin = request.headers.get("origin")
     if origin is None:
-        if request.headers.get("sec-fetch-site", "same-origin") in ("same-origin", "none"):
+        site = request.headers.get("sec-fetch-site")
+        if site in ("same-origin", "none"):
             return
+        if site is None and COOKIE not in request.cookies:
+            return
+        if site is None:
+            raise NotAllowed(
+                "This change is refused: neither Origin nor Sec-Fetch-Site says where it comes from. A "
+                "program needs an API token instead of the cookie."
+            )
         raise NotAllowed("This change was asked for by another site and is refused.")
     own = {services.settings.public_url, f"{request.url.scheme}://{request.headers.get('host', '')}"}
     if _address_of(origin) not in own:

@@ -20,16 +20,20 @@ from server.models import IdentityKey, RecruiterIdentity, StudyRun
 AT_ONCE = 500
 
 
-def keep(session: Session, run: StudyRun, study_key: str, known_as: KnownAs, identifier: str) -> None:
+def keep(
+    session: Session, run: StudyRun, study_key: str, known_as: KnownAs, identifier: str | None = None
+) -> None:
     """Store who the person of a run is, under a separate key.
 
-    `identifier` stands for all ways to write the person's id; visits are matched by its keyed hash.
+    Visits are matched by the keyed hash of `identifier`, which stands for all ways to write the person's id;
+    without it of the id as it is written.
     """
     sealed = seal(session.info[SIGNING_KEY](), run.public_id, known_as)
+    matched_by = known_as.identifier if identifier is None else identifier
     session.add(
         RecruiterIdentity(
             study_run_id=run.id,
-            identifier_hash=identifier_hash(study_key, identifier),
+            identifier_hash=identifier_hash(study_key, matched_by),
             sealed=sealed.content,
         )
     )

@@ -67,6 +67,7 @@ def back_up(
     InputError
         A folder is missing, or a file cannot be written or holds the keys of another installation.
     """
+    erasures.begin_ledger(services.settings)
     key_path = keys or keys_apart.beside(path)
     check_targets([path, key_path, key_path.parent / erasures.NAME])
     keys_apart.check_replaceable(key_path, services.settings.key)
@@ -81,14 +82,14 @@ def _write_keys(services: Services, path: Path, kept: KeyFile) -> None:
     with locked(services.settings.common_folder / "backup-keys.lock"):
         keys_apart.check_replaceable(path, services.settings.key)
         keys_apart.write_keys(path, kept)
-        _write_ledger(services, path.parent / erasures.NAME)
+        _write_ledger(services, path.parent / erasures.NAME, kept.written_at)
 
 
-def _write_ledger(services: Services, path: Path) -> None:
+def _write_ledger(services: Services, path: Path, moment: str) -> None:
     """A copy of the ledger of erasures beside the key file; what it names already stays."""
     there = path.read_bytes() if path.is_file() else b""
     with whole_private_file(path) as stream:
-        stream.write(erasures.merged(there, erasures.content(services.settings)))
+        stream.write(erasures.copy_for_backup(services.settings, there, moment))
 
 
 def write_backup(

@@ -177,10 +177,19 @@ def restore(
             help="Take a key file that is older than the backup: recruiters' ids of later visits are lost.",
         ),
     ] = False,
+    despite_erasures: Annotated[
+        bool,
+        typer.Option(
+            "--despite-erasures",
+            help="Restore without a ledger of erasures newer than the backup: people erased since come back.",
+        ),
+    ] = False,
 ) -> None:
     """Bring a backup back into an empty database (SQLite or PostgreSQL) and clip store.
 
-    The database of the settings must be empty; stop the server first. Counts and hashes are compared.
+    The database of the settings must be empty; stop the server first. Counts and hashes are compared. People
+    who were erased since the backup are erased again, by the ledger of erasures (erasures.ndjson) next to the
+    backup or in the data folder.
 
     Examples:
 
@@ -195,7 +204,9 @@ def restore(
             path = _in_the_open(file, settings, _private_key(settings, identity), held)
             plain = not file.endswith(ENDING)
             keys = keys or (settings.backup_keys if plain else None)
-            described = restoring.restore(services, path, out.print, keys=keys, stale_keys=stale_keys)
+            described = restoring.restore(
+                services, path, out.print, keys=keys, stale_keys=stale_keys, despite_erasures=despite_erasures
+            )
     finally:
         services.database.close()
     out.print(f"restored what was backed up on {described.created_at}")

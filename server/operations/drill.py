@@ -118,7 +118,7 @@ def _here(
 def _brought_back(apart: Settings, backup: Path, keys: Path | None) -> DrillResult:
     services = open_services(apart)
     try:
-        described = restore(services, backup, keys=keys)
+        described = restore(services, backup, keys=keys, despite_erasures=True)
         missing = keys is None and not beside(backup).exists()
         failed = [_key_file_missing(backup)] if missing and _needs_key_file(described) else []
         failed += [

@@ -15,6 +15,7 @@ from server.settings import Settings
 
 LOG = logging.getLogger(__name__)
 NAME = "erasures.ndjson"
+KNOWN_UNTIL = "known_until"
 
 
 def ledger(settings: Settings) -> Path:
@@ -30,6 +31,13 @@ def note(settings: Settings, runs: list[str]) -> None:
 def note_identifiers(settings: Settings, runs: list[str]) -> None:
     """Write down that it is erased who these runs' persons are; their answers stay."""
     _append(settings, "identifiers_of", runs)
+
+
+def begin_ledger(settings: Settings) -> None:
+    """Make an empty ledger where there is none: a ledger that is there knows that nobody was erased."""
+    path = ledger(settings)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    os.close(os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600))
 
 
 def _append(settings: Settings, key: str, runs: list[str]) -> None:
@@ -62,7 +70,24 @@ def content(settings: Settings) -> bytes:
 def merged(one: bytes, other: bytes) -> bytes:
     """The lines of both ledgers, each once; a line that a crash cut off is ended."""
     lines = dict.fromkeys(line for line in (one + b"\n" + other).splitlines() if line.strip())
-    return b"".join(line + b"\n" for line in lines)
+    return b"".join(line + b"\n" for line in lines if KNOWN_UNTIL.encode() not in line)
+
+
+def copy_for_backup(settings: Settings, before: bytes, moment: str) -> bytes:
+    """The ledger as it is kept next to backups: what an earlier copy names too, and until when it knows."""
+    return merged(before, content(settings)) + json.dumps({KNOWN_UNTIL: moment}).encode() + b"\n"
+
+
+def known_until(copy: bytes) -> str:
+    """The last moment of which a copy knows who was erased; empty where it says none."""
+    moments = [""]
+    for line in copy.splitlines():
+        try:
+            entry = json.loads(line)
+            moments.append(str(entry.get(KNOWN_UNTIL) or entry.get("erased_at") or ""))
+        except (ValueError, AttributeError):
+            continue
+    return max(moments)
 
 
 def take_over(settings: Settings, further: bytes) -> None:

@@ -3,12 +3,15 @@
 import logging
 import time
 
+from starlette.requests import ClientDisconnect
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from server.operations.metrics import ANSWERS, SECONDS, UNDER_WAY
 from server.settings import Settings
 
 log = logging.getLogger("palpebra.requests")
+CLIENT_GONE = 499
+"""Counted where nobody is left to answer: the client left, or sent what is not HTTP and was cut off."""
 METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
 
 
@@ -36,6 +39,10 @@ class Observer:
         UNDER_WAY.inc()
         try:
             await self.app(scope, receive, watched)
+            if seconds is None:
+                status = CLIENT_GONE
+        except ClientDisconnect:
+            status = CLIENT_GONE
         finally:
             UNDER_WAY.dec()
             self._note(scope, status, time.perf_counter() - began if seconds is None else seconds)

@@ -66,8 +66,8 @@ def back_up_to(
         described, keys = write_backup(services, stream, with_clips=with_clips)
         _put_newest(store, _Kept(NAME, ours, keys.written_at), content_of_keys(keys), recipient)
         ledger = _Kept(erasures.NAME, ours, iso(now()))
-        if erased := erasures.content(services.settings):
-            _put_newest(store, ledger, erased, recipient)
+        copy = erasures.copy_for_backup(services.settings, b"", keys.written_at)
+        _put_newest(store, ledger, copy, recipient)
         made.append(described)
 
     kept_as = f"{name.removesuffix('.tar')}{ending_of(services.settings.key)}"

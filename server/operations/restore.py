@@ -45,6 +45,7 @@ def restore(
     *,
     keys: Path | None = None,
     stale_keys: bool = False,
+    despite_erasures: bool = False,
 ) -> Description:
     """Bring a backup back; afterwards the database has the newest revision.
 
@@ -57,19 +58,26 @@ def restore(
         The key file, beside the backup where None; without one recruiters' ids are left out.
     stale_keys : bool
         Take one that is older than the backup, though ids of later visits are left out then.
+    despite_erasures : bool
+        Restore without a ledger of erasures that is newer than the backup, though people who were erased
+        since come back.
 
     Raises
     ------
     InputError
         The file is no backup, is damaged or of a newer program; the database is not empty; the data folder
-        has another secret key; the key file is another installation's or older than the backup.
+        has another secret key; the key file is another installation's or older than the backup; no ledger of
+        erasures knows who was erased since the backup.
     """
+    copied_ledger = (keys or beside(path)).parent / erasures.NAME
     try:
         with tarfile.open(path) as tar:
             described = _description(tar, path)
             key = _content(tar, KEY)
             _check_key(services.settings, key)
             apart = _key_file(described, key, keys or beside(path), named=keys is not None, stale=stale_keys)
+            if not despite_erasures:
+                _check_ledger(services.settings, copied_ledger, described)
             _restore_rows(services, tar, described, _Keys(key, apart), told)
             for sha256 in described.clips:
                 _restore_clip(services, tar, sha256)
@@ -80,9 +88,9 @@ def restore(
             raise InputError(f"no room left for what {path} holds; make room and restore again") from error
         raise InputError(f"{path} cannot be read: {error.strerror or error}") from error
     _keep_key(services.settings, key)
-    _take_over_ledger(services.settings, (keys or beside(path)).parent / erasures.NAME)
-    _erase_again(services, told)
+    _take_over_ledger(services.settings, copied_ledger)
     told(f"{len(described.clips)} clips, secret key")
+    _erase_again(services, told)  # last: what it says of erased people must not be lost among tables
     return described
 
 
@@ -90,6 +98,20 @@ def _reason(error: Exception) -> str:
     """What the library says; where that is only that no format fits, and a list of them, what to do."""
     (reason, *_) = str(error).splitlines() or [type(error).__name__]
     return "; name a file that it wrote" if reason.endswith(":") else f": {reason}"
+
+
+def _check_ledger(settings: Settings, copy: Path, described: Description) -> None:
+    """Where no ledger is newer than the backup, people who were erased since would come back unnoticed."""
+    if ledger(settings).is_file():
+        return
+    if copy.is_file() and erasures.known_until(copy.read_bytes()) > described.created_at:
+        return
+    raise InputError(
+        f"expected a ledger of erasures that is newer than the backup of {described.created_at}, in the data "
+        f"folder ({ledger(settings)}) or next to the backup ({copy}), got none: people erased since would "
+        f"come back. Put the newest {erasures.NAME} there; if nobody was erased since, restore with "
+        "--despite-erasures"
+    )
 
 
 def _take_over_ledger(settings: Settings, path: Path) -> None:
@@ -102,8 +124,8 @@ def _erase_again(services: Services, told: Callable[[str], None]) -> None:
     path = ledger(services.settings)
     if not path.is_file():
         told(
-            f"no ledger of erasures at {path}: who was erased since this backup is back; if you have one, "
-            "put it there and run: server database erase-again"
+            f"WARNING: no ledger of erasures at {path}. People who were erased since this backup are back. "
+            "If you find the ledger, put it there and run: server database erase-again"
         )
         return
     with services.database.write() as session:

@@ -39,7 +39,12 @@ def fresh_browser(client: TestClient, settings: Settings) -> TestClient:
     It asks in the same event loop, as all browsers of a server do; with none given, a client begins a thread
     and a loop for each request.
     """
-    fresh = TestClient(client.app, base_url=settings.public_url, raise_server_exceptions=False)
+    fresh = TestClient(
+        client.app,
+        base_url=settings.public_url,
+        raise_server_exceptions=False,
+        headers={"sec-fetch-site": "same-origin"},
+    )
     fresh.portal = client.portal
     return fresh
 

@@ -230,6 +230,8 @@ def good_playback(trial: Any) -> dict[str, Any]:
     }
 
 
+FROM_OWN_PAGE = {"sec-fetch-site": "same-origin"}
+"""What every browser adds to the requests of a server's pages."""
 _built: list[FastAPI] = []
 """The application, built once: putting all routes together takes longer than a test."""
 
@@ -241,7 +243,7 @@ def client(services: Services) -> Iterator[TestClient]:
         _built.append(create_app(services.settings))
     app = _built[0]
     app.state.services = services
-    with TestClient(app, raise_server_exceptions=False) as opened:
+    with TestClient(app, raise_server_exceptions=False, headers=FROM_OWN_PAGE) as opened:
         yield opened
 
 

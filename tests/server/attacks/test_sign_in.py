@@ -25,6 +25,7 @@ from server.context import Services
 from server.models import Account, AdminSession
 from server.settings import Settings
 from tests.helpers.admins import PASSWORD, Admin, fresh_browser
+from tests.helpers.studies import FROM_OWN_PAGE
 from tests.helpers.databases import run_server_command
 
 SIX = 6
@@ -90,7 +91,9 @@ def test_wrong_passwords_keep_nobody_else_out(client: TestClient, settings: Sett
     assert 429 in answers
     assert sign_in(fresh_browser(client, settings), owner.name, PASSWORD) == 200  # from her own place
     owner.client.post("/api/admin/session", json={"name": owner.name, "password": "a slip"})
-    known = TestClient(client.app, base_url=settings.public_url, client=("203.0.113.9", 1))
+    known = TestClient(
+        client.app, base_url=settings.public_url, client=("203.0.113.9", 1), headers=FROM_OWN_PAGE
+    )
     known.cookies = owner.client.cookies  # her own browser, in the attacker's network
     assert sign_in(known, owner.name, PASSWORD) == 200
 

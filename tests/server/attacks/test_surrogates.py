@@ -120,7 +120,7 @@ def test_backup_copy_and_command_line_export_survive_it(
     called = run_server_command(settings, "database", "copy", settings.database_url, target)
     assert called.returncode == 0, called.stderr
     into = settings.model_copy(update={"database_url": f"sqlite:///{tmp_path / 'again.sqlite'}"})
-    called = run_server_command(into, "restore", str(tmp_path / "backup.tar"))
+    called = run_server_command(into, "restore", "--despite-erasures", str(tmp_path / "backup.tar"))
     assert called.returncode == 0, called.stderr
 
 

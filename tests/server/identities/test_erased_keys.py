@@ -50,7 +50,7 @@ def ids(services: Services) -> dict[str, str]:
 
 def restored(backup: Path, url: str, folder: Path) -> tuple[Services, list[str]]:
     services, lines = open_services(Settings(database_url=url, data_folder=folder)), list[str]()
-    restore(services, backup, lines.append)
+    restore(services, backup, lines.append, despite_erasures=True)
     return services, lines
 
 
@@ -132,7 +132,9 @@ def test_with_the_key_file_ids_and_pseudonyms_are_as_before(
     (tmp_path / "a").mkdir()
     back_up(services, tmp_path / "a" / "b.tar", with_clips=False, keys=keys)
     settings = Settings(database_url=empty_database_url, data_folder=tmp_path / "new")
-    done = run_server_command(settings, "restore", str(tmp_path / "a" / "b.tar"), "--keys", str(keys))
+    done = run_server_command(
+        settings, "restore", "--despite-erasures", str(tmp_path / "a" / "b.tar"), "--keys", str(keys)
+    )
     assert "2 recruiters' ids; of 0 there is no key any more" in done.stdout, done.stderr
     again = open_services(settings)
     assert sorted(ids(again).values()) == list(CODES)
@@ -201,7 +203,7 @@ def test_what_is_no_key_file(
     empty = Settings(database_url=f"sqlite:///{tmp_path / 'x.sqlite'}", data_folder=tmp_path / "new")
     target = open_services(empty)
     with pytest.raises(InputError, match=said):
-        restore(target, backup)
+        restore(target, backup, despite_erasures=True)
     target.database.close()
 
 

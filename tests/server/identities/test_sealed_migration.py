@@ -22,7 +22,7 @@ def golden(tmp_path: Path) -> Services:
     """A database with recruiters' ids."""
     url = f"sqlite:///{tmp_path / 'x.sqlite'}"
     services = open_services(Settings(database_url=url, data_folder=tmp_path / "data"))
-    restore(services, golden_backup(SEALED, tmp_path), keys=golden_keys(SEALED))
+    restore(services, golden_backup(SEALED, tmp_path), keys=golden_keys(SEALED), despite_erasures=True)
     return services
 
 

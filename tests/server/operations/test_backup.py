@@ -100,14 +100,14 @@ def test_a_backup_comes_back_whole_on_either_database(
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
     assert [entry.name for entry in tmp_path.glob("*.tar*")] == ["b.tar"]
     target = another(settings, empty_database_url, tmp_path / "new")
-    restore(target, path)
+    restore(target, path, despite_erasures=True)
     assert contents(empty_database_url) == contents(settings.database_url)
     for sha256 in described.clips:
         assert target.clips.size(sha256) == with_data.clips.size(sha256) is not None
     assert target.settings.key == settings.key
     assert stat.S_IMODE((tmp_path / "new" / "secret_key").stat().st_mode) == 0o600
     with pytest.raises(InputError, match=r"already holds rows .*name a new folder in PALPEBRA_DATA_FOLDER"):
-        restore(target, path)
+        restore(target, path, despite_erasures=True)
     target.database.close()
 
 
@@ -120,7 +120,7 @@ class TestRefusals:
         back_up(with_data, tmp_path / "b.tar", with_clips=False)
         target = another(settings, empty_database_url, tmp_path / "new", key="another key")
         with pytest.raises(InputError, match="another secret key"):
-            restore(target, tmp_path / "b.tar")
+            restore(target, tmp_path / "b.tar", despite_erasures=True)
         target.database.close()
 
     def test_a_damaged_file_restores_nothing(
@@ -139,16 +139,16 @@ class TestRefusals:
                 target_tar.addfile(entry, io.BytesIO(content))
         target = another(settings, empty_database_url, tmp_path / "new")
         with pytest.raises(InputError, match="the backup is damaged, nothing was restored"):
-            restore(target, changed)
+            restore(target, changed, despite_erasures=True)
         cut = tmp_path / "cut.tar"
         cut.write_bytes(whole.read_bytes()[: whole.stat().st_size // 3])
         with pytest.raises(InputError):
-            restore(target, cut)
+            restore(target, cut, despite_erasures=True)
         (tmp_path / "text.tar").write_text("hello")
         with pytest.raises(InputError, match=r"no backup of `server backup`; name a file that it wrote$"):
-            restore(target, tmp_path / "text.tar")
+            restore(target, tmp_path / "text.tar", despite_erasures=True)
         with pytest.raises(InputError, match="cannot be read"):
-            restore(target, tmp_path / "nothing.tar")
+            restore(target, tmp_path / "nothing.tar", despite_erasures=True)
         assert contents(empty_database_url) == {}
         assert not (tmp_path / "new" / "secret_key").exists()
         target.database.close()

@@ -110,10 +110,10 @@ def test_a_key_file_older_than_the_backup_fails_drill_and_restore(
     assert not result.passed
     assert "is older than the backup" in result.said
     new = tmp_path / "new"
-    arguments = ("restore", str(folder / "newer.tar"))
+    arguments = ("restore", "--despite-erasures", str(folder / "newer.tar"))
     target = empty(new)
     with pytest.raises(InputError, match="is older than the backup"):
-        restore(target, folder / "newer.tar")
+        restore(target, folder / "newer.tar", despite_erasures=True)
     target.database.close()
     refused = run_server_command(target.settings, *arguments)
     assert refused.returncode == 2
@@ -147,7 +147,7 @@ def test_the_keys_stand_there_before_the_backup(
     for names in seen:
         if any(name.endswith(".tar.age") for name in names):
             assert any(name.startswith("palpebra-keys-") for name in names)
-    assert len(seen[-1]) == 2
+    assert len(seen[-1]) == 3  # and the ledger of erasures
 
 
 def _killed(*_arguments: object) -> None:
@@ -228,10 +228,15 @@ def test_a_restore_takes_no_keys_of_another_installation(
     other.database.close()
     target = empty(tmp_path / "new")
     with pytest.raises(InputError, match="keys of another installation or secret key than the backup"):
-        restore(target, tmp_path / "a" / TAR, keys=tmp_path / "b" / NAME)
+        restore(target, tmp_path / "a" / TAR, keys=tmp_path / "b" / NAME, despite_erasures=True)
     target.database.close()
     again = run_server_command(
-        target.settings, "restore", str(tmp_path / "a" / TAR), "--keys", str(tmp_path / "a" / NAME)
+        target.settings,
+        "restore",
+        "--despite-erasures",
+        str(tmp_path / "a" / TAR),
+        "--keys",
+        str(tmp_path / "a" / NAME),
     )
     assert "1 recruiters' ids; of 0 there is no key" in again.stdout, again.stderr
 
@@ -250,7 +255,7 @@ def test_after_a_change_of_the_secret_key_older_backups_keep_their_keys(
     back_up(changed, folder / "newer.tar", with_clips=False)
     target = empty(tmp_path / "new")
     with pytest.raises(InputError, match="another installation or secret key than the backup"):
-        restore(target, folder / "older.tar")
+        restore(target, folder / "older.tar", despite_erasures=True)
     restore(target, folder / "older.tar", keys=folder / "keys-of-before.json")
     assert ids(target) == ["40177"]
     with target.database.read() as one, services.database.read() as two:
@@ -277,7 +282,9 @@ def test_two_installations_share_a_store_without_the_private_key(
     other.database.close()
     backup = next(name for name in ours if name.startswith("palpebra-2026-01-02"))
     target = empty(tmp_path / "new")
-    done = run_server_command(target.settings, "restore", str(folder / backup), "--identity", str(safe[1]))
+    done = run_server_command(
+        target.settings, "restore", "--despite-erasures", str(folder / backup), "--identity", str(safe[1])
+    )
     assert "1 recruiters' ids; of 0 there is no key" in done.stdout, done.stderr
     target.database.close()
 

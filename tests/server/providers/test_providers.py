@@ -20,6 +20,7 @@ from server.settings import Settings
 from server.workspaces import service as workspaces
 from tests.helpers.admins import PASSWORD, Admin, fresh_browser, signed_in, wrong_code
 from tests.helpers.providers import SECRET, RunningProvider, Visitor, provider_for, state_of
+from tests.helpers.studies import FROM_OWN_PAGE
 
 PUBLIC_URL = "http://localhost:8000"
 REFUSED = "/admin/sign-in?refused=sign_in_refused"
@@ -51,7 +52,7 @@ def settings(settings: Settings, running: RunningProvider, tmp_path: Path) -> Se
 
 @pytest.fixture
 def client(services: Services) -> Iterator[TestClient]:
-    with TestClient(create_app(services.settings), base_url=PUBLIC_URL) as made:
+    with TestClient(create_app(services.settings), base_url=PUBLIC_URL, headers=FROM_OWN_PAGE) as made:
         yield made
 
 
@@ -117,7 +118,7 @@ def test_a_lost_claim_takes_the_membership_with_it(visitor: Visitor, services: S
     services.settings.oidc["uni"] = services.settings.oidc["uni"].model_copy(
         update={"roles": (LAB.model_copy(update={"value": "another group"}),)}
     )
-    with TestClient(create_app(services.settings), base_url=PUBLIC_URL) as later:
+    with TestClient(create_app(services.settings), base_url=PUBLIC_URL, headers=FROM_OWN_PAGE) as later:
         again = Visitor(fresh_browser(later, services.settings))
         assert again.sign_in(**{"as": "ada"}) == "/admin/"
     assert roles(services, "Ada Lovelace") == {}

@@ -123,7 +123,7 @@ class TestOnSqlite:
         new = Settings(database_url=f"sqlite:///{folder / 'x.sqlite'}", data_folder=folder)
         erasures.ledger(new).write_bytes(erasures.ledger(services.settings).read_bytes())
         again = open_services(new)
-        restore(again, tmp_path / "b.tar")
+        restore(again, tmp_path / "b.tar", despite_erasures=True)
         assert state(again) == {unnamed: "unnamed", erased: "erased"}
         again.database.close()
 
