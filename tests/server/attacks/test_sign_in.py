@@ -25,8 +25,8 @@ from server.context import Services
 from server.models import Account, AdminSession
 from server.settings import Settings
 from tests.helpers.admins import PASSWORD, Admin, fresh_browser
-from tests.helpers.studies import FROM_OWN_PAGE
 from tests.helpers.databases import run_server_command
+from tests.helpers.studies import FROM_OWN_PAGE
 
 SIX = 6
 OTHER = "another quite long one"
