@@ -50,6 +50,7 @@ def passage(asked: Passage, events: Sequence[Event] = (), changes: Sequence[Stat
         events=events,
         changes=changes,
         parameters=parameters,
+        ends_open=True,
     )
 
 

@@ -11,7 +11,7 @@ from blender_addon.rig import RigError, chosen_channels, rig_guesses
 from blender_addon.sound import read_sound
 from blender_addon.voice import speech_in_samples
 from blink_engine import Performance
-from blink_engine.speech import speech_events, speech_states
+from blink_engine.speech import seed_of_speaker, speech_events, speech_states
 
 
 class _BlinkOperator(bpy.types.Operator):
@@ -77,7 +77,7 @@ class PALPEBRA_OT_blink(_BlinkOperator):  # noqa: N801
         """Write it and move the seed on, so that the next blink is another one."""
         settings, scene = rig.palpebra, context.scene
         channels = chosen_channels(rig, settings)
-        done = one_blink(frames_per_second(scene), settings.seed)
+        done = one_blink(frames_per_second(scene), _seed(rig))
         start = scene.frame_current
         _write(channels, done, start, start + done.left.size - 1, settings)
         settings.seed += 1
@@ -91,7 +91,7 @@ class PALPEBRA_OT_fill(_BlinkOperator):  # noqa: N801
 
     def run(self, context: Any, rig: Any) -> str:
         """Write them in place of what an earlier fill wrote."""
-        settings, asked = rig.palpebra, _passage(context.scene, rig.palpebra)
+        settings, asked = rig.palpebra, _passage(context.scene, rig)
         channels = chosen_channels(rig, settings)
         done = passage(asked)
         _write(channels, done, asked.start, asked.end, settings)
@@ -105,7 +105,7 @@ class PALPEBRA_OT_from_speech(_BlinkOperator):  # noqa: N801
 
     def run(self, context: Any, rig: Any) -> str:
         """Find the speech, tell the engine, write its blinks."""
-        settings, asked = rig.palpebra, _passage(context.scene, rig.palpebra)
+        settings, asked = rig.palpebra, _passage(context.scene, rig)
         channels = chosen_channels(rig, settings)
         offset_s = (settings.sound_start - asked.start) / asked.fps
         stretches = [
@@ -133,7 +133,7 @@ class PALPEBRA_OT_reroll(_BlinkOperator):  # noqa: N801
         span = blink_at(ours, scene.frame_current, gap=_gap(settings))
         if span is None:
             raise RigError(f"no blink of ours at frame {scene.frame_current}; move the cursor onto one")
-        done = one_blink(frames_per_second(scene), settings.seed + 1)
+        done = one_blink(frames_per_second(scene), _seed(rig, later=1))
         start = round(span[0])
         following = ours[ours > span[1]]
         length = done.left.size if not following.size else min(done.left.size, int(following[0]) - start)
@@ -162,14 +162,20 @@ def frames_per_second(scene: Any) -> float:
     return float(scene.render.fps / scene.render.fps_base)
 
 
-def _passage(scene: Any, settings: Any) -> Passage:
+def _seed(rig: Any, later: int = 0) -> int:
+    """The engine's seed for a rig: two of one scene and one number do not blink alike."""
+    return seed_of_speaker(rig.palpebra.seed + later, rig.name)
+
+
+def _passage(scene: Any, rig: Any) -> Passage:
+    settings = rig.palpebra
     start, end = (
         (scene.frame_preview_start, scene.frame_preview_end)
         if scene.use_preview_range
         else (scene.frame_start, scene.frame_end)
     )
     rate = settings.rate or None
-    return Passage(start, end, frames_per_second(scene), settings.seed, settings.state, rate)
+    return Passage(start, end, frames_per_second(scene), _seed(rig), settings.state, rate)
 
 
 def _write(

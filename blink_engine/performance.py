@@ -43,6 +43,7 @@ def perform(
     events: Iterable[Event] = (),
     changes: Iterable[StateChange] = (),
     parameters: Parameters | None = None,
+    ends_open: bool = False,
 ) -> Performance:
     """Return a performance of `duration_s` seconds.
 
@@ -56,6 +57,9 @@ def perform(
         As for `BlinkEngine`.
     events : iterable of Event
     changes : iterable of StateChange
+    ends_open : bool, optional
+        Leave out a blink that would not be over at the end, as for a clip; without it the last frames may
+        show half a blink, as the same moments of a stream do.
 
     Returns
     -------
@@ -79,6 +83,8 @@ def perform(
         raise ValueError(f"expected a duration above 0 s and below 10,000,000 s, got {duration_s}")
     chosen = parameters or default_parameters()
     blinks = planned(duration_s, BlinkPlan(chosen, state, seed), events, changes)
+    if ends_open:
+        blinks = [blink for blink in blinks if blink.end_s <= duration_s - 1.0 / fps]
     count = max(1, round(duration_s * fps))
     left, right = (_lay(blinks, count, fps, right=eye) for eye in (False, True))
     resting, profile = resting_closure(chosen, 0.0, 0.0), chosen.profile

@@ -11,6 +11,9 @@ from blink_engine.random_numbers import RandomNumbers
 
 INTERVALS, SHAPES, RESPONSES, DRIFT = 1, 2, 3, 4
 ANTICIPATED_MAX = 2
+LONGEST_CLOSED_SPREADS = 2.0
+"""How far the closed time of a blink that is not long may lie above its median, in spreads of its logarithm:
+at most 0.25 s. The tail of the fitted law would keep eyes shut for half a second and more."""
 
 
 @dataclass(frozen=True)
@@ -122,6 +125,10 @@ class BlinkPlan:
         again = numbers.uniform() < model.double_share
         long, complete = kind < model.long_share, kind < model.long_share + model.complete_share
         law = model.long_closed_s if long else model.closed_s
+        if not long and closed_z > LONGEST_CLOSED_SPREADS:
+            closed_z = (
+                2.0 * LONGEST_CLOSED_SPREADS - closed_z
+            )  # reflected: no pile of equal blinks at the limit
         closed = law.median * math.exp(law.spread * closed_z) if complete else 0.0
         logit = model.partial_logit_median + model.partial_logit_spread * partial
         peak = 1.0 if complete else 1.0 / (1.0 + math.exp(-logit))

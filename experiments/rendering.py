@@ -97,8 +97,9 @@ class RenderSettings(Declaration):
     event: EventKind = "turn_end"
     """What happens at the moments of `events_s`."""
     speech: str = ""
-    """A recording with sound or subtitles (.vtt, .srt) beside the TOML whose pauses and turns blinks answer,
-    where `performance` is `events`; the person speaks then, and is in `state` between turns."""
+    """A recording with sound or subtitles (.vtt, .srt) next to the TOML whose pauses and turns blinks answer,
+    where `performance` is `events`; the person speaks then, and is in `state` between turns. Of subtitles
+    with several voices name one: `dialogue.vtt#Anna`."""
     fps: Fps = 30
     """Frame rate of the clip, in frames per second."""
     width_px: Annotated[int, Field(ge=320, le=1920, multiple_of=2)] = 960

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from blink_engine import Event, Law, Parameters, Performance, StateChange, default_parameters, perform
-from blink_engine.speech import Speech, speech_events, speech_states
+from blink_engine.speech import Speech, seed_of_speaker, speech_events, speech_states
 from experiments.errors import InputError
 from experiments.rendering import RenderSettings
 from stimuli_builder.blinks.profile import PROFILE_FPS
@@ -64,6 +64,7 @@ def _performed(
     events: list[Event] = []
     changes: list[StateChange] = []
     parameters = _parameters(settings)
+    _, speaker = file_and_speaker(settings.speech)
     if settings.performance == "events":
         events = [Event(settings.event, time_s) for time_s in settings.events_s]
         stretches = _speech(settings, beside)
@@ -77,11 +78,12 @@ def _performed(
     return perform(
         settings.seconds,
         PROFILE_FPS,
-        seed=seed,
+        seed=seed_of_speaker(seed, speaker) if speaker else seed,
         state=settings.state,
         events=events,
         changes=changes,
         parameters=parameters,
+        ends_open=True,
     )
 
 
@@ -111,10 +113,21 @@ def _timer(length_s: float, mean_s: float, rng: np.random.Generator) -> list[flo
     return times
 
 
+def file_and_speaker(speech: str) -> tuple[str, str]:
+    """The file of a key `speech`, and the voice after its #; empty where none is named.
+
+    >>> file_and_speaker("dialogue.vtt#Anna"), file_and_speaker("speech.wav")
+    (('dialogue.vtt', 'Anna'), ('speech.wav', ''))
+    """
+    file, _, speaker = speech.partition("#")
+    return file, speaker
+
+
 def _speech(settings: RenderSettings, beside: Path | None) -> list[Speech]:
     if not settings.speech:
         return []
-    stretches, length_s = speech_of((beside or Path()) / settings.speech)
+    file, speaker = file_and_speaker(settings.speech)
+    stretches, length_s = speech_of((beside or Path()) / file, speaker or None)
     if length_s < settings.seconds:
         raise InputError(
             f"{settings.speech} lasts {length_s:.1f} s, the clip {settings.seconds:g} s; shorten `seconds`"

@@ -21,7 +21,9 @@ def performance(
         str, typer.Option("--format", help="csv, json, blender, maya, arkit, gltf or usd.")
     ] = "csv",
     fps: Annotated[float, typer.Option(help="Frame rate of the curves.")] = 60.0,
-    seed: Annotated[int, typer.Option(help="The same seed gives the same blinks.")] = 1,
+    seed: Annotated[
+        int, typer.Option(help="The same seed gives the same blinks; speakers differ with one seed too.")
+    ] = 1,
     state: Annotated[
         str,
         typer.Option(

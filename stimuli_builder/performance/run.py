@@ -8,7 +8,7 @@ import numpy as np
 from rich.console import Console
 
 from blink_engine import Performance, StateName, default_parameters, perform
-from blink_engine.speech import Speech, speech_events, speech_states
+from blink_engine.speech import Speech, seed_of_speaker, speech_events, speech_states
 from experiments.counted import counted
 from experiments.errors import InputError, did_you_mean
 from experiments.files import check_targets, whole_text
@@ -55,11 +55,12 @@ def write_performance(job: PerformanceJob) -> None:
     done = perform(
         duration_s,
         job.fps,
-        seed=job.seed,
+        seed=job.seed if job.speaker is None else seed_of_speaker(job.seed, job.speaker),
         state=state,
         events=speech_events(stretches),
         changes=speech_states(stretches, state) if stretches else (),
         parameters=parameters,
+        ends_open=True,
     )
     text = write_curve(job.format_name, animation_curve(done), job.target)
     with whole_text(job.out) as stream:

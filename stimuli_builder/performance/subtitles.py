@@ -1,5 +1,6 @@
 """Where somebody speaks by the times of subtitles (WebVTT, SubRip)."""
 
+import shlex
 from pathlib import Path
 
 import webvtt
@@ -19,19 +20,25 @@ def speech_in_subtitles(path: Path, speaker: str | None = None) -> tuple[list[Sp
     path : Path
         A .vtt or .srt file.
     speaker : str, optional
-        Of a file with voices (<v Name>), the one whose eyes these are.
+        Of a file with voices (<v Name>), the one whose eyes these are. One of several voices must be named.
 
     Raises
     ------
     InputError
-        Where the file cannot be read, a time is impossible, or nobody of that name speaks.
+        Where the file cannot be read, a time is impossible, nobody of that name speaks, or several people
+        speak and none is named.
     """
     captions = _captions(path)
-    if speaker is not None:
-        voices = sorted({caption.voice for caption in captions if caption.voice})
-        if speaker not in voices:
-            spoken = f"; voices: {', '.join(voices)}" if voices else "; the file names no voices"
-            raise InputError(f"{path}: nobody is called '{speaker}'{did_you_mean(speaker, voices)}{spoken}")
+    voices = sorted({caption.voice for caption in captions if caption.voice})
+    if speaker is None and len(voices) > 1:
+        raise InputError(
+            f"{path}: expected one person, got {len(voices)} voices ({', '.join(voices)}); name the one "
+            f"whose eyes these are: --speaker {shlex.quote(voices[0])}, in an experiment speech = "
+            f'"{path.name}#{voices[0]}"'
+        )
+    if speaker is not None and speaker not in voices:
+        spoken = f"; voices: {', '.join(voices)}" if voices else "; the file names no voices"
+        raise InputError(f"{path}: nobody is called '{speaker}'{did_you_mean(speaker, voices)}{spoken}")
     length_s = max((_seconds(caption.end) for caption in captions), default=0.0)
     own = [caption for caption in captions if speaker is None or caption.voice == speaker]
     return joined([_stretch(path, caption) for caption in own]), length_s

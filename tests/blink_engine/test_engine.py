@@ -18,6 +18,7 @@ from blink_engine import (
     Event,
     Law,
     StateChange,
+    StateName,
     default_parameters,
     perform,
 )
@@ -192,6 +193,32 @@ def test_courses_and_peaks_are_within_published_figures() -> None:
     # Ousler et al. 2014, Clin. Ophthalmol. 8, 869: 48% of 1,414 blinks complete; Sforza 2008: 44% at most.
     complete = np.mean([blink.left_peak >= 0.95 for blink in blinks])
     assert 0.3 < complete < 0.5
+
+
+def test_no_blink_stays_shut_for_long_where_long_blinks_are_off() -> None:
+    closed = [blink.shape.closed_s for seed in range(40) for blink in perform(1200, 1, seed=seed).blinks]
+    assert default_parameters().profile.long_share == 0
+    assert max(closed) <= 0.26
+    # Reflected, not cut off: the longest are not all alike.
+    assert len({round(one, 4) for one in closed if one > 0.2}) > 20
+
+
+def test_long_blinks_that_are_asked_for_stay_long() -> None:
+    long = default_parameters().with_profile(long_share=1.0)
+    closed = [blink.shape.closed_s for blink in perform(3600, 1, seed=1, parameters=long).blinks]
+    assert max(closed) > 0.4
+
+
+@pytest.mark.parametrize("state", ["speaking", "listening", "rest"])
+@pytest.mark.parametrize("fps", [24.0, 30.0, 300.0])
+def test_a_performance_for_a_clip_ends_with_open_eyes(state: StateName, fps: float) -> None:
+    as_streamed = [perform(10.0, fps, seed=seed, state=state) for seed in range(200)]
+    for seed, stream in enumerate(as_streamed):
+        whole = perform(10.0, fps, seed=seed, state=state, ends_open=True)
+        assert max(whole.left[-1], whole.right[-1]) == 0.0
+        assert whole.blinks == stream.blinks[: len(whole.blinks)]
+        assert len(stream.blinks) - len(whole.blinks) <= 2
+    assert any(stream.left[-1] > 0.05 for stream in as_streamed)
 
 
 def _time_above(course: np.ndarray, step_s: float, share: float = 0.1) -> float:

@@ -9,6 +9,7 @@ const SHAPES = 2;
 const RESPONSES = 3;
 const DRIFTS = 4;
 const ANTICIPATED_MAX = 2;
+const LONGEST_CLOSED_SPREADS = 2;
 
 export interface Blink {
   left_onset_s: number;
@@ -121,12 +122,14 @@ export class BlinkPlan {
     const partial = numbers.normal();
     const closing_s = draw(profile.closing_s, numbers);
     const opening_s = draw(profile.opening_s, numbers);
-    const closed = numbers.normal();
+    const drawnClosed = numbers.normal();
     const asymmetry = profile.asymmetry * numbers.normal();
     const delay_s = profile.delay_s * numbers.normal();
     const again = numbers.uniform() < profile.double_share;
     const complete = kind < profile.long_share + profile.complete_share;
-    const law = kind < profile.long_share ? profile.long_closed_s : profile.closed_s;
+    const long = kind < profile.long_share;
+    const law = long ? profile.long_closed_s : profile.closed_s;
+    const closed = long || drawnClosed <= LONGEST_CLOSED_SPREADS ? drawnClosed : 2 * LONGEST_CLOSED_SPREADS - drawnClosed;
     const closed_s = complete ? law.median * Math.exp((law.spread ?? 0) * closed) : 0;
     const peak = complete ? 1 : 1 / (1 + Math.exp(-(profile.partial_logit_median + profile.partial_logit_spread * partial)));
     const { closing_power, opening_power } = profile;

@@ -10,7 +10,9 @@ from typer.testing import CliRunner
 
 from blink_engine.speech import Speech, joined, speech_events, speech_states
 from experiments.errors import InputError
+from experiments.rendering import RenderSettings
 from stimuli_builder.cli import app
+from stimuli_builder.clips.performances import performance_curve
 from stimuli_builder.performance.audio import speech_in_audio
 from stimuli_builder.performance.run import PerformanceJob, write_performance
 from stimuli_builder.performance.subtitles import speech_in_subtitles
@@ -65,6 +67,52 @@ def test_speech_is_heard_where_it_is(tmp_path: Path) -> None:
     )
 
 
+def test_two_speakers_of_one_dialogue_do_not_blink_alike(tmp_path: Path) -> None:
+    (tmp_path / "dialogue.vtt").write_text(SUBTITLES, encoding="utf-8")
+    curves = {}
+    for speaker in ("Anna", "Bob"):
+        out = tmp_path / f"{speaker}.json"
+        job = PerformanceJob(out, tmp_path / "dialogue.vtt", "json", speaker=speaker, duration_s=120)
+        write_performance(job)
+        curves[speaker] = np.array(json.loads(out.read_text())["closure_left"])
+    starts = [set(np.flatnonzero((one[1:] > 0) & (one[:-1] == 0)).tolist()) for one in curves.values()]
+    shapes = [np.unique(np.round(one, 4)) for one in curves.values()]
+    assert len(starts[0] & starts[1]) < 0.3 * min(map(len, starts))
+    assert len(np.intersect1d(*shapes)) < 0.3 * min(map(len, shapes))
+
+
+def test_subtitles_of_several_voices_need_a_name(tmp_path: Path) -> None:
+    path = tmp_path / "dialogue.vtt"
+    path.write_text(SUBTITLES, encoding="utf-8")
+    with pytest.raises(InputError, match=r"2 voices \(Anna, Bob\).*--speaker Anna.*dialogue.vtt#Anna"):
+        speech_in_subtitles(path)
+    one_voice = SUBTITLES.replace("<v Bob>", "<v Anna>")
+    path.write_text(one_voice, encoding="utf-8")
+    assert len(speech_in_subtitles(path)[0]) == 3
+    path.write_text(SUBTITLES.replace("<v Bob>", "").replace("<v Anna>", ""), encoding="utf-8")
+    assert len(speech_in_subtitles(path)[0]) == 3
+
+
+def test_clips_of_two_speakers_name_their_voice(tmp_path: Path) -> None:
+    (tmp_path / "dialogue.vtt").write_text(SUBTITLES, encoding="utf-8")
+    settings = {"performance": "events", "seconds": 7, "character": "cartoon"}
+    anna, bob = (
+        performance_curve(
+            RenderSettings.model_validate(settings | {"speech": f"dialogue.vtt#{voice}"}),
+            "family",
+            1,
+            5,
+            tmp_path,
+        )
+        for voice in ("Anna", "Bob")
+    )
+    assert anna.blinks_s != bob.blinks_s
+    with pytest.raises(InputError, match="2 voices"):
+        performance_curve(
+            RenderSettings.model_validate(settings | {"speech": "dialogue.vtt"}), "f", 1, 5, tmp_path
+        )
+
+
 def test_silence_has_no_speech_and_the_blinks_of_the_state(tmp_path: Path) -> None:
     path = write_wave(tmp_path / "silence.wav", np.zeros(RATE_HZ * 60, dtype=np.int16))
     out = tmp_path / "out.json"
@@ -79,7 +127,6 @@ def test_subtitles_out_of_order_and_by_voice(tmp_path: Path) -> None:
     path.write_text(SUBTITLES, encoding="utf-8")
     anna, length_s = speech_in_subtitles(path, "Anna")
     assert (anna, length_s) == ([Speech(1.0, 2.5), Speech(2.9, 5.0)], 8.0)
-    assert len(speech_in_subtitles(path)[0]) == 3
     with pytest.raises(InputError, match=r"nobody is called 'Ana'.*Anna.*voices: Anna, Bob"):
         speech_in_subtitles(path, "Ana")
 
