@@ -48,7 +48,7 @@ def _texts(declared: BaseModel, prefix: str = "") -> Iterator[Text]:
     for key, field in type(declared).model_fields.items():
         value = getattr(declared, key)
         if key in declared.model_fields_set and value != field.get_default(call_default_factory=True):
-            yield from _within(value, f"{prefix}{key}", _mentions(field.annotation))
+            yield from _within(value, f"{prefix}{key}", is_translated(field.annotation))
 
 
 def _within(value: Any, path: str, is_text: bool) -> Iterator[Text]:
@@ -61,5 +61,6 @@ def _within(value: Any, path: str, is_text: bool) -> Iterator[Text]:
         yield path, value
 
 
-def _mentions(annotation: Any) -> bool:
-    return annotation == Translated or any(map(_mentions, get_args(annotation)))
+def is_translated(annotation: Any) -> bool:
+    """True where a key of this type holds a text in several languages."""
+    return annotation == Translated or any(map(is_translated, get_args(annotation)))

@@ -13,9 +13,10 @@ from server.accounts.permission import SecondFactorNeeded, Viewer
 from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES, NotFound
 from server.monitor import service
-from server.monitor.schemas import MonitorSnapshot
+from server.monitor.failing_clips import failing_clips
+from server.monitor.schemas import FailingClip, MonitorSnapshot
 from server.participants.schemas import Origin
-from server.studies.lookup import active_definition, study_with_rights
+from server.studies.lookup import active_definition, find_study, study_with_rights
 
 router = APIRouter(prefix="/api/admin/studies/{study}", tags=["monitor"], responses=ERROR_RESPONSES)
 EVERY_S = 2.0
@@ -44,6 +45,15 @@ def get_monitor(
 ) -> MonitorSnapshot:
     """The monitor at this moment, of one origin; that of people now taking part where none is given."""
     return _snapshot(services, study, identity, origin)
+
+
+@router.get("/failing-clips")
+def list_failing_clips(
+    services: ServicesDep, identity: Viewer, study: str, origin: Origin | None = None
+) -> list[FailingClip]:
+    """The clips that people could not see in the latest runs, those that raise an alarm first."""
+    with services.database.read() as session:
+        return failing_clips(session, find_study(session, study, identity, "view"), origin)
 
 
 def changes(before: MonitorSnapshot | None, after: MonitorSnapshot) -> str:

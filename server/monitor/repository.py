@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
-from server.models import Link, RunEvent, RunTally, Study, StudyRun
+from server.models import Link, Rating, RunEvent, RunTally, Study, StudyRun, TrialClip, VersionClip
 
 # Whole objects would take several times as long: this is asked every two seconds, of hundreds of runs.
 SHOWN = (
@@ -92,6 +92,89 @@ def latest_runs(session: Session, study: Study, origin: str, limit: int) -> Sequ
     query = select(*SHOWN).outerjoin(RunTally, RunTally.study_run_id == StudyRun.id)
     query = query.where(StudyRun.study_id == study.id, StudyRun.origin == origin)
     return session.execute(query.order_by(StudyRun.id.desc()).limit(limit)).all()[::-1]
+
+
+class MetRun(NamedTuple):
+    """A run and how far its trials went: a letter a trial."""
+
+    id: int
+    participant: str
+    heat: str
+
+
+class ShownClip(NamedTuple):
+    """A clip by its file and its cell."""
+
+    sha256: str
+    file: str
+    cell: str
+
+
+class FailedPlay(NamedTuple):
+    """A play that failed, with the clips of its trial that it failed for, by role."""
+
+    run: int
+    trial_index: int
+    rule: str
+    blamed: list[tuple[str, ShownClip]]
+
+
+def met_runs(session: Session, study: Study, origin: str, limit: int) -> list[MetRun]:
+    """The runs of one origin that began last and have shown a trial."""
+    query = select(StudyRun.id, StudyRun.participant, RunTally.heat)
+    query = query.join(RunTally, RunTally.study_run_id == StudyRun.id)
+    query = query.where(StudyRun.study_id == study.id, StudyRun.origin == origin)
+    return [MetRun(*row) for row in session.execute(query.order_by(StudyRun.id.desc()).limit(limit))]
+
+
+def failed_plays(session: Session, runs: Sequence[int]) -> list[FailedPlay]:
+    """The failed plays of these runs. A play of several clips failed for those that were not played."""
+    columns = (
+        Rating.study_run_id,
+        Rating.trial_index,
+        Rating.play,
+        Rating.verdict_rule,
+        Rating.playback,
+        TrialClip.role,
+        VersionClip.clip_sha256,
+        VersionClip.file,
+        VersionClip.cell,
+    )
+    same_trial = (TrialClip.study_run_id == Rating.study_run_id) & (
+        TrialClip.trial_index == Rating.trial_index
+    )
+    query = select(*columns).join(TrialClip, same_trial)
+    query = query.join(VersionClip, VersionClip.id == TrialClip.version_clip_id)
+    query = query.where(Rating.study_run_id.in_(runs), Rating.verdict == "failed")
+    query = query.order_by(Rating.study_run_id, Rating.trial_index, Rating.play, TrialClip.position)
+    plays: dict[tuple[int, int, int], FailedPlay] = {}
+    unplayed: dict[tuple[int, int, int], set[str]] = {}
+    for run, trial, play, rule, playback, role, sha256, file, cell in session.execute(query):
+        key = (run, trial, play)
+        known = plays.setdefault(key, FailedPlay(run, trial, rule, []))
+        known.blamed.append((role, ShownClip(sha256, file, cell)))
+        logs = playback if isinstance(playback, dict) else {}
+        unplayed[key] = {one for one, log in logs.items() if log and not log.get("frames_drawn")}
+    return [
+        play._replace(blamed=[one for one in play.blamed if one[0] in unplayed[key]] or play.blamed)
+        for key, play in plays.items()
+    ]
+
+
+def trials_with_clips(
+    session: Session, runs: Sequence[int], hashes: Sequence[str]
+) -> list[tuple[int, int, str]]:
+    """Run, trial and clip, of the trials of these runs that have one of these clips."""
+    query = select(TrialClip.study_run_id, TrialClip.trial_index, VersionClip.clip_sha256)
+    query = query.join(VersionClip, VersionClip.id == TrialClip.version_clip_id)
+    query = query.where(TrialClip.study_run_id.in_(runs), VersionClip.clip_sha256.in_(hashes))
+    return [(run, trial, sha256) for run, trial, sha256 in session.execute(query)]
+
+
+def unavailable_clips(session: Session, runs: Sequence[int]) -> list[dict[str, Any]]:
+    """What pages said when they could not show a clip."""
+    query = select(RunEvent.data).where(RunEvent.study_run_id.in_(runs))
+    return list(session.scalars(query.where(RunEvent.type == "clip_unavailable")))
 
 
 def refused_browsers(session: Session, study: Study) -> int:

@@ -73,3 +73,16 @@ class MonitorSnapshot(BaseModel):
     )
     total: int = Field(description="Runs of this origin.")
     runs: list[MonitoredRun] = Field(description="The latest, in the order they began; not more than 500.")
+
+
+class FailingClip(BaseModel):
+    """A clip that people could not see: no play of its trial was better than failed."""
+
+    clip_sha256: str
+    file: str
+    cell: str
+    people: int = Field(description="Who came to a trial with this clip, in the latest 500 runs.")
+    failed_for: int = Field(description="Of these people, those who could not see it.")
+    rules: dict[str, int] = Field(description="Why its plays failed: rule and number of plays.")
+    reason: str = Field(description="What most browsers said of it; empty where none did.")
+    alarm: bool = Field(description="It failed for everybody, or for half of several people or more.")

@@ -21,7 +21,7 @@ from server.models import NO_SLOT, Link, Study, StudyRun
 from server.participants import grouping, places_repository, repository, returning
 from server.participants.bounds import checked_device
 from server.participants.placing import assign_slot
-from server.participants.recruiter import Recruiter, stored_recruiter
+from server.participants.recruiter import Recruiter, refuse_other_recruiter, stored_recruiter
 from server.participants.refusals import (
     LanguageUnknown,
     LinkExpired,
@@ -136,6 +136,8 @@ def _begun(services: Services, session: Session, link: Link, study: Study, start
     if status != "open":
         refusal, message = _REFUSALS[status]
         raise refusal(message)
+    if link.kind == "general" and not link.synthetic:
+        refuse_other_recruiter(recruiter_of(link), start.query)
     if start.language not in loaded.experiment.languages:
         near = did_you_mean(start.language, loaded.experiment.languages)
         raise LanguageUnknown(f"The study has no texts in '{start.language}'{near}.")

@@ -23,7 +23,7 @@ from urllib.parse import quote
 
 from pydantic import BaseModel, ConfigDict, StringConstraints
 
-from server.participants.refusals import IdentifierInvalid
+from server.participants.refusals import IdentifierInvalid, RecruiterNotSet
 
 Code = Annotated[str, StringConstraints(max_length=100)]
 Address = Annotated[str, StringConstraints(max_length=1000, pattern=r"^(https?://.*)?$")]
@@ -34,6 +34,8 @@ ID_PARAMETERS = {
     "mturk": "workerId",
     "generic": "participant",
 }
+NAMES = {"prolific": "Prolific", "sona": "SONA", "mturk": "Amazon Mechanical Turk"}
+"""Recruiters that have a name."""
 ID_FORMS = {
     "prolific": (r"[0-9a-f]{24}", "24 letters and digits from 0-9 and a-f"),
     "sona": (r"[0-9a-z_-]{1,64}", "letters and digits"),
@@ -123,6 +125,22 @@ class Recruiter(BaseModel):
             return _filled_in(self.redirect_screened_out, self.code_screened_out, run, parameters)
         by_code = self.kind == "prolific" and self.code_screened_out
         return self.redirect(self.code_screened_out, run, parameters) if by_code else None
+
+
+def refuse_other_recruiter(recruiter: Recruiter, parameters: Mapping[str, str]) -> None:
+    """RecruiterNotSet where the address is another recruiter's: its id and code would be lost.
+
+    Without this a person could take part any number of times, with a completion code that pays nobody.
+    """
+    if recruiter.participant(parameters):
+        return
+    for kind, name in NAMES.items():
+        parameter = ID_PARAMETERS[kind]
+        if parameters.get(parameter) and parameter != recruiter.id_name:
+            raise RecruiterNotSet(
+                f"This study is not set up for participants from {name}. Please return your submission "
+                "there and write to the researchers; nothing was stored."
+            )
 
 
 def stored_recruiter(declared: Mapping[str, Any] | None) -> Recruiter:

@@ -75,6 +75,12 @@ class IdentifierInvalid(Invalid):
     code = "identifier_invalid"
 
 
+class RecruiterNotSet(Conflict):
+    """The address is of a recruiter that neither the link nor the study has."""
+
+    code = "recruiter_not_set"
+
+
 class SignatureMissing(Conflict):
     """Addresses of this study are signed, and this one is not."""
 

@@ -28,6 +28,7 @@ from server.studies.importing import (
     notes_of,
     store_clips,
 )
+from server.studies.launch_checks import refuse_if_live, refuse_unready
 from server.studies.links import (
     LinkKind,
     LinkOptions,
@@ -87,6 +88,7 @@ def add(
             said = f"version {study.active_version}, nothing new"
             if version is None:
                 version = add_version(session, study, text, declared, manifest, None)
+                refuse_if_live(session, study)
                 said = f"version {version.number}, {len(manifest.clips)} clips ({new} new)"
             out.print(f"study {study.name}: {said}")
             for note in notes_of(declared, manifest, version):
@@ -119,6 +121,8 @@ def _set_status(session: Session, study: Study, status: str) -> None:
     must_not_be_archived(study)
     if study.status == status:
         return
+    if status == "live":
+        refuse_unready(session, study)
     record(session, None, "status changed", "study", study.name, old=study.status, new=status)
     study.status, study.revision = status, study.revision + 1
     if status in ("pilot", "live"):

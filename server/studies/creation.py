@@ -16,6 +16,7 @@ from server.studies import own_clips
 from server.studies.clip_schemas import LevelsPattern, LevelsTable
 from server.studies.edits import for_edit
 from server.studies.importing import add_version, check_against_design, create_study, store_clips
+from server.studies.launch_checks import refuse_if_live
 from server.studies.lookup import active_version, find_study
 from server.studies.planned import planned_experiment
 from server.studies.schemas import NewStudy, NewVersion, ShippedExperiment
@@ -130,6 +131,7 @@ def add_definition(services: Services, name: str, order: NewVersion, identity: I
             manifest = own_clips.merged_manifest(manifest, added)
         manifest = own_clips.only_declared(manifest, experiment)
         add_version(session, study, order.toml, experiment, manifest, identity, order.note)
+        refuse_if_live(session, study)
 
 
 def _added_clips(

@@ -1,34 +1,154 @@
-"""What an experimenter should know before a study goes live."""
+"""What an experimenter should know before a study goes live, and what the server refuses to open.
+
+The same checks hold for whatever reaches participants later: a new version of a live study, and its settings.
+"""
 
 from collections.abc import Callable, Iterator
+from typing import NamedTuple
 
 from sqlalchemy.orm import Session
 
+from experiments.definition import Experiment
+from experiments.definition.placeholders import unfilled, untranslated
 from experiments.level_leaks import reported_leaks
 from experiments.manifest import Manifest
 from server.accounts.identity import Identity
+from server.errors import Conflict
 from server.models import Study, StudyVersion
-from server.studies.lookup import active_version, find_study
+from server.participants.recruiter import Recruiter, stored_recruiter
+from server.studies import links_repository
+from server.studies.lookup import active_version, definition_of, find_study
 from server.studies.schemas import LaunchCheck
 
-Check = Callable[[Study, StudyVersion], Iterator[LaunchCheck]]
+MAX_TEXTS_NAMED = 3
+
+
+class NotReady(Conflict):
+    """A launch check that blocks has found something."""
+
+    code = "not_ready"
+
+
+class ToLaunch(NamedTuple):
+    """What participants of a live study meet: its declaration, clips, recruiters and links."""
+
+    version: StudyVersion
+    experiment: Experiment
+    recruiter: Recruiter | None
+    of_links: list[Recruiter]
+    has_personal_links: bool
+
+
+Check = Callable[[ToLaunch], Iterator[LaunchCheck]]
 
 
 def launch_checks(session: Session, name: str, identity: Identity) -> list[LaunchCheck]:
     """What speaks against opening the active version of a study, blocking findings first."""
-    study = find_study(session, name, identity, "view")
-    version = active_version(session, study)
-    findings = [finding for check in _CHECKS for finding in check(study, version)]
+    launch = _to_launch(session, find_study(session, name, identity, "view"))
+    findings = [finding for check in (*_BLOCKING, *_ADVISING) for finding in check(launch)]
     return sorted(findings, key=lambda finding: not finding.blocks)
 
 
-def _levels_told_apart(_study: Study, version: StudyVersion) -> Iterator[LaunchCheck]:
+def refuse_unready(session: Session, study: Study) -> None:
+    """NotReady, with the sentences of every blocking check, where the study must not be live as it is."""
+    launch = _to_launch(session, study)
+    sentences = [finding.text for check in _BLOCKING for finding in check(launch) if finding.blocks]
+    if sentences:
+        raise NotReady(" ".join(sentences))
+
+
+def refuse_if_live(session: Session, study: Study) -> None:
+    """As `refuse_unready`, of a new version of a study that is live."""
+    if study.status == "live":
+        refuse_unready(session, study)
+
+
+def refuse_recruiter(study: Study, recruiter: Recruiter | None, page: str) -> None:
+    """NotReady where a live study gets this recruiter, set on `page`, and nobody could be paid by it."""
+    if study.status == "live" and recruiter is not None and _code_is_random(recruiter):
+        raise NotReady(_CODE_NEEDED.format(page=page))
+
+
+def _to_launch(session: Session, study: Study) -> ToLaunch:
+    version = active_version(session, study)
+    return ToLaunch(
+        version,
+        definition_of(version),
+        stored_recruiter(study.recruiter) if study.recruiter else None,
+        [stored_recruiter(declared) for declared in links_repository.recruiters_of_links(session, study)],
+        links_repository.has_personal_links(session, study),
+    )
+
+
+def _placeholders(launch: ToLaunch) -> Iterator[LaunchCheck]:
+    """Texts that still have marks such as [Title]."""
+    for text in unfilled(launch.experiment):
+        yield LaunchCheck(kind="placeholders", blocks=text.certain, text=str(text))
+
+
+def _completion_codes(launch: ToLaunch) -> Iterator[LaunchCheck]:
+    """Prolific knows its own code alone; a random one pays nobody."""
+    recruiters = [(launch.recruiter, "Settings")] if launch.recruiter else []
+    recruiters += [(recruiter, "Links") for recruiter in launch.of_links]
+    for recruiter, page in recruiters:
+        if _code_is_random(recruiter):
+            text = _CODE_NEEDED.format(page=page)
+            yield LaunchCheck(kind="completion_code", blocks=True, text=text)
+            return
+
+
+_CODE_NEEDED = (
+    "Recruiting through Prolific needs the completion code of the Prolific study, and none is set: "
+    "participants would get a random code that Prolific does not accept. Enter it under {page}."
+)
+
+
+def _code_is_random(recruiter: Recruiter) -> bool:
+    fixed = recruiter.code_complete or (recruiter.redirect_url and "{code}" not in recruiter.redirect_url)
+    return recruiter.kind == "prolific" and not fixed
+
+
+def _levels_told_apart(launch: ToLaunch) -> Iterator[LaunchCheck]:
     """Levels that raters can recognize by something other than the factor."""
-    manifest = Manifest.model_validate(version.manifest)
+    manifest = Manifest.model_validate(launch.version.manifest)
     for sentence in reported_leaks(manifest.clips):
         yield LaunchCheck(
             kind="levels_told_apart", blocks=False, text=f"{sentence[:1].upper()}{sentence[1:]}."
         )
 
 
-_CHECKS: tuple[Check, ...] = (_levels_told_apart,)
+def _translations(launch: ToLaunch) -> Iterator[LaunchCheck]:
+    """Texts that participants read in another language than they chose."""
+    first = launch.experiment.languages[0]
+    for language, paths in untranslated(launch.experiment).items():
+        named = ", ".join(paths[:MAX_TEXTS_NAMED])
+        more = f" and {len(paths) - MAX_TEXTS_NAMED} more" if len(paths) > MAX_TEXTS_NAMED else ""
+        yield LaunchCheck(
+            kind="translations",
+            blocks=False,
+            text=f"Participants who choose the language {language} read {named}{more} in {first}: "
+            f"{'this text has' if len(paths) == 1 else 'these texts have'} no translation.",
+        )
+
+
+def _recruiter(launch: ToLaunch) -> Iterator[LaunchCheck]:
+    """Without a recruiter and without personal links nothing says who a participant is."""
+    if launch.recruiter is None and not launch.of_links and not launch.has_personal_links:
+        yield LaunchCheck(
+            kind="recruiter",
+            blocks=False,
+            text="No recruiter is set, so one person can take part twice. To recruit through Prolific, SONA "
+            "or MTurk, choose it under Settings first: links of these services are refused until then.",
+        )
+    if launch.recruiter is not None and launch.recruiter.kind == "sona" and not launch.recruiter.redirect_url:
+        yield LaunchCheck(
+            kind="recruiter",
+            blocks=False,
+            text="SONA grants credit by an address to go to at the end, and none is set. Enter SONA's "
+            "completion URL under Settings, or grant credit by hand.",
+        )
+
+
+_BLOCKING: tuple[Check, ...] = (_placeholders, _completion_codes)
+"""Fast: they are asked in the transaction that opens or changes the study."""
+_ADVISING: tuple[Check, ...] = (_recruiter, _translations, _levels_told_apart)

@@ -13,6 +13,7 @@ from server.context import Services, ServicesDep
 from server.errors import ERROR_RESPONSES
 from server.models import Link
 from server.studies.fields import Label
+from server.studies.launch_checks import refuse_recruiter
 from server.studies.link_schemas import LinkOut, LinkPage, NewLinks, Signing
 from server.studies.links import (
     LinkOptions,
@@ -75,6 +76,7 @@ def create_links(services: ServicesDep, identity: Writer, study: str, body: NewL
     rows = prepared_links(services.settings.key, options, labels)
     with services.database.write() as session:
         known = find_study(session, study, identity, "run")
+        refuse_recruiter(known, body.recruiter, "Links")
         make_links(session, known, body.kind, body.group, rows)
         record(session, identity, "links made", "study", study, links=body.kind, number=len(rows))
     return [_link_out(services, row) for row in rows]

@@ -1,5 +1,6 @@
 """Links into studies, and how many runs each has."""
 
+import json
 from collections.abc import Sequence
 from typing import Any
 
@@ -47,6 +48,21 @@ def first_general_link(session: Session, study: Study, group: str) -> Link | Non
     """The oldest general link for a group (empty: for none) that belongs to no recruiter."""
     query = _shown(study).where(Link.kind == "general", Link.recruiter.is_(None), Link.group_name == group)
     return session.scalar(query.limit(1))
+
+
+def recruiters_of_links(session: Session, study: Study) -> list[dict[str, Any]]:
+    """The recruiters that links of a study have for themselves, each once."""
+    query = select(Link.recruiter).where(
+        Link.study_id == study.id, Link.revoked_at.is_(None), Link.kind != "preview"
+    )
+    stored = (recruiter for recruiter in session.scalars(query.order_by(Link.id)) if recruiter)
+    return list({json.dumps(recruiter, sort_keys=True): recruiter for recruiter in stored}.values())
+
+
+def has_personal_links(session: Session, study: Study) -> bool:
+    """Whether somebody was given a link that is theirs alone."""
+    personal = _shown(study).where(Link.kind == "personal").limit(1)
+    return session.scalar(personal) is not None
 
 
 def _shown(study: Study) -> Select[Link]:

@@ -18,6 +18,7 @@ from server.studies.clip_schemas import ClipOut
 from server.studies.definitions import design_out
 from server.studies.edits import for_edit
 from server.studies.importing import size_notes
+from server.studies.launch_checks import refuse_recruiter, refuse_unready
 from server.studies.lookup import (
     active_version,
     definition_of,
@@ -48,6 +49,8 @@ def change_status(session: Session, name: str, revision: int, status: str, ident
         raise Conflict(
             f"A study that is {study.status} can become {' or '.join(ALLOWED[study.status])}, not {status}."
         )
+    if status == "live":
+        refuse_unready(session, study)
     if study.status == "draft":
         study.opened_at = now()
     study.closed_at = now() if status == "closed" else None
@@ -59,8 +62,11 @@ def change_status(session: Session, name: str, revision: int, status: str, ident
 def change_settings(session: Session, name: str, order: ChangeSettings, identity: Identity) -> None:
     """Pause or go on, set the quota, name the recruiter."""
     study = for_edit(session, name, order.revision, identity, "run")
+    recruiter_before = study.recruiter
     study.paused, study.quota = order.paused, order.quota
     study.recruiter = _checked_recruiter(order.recruiter, study.recruiter)
+    if study.recruiter != recruiter_before:
+        refuse_recruiter(study, order.recruiter, "Settings")
     study.revision += 1
     record(
         session, identity, "settings changed", "study", name, paused=order.paused, quota=order.quota,

@@ -429,6 +429,11 @@ export interface paths {
   };
   get: operations["get_monitor"];
  };
+ "/api/admin/studies/{study}/failing-clips": {
+  parameters: {
+  };
+  get: operations["list_failing_clips"];
+ };
  "/api/admin/studies/{study}/monitor/stream": {
   parameters: {
   };
@@ -1550,6 +1555,18 @@ export interface components {
    name: string;
    label: string;
    levels: components["schemas"]["LevelOut"][];
+  };
+  FailingClip: {
+   clip_sha256: string;
+   file: string;
+   cell: string;
+   people: number;
+   failed_for: number;
+   rules: {
+    [key: string]: number;
+   };
+   reason: string;
+   alarm: boolean;
   };
   ForgottenPassword: {
    name: string;
@@ -3779,6 +3796,7 @@ export type Exemplars = components['schemas']['Exemplars'];
 export type Experiment = components['schemas']['Experiment'];
 export type Factor = components['schemas']['Factor'];
 export type FactorOut = components['schemas']['FactorOut'];
+export type FailingClip = components['schemas']['FailingClip'];
 export type ForgottenPassword = components['schemas']['ForgottenPassword'];
 export type Form = components['schemas']['Form'];
 export type FormAnswers = components['schemas']['FormAnswers'];
@@ -7283,6 +7301,42 @@ export interface operations {
     };
     content: {
      "application/json": components["schemas"]["MonitorSnapshot"];
+    };
+   };
+   422: {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["ErrorBody"];
+    };
+   };
+   "4XX": {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["ErrorBody"];
+    };
+   };
+  };
+ };
+ list_failing_clips: {
+  parameters: {
+   query?: {
+    origin?: ("participant" | "preview" | "pilot" | "simulated") | null;
+   };
+   path: {
+    study: string;
+   };
+  };
+  responses: {
+   200: {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["FailingClip"][];
     };
    };
    422: {

@@ -49,6 +49,7 @@ NEEDED: dict[Right, set[str]] = {
         "GET originals/{sha256}/frame-map.csv",
         "GET monitor",
         "GET monitor/stream",
+        "GET failing-clips",
         "GET results",
         "GET data/analysis.{language}",
         "GET data/codebook.md",

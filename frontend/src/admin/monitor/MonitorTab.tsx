@@ -5,6 +5,7 @@ import { ORIGINS } from "../results/origins";
 import type { Schemas } from "../api";
 import { Figures } from "../ui/Figures";
 import { soon } from "../ui/format";
+import { FailingClips } from "./FailingClips";
 import { Funnel } from "./Funnel";
 import { Groups } from "./Groups";
 import { Quality } from "./Quality";
@@ -66,6 +67,7 @@ export function MonitorTab() {
             <Quality runs={snapshot.runs} of={snapshot.total} />
             {snapshot.groups.length > 0 && <Groups groups={snapshot.groups} />}
           </SimpleGrid>
+          <FailingClips study={study} all />
           <RunTable study={study} snapshot={snapshot} />
         </>
       )}

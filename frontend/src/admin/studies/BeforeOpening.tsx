@@ -16,7 +16,11 @@ export function BeforeOpening({ study, status }: { study: string; status: string
       {checks.length > 0 && (
         <Stack gap="xs" mt="sm">
           {checks.map(({ kind, blocks, text }) => (
-            <Alert key={`${kind} ${text}`} color={blocks ? "red" : "yellow"} title={blocks ? "Fix this first" : "Check this first"}>
+            <Alert
+              key={`${kind} ${text}`}
+              color={blocks ? "red" : "yellow"}
+              title={blocks ? (status === "live" ? "Fix this first" : "Fix this before the study goes live") : "Check this first"}
+            >
               <Text size="sm">{text}</Text>
             </Alert>
           ))}

@@ -18,20 +18,28 @@ export function OpenedDialog({ study, onClose }: Props) {
   const link = useQuery({ queryKey: ["links", study, "general"], queryFn: () => generalLink(study) });
   const detail = useQuery(studyQuery(study)).data;
   const recruiter = detail?.recruiter;
-  const kinds = typeof recruiter?.["kind"] === "string" ? [recruiter["kind"]] : ["prolific", "sona"];
+  const kind = typeof recruiter?.["kind"] === "string" ? recruiter["kind"] : null;
   return (
     <Modal opened onClose={onClose} title="Participants can begin" size="lg" closeButtonProps={{ "aria-label": "Close" }}>
       <Answer of={link}>
         {({ url }) => (
           <Stack>
             <Address label="Link for participants" url={url} />
-            {kinds.map((kind) => (
+            {kind === null ? (
+              <Text size="sm">
+                To recruit through Prolific, SONA or MTurk, first choose the service under{" "}
+                <Link to="/studies/$study/settings" params={{ study }} onClick={onClose}>
+                  Settings
+                </Link>
+                . The link then appears here and under Links. Until then links of these services are refused, because participants would
+                have no id, get a random completion code, and could take part twice.
+              </Text>
+            ) : (
               <Address
-                key={kind}
-                label={`For ${RECRUITER_NAMES[kind] ?? kind}, which fills in who comes`}
-                url={addressFor(url, kind === recruiter?.["kind"] ? recruiter : { kind })}
+                label={`For ${RECRUITER_NAMES[kind] ?? kind}, which fills in each participant's id`}
+                url={addressFor(url, recruiter)}
               />
-            ))}
+            )}
             <TurnedAway design={detail?.design} />
             <Text size="sm" c="dimmed">
               Personal links, quotas and completion codes are under{" "}

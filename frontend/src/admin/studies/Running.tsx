@@ -1,6 +1,6 @@
 /** Whether people may begin, how many, where they come from and where they go at the end. */
 
-import { Button, Card, Group, NumberInput, Select, SimpleGrid, Stack, Switch, TextInput, Title } from "@mantine/core";
+import { Button, Card, Group, NumberInput, Select, SimpleGrid, Stack, Switch, Text, TextInput, Title } from "@mantine/core";
 import { useState } from "react";
 import { api, type Schemas, unwrap } from "../api";
 import { useChange } from "../ui/useChange";
@@ -10,7 +10,7 @@ type Kind = NonNullable<Schemas["Recruiter"]["kind"]>;
 const KINDS: Kind[] = ["prolific", "sona", "mturk", "generic"];
 
 const FIELDS = {
-  code_complete: ["Completion code", "empty: one of its own for each run"],
+  code_complete: ["Completion code", "empty: a different one for each run"],
   code_screened_out: ["Code where screened out", "empty: none is shown"],
   code_failed_check: ["Code where checks failed", "empty: the completion code"],
   redirect_screened_out: ["Address for who is screened out", "empty: none, on Prolific by the code"],
@@ -73,6 +73,12 @@ export function Running({ detail }: { detail: Schemas["StudyDetail"] }) {
         </Group>
         {kind !== null && <RecruiterFields texts={texts} onChange={setTexts} />}
         {Boolean(detail.recruiter?.["signature_parameter"]) && <SigningButton study={name} />}
+        {kind === "prolific" && texts.code_complete === "" && (
+          <Text size="sm" c="orange.9">
+            Enter the completion code of the Prolific study: without it participants get a random code, which Prolific does not accept, and
+            the study cannot go live.
+          </Text>
+        )}
         <Button onClick={() => save.mutate(undefined)} loading={save.isPending}>
           Save
         </Button>

@@ -1,6 +1,8 @@
 import { Button, Group } from "@mantine/core";
+import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";
 import { api, type Schemas, unwrap } from "../api";
+import { launchChecksQuery } from "../queries";
 import { keptWork } from "../builder/kept";
 import { ConfirmButton } from "../ui/ConfirmButton";
 import { useChange } from "../ui/useChange";
@@ -32,6 +34,8 @@ export function StatusButtons({ summary }: { summary: Schemas["StudySummary"] })
       then: (detail) => setOpened(isOpen(detail.summary.status)),
     },
   );
+  // Loaded by what the dialog shows; the server refuses for the same reasons.
+  const isBlocked = useQuery({ ...launchChecksQuery(summary.name), enabled: false }).data?.some(({ blocks }) => blocks) ?? false;
   const preview = useChange(
     () =>
       unwrap(
@@ -54,6 +58,7 @@ export function StatusButtons({ summary }: { summary: Schemas["StudySummary"] })
           question={`${WORDS[status][1]}${keptWork(summary.name) === null ? "" : " The work in the builder is not saved and not part of it."}`}
           confirm={WORDS[status][0]}
           harmless={status !== "closed"}
+          blocked={status === "live" && isBlocked}
           onConfirm={() => change.mutate(status)}
         >
           {isOpen(status) && <BeforeOpening study={summary.name} status={status} />}

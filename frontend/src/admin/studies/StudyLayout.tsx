@@ -5,6 +5,7 @@ import { useEffect, useRef } from "react";
 import { useQuery } from "@tanstack/react-query";
 import { Outlet, useLocation, useNavigate, useParams } from "@tanstack/react-router";
 import type { Schemas } from "../api";
+import { FailingClips } from "../monitor/FailingClips";
 import { studyQuery } from "../queries";
 import { Answer } from "../ui/Answer";
 import { StatusBadge } from "./StatusBadge";
@@ -53,6 +54,7 @@ export function StudyLayout() {
             </div>
             {summary.rights.includes("run") && summary.archived_at === null && <StatusButtons summary={summary} />}
           </Group>
+          <FailingClips study={study} />
           <Tabs
             value={current}
             keepMounted={false}

@@ -12,10 +12,12 @@ interface Props extends ButtonProps {
   confirm: string;
   /** True where nothing is lost by it. */
   harmless?: boolean;
+  /** True where something named below the question has to be done first. */
+  blocked?: boolean;
   onConfirm: () => void;
 }
 
-export function ConfirmButton({ label, question, children, confirm, harmless = false, onConfirm, ...button }: Props) {
+export function ConfirmButton({ label, question, children, confirm, harmless = false, blocked = false, onConfirm, ...button }: Props) {
   const [opened, { open, close }] = useDisclosure(false);
   return (
     <>
@@ -31,6 +33,7 @@ export function ConfirmButton({ label, question, children, confirm, harmless = f
           </Button>
           <Button
             {...(harmless ? {} : { color: "red" })}
+            disabled={blocked}
             onClick={() => {
               close();
               onConfirm();

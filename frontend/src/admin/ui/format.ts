@@ -27,8 +27,8 @@ export function fixed(value: number | null | undefined, digits = 2): string {
 }
 
 /** "1 run", "2 runs". */
-export function counted(number: number, thing: string): string {
-  return `${number.toLocaleString()} ${number === 1 ? thing : `${thing}s`}`;
+export function counted(number: number, thing: string, several = `${thing}s`): string {
+  return `${number.toLocaleString()} ${number === 1 ? thing : several}`;
 }
 
 /** A key of the data as words: "forms_before" is "forms before". */

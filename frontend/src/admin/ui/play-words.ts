@@ -10,6 +10,9 @@ const RULES: Readonly<Record<string, string>> = {
   flagged_longest_gap_ms: "gap between frames",
   uncertain_unevenness_ms: "uneven clock of the page",
   video_fallback: "shown by the video element",
+  clip_not_played: "the browser could not play it",
+  wrong_clip: "another clip was shown",
+  not_rated: "no answer could be given",
   impossible_value: "the browser reported an impossible number",
   no_clock_record: "no record of the clock",
 };
