@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from video_conversion.frame_times import frame_map
-from video_conversion.video_file import NotAClip, VideoFile
+from video_conversion.video_file import MAX_PX, NotAClip, VideoFile, check_amount
 
 PLAYED_PROFILES = ("Constrained Baseline", "Baseline", "Main", "High", "Progressive High", "Constrained High")
 MIN_FPS, MAX_FPS = 1, 240
@@ -63,9 +63,11 @@ def conversion_of(video: VideoFile, asked_fps: float | None) -> Conversion:
         raise NotAClip(
             f"it has {float(rate):g} frames per second; choose a rate of {MIN_FPS} to {MAX_FPS} for all clips"
         )
+    turned_px, filters, picture_changes = _picture(video)
+    # A frame that is shown for long is repeated: few frames may become many.
+    check_amount(round((video.end_s - video.times_s[0]) * float(rate)), turned_px[0] * turned_px[1])
     keeps_times = video.rate is not None and abs(float(video.rate) - float(rate)) < 1e-6 * float(rate)
     shown = tuple(range(len(video.times_s))) if keeps_times else frame_map(video.times_s, video.end_s, rate)
-    turned_px, filters, picture_changes = _picture(video)
     timing = () if keeps_times else (_timing_words(video, rate, shown),)
     changes = (*_stream_words(video), *timing, *picture_changes)
     left_out = _left_out(video)
@@ -96,6 +98,10 @@ def _picture(video: VideoFile) -> tuple[tuple[int, int], str, tuple[str, ...]]:
     filters, words = [], []
     if video.pixel_aspect not in (0, 1):
         width = max(2, round(width * video.pixel_aspect))
+        if width > MAX_PX:
+            raise NotAClip(
+                f"its pixels are stretched to {width} x {height}; scale it to at most {MAX_PX} a side"
+            )
         filters.append(f"scale={width}:{height}:flags=lanczos,setsar=1")
         words.append(f"stretched to square pixels, {width} x {height}")
     if video.rotation_deg:

@@ -17,6 +17,9 @@ from video_conversion.frame_times import LONE_FRAME_RATE, constant_rate, typical
 MAX_S = 120.0
 MAX_PX = 4096
 MAX_FRAMES = 30_000
+MAX_FPS = 1_000
+MAX_PIXELS = 32_000_000_000
+"""Of all frames together: two minutes of 3840 x 2160 pixels at 30 frames per second take 29.9 billion."""
 FORMATS = (
     "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi,mpegts,mpeg,mpegvideo,gif,apng,flv,asf,ogg,mxf,"
     "yuv4mpegpipe,h264,hevc,ivf,dv,nut"
@@ -88,6 +91,8 @@ def opened(path: Path) -> Iterator[Any]:
     try:
         with av.open(str(path), options=OPEN_OPTIONS, metadata_errors="ignore") as container:
             yield container
+    except MemoryError:
+        raise
     except (FFmpegError, ValueError, EOFError) as error:
         raise NotAClip(f"it cannot be read as a video, it may be damaged; {READ_AGAIN}") from error
 
@@ -98,18 +103,59 @@ def examine(path: Path) -> VideoFile:
     Raises
     ------
     NotAClip
-        It is no video, damaged, interlaced, in HDR or wide-gamut colours, or beyond a limit.
+        It is not a video, damaged, interlaced, in HDR or wide-gamut colours, or beyond a limit. What the
+        container says of rate, frames and pixels is checked before the first frame is decoded.
     """
+    _check_packets(path)
+    with opened(path) as container:
+        stream = container.streams.video[0]
+        frames = _Frames()
+        for frame in _decoded(container, stream):
+            frames.add(frame)
+        return _described(container, stream, frames)
+
+
+def _check_packets(path: Path) -> None:
+    """NotAClip where the container holds more than a clip may: packets are counted, and none is decoded."""
     with opened(path) as container:
         if not container.streams.video:
             held = ", ".join(sorted({stream.type for stream in container.streams})) or "nothing"
             raise NotAClip(f"it holds {held} and no picture; expected a video")
         stream = container.streams.video[0]
-        _check_size(stream.codec_context, container.duration)
-        frames = _Frames()
-        for frame in _decoded(container, stream):
-            frames.add(frame)
-        return _described(container, stream, frames)
+        context = stream.codec_context
+        _check_size(context, container.duration)
+        pixels = context.width * context.height
+        check_amount(stream.frames, pixels)
+        count, earliest, latest = 0, None, None
+        for packet in container.demux(stream):
+            if not packet.size:
+                continue
+            count += 1
+            check_amount(count, pixels)
+            if packet.pts is not None:
+                earliest = packet.pts if earliest is None else min(earliest, packet.pts)
+                latest = packet.pts if latest is None else max(latest, packet.pts)
+        if earliest is None or latest is None or count < 2:
+            return
+        span_s = float((latest - earliest) * stream.time_base)
+        _check_rate(count, span_s)
+
+
+def _check_rate(count: int, span_s: float) -> None:
+    if count - 1 > MAX_FPS * span_s:
+        had = f"{(count - 1) / span_s:.0f}" if span_s > 0 else "any number of"
+        raise NotAClip(f"it has {had} frames per second; make it at most {MAX_FPS} frames per second")
+
+
+def check_amount(frames: int, pixels: int) -> None:
+    """NotAClip where there are more frames, or more pixels in all frames together, than a clip may have."""
+    if frames > MAX_FRAMES:
+        raise NotAClip(f"it has more than {MAX_FRAMES} frames; cut it shorter")
+    if frames * pixels > MAX_PIXELS:
+        raise NotAClip(
+            f"it has at least {frames} frames of {pixels / 1e6:.3g} megapixels; cut it or scale it down to "
+            f"at most {MAX_PIXELS / 1e9:.0f} billion pixels in all"
+        )
 
 
 def _check_size(context: Any, duration_us: int | None) -> None:
@@ -125,16 +171,18 @@ def _check_size(context: Any, duration_us: int | None) -> None:
 
 def _decoded(container: Any, stream: Any) -> Iterator[Any]:
     """Each frame; NotAClip for the first that is damaged, which a decoder would else patch up."""
-    stream.codec_context.options = {"err_detect": "explode"}
+    # A stream may change its size on the way: no picture larger than the largest allowed is ever decoded.
+    stream.codec_context.options = {"err_detect": "explode", "max_pixels": str(MAX_PX * MAX_PX)}
     number = 0
     try:
         for frame in container.decode(stream):
             if frame.is_corrupt:
                 raise NotAClip(f"its frame {number} is damaged; {READ_AGAIN}")
             number += 1
-            if number > MAX_FRAMES:
-                raise NotAClip(f"it has more than {MAX_FRAMES} frames; cut it shorter")
+            check_amount(number, frame.width * frame.height)
             yield frame
+    except MemoryError:
+        raise
     except (FFmpegError, ValueError) as error:
         raise NotAClip(f"it cannot be decoded after its frame {number}; {READ_AGAIN}") from error
 

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from server.studies.uploaded_file import UploadTooLarge
+from server.transcoding.records import sender
 
 MAX_UPLOADS = 200
 """Of an account within a day."""
-_WHOSE = ".account"
-"""File of an upload's folder with the number of the account that sent it."""
 
 
 @dataclass(frozen=True)
@@ -70,20 +69,6 @@ class Quota:
             f"{self.bytes / 1e9:.1f} GB in {MAX_UPLOADS} are kept. "
             "Each is removed after a day; studies that were made of them stay."
         )
-
-
-def mark(upload: Path, account: int) -> None:
-    """Say whose an upload is."""
-    (upload / _WHOSE).write_text(str(account), encoding="ascii")
-
-
-def sender(upload: Path) -> str | None:
-    """The number of the account that sent an upload; None where nobody is named."""
-    # Uploads that an older release took have no sender; they end within a day.
-    try:
-        return (upload / _WHOSE).read_text(encoding="ascii")
-    except (FileNotFoundError, NotADirectoryError):
-        return None
 
 
 def _sizes(upload: Path) -> Iterator[int]:

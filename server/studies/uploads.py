@@ -13,9 +13,17 @@ from server.errors import Invalid, NotFound
 from server.studies.clip_schemas import UploadedFile, UploadOut, UploadProgress
 from server.studies.left_out import files_aside
 from server.studies.packed import MAX_FILES, unpack
-from server.studies.upload_quota import Quota, mark, sender
+from server.studies.upload_quota import Quota
 from server.studies.uploaded_file import UploadTooLarge, copy, safe_name
-from server.transcoding.records import ask_rate, asked_rate, records_of, videos_of, write_record
+from server.transcoding.records import (
+    ask_rate,
+    asked_rate,
+    mark,
+    records_of,
+    sender,
+    videos_of,
+    write_record,
+)
 from video_conversion.prepared import Prepared, clip_name
 
 KEEP_S = 24 * 3600

@@ -10,6 +10,22 @@ from experiments.manifest import MANIFEST_NAME
 from video_conversion.prepared import VIDEO_ENDINGS, Prepared
 
 RECORDS, FRAME_RATE, BEGUN, CLIPS = ".prepared", ".frame_rate", ".begun", ".clips"
+_WHOSE = ".account"
+"""File of an upload's folder with the number of the account that sent it."""
+
+
+def mark(upload: Path, account: int) -> None:
+    """Say whose an upload is."""
+    (upload / _WHOSE).write_text(str(account), encoding="ascii")
+
+
+def sender(upload: Path) -> str | None:
+    """The number of the account that sent an upload; None where nobody is named."""
+    # Uploads that an older release took have no sender; they end within a day.
+    try:
+        return (upload / _WHOSE).read_text(encoding="ascii")
+    except (FileNotFoundError, NotADirectoryError):
+        return None
 
 
 def videos_of(folder: Path) -> list[Path]:
