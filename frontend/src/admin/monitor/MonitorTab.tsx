@@ -5,13 +5,14 @@ import { ORIGINS } from "../results/origins";
 import type { Schemas } from "../api";
 import { Figures } from "../ui/Figures";
 import { soon } from "../ui/format";
-import { FailingClips } from "./FailingClips";
+import { onDemand } from "../ui/onDemand";
 import { Funnel } from "./Funnel";
 import { Groups } from "./Groups";
 import { Quality } from "./Quality";
 import { RunTable } from "./RunTable";
 import { useMonitor } from "./useMonitor";
 
+const FailingClips = onDemand(async () => (await import("./FailingClips")).FailingClips);
 type Origin = Schemas["MonitorSnapshot"]["origin"];
 
 const MONITORED = [...ORIGINS, { value: "preview", label: "Preview" }] satisfies { value: Origin; label: string }[];

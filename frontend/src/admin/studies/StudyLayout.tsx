@@ -5,11 +5,13 @@ import { useEffect, useRef } from "react";
 import { useQuery } from "@tanstack/react-query";
 import { Outlet, useLocation, useNavigate, useParams } from "@tanstack/react-router";
 import type { Schemas } from "../api";
-import { FailingClips } from "../monitor/FailingClips";
 import { studyQuery } from "../queries";
 import { Answer } from "../ui/Answer";
+import { onDemand } from "../ui/onDemand";
 import { StatusBadge } from "./StatusBadge";
 import { StatusButtons } from "./StatusButtons";
+
+const FailingClips = onDemand(async () => (await import("../monitor/FailingClips")).FailingClips);
 
 const TABS = [
   ["design", "Design"],
