@@ -17,6 +17,7 @@ WORDS = {
     "colour": "red green blue yellow black white grey gray orange purple brown pink",
     "agent": "human robot android avatar person agent",
     "condition": "control treatment baseline experimental",
+    "system": "ours baseline proposed mocap gt groundtruth reference natural ablation previous handmade",
     "presence": "on off with without yes no present absent",
     "quality": "original compressed reference impaired",
     "profile": "real model",
@@ -26,10 +27,11 @@ TAKES = ("exemplar", "ex", "take", "rep", "clip", "no", "nr", "n", "v", "version
 """Words that number clips of the same kind."""
 _KEYED = re.compile(r"([A-Za-z][A-Za-z0-9]*)([-=])(.+)")
 _NUMBERED = re.compile(r"([A-Za-z]+)()(\d+(?:[.p]\d+)?)")
+_WITH_UNIT = re.compile(r"(.*\d)(ms|s|fps|hz|px|mm|cm|deg|db|percent)", re.IGNORECASE)
 
 
-def name_and_prefix(parts: Sequence[str]) -> tuple[str | None, str]:
-    """What a factor may be called by its levels, and what stands before each of them.
+def name_and_frame(parts: Sequence[str]) -> tuple[str | None, str, str]:
+    """What a factor may be called by its levels, and what stands before and after each of them.
 
     Parameters
     ----------
@@ -41,8 +43,20 @@ def name_and_prefix(parts: Sequence[str]) -> tuple[str | None, str]:
     str or None
         The name; None where the parts do not give one away.
     str
-        What begins each part and is no part of the level, such as `speed-`.
+        What begins each part without belonging to the level, such as `speed-`.
+    str
+        What ends each part likewise, such as the unit of `dur60ms`.
     """
+    name, head = _name_and_head(parts)
+    tails = {fit[2] if (fit := _WITH_UNIT.fullmatch(part)) else "" for part in parts}
+    if name is None and len(tails) == 1 and (tail := tails.pop()):
+        name, head = _name_and_head([part.removesuffix(tail) for part in parts])
+        if name is not None:
+            return name, head, tail
+    return name, head, ""
+
+
+def _name_and_head(parts: Sequence[str]) -> tuple[str | None, str]:
     for form in (_KEYED, _NUMBERED):
         fits = [form.fullmatch(part) for part in parts]
         heads = {fit[1] + fit[2] for fit in fits if fit is not None}

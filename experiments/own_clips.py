@@ -11,7 +11,7 @@ from math import prod
 from pathlib import PurePosixPath
 
 from experiments.errors import InputError, did_you_mean
-from experiments.factor_names import TAKES, name_and_prefix
+from experiments.factor_names import TAKES, name_and_frame
 from experiments.level_order import in_order
 from experiments.name_patterns import FIELD, NamePattern
 from experiments.text_tables import separator_of
@@ -46,6 +46,7 @@ def _read_table(text: str, files: Iterable[str]) -> Placed:
             f"expected a CSV with a column 'file' and one a factor, got {', '.join(columns) or 'none'}"
         )
     factors = [name for name in columns if name not in ("file", FIRST_FIELD)]
+    refuse_reserved_factors(factors)
     known, rows = set(files), {}
     for number, row in enumerate(reader, start=2):
         name = one_form((row["file"] or "").strip())
@@ -67,6 +68,7 @@ def _read_table(text: str, files: Iterable[str]) -> Placed:
 def levels_from_names(pattern: str, files: Iterable[str]) -> Placed:
     """Read levels from file names by a pattern such as `{character}_{speed}_{exemplar}.mp4`."""
     fields = FIELD.findall(pattern)
+    refuse_reserved_factors(fields)
     if not [name for name in fields if name != FIRST_FIELD] or len(set(fields)) != len(fields):
         raise InputError(
             "expected a pattern with factors in braces, each once, such as {character}_{exemplar}.mp4"
@@ -119,9 +121,15 @@ def check_factorial(placed: Placed) -> None:
             f"every cell needs the same number of clips: {'/'.join(largest[0])} has {largest[1]}, "
             f"{'/'.join(smallest[0])} has {smallest[1]}"
         )
-    if reserved := [name for name in known if name in reserved_names()]:
+    refuse_reserved_factors(known)
+
+
+def refuse_reserved_factors(names: Iterable[str]) -> None:
+    """InputError where a factor has the name of another column of the answers."""
+    if reserved := sorted(set(names) & (reserved_names() - {FIRST_FIELD})):
         raise InputError(
-            f"a factor cannot be called '{reserved[0]}', the name of a ratings column; rename it"
+            f"a factor cannot be called '{reserved[0]}', the name of a column of the answers; call it, say, "
+            f"'{reserved[0]}_shown'"
         )
 
 
@@ -152,22 +160,28 @@ def check_names(names: Iterable[str]) -> None:
 
 
 def suggest_pattern(names: Iterable[str]) -> str | None:
-    """A pattern where every name has as many parts between underscores, or hyphens; None elsewhere.
+    """A pattern where every name has as many parts between underscores, hyphens or blanks, or is one part.
 
     Factors are called by what their levels give away (`factor_names`), else `factor1`, `factor2` and so on.
+    None where the names follow no pattern, and where all that varies is a number of the clip.
     """
     paths = [PurePosixPath(name) for name in names]
     endings = {path.suffix for path in paths}
     ending = endings.pop() if len(endings) == 1 else ".mp4"
+    stems = [path.stem for path in paths]
     for between in ("_", "-", " "):
-        if (stem := _suggested([path.stem for path in paths], between)) is not None:
+        if (stem := _suggested(stems, between)) is not None:
             return stem + ending
-    return None
+    whole = "\0"  # in no name: the names are one part each
+    if any(sign in stem for stem in stems for sign in "_- "):
+        return None
+    stem = _suggested(stems, whole, least_parts=1)
+    return None if stem is None or FIELD.findall(stem)[0] in (FIRST_FIELD, *TAKES) else stem + ending
 
 
-def _suggested(stems: Sequence[str], between: str) -> str | None:
+def _suggested(stems: Sequence[str], between: str, least_parts: int = 2) -> str | None:
     split = [stem.split(between) for stem in stems]
-    if not split or len({len(parts) for parts in split}) != 1 or len(split[0]) < 2:
+    if not split or len({len(parts) for parts in split}) != 1 or len(split[0]) < least_parts:
         return None
     columns = list(zip(*split, strict=True))
     varying = [position for position, column in enumerate(columns) if len(set(column)) > 1]
@@ -176,15 +190,15 @@ def _suggested(stems: Sequence[str], between: str) -> str | None:
     words = [column[0] for column in columns]  # a part that every name has stands as it is
     taken: set[str] = set()
     for number, position in enumerate(varying, start=1):
-        guessed, head = name_and_prefix(columns[position])
+        guessed, head, tail = name_and_frame(columns[position])
         last = position == len(columns) - 1 and len(varying) > 1
         counts = all(part.removeprefix(head).isdigit() for part in columns[position])
         if last and counts and (head == "" or guessed in TAKES):
             guessed = FIRST_FIELD
         if guessed is None or guessed in taken:
-            guessed, head = _free_number(number, taken), ""
+            guessed, head, tail = _free_number(number, taken), "", ""
         taken.add(guessed)
-        words[position] = f"{head}{{{guessed}}}"
+        words[position] = f"{head}{{{guessed}}}{tail}"
     return between.join(words)
 
 

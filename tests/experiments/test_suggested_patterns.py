@@ -2,7 +2,9 @@
 
 import pytest
 
-from experiments.own_clips import levels_from_names, suggest_pattern
+from experiments.errors import InputError
+from experiments.own_clips import levels_from_names, levels_from_table, suggest_pattern
+from experiments.trials import reserved_names
 
 
 @pytest.mark.parametrize(
@@ -25,6 +27,18 @@ from experiments.own_clips import levels_from_names, suggest_pattern
         (["happy_v0.5.mp4", "sad_v1.mp4"], "{emotion}_v{v}.mp4"),
         (["happy_v1.mp4", "sad_v2.mp4"], "{emotion}_v{exemplar}.mp4"),
         (["factor2-a_xx.mp4", "factor2-b_qq.mp4"], "factor2-{factor2}_{factor3}.mp4"),
+        (["ours.mp4", "baseline.mp4", "mocap.mp4"], "{system}.mp4"),
+        (["ours_1.mp4", "mocap_1.mp4", "ours_2.mp4", "mocap_2.mp4"], "{system}_{exemplar}.mp4"),
+        (["dur60.mp4", "dur90.mp4", "dur180.mp4"], "dur{dur}.mp4"),
+        (["dur60ms.mp4", "dur180ms.mp4"], "dur{dur}ms.mp4"),
+        (["face_dur60ms_1.mp4", "face_dur180ms_1.mp4"], "face_dur{dur}ms_1.mp4"),
+        (["speed=slow.mp4", "speed=fast.mp4"], "speed={speed}.mp4"),
+        (["left.mp4", "right.mp4"], "{side}.mp4"),
+        (["alpha.mp4", "beta.mp4"], "{factor1}.mp4"),
+        (["60.mp4", "90.mp4"], "{factor1}.mp4"),
+        (["clip1.mp4", "clip2.mp4"], None),
+        (["take01.mov", "take02.mov"], None),
+        (["one.mp4"], None),
         (["one_1.mp4"], None),
         (["a_1.mp4", "b.mp4"], None),
     ],
@@ -33,6 +47,21 @@ def test_parts_that_vary_are_factors(names: list[str], pattern: str | None) -> N
     assert suggest_pattern(names) == pattern
     if pattern is not None:
         assert set(levels_from_names(pattern, names)) == set(names)
+
+
+@pytest.mark.parametrize("name", ["method", "value", "kind", "position", "series", "reference"])
+def test_a_factor_with_the_name_of_a_column_is_refused_as_soon_as_it_is_read(name: str) -> None:
+    with pytest.raises(InputError, match=f"'{name}'.*'{name}_shown'"):
+        levels_from_names(f"{{{name}}}_{{exemplar}}.mp4", ["a_1.mp4"])
+    with pytest.raises(InputError, match=f"'{name}'.*'{name}_shown'"):
+        levels_from_table(f"file,{name}\na_1.mp4,a\n", ["a_1.mp4"])
+
+
+def test_no_suggested_name_is_one_of_a_column() -> None:
+    for name in sorted(reserved_names() - {"exemplar"}):
+        pattern = suggest_pattern([f"{name}-a_1.mp4", f"{name}-b_1.mp4"])
+        assert pattern is not None
+        assert f"{{{name}}}" not in pattern
 
 
 def test_an_ending_is_no_part_of_a_level_as_the_page_shows_it() -> None:

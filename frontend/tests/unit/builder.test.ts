@@ -5,7 +5,18 @@ import { fileURLToPath } from "node:url";
 import { describe, expect, it } from "vitest";
 import declared from "../../src/api/declaration.json";
 import { FORMS, inLanguages } from "../../src/admin/builder/bank";
-import { type Data, freeName, isTable, labelOf, listAt, type Path, valueAt, withMoved, withValue } from "../../src/admin/builder/data";
+import {
+  type Data,
+  freeName,
+  isTable,
+  labelOf,
+  listAt,
+  type Path,
+  singularOf,
+  valueAt,
+  withMoved,
+  withValue,
+} from "../../src/admin/builder/data";
 import { begun, edited, latestToml, redone, undone, written } from "../../src/admin/builder/history";
 import { type Editor, editorOf, effectOf, EXPERIMENT, type Schema, starter, starterOf } from "../../src/admin/builder/schema";
 import { helpOf } from "../../src/admin/builder/help";
@@ -235,5 +246,12 @@ describe("the preview of a trial", () => {
     ["yes or no", { kind: "threshold", task: { asks: "yes_no" } }, ["clip"], false],
   ])("has the clips of %s", (_, trial, words, stacked) => {
     expect(shownClips(trial)).toEqual({ words, stacked });
+  });
+});
+
+describe("buttons that add to a list", () => {
+  it("name one of it, for every list of a declaration", () => {
+    const one = ["languages", "factors", "series", "categories", "own per", "exclusions", "choices", "verdicts"].map(singularOf);
+    expect(one).toEqual(["language", "factor", "series", "category", "own per", "exclusion", "choice", "verdict"]);
   });
 });

@@ -1,6 +1,14 @@
 import { describe, expect, it } from "vitest";
 import { sizeRemark } from "../../src/admin/clips/sizes";
-import { declaredPattern, levelsByPattern, patternProblem, unnamedFactors, withNames } from "../../src/admin/studies/file-pattern";
+import {
+  declaredPattern,
+  factorsOfTable,
+  levelsByPattern,
+  patternProblem,
+  reservedProblem,
+  unnamedFactors,
+  withNames,
+} from "../../src/admin/studies/file-pattern";
 
 const FILES = ["rosie_slow_1.mp4", "hal_slow_1.webm", "hal_fast_2.mp4"];
 
@@ -29,6 +37,16 @@ describe("levels by the names of files", () => {
     expect(declaredPattern(factors, ["tin-fast.webm"])).toBe("{robot}-{speed}.mp4");
     expect(declaredPattern(factors, ["rosie_slow_1.mp4", "rosie_quick_1.mp4"])).toBe("");
     expect(declaredPattern(factors, [])).toBe("");
+  });
+
+  it("are refused before a study is made where a factor has the name of a column of the answers", () => {
+    for (const name of ["method", "value", "kind", "series"]) {
+      expect(patternProblem(`{${name}}_{exemplar}.mp4`, ["a_1.mp4"])).toContain(`${name}_shown`);
+      expect(reservedProblem(factorsOfTable(`file;${name};exemplar\na_1.mp4;a;1`))).toContain(`${name}_shown`);
+    }
+    expect(reservedProblem(factorsOfTable("file,speed,exemplar"))).toBe(false);
+    expect(patternProblem(withNames("{factor1}_{exemplar}.mp4", { factor1: "Method" }), ["a_1.mp4"])).toBe(false);
+    expect(patternProblem(withNames("{factor1}_{exemplar}.mp4", { factor1: "method" }), ["a_1.mp4"])).toContain("method_shown");
   });
 
   it("ask what a factor without a name is", () => {

@@ -78,6 +78,16 @@ export function labelOf(key: string): string {
   return `${words.charAt(0).toUpperCase()}${words.slice(1)}${unit === undefined ? "" : ` (${unit})`}`;
 }
 
+const IRREGULAR: Record<string, string> = { series: "series", stimuli: "stimulus" };
+
+/** One of several: "factors" are made of factors, "categories" of categories, and a series is one of "series". */
+export function singularOf(plural: string): string {
+  const words = plural.split(" ");
+  const last = words.pop() ?? "";
+  const one = IRREGULAR[last] ?? (last.endsWith("ies") ? `${last.slice(0, -3)}y` : last.replace(/(?<!s)s$/, ""));
+  return [...words, one].join(" ");
+}
+
 /** A name that none of `taken` has: "factor_2" after "factor". */
 export function freeName(stem: string, taken: readonly string[]): string {
   if (!taken.includes(stem)) return stem;

@@ -5,7 +5,7 @@ import { useState } from "react";
 import type { Schemas } from "../api";
 import { UploadClips } from "../clips/UploadClips";
 import { useUpload } from "../clips/useUpload";
-import { fieldsOf, levelsByPattern, patternProblem, unnamedFactors, withNames } from "./file-pattern";
+import { factorsOfTable, fieldsOf, levelsByPattern, patternProblem, reservedProblem, unnamedFactors, withNames } from "./file-pattern";
 import { StillNeeded } from "./StillNeeded";
 import { TEMPLATES } from "./templates";
 import { refusal, useCreate } from "./useCreate";
@@ -50,7 +50,7 @@ function Levels({ name, upload, isLooked, onTaken, onCreated }: LevelsProps) {
   const refused = refusal(create.error);
   const needed = [
     (!isLooked || files.length === 0) && "clips that have been looked into",
-    by === "pattern" && patternProblem(withNames(pattern, names), files),
+    by === "pattern" ? patternProblem(withNames(pattern, names), files) : reservedProblem(factorsOfTable(csv)),
     name === "" && "a short name (above)",
     asked.title.trim() === "" && "a title of the study",
   ];

@@ -1,5 +1,7 @@
 /** What a pattern such as `{speed}_{exemplar}.mp4` reads from the names of files, as the server reads them. */
 
+import reservedNames from "../../api/reserved-names.json";
+
 const FIELD = /\{([A-Za-z]\w*)\}/g;
 /** Names that the server gives where levels do not give one away. */
 const NUMBERED = /^factor\d+$/;
@@ -28,9 +30,26 @@ export function levelsByPattern(pattern: string, files: readonly string[]): File
     .sort((a, b) => Number(a.levels !== null) - Number(b.levels !== null));
 }
 
+const RESERVED: ReadonlySet<string> = new Set(reservedNames.filter((name) => name !== EXEMPLAR));
+
+/** What to do about a factor that has the name of another column of the answers; false where none has. */
+export function reservedProblem(factors: readonly string[]): string | false {
+  const name = factors.find((one) => RESERVED.has(one));
+  return name !== undefined && `another name for the factor ‘${name}’, which is a column of the answers: say, ${name}_shown`;
+}
+
+/** The factors of a table of levels, as its header names them. */
+export function factorsOfTable(csv: string): string[] {
+  const [header = ""] = csv.replace(/^\uFEFF/, "").split(/\r?\n/);
+  const separator = [",", ";", "\t"].reduce((best, sign) => (header.split(sign).length > header.split(best).length ? sign : best));
+  return header.split(separator).map((name) => name.trim().replaceAll(/^"|"$/g, ""));
+}
+
 /** What a pattern lacks before a study can be made by it; false where nothing. */
 export function patternProblem(pattern: string, files: readonly string[]): string | false {
   if (fieldsOf(pattern).every((field) => field === EXEMPLAR)) return "a pattern with the name of a factor in braces, such as {speed}";
+  const reserved = reservedProblem(fieldsOf(pattern));
+  if (reserved !== false) return reserved;
   const strays = levelsByPattern(pattern, files).filter(({ levels }) => levels === null);
   return strays.length > 0 && `a pattern that every file name fits (${strays[0]?.file ?? ""} does not), or a table`;
 }

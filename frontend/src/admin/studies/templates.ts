@@ -52,7 +52,7 @@ export const TEMPLATES: readonly [Words, ...Words[]] = [
   {
     value: "pairs",
     label: "Paired comparisons",
-    about: "Two clips beside one another: which of them? Every clip meets every other of the same exemplar number.",
+    about: "Two clips side by side: which of them? Every clip meets every other of the same exemplar number.",
     question: "Which clip looked more natural?",
     ends: false,
   },
@@ -61,7 +61,7 @@ export const TEMPLATES: readonly [Words, ...Words[]] = [
     label: "Just-noticeable difference",
     about:
       "Two clips in turn, the standard and a stimulus, in adaptive series. One factor has numbers as its levels; the lowest is the standard.",
-    question: "In which of the two was the blink slower?",
+    question: "In which of the two clips was the effect stronger?",
     ends: false,
   },
 ];

@@ -2,7 +2,7 @@
 
 import { Alert, Button, Fieldset, Menu, Select, Stack, Switch, Text } from "@mantine/core";
 import { languageName } from "../../ui/format";
-import { isTable, labelOf, listAt, type Path, pathName, tableAt, textAt } from "../data";
+import { isTable, labelOf, listAt, type Path, pathName, singularOf, tableAt, textAt } from "../data";
 import { helpOf } from "../help";
 import { type Editor, editorOf, mayBeNull, resolved, type Schema, starter, starterOf, withoutNull } from "../schema";
 import { useBuilderHere } from "../useBuilder";
@@ -148,9 +148,7 @@ function Add({ path, of }: { path: Path; of: Schema }) {
   const builder = useBuilderHere();
   const editor = editorOf(of);
   const list = listAt(builder.data, path);
-  const what = labelOf(String(path.at(-1) ?? ""))
-    .toLowerCase()
-    .replace(/s$/, "");
+  const what = singularOf(labelOf(String(path.at(-1) ?? "")).toLowerCase());
   const add = (fresh: unknown) => builder.set(path, [...list, named(fresh, list, what)]);
   if (editor.kind !== "variants")
     return (
