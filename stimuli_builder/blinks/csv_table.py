@@ -10,6 +10,7 @@ import pandas as pd
 
 from experiments.counted import counted
 from experiments.errors import InputError
+from experiments.spreadsheet import guarded_cell, guarded_row, unguarded_cell
 from experiments.text_tables import HEAD_BYTES, separator_of, utf8_stream
 
 NOTE = "note"
@@ -92,10 +93,24 @@ def _cells(path: Path, **options: Any) -> pd.DataFrame:
         raise InputError(f"{path}: {_why_not_parsed(str(error))}") from error
     except pd.errors.EmptyDataError as error:
         raise InputError(f"{path}: expected a CSV table with a header line, got no column") from error
-    table.columns = table.columns.astype(str).str.strip()
+    table.columns = pd.Index([unguarded_cell(name.strip()) for name in table.columns.astype(str)])
+    for name in table.columns[[kind.kind not in "fiub" for kind in table.dtypes]]:
+        if table[name].astype(str).str.contains("'", regex=False).any():
+            table[name] = table[name].map(
+                lambda cell: unguarded_cell(cell) if isinstance(cell, str) else cell
+            )
     if table.empty:
         raise InputError(f"{path}: the table has a header but no rows")
     return table
+
+
+def write_table(file: Path, table: pd.DataFrame) -> None:
+    """Write a table as CSV in which no name or text can run as a formula in a spreadsheet."""
+    guarded = table.rename(columns=lambda name: guarded_cell(str(name)))
+    for place, kind in enumerate(guarded.dtypes):
+        if kind.kind not in "fiub":
+            guarded.isetitem(place, guarded_row(guarded.iloc[:, place]))
+    guarded.to_csv(file, index=False, lineterminator="\n")
 
 
 def line_of(path: Path, row: int) -> int:

@@ -8,7 +8,7 @@ import pandas as pd
 
 from experiments.errors import InputError
 from experiments.files import whole_file
-from stimuli_builder.blinks.csv_table import few, read_table
+from stimuli_builder.blinks.csv_table import few, read_table, write_table
 from stimuli_builder.blinks.profile import PROFILE_FPS, Array, BlinkProfile, Eye
 
 EYES: dict[str, Eye | None] = {"left": "left", "right": "right", "both": "both", "": None}
@@ -27,7 +27,7 @@ def write_profile_table(path: Path, profiles: Sequence[BlinkProfile]) -> None:
     """Write profiles as a CSV of `TABLE_COLUMNS`; onset and end are the first and last sample."""
     samples = [_samples(profile) for profile in profiles] or [pd.DataFrame(columns=list(TABLE_COLUMNS))]
     with whole_file(path) as partial:
-        pd.concat(samples).to_csv(partial, index=False, lineterminator="\n")
+        write_table(partial, pd.concat(samples))
 
 
 def _samples(profile: BlinkProfile) -> pd.DataFrame:

@@ -11,7 +11,7 @@ import pandas as pd
 
 from experiments.errors import InputError, did_you_mean
 from experiments.files import whole_file
-from stimuli_builder.blinks.csv_table import read_table
+from stimuli_builder.blinks.csv_table import read_table, write_table
 from stimuli_builder.blinks.measure import MeasuredBlink
 from stimuli_builder.blinks.series import scaled_frames
 
@@ -103,7 +103,7 @@ def write_reviews(path: Path, reviews: Sequence[Review]) -> None:
         table = table.astype(dict.fromkeys(EDGE_COLUMNS, "Int64"))
         if not any(review.moves for review in reviews):
             table = table.drop(columns=list(EDGE_COLUMNS))
-        table.to_csv(partial, index=False, lineterminator="\n")
+        write_table(partial, table)
 
 
 def parse_choice(text: str, decision: Decision, blinks: Sequence[MeasuredBlink]) -> Review:

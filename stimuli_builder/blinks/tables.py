@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from experiments.files import whole_file, whole_text
+from stimuli_builder.blinks.csv_table import write_table
 from stimuli_builder.blinks.extract import EyeBlinks
 from stimuli_builder.blinks.measure import MeasuredBlink
 from stimuli_builder.blinks.profile import Array, BlinkProfile
@@ -104,16 +105,14 @@ def blinks_frame(
 def write_blinks(path: Path, frame: pd.DataFrame) -> None:
     """Write the blinks table as CSV."""
     with whole_file(path) as partial:
-        frame.to_csv(partial, index=False, lineterminator="\n")
+        write_table(partial, frame)
 
 
 def write_events(path: Path, eyes: Sequence[EyeBlinks]) -> None:
     """Write every lid event of every column as CSV, columns as in `EVENT_COLUMNS`."""
     rows = [{"column": eye.series.column} | asdict(event) for eye in eyes for event in eye.events]
     with whole_file(path) as partial:
-        pd.DataFrame(rows, columns=list(EVENT_COLUMNS)).round(6).to_csv(
-            partial, index=False, lineterminator="\n"
-        )
+        write_table(partial, pd.DataFrame(rows, columns=list(EVENT_COLUMNS)).round(6))
 
 
 def aligned(profiles: Sequence[BlinkProfile]) -> tuple[Array, Array]:

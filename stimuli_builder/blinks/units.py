@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from experiments.errors import InputError, nearest
 from experiments.files import whole_file
-from stimuli_builder.blinks.csv_table import read_table
+from stimuli_builder.blinks.csv_table import read_table, write_table
 from stimuli_builder.blinks.events.levels import local_opening
 from stimuli_builder.blinks.profile import OPEN_PERCENTILE, Array
 from stimuli_builder.blinks.series import BlinkSeries
@@ -189,4 +189,4 @@ def write_lids(path: Path, eyes: Sequence[tuple[BlinkSeries, float]], scale: Sca
             columns[f"{name}_mm"] = np.round(mm, 4)
             columns[f"{name}_degrees"] = np.round(lid_degrees(mm), 3)
     with whole_file(path) as partial:
-        pd.DataFrame(columns).to_csv(partial, index=False, lineterminator="\n")
+        write_table(partial, pd.DataFrame(columns))

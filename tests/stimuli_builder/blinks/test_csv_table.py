@@ -1,11 +1,15 @@
 """Series as spreadsheets and other programs write them, and files that are none."""
 
+import csv
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
 
 from experiments.errors import InputError
-from stimuli_builder.blinks.csv_table import NOTE, line_of, read_table
+from experiments.spreadsheet import guarded_cell
+from stimuli_builder.blinks.csv_table import NOTE, line_of, read_table, write_table
 from stimuli_builder.blinks.series import read_series
 
 
@@ -215,3 +219,17 @@ def test_minus_one_is_a_frame_that_was_not_measured(tmp_path, length):
     pd.DataFrame({"time_s": np.arange(1200) / 120, "gap": values}).to_csv(tmp_path / "s.csv", index=False)
     with pytest.raises(InputError, match="negative distances"):
         read_series(tmp_path / "s.csv")
+
+
+@pytest.mark.parametrize("name", ["=1+1", "＝1+1", "@SUM(1)", "-lid", "+lid", "lid;=1+1"])
+def test_names_and_texts_do_not_run_in_a_spreadsheet_and_come_back(tmp_path: Path, name: str) -> None:
+    table = pd.DataFrame({name: [1.5, -2.5], "reason": [name, ""], "frame": [1, 2]})
+    write_table(tmp_path / "t.csv", table)
+    written = (tmp_path / "t.csv").read_text(encoding="utf-8")
+    header, *rows = csv.reader(written.splitlines())
+    assert header == [guarded_cell(name), "reason", "frame"]
+    assert rows[0] == ["1.5", guarded_cell(name), "1"]
+    assert rows[1][0] == "-2.5"
+    read = read_table(tmp_path / "t.csv")
+    assert list(read.columns) == list(table.columns)
+    assert read["reason"][0] == name
