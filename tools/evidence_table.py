@@ -41,7 +41,7 @@ RULES = "".join(
     f'[[warnings.rules]]\nrule = "{rule}"\n\n' for rule in ("same_answer", "repeated_pattern", "fast_answers")
 )
 CLIP_FRAMES = 90
-NEVER_LIKELY = ("http", "http-slow", "script")
+NEVER_LIKELY = ("http", "http-slow", "script", "scripted")
 
 
 def main() -> int:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 from experiments import design
 from experiments.assignment.block_orders import block_orders
+from experiments.assignment.checks import attention_by_block
 from experiments.assignment.groups import Seat, cells_of, seat_of
 from experiments.assignment.levels import seen_levels, sees
 from experiments.assignment.shares import share
@@ -84,7 +85,8 @@ def with_attention(
 ) -> list[Trial]:
     """Put the declared number of instructed ratings between a block's trials, never before the first."""
     trials = list(main)
-    places = sorted(rng.sample(range(1, len(main) + 1), min(experiment.attention.per_block, len(main))))
+    count = attention_by_block(experiment)[main[0].block - 1] if main else 0
+    places = sorted(rng.sample(range(1, len(main) + 1), min(count, len(main))))
     for position in reversed(places):
         response = asked(rng)
         check = Trial("attention", main[0].block, main[0].block_label, expected_response=response)

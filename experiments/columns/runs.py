@@ -89,6 +89,7 @@ EVIDENCE_COLUMNS = (
     _share("motion_checks_guessed", "How likely guesses are right in as many of the motion checks."),
     _amount("motion_checks_other_way", "Motion checks answered the other way that the study offers."),
     _amount("motion_checks_void", "Motion checks that tell nothing: their play failed, or none was given."),
+    _share("checks_guessed", "How likely guesses are right in as many attention and motion checks together."),
 )
 """One column a signal, named as `Signals` of the server names it."""
 

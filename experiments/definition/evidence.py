@@ -68,5 +68,9 @@ class MotionChecks(Declaration):
 class Evidence(Declaration):
     """What is asked for to tell people from programs, beside what every page brings (docs/evidence.md)."""
 
+    online_recruitment: bool = False
+    """For participants recruited online: each run has two motion checks and one attention question at least,
+    at random places of evenly spread blocks. Without checks no run is rated likely a person's. Consent must
+    mention that clips flicker, and `stimuli checks` makes the clips."""
     motion_checks: MotionChecks = MotionChecks()
     """Checks that show their content by motion alone."""

@@ -5,8 +5,8 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, ValidationError, ValidationInfo, model_validator
 
-from experiments import design
 from experiments.assignment import grouping, shares
+from experiments.assignment.checks import motion_checks_by_block
 from experiments.base import Declaration, Language, Name, Translated
 from experiments.definition.analysis_plan import AnalysisPlan
 from experiments.definition.assignment import Assignment
@@ -15,6 +15,7 @@ from experiments.definition.dataset import Dataset
 from experiments.definition.display import Display
 from experiments.definition.evidence import Evidence
 from experiments.definition.factors import Exemplars, Factor, names_listed
+from experiments.definition.flicker import silent_on_flicker, suggested_sentence
 from experiments.definition.forms import Form
 from experiments.definition.groups import Groups
 from experiments.definition.languages import fault as language_fault
@@ -195,11 +196,24 @@ class Experiment(Declaration):
     @model_validator(mode="after")
     def _enough_check_clips(self) -> Self:
         checks = self.evidence.motion_checks
-        asked = checks.per_block * len(design.blocks(self))
+        asked = sum(motion_checks_by_block(self))
         if asked > checks.clips:
             raise ValueError(
                 f"evidence.motion_checks.clips: expected at least the {asked} checks that a participant is "
                 f"asked, got {checks.clips}"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _consent_mentions_flicker(self, info: ValidationInfo) -> Self:
+        """Where the switch adds motion checks; studies that declare them by hand get a warning instead."""
+        if not self.evidence.online_recruitment or (info.context or {}).get(STORED):
+            return self
+        if silent := silent_on_flicker(self):
+            raise ValueError(
+                f"texts.{silent[0]}.consent: expected it to mention that clips flicker, since "
+                "evidence.online_recruitment shows clips of flickering dots; add a sentence such as "
+                f'"{suggested_sentence(silent[0])}"'
             )
         return self
 

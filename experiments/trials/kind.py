@@ -79,6 +79,12 @@ def nothing_more(experiment: "Experiment") -> tuple[str, ...]:
     return ()
 
 
+def two_choices(experiment: "Experiment") -> int:
+    """The answers that an attention check offers at least."""
+    del experiment
+    return 2
+
+
 def never(experiment: "Experiment") -> bool:
     """No kind's trials depend on what is stored unless it says so."""
     del experiment
@@ -129,6 +135,8 @@ class Kind:
         As `assign`, with the comparisons stored before, where `chooses` says so.
     check_response : callable
         The number that an answer, as stored, is to an attention check, which asks for one.
+    check_choices : callable
+        How many numbers an attention check may ask for.
     """
 
     declaration: type[TrialDeclaration]
@@ -144,6 +152,7 @@ class Kind:
     further_examples: tuple[str, ...] = ()
     plan: "Callable[[Experiment], tuple[str, ...]]" = nothing_more
     check_response: Callable[[Mapping[str, Any]], int | None] = lambda _: None
+    check_choices: "Callable[[Experiment], int]" = two_choices
     shares_clips: bool = False
     groups: bool = False
     random_factors: bool = False

@@ -9,22 +9,31 @@ from server.evidence.comparable import comparable
 from server.evidence.signals import JudgedAnswer
 from server.evidence.verdict import NOT_JUDGED, Judgement, judge
 from server.models import StudyRun
+from server.studies.lookup import definition_of
 
 
 def judge_run(session: Session, run: StudyRun) -> Judgement:
     """The judgement on a run as it is stored; runs whose page was not asked for evidence are not judged."""
     if run.evidence != "asked" or run.erased_at is not None:
         return NOT_JUDGED
-    answers = [_answer(row) for row in repository.answers(session, run)]
+    rows = repository.answers(session, run)
+    offered = _offered(run) if any(row.trial.kind == "attention" for row in rows) else 0
+    answers = [_answer(row, offered) for row in rows]
     passed_over = [len(CHECK_KINDS[check].choices) for check in repository.checks_passed_over(session, run)]
     return judge(answers, refused=repository.has_refusals(session, run), passed_over=passed_over)
 
 
-def _answer(row: repository.StoredAnswer) -> JudgedAnswer:
+def _offered(run: StudyRun) -> int:
+    """How many answers an attention check of the run's study offers."""
+    experiment = definition_of(run.version)
+    return KINDS[experiment.trial.kind].check_choices(experiment)
+
+
+def _answer(row: repository.StoredAnswer, offered: int) -> JudgedAnswer:
     evidence, trial = row.evidence, row.trial
-    response = comparable(row.rating.payload)
+    response, choices = comparable(row.rating.payload), 0
     if trial.kind == "attention":
-        response = KINDS[row.rating.kind].check_response(row.rating.payload)
+        response, choices = KINDS[row.rating.kind].check_response(row.rating.payload), offered
     if trial.kind == "check":
         response = row.rating.payload.get("check")
     given = (evidence.interaction if evidence else None) or {}
@@ -45,7 +54,7 @@ def _answer(row: repository.StoredAnswer) -> JudgedAnswer:
         presses=given.get("presses"),
         trusted=given.get("trusted"),
         press_ms=given.get("press_ms"),
-        choices=len(CHECK_KINDS[row.check].choices) if row.check else 0,
+        choices=len(CHECK_KINDS[row.check].choices) if row.check else choices,
         void=row.check is not None and row.rating.verdict == "failed",
         other_way=trial.kind == "check" and bool(row.rating.payload.get("other_way")),
     )

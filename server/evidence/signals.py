@@ -29,7 +29,7 @@ class JudgedAnswer:
     expected : int or None
         What an attention check asked for, or what a motion check's clip shows.
     choices : int
-        How many answers a motion check offered.
+        How many answers a motion or attention check offered.
     void : bool
         The check tells nothing, since its play failed or it was passed over.
     other_way : bool
@@ -103,6 +103,9 @@ class Signals:
         How many were answered the other way that the study offers.
     motion_checks_void : float or None
         How many tell nothing, since their play failed or they were passed over.
+    checks_guessed : float or None
+        How likely guesses are right in as many of all checks, those of attention and of motion together;
+        None where none was answered.
     """
 
     tickets: float | None = None
@@ -125,6 +128,7 @@ class Signals:
     motion_checks_guessed: float | None = None
     motion_checks_other_way: float | None = None
     motion_checks_void: float | None = None
+    checks_guessed: float | None = None
 
 
 SIGNAL_NAMES = tuple(field.name for field in fields(Signals))
@@ -176,7 +180,16 @@ def signals_of(answers: Sequence[JudgedAnswer], passed_over: Sequence[int] = ())
         ),
         motion_checks_other_way=sum(one.other_way for one in offered) if offered else None,
         motion_checks_void=len(asked) - len(motion) + len(passed_over) if offered or passed_over else None,
+        checks_guessed=_guessed_together([*checks, *motion]),
     )
+
+
+def _guessed_together(checks: Sequence[JudgedAnswer]) -> float | None:
+    weighed = [one for one in checks if one.choices > 1]
+    if not weighed:
+        return None
+    right = sum(one.response == one.expected for one in weighed)
+    return _at_least([1 / one.choices for one in weighed])[right]
 
 
 def checks_tell(answers: Sequence[JudgedAnswer], passed_over: Sequence[int] = ()) -> bool:

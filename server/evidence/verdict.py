@@ -2,6 +2,8 @@
 
 Points of all signals are added. From `LIKELY` on a run is `likely` a person's, up to `UNLIKELY` it is
 `unlikely`, between them `unclear`. A signal that cannot be had adds nothing, unless the table says so.
+Points alone never make a run `likely`: its attention and motion checks must be passed as well, since a
+browser that a script drives has every other signal of a person.
 """
 
 from collections.abc import Sequence
@@ -12,7 +14,7 @@ from server.evidence.signals import GUESSED_BY_CHANCE, JudgedAnswer, Signals, ch
 
 Verdict = Literal["likely", "unclear", "unlikely", "not_judged"]
 VERDICTS: tuple[Verdict, ...] = ("likely", "unclear", "unlikely", "not_judged")
-LIKELY, UNLIKELY = 8.0, 0.0
+LIKELY, UNLIKELY = 7.0, 0.0
 MIN_ANSWERS = 6
 """Runs with fewer answers are unclear: there is not enough to judge by."""
 
@@ -35,8 +37,8 @@ BANDS: dict[str, tuple[Band, ...]] = {
     "order": (Band(0, 0.8, -2),),
     "interaction": (Band(0, 0.5, -3), Band(0.9, INFINITE, 1)),
     "trusted": (Band(0, 0.5, -2), Band(0.9, INFINITE, 2)),
-    "press_ms": (Band(0, 15, -2), Band(25, 1000, 1)),
-    "press_spread": (Band(0, 2, -3), Band(4, INFINITE, 1)),
+    "press_ms": (Band(0, 25, -2),),
+    "press_spread": (Band(0, 2, -3),),
     "rt_median": (Band(0, 200, -2), Band(300, INFINITE, 1)),
     "rt_spread": (Band(0, 0.1, -3), Band(0.12, INFINITE, 1)),
     "same_answer": (Band(0.95, INFINITE, -1.5),),
@@ -46,12 +48,20 @@ BANDS: dict[str, tuple[Band, ...]] = {
 }
 """Points of each signal; a value in none of its bands adds nothing. `late` is shown and adds nothing, as are
 `motion_checks` and its numbers: the same share says more or less by how many checks and choices there were,
-which `motion_checks_guessed` weighs."""
+which `motion_checks_guessed` weighs. The lengths of presses only take points: other work on a machine
+lengthens and varies the presses that a script makes, so that usual lengths are evidence of nothing.
+`checks_guessed` adds nothing either; no run is `likely` without it."""
+ENOUGH_BY_CHANCE = 0.05
+"""A run can be `likely` where guesses do as well in all its checks together with less than this probability.
+
+With one attention question of seven answers and two motion checks of nine choices, the question and one of
+the checks must be right: 99.7 % of those who read the question and see 95 % of such clips (`SEEN`).
+"""
 VOID_SHARE = 0.2
 """Share of motion checks that may tell nothing, as plays fail on honest people's machines; one may always."""
 REFUSED_POINTS = -4.0
 """Points where answers of the run were refused for their evidence."""
-WITHOUT: dict[str, float] = {"trusted": -1, "press_ms": -1}
+WITHOUT: dict[str, float] = {"trusted": -1, "press_ms": -2}
 """Points where a signal cannot be had that every page reports."""
 
 
@@ -79,8 +89,9 @@ def judge(
 ) -> Judgement:
     """The verdict on a run whose page was asked for evidence.
 
-    Where motion checks were answered the other way that the study offers, or too many of them tell nothing,
-    the verdict is at most unclear; not so where they were too few to tell anything.
+    Without passed checks the verdict is at most unclear. So it is where motion checks were answered the
+    other way that the study offers, or too many of them tell nothing; not so where they were too few to
+    tell anything.
 
     Parameters
     ----------
@@ -90,15 +101,33 @@ def judge(
         Number of choices of each motion check that was left out.
     """
     signals = signals_of(answers, passed_over)
-    points = sum(points_of(name, getattr(signals, name)) for name in BANDS) + REFUSED_POINTS * refused
-    if len(answers) < MIN_ANSWERS:
-        few: Verdict = "unlikely" if refused else "unclear" if answers else "not_judged"
-        return Judgement(few, points, signals)
-    verdict: Verdict = "likely" if points >= LIKELY else "unlikely" if points <= UNLIKELY else "unclear"
-    escaped = _escapes(signals) and checks_tell(answers, passed_over)
-    if verdict == "likely" and (signals.motion_checks_other_way or escaped):
-        verdict = "unclear"
+    tells = checks_tell(answers, passed_over)
+    verdict, points = verdict_on(signals, answers=len(answers), refused=refused, tells=tells)
     return Judgement(verdict, points, signals)
+
+
+def verdict_on(signals: Signals, *, answers: int, refused: bool, tells: bool) -> tuple[Verdict, float]:
+    """The verdict on a run with these signals, and its points.
+
+    Parameters
+    ----------
+    answers : int
+        How many answers the run has.
+    tells : bool
+        The motion checks that were asked can tell guesses from people (`checks_tell`).
+    """
+    points = sum(points_of(name, getattr(signals, name)) for name in BANDS) + REFUSED_POINTS * refused
+    if answers < MIN_ANSWERS:
+        return ("unlikely" if refused else "unclear" if answers else "not_judged"), points
+    if points <= UNLIKELY:
+        return "unlikely", points
+    doubted = signals.motion_checks_other_way or (_escapes(signals) and tells)
+    return ("likely" if points >= LIKELY and _passes(signals) and not doubted else "unclear"), points
+
+
+def _passes(signals: Signals) -> bool:
+    """Whether the run's attention and motion checks together are right more often than guesses."""
+    return signals.checks_guessed is not None and signals.checks_guessed < ENOUGH_BY_CHANCE
 
 
 def _escapes(signals: Signals) -> bool:

@@ -1,5 +1,6 @@
 """What the page is told of a study's motion checks: questions and choices, never an answer."""
 
+from experiments.assignment.checks import motion_checks_by_block
 from experiments.checks import CHECK_KINDS, CheckName
 from experiments.definition import Experiment
 from server.participants.schemas import ShownCheck, ShownChecks, ShownOtherWay
@@ -9,7 +10,7 @@ from server.trials.warnings import in_language
 def shown_checks(experiment: Experiment, language: str) -> ShownChecks | None:
     """The words of the declared checks in the run's language; None where there are no checks."""
     declared = experiment.evidence.motion_checks
-    if not declared.per_block:
+    if not any(motion_checks_by_block(experiment)):
         return None
     other = declared.other_way
     said = (

@@ -105,6 +105,10 @@ def _driver(rng: random.Random, _person: Person) -> Interaction:
     return {"presses": 2, "trusted": 2, "press_ms": round(rng.uniform(0.3, 1.5), 1), "moves": 2}
 
 
+def _busy_driver(rng: random.Random, _person: Person) -> Interaction:
+    return {"presses": 2, "trusted": 2, "press_ms": round(rng.uniform(5, 60), 1), "moves": 2}
+
+
 def _screen_reader(_rng: random.Random, _person: Person) -> Interaction:
     return {"presses": 2, "trusted": 2, "press_ms": None, "moves": 0}
 
@@ -154,8 +158,18 @@ MANNERS: dict[str, Manner] = {
         interaction=_screen_reader,
         checks="goes around",
     ),
+    "scripted": Manner(
+        tickets=True,
+        fetches=True,
+        waits=True,
+        rt_ms=_human_rt,
+        interaction=_busy_driver,
+        answers="any",
+        reads=False,
+    ),
 }
 """http: plain HTTP. http-slow: HTTP with plausible waits and fetched clips. script: a headless browser whose
 page a script clicks. frames: a driven browser that answers from single frames. flow: one that computes
 optical flow, and so sees what motion checks show. careless: a person, fast and always the same. honest: a
-person whose network goes away, who reloads, whose clock jumps. assistive: a screen reader."""
+person whose network goes away, who reloads, whose clock jumps. assistive: a screen reader. scripted: a
+browser that a script clicks, on a machine whose other work lengthens its presses."""

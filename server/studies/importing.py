@@ -7,6 +7,7 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from experiments import design
+from experiments.assignment.checks import motion_checks_by_block
 from experiments.checks import CHECK_CELL
 from experiments.definition import Experiment
 from experiments.errors import InputError
@@ -82,7 +83,7 @@ def _remedy(manifest: Manifest) -> str:
 def _check_checks(experiment: Experiment, manifest: Manifest) -> None:
     """InputError where there are fewer check clips than a participant is asked, or of kinds not declared."""
     declared = experiment.evidence.motion_checks
-    asked = declared.per_block * len(design.blocks(experiment))
+    asked = sum(motion_checks_by_block(experiment))
     if not asked:
         return
     fitting = [clip for clip in manifest.checks if clip.check in declared.kinds]

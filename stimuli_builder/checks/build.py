@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from experiments.assignment.checks import motion_checks_by_block
 from experiments.definition import Experiment
 from experiments.errors import InputError
 from experiments.manifest import MANIFEST_NAME, CheckClip, Manifest
@@ -47,9 +48,10 @@ def build_checks(
         The experiment asks for no checks, the folder holds no clips of it or cannot be written, or the work
         was interrupted; what is made by then is kept and used by the next run.
     """
-    if not experiment.evidence.motion_checks.per_block:
+    if not any(motion_checks_by_block(experiment)):
         raise InputError(
-            f"'{experiment.name}' asks for no motion checks; set per_block in [evidence.motion_checks]"
+            f"'{experiment.name}' asks for no motion checks; set online_recruitment in [evidence], or "
+            "per_block in [evidence.motion_checks]"
         )
     former = former_manifest(experiment, folder)
     if former is None:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from experiments import design
+from experiments.assignment.checks import motion_checks_by_block
 from experiments.checks import CHECK_KINDS, CheckName
 from experiments.definition import Experiment
 from experiments.rendering import RenderSettings
@@ -29,7 +30,7 @@ class PlannedCheck:
 def planned_checks(experiment: Experiment, seed: int, options: Options) -> list[PlannedCheck]:
     """The clips of an experiment's motion checks in order; none where no block asks for any."""
     declared = experiment.evidence.motion_checks
-    if not declared.per_block:
+    if not any(motion_checks_by_block(experiment)):
         return []
     kinds = declared.kinds
     return [

@@ -5,7 +5,7 @@ from experiments.trials.clip_rating.answer import RatingAnswer, check_response
 from experiments.trials.clip_rating.columns import RATINGS
 from experiments.trials.clip_rating.declaration import ClipRating
 from experiments.trials.clip_rating.page import ShownClipRating, shown
-from experiments.trials.clip_rating.plan import assign, block_size, plan
+from experiments.trials.clip_rating.plan import assign, block_size, check_choices, plan
 from experiments.trials.kind import Kind
 
 EFFECTS: dict[str, Effect] = {
@@ -119,4 +119,5 @@ CLIP_RATING = Kind(
     example=EXAMPLE,
     further_examples=FURTHER_EXAMPLES,
     check_response=check_response,
+    check_choices=check_choices,
 )

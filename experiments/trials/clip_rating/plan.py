@@ -28,6 +28,12 @@ def assign(experiment: "Experiment", seed: int, slot: int) -> list[Trial]:
     return trials if reference is None else [_after(reference, experiment, trial) for trial in trials]
 
 
+def check_choices(experiment: "Experiment") -> int:
+    """The points of the scale on which attention checks ask."""
+    scale = clip_rating_of(experiment).check_scale
+    return scale.maximum - scale.minimum + 1
+
+
 def _after(reference: RatingReference, experiment: "Experiment", trial: Trial) -> Trial:
     """The trial with its reference; checks have none."""
     if trial.clip is None or trial.check is not None:

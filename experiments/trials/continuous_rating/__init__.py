@@ -5,7 +5,7 @@ from experiments.schema.effects import Effect
 from experiments.trials.clip_rating.plan import block_size
 from experiments.trials.continuous_rating.answer import ContinuousAnswer, check_response
 from experiments.trials.continuous_rating.columns import TRACES
-from experiments.trials.continuous_rating.declaration import ContinuousRating
+from experiments.trials.continuous_rating.declaration import CHECK_POINTS, ContinuousRating
 from experiments.trials.continuous_rating.page import ShownContinuousRating, shown
 from experiments.trials.continuous_rating.plan import assign
 from experiments.trials.kind import Kind
@@ -55,4 +55,5 @@ CONTINUOUS_RATING = Kind(
     shares_clips=True,
     example=EXAMPLE,
     check_response=check_response,
+    check_choices=lambda _: CHECK_POINTS,
 )

@@ -6,7 +6,7 @@ from experiments.trials.paired_comparison.answer import ComparisonAnswer, check_
 from experiments.trials.paired_comparison.columns import COMPARISONS
 from experiments.trials.paired_comparison.declaration import PairedComparison
 from experiments.trials.paired_comparison.page import ShownPairedComparison, shown
-from experiments.trials.paired_comparison.plan import assign, block_size, chooses, plan
+from experiments.trials.paired_comparison.plan import assign, block_size, check_choices, chooses, plan
 
 EFFECTS: dict[str, Effect] = {
     "kind": "measured",
@@ -68,6 +68,7 @@ PAIRED_COMPARISON = Kind(
     further_examples=FURTHER_EXAMPLES,
     plan=plan,
     check_response=check_response,
+    check_choices=check_choices,
     groups=True,
     chooses=chooses,
     assign_by=assign,

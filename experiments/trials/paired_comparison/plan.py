@@ -49,7 +49,7 @@ def _of_group(
         else deal(experiment).of_slot(number_in_group)
     )
     times = Counter[str]()
-    choices = 3 if paired_comparison_of(experiment).ties else 2
+    choices = check_choices(experiment)
     for number, block in enumerate(ordered_blocks(experiment, rng, number_in_group), start=1):
         members = set(block.clips)
         pairs = [pair for pair in dealt if pair.left in members]
@@ -61,6 +61,11 @@ def _of_group(
         main = [_trial(experiment, "main", number, block.label, pair) for pair in pairs]
         trials.extend(with_attention(experiment, main, rng, lambda draw: draw.randint(1, choices)))
     return trials
+
+
+def check_choices(experiment: "Experiment") -> int:
+    """The two sides, and the tie where it may be answered."""
+    return 3 if paired_comparison_of(experiment).ties else 2
 
 
 def _practice(experiment: "Experiment", rng: random.Random) -> list[Trial]:

@@ -25,6 +25,7 @@ EXPECTED = {
     "careless": {"unclear", "unlikely"},
     "assistive": {"unclear"},
     "honest": {"likely", "unclear"},
+    "scripted": {"unclear", "unlikely"},
 }
 BY_LUCK = {"http-slow": "unclear", "assistive": "likely"}
 PEOPLE = 2

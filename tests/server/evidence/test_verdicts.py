@@ -7,10 +7,12 @@ from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 
 from experiments.columns.runs import EVIDENCE_COLUMNS
-from server.evidence.signals import SIGNAL_NAMES, JudgedAnswer, Signals, signals_of
-from server.evidence.verdict import BANDS, WITHOUT, judge
+from server.evidence.signals import GUESSED_BY_CHANCE, SIGNAL_NAMES, JudgedAnswer, Signals, signals_of
+from server.evidence.verdict import BANDS, ENOUGH_BY_CHANCE, WITHOUT, judge, verdict_on
 
 START = datetime(2026, 11, 21, tzinfo=UTC)
 HONEST_RUNS, FALSE_ALARMS = 1_000, 0.01
@@ -31,6 +33,7 @@ def answered(rng: random.Random, rt: Any, response: Any, press: Any, **rest: Any
             "play": 1,
             "part": "attention" if check else "main",
             "expected": 2 if check else None,
+            "choices": 7 if check else 0,
             "response": 2 if check and rest.get("reads", True) else response(index),
             "rt": took,
             "clip_ms": 0.0 if check else CLIP_MS,
@@ -143,7 +146,21 @@ def http_without_clips(seed: int) -> list[JudgedAnswer]:
     return answered(rng, lambda _: 700.0, lambda _: rng.randint(1, 7), nothing, tickets=False, digests=False)
 
 
+def driver_on_a_busy_machine(seed: int) -> list[JudgedAnswer]:
+    """A browser clicked by a script, whose presses the machine's other work makes 8 to 70 ms long."""
+    rng = random.Random(seed)
+    longest = rng.uniform(18, 70)
+    return answered(
+        rng,
+        lambda _: rng.lognormvariate(6.6, 0.4),
+        lambda _: rng.randint(1, 7),
+        lambda _: (2, 2, rng.uniform(8, longest)),
+        reads=False,
+    )
+
+
 ADVERSARIES = (
+    driver_on_a_busy_machine,
     polling_script,
     patient_script,
     driver,
@@ -157,6 +174,102 @@ ADVERSARIES = (
 def test_no_program_is_likely_a_person(adversary: Any) -> None:
     verdicts = Counter(judge(adversary(seed)).verdict for seed in range(ADVERSE_RUNS))
     assert verdicts["likely"] == 0
+
+
+BEST = {
+    "tickets": 1.0,
+    "digests": 1.0,
+    "clip_time": 0.8,
+    "claimed_time": 0.9,
+    "order": 1.0,
+    "late": 0.0,
+    "interaction": 1.0,
+    "trusted": 1.0,
+    "press_ms": 90.0,
+    "press_spread": 20.0,
+    "rt_median": 900.0,
+    "rt_spread": 0.4,
+    "same_answer": 0.3,
+    "cycle": 0.2,
+}
+"""What an honest person's signals are, without those of checks."""
+ANY = {name: st.one_of(st.none(), st.floats(0, 2_000), st.floats(0, 1.2)) for name in BEST}
+NO_CHECK = st.fixed_dictionaries(
+    {
+        "motion_checks_void": st.one_of(st.none(), st.integers(0, 10)),
+        "motion_checks_other_way": st.one_of(st.none(), st.integers(0, 10)),
+    }
+)
+FAILED = st.fixed_dictionaries(
+    {
+        "checks": st.one_of(st.none(), st.floats(0, 1)),
+        "motion_checks": st.one_of(st.none(), st.floats(0, 1)),
+        "motion_checks_guessed": st.one_of(st.none(), st.floats(GUESSED_BY_CHANCE, 1)),
+        "checks_guessed": st.floats(ENOUGH_BY_CHANCE, 1),
+    }
+)
+
+
+@given(signals=st.fixed_dictionaries(ANY), checks=st.one_of(NO_CHECK, FAILED))
+@example(signals=BEST, checks={})
+@example(signals=BEST | {"press_ms": 15.0}, checks={})
+@example(signals=BEST, checks={"checks": 1.0, "checks_guessed": 1 / 7})
+@settings(max_examples=500, deadline=None)
+def test_no_combination_of_signals_is_likely_without_a_passed_check(
+    signals: dict[str, float | None], checks: dict[str, float | None]
+) -> None:
+    verdict, _ = verdict_on(Signals(**signals, **checks), answers=60, refused=False, tells=True)
+    assert verdict != "likely"
+
+
+@given(signals=st.fixed_dictionaries(ANY), press=st.floats(0, 2_000), spread=st.floats(0, 500))
+@settings(max_examples=500, deadline=None)
+def test_lengths_of_presses_only_ever_speak_against_a_run(
+    signals: dict[str, float | None], press: float, spread: float
+) -> None:
+    """With passed checks too, presses of any length carry no run further than presses of 90 ms do."""
+    passed = {"checks": 1.0, "motion_checks_guessed": 1e-6, "checks_guessed": 1e-6}
+    measured = Signals(**(signals | passed | {"press_ms": press, "press_spread": spread}))
+    without = Signals(**(signals | passed | {"press_ms": 90.0, "press_spread": None}))
+    points = [verdict_on(one, answers=60, refused=False, tells=False)[1] for one in (measured, without)]
+    assert points[0] <= points[1]
+
+
+def test_the_best_signals_with_passed_checks_are_a_persons() -> None:
+    """The property above is not met by never saying `likely`."""
+    passed = {"checks": 1.0, "checks_guessed": 7**-3}
+    assert verdict_on(Signals(**BEST, **passed), answers=60, refused=False, tells=False)[0] == "likely"
+
+
+@pytest.mark.parametrize(
+    ("choices", "right", "verdict"),
+    [
+        ([7, 9, 9], 3, "likely"),
+        ([7, 9, 9], 2, "likely"),
+        ([9, 9, 7], 2, "unclear"),
+        ([7, 9, 9], 1, "unclear"),
+        ([7, 7], 2, "likely"),
+        ([7, 7], 1, "unclear"),
+        ([7], 1, "unclear"),
+        ([2, 2], 2, "unclear"),
+        ([], 0, "unclear"),
+    ],
+)
+def test_checks_are_passed_where_guessing_hardly_does_as_well(
+    choices: list[int], right: int, verdict: str
+) -> None:
+    """Attention questions (7 or 2 answers) and motion checks (9) count together; the first `right` are right.
+
+    A question of attention that is wrong takes points besides.
+    """
+    person = [replace(one, part="main", expected=None) for one in gamma_person(4)]
+    for number, options in enumerate(choices):
+        part = "check" if options == 9 else "attention"
+        given = 1 if number < right else 2
+        person[10 + number] = replace(
+            person[10 + number], part=part, choices=options, expected=1, response=given
+        )
+    assert judge(person).verdict == verdict
 
 
 def test_honest_people_are_hardly_ever_doubted() -> None:
