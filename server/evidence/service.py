@@ -2,7 +2,9 @@
 
 from sqlalchemy.orm import Session
 
+from experiments.assignment.checks import attention_by_block, motion_checks_by_block
 from experiments.checks import CHECK_KINDS
+from experiments.definition import Experiment
 from experiments.trials import KINDS
 from server.evidence import repository
 from server.evidence.comparable import comparable
@@ -21,6 +23,16 @@ def judge_run(session: Session, run: StudyRun) -> Judgement:
     answers = [_answer(row, offered) for row in rows]
     passed_over = [len(CHECK_KINDS[check].choices) for check in repository.checks_passed_over(session, run)]
     return judge(answers, refused=repository.has_refusals(session, run), passed_over=passed_over)
+
+
+def guessed_throughout(experiment: Experiment) -> float:
+    """How likely guesses are right in every attention and motion check that a run of a study has."""
+    kinds = experiment.evidence.motion_checks.kinds
+    fewest = min(len(CHECK_KINDS[kind].choices) for kind in kinds)
+    questions, clips = sum(attention_by_block(experiment)), sum(motion_checks_by_block(experiment))
+    offered = KINDS[experiment.trial.kind].check_choices(experiment)
+    guesses: int = offered**questions * fewest**clips
+    return 1 / guesses
 
 
 def _offered(run: StudyRun) -> int:

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from html import escape
 
+from experiments.assignment.checks import attention_by_block, motion_checks_by_block
 from experiments.definition import Experiment
 from server.methods.repository import Number
 
@@ -178,16 +179,20 @@ def declared(experiment: Experiment) -> dict[str, Number]:
 
 def _checks(experiment: Experiment, counted: Mapping[str, Number]) -> list[str]:
     lines = []
-    if each := experiment.attention.per_block:
-        answers = f"{{attention_per_block}} instructed answer{'s' * (each != 1)} a block"
+    if any(attention_by_block(experiment)):
+        each = experiment.attention.per_block  # 0 where the switch for online recruitment alone asks
+        number = f"{{attention_per_block}} instructed answer{'s' * (each != 1)} a block"
+        answers = number if each else "instructed answers"
         lines.append(f"Attention was checked by {answers}; completed visits hold {{checks}}.")
     motion = experiment.evidence.motion_checks
-    if motion.per_block:
+    in_blocks = set(motion_checks_by_block(experiment))
+    if any(in_blocks):
+        number = f"In each block {{motion_checks_per_block}} short clip{'s' * (motion.per_block != 1)} showed"
+        clips = number if in_blocks == {motion.per_block} else "Between the trials short clips showed"
         kinds = ", ".join(kind.replace("_", " ") for kind in motion.kinds)
         lines.append(
-            f"In each block {{motion_checks_per_block}} short clip{'s' * (motion.per_block != 1)} showed "
-            f"what was asked by motion alone ({kinds}); of {{motion_checks}} answers to them in completed "
-            "visits {motion_checks_right} {motion_checks_right:was|were} right."
+            f"{clips} what was asked by motion alone ({kinds}); of {{motion_checks}} answers to them in "
+            "completed visits {motion_checks_right} {motion_checks_right:was|were} right."
         )
     if counted["motion_checks_other_way"].value:
         lines.append(

@@ -9,11 +9,14 @@ from typing import NamedTuple
 from sqlalchemy.orm import Session
 
 from experiments.definition import Experiment
+from experiments.definition.flicker import silent_on_flicker, suggested_sentence
 from experiments.definition.placeholders import unfilled, untranslated
 from experiments.level_leaks import reported_leaks
 from experiments.manifest import Manifest
 from server.accounts.identity import Identity
 from server.errors import Conflict
+from server.evidence.service import guessed_throughout
+from server.evidence.verdict import ENOUGH_BY_CHANCE
 from server.models import Study, StudyVersion
 from server.participants.recruiter import Recruiter, stored_recruiter
 from server.studies import links_repository
@@ -149,6 +152,37 @@ def _recruiter(launch: ToLaunch) -> Iterator[LaunchCheck]:
         )
 
 
+def _flicker(launch: ToLaunch) -> Iterator[LaunchCheck]:
+    """Motion checks of flickering dots that the consent does not mention."""
+    if languages := silent_on_flicker(launch.experiment):
+        yield LaunchCheck(
+            kind="flicker",
+            blocks=False,
+            text="Motion checks show flickering dots, and the consent does not mention flicker "
+            f"({', '.join(languages)}). Some people are sensitive to it: add a sentence such as "
+            f'"{suggested_sentence(languages[0])}"',
+        )
+
+
+def _person_checks(launch: ToLaunch) -> Iterator[LaunchCheck]:
+    """Recruited participants, and too few checks to tell people from programs."""
+    if (launch.recruiter or launch.of_links) and guessed_throughout(launch.experiment) >= ENOUGH_BY_CHANCE:
+        yield LaunchCheck(
+            kind="person_checks",
+            blocks=False,
+            text="Participants are recruited online, and the study has too few attention and motion checks "
+            "to separate people from programs: no run can be rated likely a person's. Turn on online "
+            "recruitment under Design, Checks and exclusions: it adds two motion checks and one attention "
+            "question.",
+        )
+
+
 _BLOCKING: tuple[Check, ...] = (_placeholders, _completion_codes)
 """Fast: they are asked in the transaction that opens or changes the study."""
-_ADVISING: tuple[Check, ...] = (_recruiter, _translations, _levels_told_apart)
+_ADVISING: tuple[Check, ...] = (
+    _recruiter,
+    _person_checks,
+    _flicker,
+    _translations,
+    _levels_told_apart,
+)

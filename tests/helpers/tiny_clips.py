@@ -11,6 +11,7 @@ import av
 import numpy as np
 
 from experiments import design
+from experiments.assignment.checks import motion_checks_by_block
 from experiments.checks import CHECK_KINDS
 from experiments.definition import Experiment
 from experiments.manifest import MANIFEST_NAME, CheckClip, Clip, Manifest
@@ -74,7 +75,7 @@ def _checks(experiment: Experiment, folder: Path, frames: int, fps: int) -> tupl
     """Clips of the declared motion checks, their answers in turn; what they show is grey."""
     declared = experiment.evidence.motion_checks
     made = []
-    for number in range(1, declared.clips + 1) if declared.per_block else ():
+    for number in range(1, declared.clips + 1) if any(motion_checks_by_block(experiment)) else ():
         check = declared.kinds[(number - 1) % len(declared.kinds)]
         data = encoded_video(frames, fps) + _free_box(f"{experiment.name} check {number}".encode())
         sha256 = hashlib.sha256(data).hexdigest()

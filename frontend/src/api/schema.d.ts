@@ -1272,6 +1272,8 @@ export interface components {
    events: components["schemas"]["Event"][];
   };
   Evidence: {
+   /** @default false */
+   online_recruitment: boolean;
    /**
    * @default {
    *       "per_block": 0,
@@ -1483,6 +1485,7 @@ export interface components {
    attention: components["schemas"]["AttentionChecks"];
    /**
    * @default {
+   *       "online_recruitment": false,
    *       "motion_checks": {
    *         "clips": 24,
    *         "contrast": 0.6,

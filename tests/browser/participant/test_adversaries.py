@@ -1,6 +1,7 @@
 """Programs in a real browser: one whose script clicks, one whose keys come from the operating system."""
 
 import os
+import random
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -58,6 +59,31 @@ def test_a_headless_browser_whose_script_clicks_is_not_a_person(
     assert (judged.signals.tickets, judged.signals.digests) == (1, 1)
     assert judged.signals.trusted == pytest.approx(0, abs=0.1), "the presses of the set-up alone"
     assert judged.verdict == "unlikely"
+
+
+def test_a_driven_browser_with_lengthened_presses_and_a_persons_times_is_unclear_at_most(
+    strict: ServerProcess, tmp_path: Path, page: Page
+) -> None:
+    """No disguise: keys held for 12 to 40 ms as on a busy machine, answers and waits at random."""
+    study = strict.add_study(tmp_path / "clips", STUDY, frames=4)
+    strict.start()
+    Visit(page, strict.address).open(study.link_token).begin()
+    rng, deadline = random.Random(5), time.monotonic() + 300
+    while page.query_selector(".code") is None:
+        assert time.monotonic() < deadline, page.inner_text("body")
+        if page.query_selector(".primary:enabled"):
+            page.click(".primary:enabled", no_wait_after=True, delay=rng.uniform(12, 40))
+        elif page.query_selector(".scale"):
+            page.wait_for_timeout(rng.uniform(320, 900))
+            page.keyboard.press(str(rng.randint(1, 7)), delay=rng.uniform(12, 40))
+        elif page.query_selector(".ready, .feedback"):
+            page.keyboard.press("Space", delay=rng.uniform(12, 40))
+        page.wait_for_timeout(40)
+    judged = judgement(strict)
+    assert (judged.signals.tickets, judged.signals.digests, judged.signals.trusted) == (1, 1, 1)
+    assert judged.signals.press_ms is not None
+    assert judged.signals.press_ms > 12
+    assert judged.verdict == "unclear"
 
 
 def with_keys(display: Display, page: Page) -> None:

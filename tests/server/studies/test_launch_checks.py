@@ -13,6 +13,7 @@ from server.models import Study, StudyVersion
 from server.settings import Settings
 from tests.helpers.admins import Admin
 from tests.helpers.databases import run_server_command
+from tests.helpers.motion_checks import checked
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study
 
 
@@ -134,3 +135,40 @@ def test_texts_without_a_translation_are_named_and_do_not_block(owner: Admin, st
     assert "de" in check["text"]
     assert "forms.1.title" in check["text"]
     assert not check["blocks"]
+
+
+def advice(admin: Admin, kind: str) -> list[str]:
+    found = admin.get("/studies/short/launch-checks").json()
+    return [check["text"] for check in found if check["kind"] == kind]
+
+
+@pytest.mark.parametrize(
+    ("attention", "advised"), [("per_block = 1", False), ("per_block = 0", True)], ids=["two", "none"]
+)
+def test_recruiting_for_a_study_without_enough_checks_recommends_them(
+    owner: Admin, services: Services, tmp_path: Path, attention: str, advised: bool
+) -> None:
+    text = SHORT.replace("[attention]\nper_block = 1", f"[attention]\n{attention}")
+    add_study(services, tmp_path / "clips", text, status="draft")
+    assert advice(owner, "person_checks") == []
+    assert recruiting(owner, {"kind": "prolific", "code_complete": "C1"}).status_code == 200
+    assert bool(advice(owner, "person_checks")) == advised
+
+
+def test_motion_checks_that_the_consent_does_not_mention_are_warned_of(
+    owner: Admin, services: Services, tmp_path: Path
+) -> None:
+    add_study(services, tmp_path / "clips", checked(SHORT), status="draft")
+    (warning,) = advice(owner, "flicker")
+    assert "(en, de)" in warning
+
+
+def test_the_switch_for_online_recruitment_is_what_is_recommended(
+    owner: Admin, services: Services, tmp_path: Path
+) -> None:
+    text = SHORT.replace("[attention]\nper_block = 1\n", "[evidence]\nonline_recruitment = true\n")
+    text = text.replace(CONSENT, '"Some clips flicker. Do you agree?"')
+    text = text.replace('"Einverstanden?"', '"Einige Clips flimmern. Einverstanden?"')
+    add_study(services, tmp_path / "clips", text, status="draft")
+    assert recruiting(owner, {"kind": "prolific", "code_complete": "C1"}).status_code == 200
+    assert advice(owner, "person_checks") == advice(owner, "flicker") == []
