@@ -39,6 +39,17 @@ def test_every_console_and_text_column_has_markup_switched_off() -> None:
     assert faults == []
 
 
+def test_no_spinner_is_given_a_text_that_it_reads_as_markup() -> None:
+    """A spinner reads every string as markup, whatever its console does; a `Text` it takes as it is."""
+    faults = [
+        f"{path.relative_to(ROOT)}:{node.lineno}"
+        for path in modules()
+        for node in calls(path)
+        if called(node) in ("status", "update") and any(isinstance(one, ast.JoinedStr) for one in node.args)
+    ]
+    assert faults == []
+
+
 def test_nothing_asks_for_markup() -> None:
     faults = [
         f"{path.relative_to(ROOT)}:{node.lineno}"

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
+from rich.text import Text
 
 from experiments.files import check_targets
 from server.accounts.audit import record
@@ -64,7 +65,7 @@ def capsule(
             study,
             CapsuleContents(origin, clips, sensitivity, series),
             out_file,
-            lambda _, step: status.update(f"capsule: {step}"),
+            lambda _, step: status.update(Text(f"capsule: {step}")),
         )
     out.print(f"{out_file}: {out_file.stat().st_size:,} bytes, {len(made.files)} files, sha256 {made.sha256}")
     missing = [
