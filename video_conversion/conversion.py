@@ -8,6 +8,9 @@ from video_conversion.video_file import MAX_PX, NotAClip, VideoFile, check_amoun
 
 PLAYED_PROFILES = ("Constrained Baseline", "Baseline", "Main", "High", "Progressive High", "Constrained High")
 MIN_FPS, MAX_FPS = 1, 240
+MAX_CLIP_FRAMES = 5_000
+"""As many as the participant page plays, and the log of a view holds."""
+QUICKTIME = "qt  "
 HD_LINES = 720
 BT601, BT709, RGB, NOT_SAID = 6, 1, 0, 2
 MATRIX_NAMES = {1: "bt709", 4: "fcc", 5: "bt470bg", 6: "smpte170m", 7: "smpte240m"}
@@ -70,8 +73,13 @@ def conversion_of(video: VideoFile, asked_fps: float | None) -> Conversion:
     shown = tuple(range(len(video.times_s))) if keeps_times else frame_map(video.times_s, video.end_s, rate)
     timing = () if keeps_times else (_timing_words(video, rate, shown),)
     changes = (*_stream_words(video), *timing, *picture_changes)
-    left_out = _left_out(video)
-    return Conversion(rate, shown, filters, turned_px, (*changes, *left_out), encodes=bool(changes))
+    copied = (*(() if changes else _container_words(video)), *_left_out(video))
+    if len(shown) > MAX_CLIP_FRAMES:
+        raise NotAClip(
+            f"the clip would have {len(shown)} frames; cut it or choose a lower rate: at most "
+            f"{MAX_CLIP_FRAMES} frames can be shown"
+        )
+    return Conversion(rate, shown, filters, turned_px, (*changes, *copied), encodes=bool(changes))
 
 
 def _stream_words(video: VideoFile) -> tuple[str, ...]:
@@ -82,6 +90,16 @@ def _stream_words(video: VideoFile) -> tuple[str, ...]:
         return (f"encoded as H.264, was {named}",)
     if "mp4" not in video.container.split(","):
         return (f"encoded anew in an MP4 file, was {video.container.split(',')[0]}",)
+    if video.is_edited:
+        return ("frames as the edit list of the file says, which players apply differently",)
+    return ()
+
+
+def _container_words(video: VideoFile) -> tuple[str, ...]:
+    """What is written into another file while pictures stay as they are encoded."""
+    is_mp4 = "mp4" in video.container.split(",")
+    if is_mp4 and video.brand in ("", QUICKTIME):
+        return ("written as an MP4 file, was QuickTime",)
     return ()
 
 

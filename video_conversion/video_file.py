@@ -43,6 +43,10 @@ class VideoFile:
     ----------
     container, codec, profile, pixel_format : str
         As FFmpeg calls them.
+    brand : str
+        The major brand in the first box of an MP4 or QuickTime file, such as isom; empty where there is none.
+    is_edited : bool
+        True where an edit list hides, repeats or reorders stored frames.
     colour_range, matrix : str and int
         Range, and the number of the matrix (ITU-T H.273); 2 where the file does not say.
     width_px, height_px : int
@@ -64,6 +68,8 @@ class VideoFile:
     """
 
     container: str
+    brand: str
+    is_edited: bool
     codec: str
     profile: str
     pixel_format: str
@@ -86,10 +92,11 @@ class VideoFile:
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[Any]:
-    """The file as a container; NotAClip where it is none."""
+def opened(path: Path, *, with_edits: bool = True) -> Iterator[Any]:
+    """The file as a container, without its edit list if `with_edits` is false; NotAClip where it is none."""
+    options = OPEN_OPTIONS if with_edits else OPEN_OPTIONS | {"ignore_editlist": "1"}
     try:
-        with av.open(str(path), options=OPEN_OPTIONS, metadata_errors="ignore") as container:
+        with av.open(str(path), options=options, metadata_errors="ignore") as container:
             yield container
     except MemoryError:
         raise
@@ -106,18 +113,29 @@ def examine(path: Path) -> VideoFile:
         It is not a video, damaged, interlaced, in HDR or wide-gamut colours, or beyond a limit. What the
         container says of rate, frames and pixels is checked before the first frame is decoded.
     """
-    _check_packets(path)
+    stored = _stored_packets(path, with_edits=False)
+    is_edited = stored != _stored_packets(path, with_edits=True)
     with opened(path) as container:
         stream = container.streams.video[0]
         frames = _Frames()
         for frame in _decoded(container, stream):
             frames.add(frame)
-        return _described(container, stream, frames)
+        return _described(container, stream, frames, brand=major_brand(path), is_edited=is_edited)
 
 
-def _check_packets(path: Path) -> None:
-    """NotAClip where the container holds more than a clip may: packets are counted, and none is decoded."""
-    with opened(path) as container:
+def major_brand(path: Path) -> str:
+    """The major brand of a file that begins with it, as the participant page's reader expects it."""
+    with path.open("rb") as stream:
+        begin = stream.read(12)
+    return begin[8:12].decode("latin-1") if begin[4:8] == b"ftyp" else ""
+
+
+def _stored_packets(path: Path, *, with_edits: bool) -> list[int | None]:
+    """Where each packet of the video is in the file, in the order of decoding, except those that are hidden.
+
+    NotAClip where the container holds more than a clip may: packets are counted, and none is decoded.
+    """
+    with opened(path, with_edits=with_edits) as container:
         if not container.streams.video:
             held = ", ".join(sorted({stream.type for stream in container.streams})) or "nothing"
             raise NotAClip(f"it holds {held} and no picture; expected a video")
@@ -127,18 +145,20 @@ def _check_packets(path: Path) -> None:
         pixels = context.width * context.height
         check_amount(stream.frames, pixels)
         count, earliest, latest = 0, None, None
+        places: list[int | None] = []
         for packet in container.demux(stream):
             if not packet.size:
                 continue
             count += 1
             check_amount(count, pixels)
+            if not packet.is_discard:
+                places.append(packet.pos)
             if packet.pts is not None:
                 earliest = packet.pts if earliest is None else min(earliest, packet.pts)
                 latest = packet.pts if latest is None else max(latest, packet.pts)
-        if earliest is None or latest is None or count < 2:
-            return
-        span_s = float((latest - earliest) * stream.time_base)
-        _check_rate(count, span_s)
+        if earliest is not None and latest is not None and count > 1:
+            _check_rate(count, float((latest - earliest) * stream.time_base))
+        return places
 
 
 def _check_rate(count: int, span_s: float) -> None:
@@ -214,7 +234,7 @@ class _Frames:
         self.last_s = float((frame.duration or 0) * frame.time_base)
 
 
-def _described(container: Any, stream: Any, frames: _Frames) -> VideoFile:
+def _described(container: Any, stream: Any, frames: _Frames, *, brand: str, is_edited: bool) -> VideoFile:
     first, times = frames.first, frames.times_s
     if first is None:
         raise NotAClip(f"it holds no frame; {READ_AGAIN}")
@@ -229,6 +249,8 @@ def _described(container: Any, stream: Any, frames: _Frames) -> VideoFile:
     is_rgb, is_full = pixels.is_rgb, pixels.name.startswith("yuvj") or pixels.is_rgb
     return VideoFile(
         container=container.format.name,
+        brand=brand,
+        is_edited=is_edited,
         codec=stream.codec_context.name,
         profile=str(stream.codec_context.profile or ""),
         pixel_format=pixels.name,

@@ -160,9 +160,10 @@ def verify_command(
         print(finding)
     if verdict.findings:
         wrong = len({finding.clip.file for finding in verdict.findings})
+        again = "write the manifest again with `stimuli manifest`, which converts what has to be converted"
         raise InputError(
-            f"{wrong} of {verdict.clips} clips are not what the manifest says; build them again with "
-            "`stimuli build`"
+            f"{wrong} of {verdict.clips} clips are not what the manifest says; "
+            + (again if verdict.is_made_elsewhere else "build them again with `stimuli build`")
         )
     measured = "the opening was measured in none"
     if verdict.opening_checked:

@@ -12,14 +12,25 @@ from numpy.typing import NDArray
 
 from experiments.errors import InputError
 from experiments.level_leaks import BRIGHTNESS, LevelLeak, Value, level_leaks
-from experiments.manifest import MANIFEST_NAME, CheckClip, Clip, file_sha256, place_of, read_manifest
+from experiments.manifest import (
+    MANIFEST_NAME,
+    UPLOADED,
+    CheckClip,
+    Clip,
+    file_sha256,
+    place_of,
+    read_manifest,
+)
 from stimuli_builder.clips.build import Progress, silent
 from stimuli_builder.clips.characters import fingerprint, geometry, shipped_names
 from stimuli_builder.clips.face_movement.amounts import Movement
 from stimuli_builder.clips.kept_levels import kept_levels
 from stimuli_builder.clips.opening import OpeningMeter
+from video_conversion.conversion import conversion_of
+from video_conversion.video_file import NotAClip, examine
 
 TOLERANCE_MM = 0.3
+RATE_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -40,7 +51,8 @@ class Verdict:
     `opening_checked` counts the clips whose eyelid opening was measured in the pixels; clips of a
     character that has changed since, or that is not here, cannot be measured. `worst_opening_mm` is the
     largest distance between measured and promised opening. `leaks` holds what tells the levels of a factor
-    apart, for every feature of the clips.
+    apart, for every feature of the clips. `is_made_elsewhere` is true for clips that `stimuli manifest` or a
+    server took in: they need not be as `stimuli build` makes them, but must play as they are.
     """
 
     clips: int
@@ -48,6 +60,7 @@ class Verdict:
     opening_checked: int
     worst_opening_mm: float
     leaks: tuple[LevelLeak, ...] = ()
+    is_made_elsewhere: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,11 +93,12 @@ def verify(folder: Path, beside: Path | None = None, progress: Progress = silent
     manifest = read_manifest(folder)
     clips = sorted(manifest.files, key=lambda clip: (clip.inputs.get("character", ""), clip.width_px))
     meters = _Meters(beside)
+    is_own = manifest.made_elsewhere or manifest.program_version == UPLOADED
     findings: list[Finding] = []
     brightness: dict[str, tuple[float, float]] = {}
     checked, worst = 0, 0.0
     for number, clip in enumerate(clips, start=1):
-        problems, error_mm = _check(clip, folder, meters, brightness)
+        problems, error_mm = _check(clip, folder, meters, brightness, is_own=is_own)
         findings += [Finding(clip, problem) for problem in problems]
         if error_mm is not None:
             checked, worst = checked + 1, max(worst, error_mm)
@@ -93,11 +107,31 @@ def verify(folder: Path, beside: Path | None = None, progress: Progress = silent
         name: {sha256: round(both[end], 1) for sha256, both in brightness.items()}
         for end, name in enumerate(BRIGHTNESS)
     }
-    return Verdict(len(clips), tuple(findings), checked, worst, level_leaks(manifest.clips, measured))
+    leaks = level_leaks(manifest.clips, measured)
+    return Verdict(len(clips), tuple(findings), checked, worst, leaks, is_own)
+
+
+def _own_problems(path: Path, clip: Clip | CheckClip) -> Iterator[str]:
+    """Whatever `stimuli manifest` would not take as it is: one rule decides there and here."""
+    try:
+        video = examine(path)
+        conversion = conversion_of(video, None)
+    except NotAClip as error:
+        yield str(error)
+        return
+    if conversion.changes:
+        yield f"browsers do not play it as it is; it needs a conversion ({'; '.join(conversion.changes)})"
+    if abs(float(conversion.rate) - clip.fps) > RATE_TOLERANCE * clip.fps:
+        yield f"expected {clip.fps:g} frames per second, got {float(conversion.rate):g}"
 
 
 def _check(
-    clip: Clip | CheckClip, folder: Path, meters: "_Meters", brightness: dict[str, tuple[float, float]]
+    clip: Clip | CheckClip,
+    folder: Path,
+    meters: "_Meters",
+    brightness: dict[str, tuple[float, float]],
+    *,
+    is_own: bool,
 ) -> tuple[list[str], float | None]:
     path = folder / clip.file
     if not path.is_file():
@@ -109,7 +143,7 @@ def _check(
     except (InputError, ValueError) as error:
         return [f"its inputs in the {MANIFEST_NAME} cannot be read ({error})"], None
     try:
-        decoded = _decoded(path, clip, meter)
+        decoded = _decoded(path, clip, meter, is_own=is_own)
     except (av.error.FFmpegError, InputError, ValueError) as error:
         return [f"cannot be decoded ({error})"], None
     measured, problems = decoded.opening_mm, decoded.problems
@@ -132,7 +166,7 @@ def _check(
     return problems, worst
 
 
-def _decoded(path: Path, clip: Clip | CheckClip, meter: OpeningMeter | None) -> DecodedClip:
+def _decoded(path: Path, clip: Clip | CheckClip, meter: OpeningMeter | None, *, is_own: bool) -> DecodedClip:
     """Decode a clip frame by frame."""
     measured: list[NDArray[np.float64]] = []
     times: list[Fraction | None] = []
@@ -146,7 +180,11 @@ def _decoded(path: Path, clip: Clip | CheckClip, meter: OpeningMeter | None) -> 
             if meter is not None and fits:
                 luma = frame.to_ndarray(format="yuv420p")[: frame.height]
                 measured.append(meter.measured_mm(luma[None])[0])
-        problems = list(_timing_problems(stream, times, clip))
+        problems = list(_shape_problems(stream, times, clip))
+        if not is_own:
+            problems += _timing_problems(stream, times, clip)
+    if is_own and not problems:
+        problems = list(_own_problems(path, clip))
     if not times:
         raise InputError("no frame")
     first, last = (
@@ -155,11 +193,14 @@ def _decoded(path: Path, clip: Clip | CheckClip, meter: OpeningMeter | None) -> 
     return DecodedClip(np.array(measured), (first, last), problems)
 
 
-def _timing_problems(stream: Any, times: list[Fraction | None], clip: Clip | CheckClip) -> Iterator[str]:
+def _shape_problems(stream: Any, times: list[Fraction | None], clip: Clip | CheckClip) -> Iterator[str]:
     if len(times) != clip.frames:
         yield f"expected {clip.frames} frames, got {len(times)}"
     if (stream.width, stream.height) != (clip.width_px, clip.height_px):
         yield f"expected {clip.width_px} x {clip.height_px} px, got {stream.width} x {stream.height}"
+
+
+def _timing_problems(stream: Any, times: list[Fraction | None], clip: Clip | CheckClip) -> Iterator[str]:
     due = 1 / Fraction(clip.fps).limit_denominator(1001)
     if any(at is None or abs(at - k * due) > due / 100 for k, at in enumerate(times)):
         yield f"its frames are not spaced evenly at {clip.fps:g} fps"

@@ -103,6 +103,25 @@ def test_sound_is_left_out_and_pictures_are_copied_as_they_are(tmp_path: Path) -
     assert examine(clip).other_streams == ()
 
 
+@pytest.mark.parametrize("name", ["a.mov", "a.mp4"])
+@pytest.mark.parametrize("b_frames", [0, 3])
+def test_a_quicktime_file_becomes_an_mp4_file_and_its_pictures_are_copied(
+    tmp_path: Path, name: str, b_frames: int
+) -> None:
+    options = {"x264-params": f"bframes={b_frames}:b-adapt=0:log-level=error"}
+    written = write_video(tmp_path / "written.mov", options=options)
+    path = written.rename(tmp_path / name)
+    assert path.read_bytes()[8:12] == b"qt  "
+    record, clip = prepared(tmp_path, path)
+    assert record.source is not None
+    assert record.source.changes == ("written as an MP4 file, was QuickTime",)
+    assert not record.source.encoded_again
+    assert packets(clip) == packets(path)
+    content = clip.read_bytes()
+    assert content[4:12] == b"ftypisom"
+    assert content.index(b"moov") < content.index(b"mdat")
+
+
 def packets(path: Path) -> list[bytes]:
     with av.open(str(path)) as container:
         return [bytes(packet) for packet in container.demux(video=0) if packet.size]

@@ -7,7 +7,7 @@ import pytest
 
 from experiments.errors import InputError
 from experiments.load import load_experiment
-from experiments.manifest import check_files, check_originals, read_manifest
+from experiments.manifest import check_files, check_originals, file_sha256, read_manifest
 from server.storage.clips import FolderStore
 from server.studies.importing import store_clips
 from stimuli_builder.cli import main
@@ -218,3 +218,44 @@ def test_an_original_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch, c
     (made / "2_ä_2.original.mp4").unlink()
     with pytest.raises(InputError, match=r"original 2_ä_2\.original\.mp4, .* is missing"):
         check_originals(read_manifest(made), made)
+
+
+OWN: dict[str, dict[str, Any]] = {
+    "B-frames": {"options": {"x264-params": "bframes=3:b-adapt=0:log-level=error"}},
+    "no B-frames": {"options": {"x264-params": "bframes=0:log-level=error"}},
+    "a rate beyond whole numbers": {"fps": 24},
+}
+
+
+@pytest.mark.parametrize("kind", OWN)
+@pytest.mark.parametrize("ending", [".mp4", ".mov", ".mkv"])
+def test_what_manifest_takes_verify_takes_too(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, kind: str, ending: str
+) -> None:
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    for name in ("slow_1", "fast_1"):
+        write_video(folder / f"{name}{ending}", **OWN[kind])
+    assert stimuli(monkeypatch, "manifest", folder, "--pattern", f"{{speed}}_{{exemplar}}{ending}") == 0
+    made = folder if (folder / "manifest.json").exists() else folder / "clips"
+    assert stimuli(monkeypatch, "verify", made) == 0
+
+
+def test_a_quicktime_clip_of_an_older_manifest_is_named_with_advice_that_can_be_followed(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], clips: Path
+) -> None:
+    arguments = ("manifest", clips, "--pattern", "{speed}_ä_{exemplar}.mp4")
+    assert stimuli(monkeypatch, *arguments) == 0
+    for path in clips.glob("*.mp4"):  # as a release that took them left them
+        content = path.read_bytes()
+        path.write_bytes(content[:8] + b"qt  " + content[12:])
+    manifest = read_manifest(clips)
+    again = [clip.model_copy(update={"sha256": file_sha256(clips / clip.file)}) for clip in manifest.clips]
+    text = manifest.model_copy(update={"clips": tuple(again)}).model_dump_json()
+    (clips / "manifest.json").write_text(text, encoding="utf-8")
+    assert stimuli(monkeypatch, "verify", clips) != 0
+    told = capsys.readouterr()
+    assert "was QuickTime" in told.out
+    assert "write the manifest again with `stimuli manifest`" in told.err
+    assert stimuli(monkeypatch, *arguments, "--out", clips.parent / "again") == 0
+    assert stimuli(monkeypatch, "verify", clips.parent / "again") == 0
