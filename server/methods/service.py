@@ -1,20 +1,19 @@
 """The Methods of a study, from its declaration, its stored runs and, where there is one, its report."""
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from sqlalchemy.orm import Session
 
-from experiments.definition import Experiment
 from experiments.files import whole_file
-from server.methods.paragraph import Methods, declared, sentences
-from server.methods.repository import Number, numbers
+from server.methods.clauses import Described, declared_numbers, sentences
+from server.methods.paragraph import Methods
+from server.methods.repository import Number, numbers, used_versions
 from server.models import Study
-from server.participants.recruiter import stored_recruiter
-from server.studies.lookup import definition_of
-from server.studies.series import version_of_series
+from server.studies.lookup import definition_of, version_numbered
+from server.studies.series import series_of, version_of_series
 
 RESULTS = "results.json"
 METHOD_MARK = "<!-- after the method -->"
@@ -33,29 +32,59 @@ class Counted:
     """What a paragraph needs of the database, taken at one moment."""
 
     study: str
-    origin: str
-    series: int
-    experiment: Experiment
-    recruiter: str
-    numbers: dict[str, Number]
+    described: Described
 
 
 def counted(session: Session, study: Study, origin: str, series: int | None) -> Counted:
-    """What the database has to say of a series: its declaration and every number."""
+    """What the database has to say of a series: its declarations and every number."""
     version = version_of_series(session, study, series)
-    recruiter = stored_recruiter(study.recruiter).kind
     experiment = definition_of(version)
-    counts = numbers(session, study.id, origin, version.series) | declared(experiment)
-    return Counted(study.name, origin, version.series, experiment, recruiter, counts)
+    used = [
+        (one, definition_of(version_numbered(session, study, one.number)))
+        for one in used_versions(session, study.id, origin, version.series)
+    ]
+    described = Described(
+        study=study.id,
+        origin=origin,
+        series=version.series,
+        experiment=experiment,
+        used=used,
+        rules=(),
+        elsewhere="" if used else _elsewhere(session, study, origin, version.series),
+        numbers=numbers(session, study.id, origin, version.series) | declared_numbers(experiment),
+    )
+    return Counted(study.name, described)
+
+
+PEOPLE = {
+    "participant": ("participant is", "participants are"),
+    "pilot": ("pilot visit is", "pilot visits are"),
+    "simulated": ("simulated visit is", "simulated visits are"),
+}
+
+
+def _elsewhere(session: Session, study: Study, origin: str, series: int) -> str:
+    """Where the visits of an origin are that a series has none of; empty where there are none at all."""
+    placed = []
+    for other in series_of(session, study):
+        runs = other.runs.get(origin, 0)
+        if other.number != series and runs:
+            one, several = PEOPLE[origin]
+            placed.append(f"{runs} {one if runs == 1 else several} in {other.name}")
+    return "; ".join(placed)
 
 
 def paragraph_of(known: Counted, results: dict[str, Any] | None) -> Methods:
     """The paragraph of what was counted, and of the results of a report."""
     excluded = _excluded(results)
-    rules = [(name, words) for name, (words, _) in excluded.items()]
-    counts = known.numbers | {name: number for name, (_, number) in excluded.items()}
-    lines = sentences(known.experiment, known.origin, known.recruiter, counts, rules)
-    return Methods(known.study, known.origin, known.series, lines, counts)
+    described = replace(
+        known.described,
+        rules=[(name, words) for name, (words, _) in excluded.items()],
+        numbers=known.described.numbers | {name: number for name, (_, number) in excluded.items()},
+    )
+    lines = sentences(described)
+    of = described
+    return Methods(known.study, of.origin, of.series, lines, of.numbers)
 
 
 def read_results(folder: Path) -> dict[str, Any] | None:

@@ -49,6 +49,9 @@ class StudyRun(Base):
         Latest `time_elapsed`, from which the clock goes on after a reload.
     px_per_mm, viewing_distance_mm : float or None
         Of the latest calibration, copied to each rating.
+    recruiter : str or None
+        Kind of the recruiter whose id the address named at the start; empty where it named nobody, None in
+        runs from before this was stored.
     evidence : str
         `asked` where the page brings evidence with each answer, `older` where it was open before pages did,
         `none` where the run is older itself or not a person's.
@@ -108,6 +111,7 @@ class StudyRun(Base):
     excluded_at: Mapped[datetime | None]
     excluded_by: Mapped[int | None] = mapped_column(ForeignKey("accounts.id", ondelete="SET NULL"))
     erased_at: Mapped[datetime | None]
+    recruiter: Mapped[str | None] = mapped_column(String(10))
     evidence: Mapped[str] = mapped_column(String(5), default="none")
     evidence_verdict: Mapped[str | None] = mapped_column(String(10))
     view_tickets: Mapped[bool] = mapped_column(default=False)

@@ -3,7 +3,7 @@
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import ForeignKey, ForeignKeyConstraint, String, Text, UniqueConstraint
+from sqlalchemy import ForeignKey, ForeignKeyConstraint, Index, String, Text, UniqueConstraint, literal_column
 from sqlalchemy.orm import Mapped, mapped_column
 
 from server.clock import now
@@ -19,7 +19,18 @@ class AssignedTrial(Base):
     """
 
     __tablename__ = "assigned_trials"
-    __table_args__ = (one_of("kind", "practice", "main", "attention", "check"),)
+    __table_args__ = (
+        one_of("kind", "practice", "main", "attention", "check"),
+        # Few trials of many: what counts answers to checks reads these alone.
+        Index(
+            "ix_assigned_trials_not_main",
+            "study_run_id",
+            "kind",
+            "trial_index",
+            sqlite_where=literal_column("kind <> 'main'"),
+            postgresql_where=literal_column("kind <> 'main'"),
+        ),
+    )
 
     study_run_id: Mapped[int] = mapped_column(
         ForeignKey("study_runs.id", ondelete="CASCADE"), primary_key=True, autoincrement=False

@@ -234,6 +234,8 @@ def _new_run(
         completion_code=new_token()[:10],
         device=checked_device(start.device),
         evidence=evidence,
+        # The study's recruiter may be another one later.
+        recruiter=recruiter.kind if identifier and not link.synthetic else "",
         view_tickets=_view_tickets(session, evidence, start),
     )
     repository.add_all(session, [run])

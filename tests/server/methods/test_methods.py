@@ -6,6 +6,7 @@ import uuid
 from pathlib import Path
 from typing import Any
 
+import pytest
 from fastapi.testclient import TestClient
 from hypothesis import given
 from hypothesis import strategies as st
@@ -71,7 +72,9 @@ def test_the_counts_are_those_of_the_runs(
     )
     assert "2 were completed" in answer["paragraph"]
     assert "Every clip was drawn frame by frame" in answer["paragraph"]
-    assert "Automated answers: tickets" in answer["paragraph"]
+    assert (
+        "Automated answers: tickets of the server and the server's time (in 0 visits)" in answer["paragraph"]
+    )
     assert "Nobody has completed" not in answer["paragraph"]
     assert "and 1 was left open" in answer["paragraph"]
     assert "attention checks failed" in answer["paragraph"]
@@ -170,3 +173,182 @@ def test_motion_checks_are_told_with_how_many_were_right(
     assert "% motion\\_checks" not in written
     assert "% motion_checks_right = 3: SELECT count(*)" in written
     assert "% motion_checks_per_block = 2: declaration: evidence.motion_checks.per_block" in written
+
+
+def paragraph(viewer: Admin, **query: Any) -> str:
+    return str(viewer.get("/studies/short/methods", params=query).json()["paragraph"])
+
+
+def values(viewer: Admin, services: Services, **query: Any) -> dict[str, int]:
+    """The numbers of the paragraph; each is what its own query gives."""
+    numbers = viewer.get("/studies/short/methods", params=query).json()["numbers"]
+    with services.database.read() as session:
+        for one in numbers:
+            if not one["source"].startswith("declaration: "):
+                assert session.scalar(text(one["source"])) == one["value"], one["name"]
+    return {one["name"]: one["value"] for one in numbers}
+
+
+def complete(client: TestClient, link: str, **start: Any) -> Participant:
+    person = Participant(client, link)
+    assert person.start(**start).status_code == 201
+    assert person.request("PUT", "/consent", {"agreed": True}).status_code == 200
+    person.answer_all()
+    assert person.request("POST", "/complete").status_code == 200
+    return person
+
+
+def save_version(admin: Admin, toml: str) -> None:
+    revision = admin.get("/studies/short").json()["summary"]["revision"]
+    saved = admin.send("POST", "/studies/short/versions", {"revision": revision, "toml": toml})
+    assert saved.status_code < 300, saved.text
+
+
+PROLIFIC = {"kind": "prolific", "code_complete": "C1ABC"}
+PERSON = "5f3c2a1b4d6e7f8091a2b3c4"
+MORE_RULES = """
+[[exclusions]]
+rule = "median_response_time"
+
+[[screening]]
+rule = "form_answer"
+form = "about"
+field = "age"
+below = 18
+"""
+
+
+def test_only_visits_that_a_recruiter_sent_were_recruited_through_it(
+    client: TestClient, study: StudyInDatabase, viewer: Admin, services: Services
+) -> None:
+    complete(client, study.link_token)
+    complete(client, study.link(synthetic=True))
+    study.change(recruiter=PROLIFIC)
+    assert "Prolific" not in paragraph(viewer)
+    complete(client, study.link_token, query={"PROLIFIC_PID": PERSON})
+    complete(client, study.link_token)
+    complete(client, study.link("personal", label="P1"))
+    assert "Through Prolific 1 visit was recruited." in paragraph(viewer)
+    study.change(recruiter={"kind": "sona"})
+    assert "Through Prolific 1 visit was recruited." in paragraph(viewer)
+    assert "SONA" not in paragraph(viewer)
+    complete(client, study.link(recruiter={"kind": "sona"}), query={"survey_code": "7"})
+    assert "Through SONA 1 visit was recruited." in paragraph(viewer)
+    assert values(viewer, services)["begun"] == 5
+    assert "recruited" not in paragraph(viewer, origin="simulated")
+
+
+def test_every_clip_was_drawn_only_where_every_play_was(
+    client: TestClient, study: StudyInDatabase, viewer: Admin, services: Services
+) -> None:
+    complete(client, study.link_token)
+    said = paragraph(viewer)
+    assert "Every clip was drawn frame by frame in the participant's browser and each frame's time" in said
+    assert "flagged" not in said
+    person = Participant(client, study.link_token).agree()
+    mains = [trial for trial in person.state()["trials"] if trial["kind"] == "main"]
+    person.rate(mains[0], None, playback={"method": "none", "clip_sha256": None, "drawn": None})
+    person.rate(mains[0], play=2)
+    person.rate(mains[1], playback={"method": "video", "clock_gap_ms": None, "drawn": None})
+    person.rate(mains[2], playback={"frames_missing": 1, "frames_drawn": 3})
+    person.answer_all()
+    assert person.request("POST", "/complete").status_code == 200
+    said = paragraph(viewer)
+    assert "Every clip" not in said
+    assert "frame's time" not in said
+    assert (
+        "drawn frame by frame in 15, shown by the browser's video element in 1, and not shown at all in 1."
+        in said
+    )
+    assert "2 were flagged (" in said
+    assert "missing frames: 1" in said
+    found = values(viewer, services)
+    assert (found["plays"], found["plays_by_frame"], found["plays_not_drawn"]) == (17, 15, 1)
+
+
+def test_rules_are_declared_before_the_data_only_where_every_visit_had_them(
+    client: TestClient, study: StudyInDatabase, viewer: Admin, owner: Admin, services: Services
+) -> None:
+    complete(client, study.link_token)
+    save_version(owner, SHORT + MORE_RULES)
+    later = "Exclusions declared or changed after 1 visit had begun: median response time."
+    said = paragraph(viewer)
+    assert "Exclusions declared before the data: attention checks failed." in said
+    assert later in said
+    assert "Rules of screening" not in said
+    complete(client, study.link_token)
+    said = paragraph(viewer)
+    assert later in said
+    assert "Rules of screening that held for 1 of 2 visits: form answer." in said
+    assert values(viewer, services)["begun_with_2"] == 1
+    # Another limit is another rule: the data were there when it was chosen.
+    save_version(
+        owner, SHORT.replace('"attention_checks_failed"', '"attention_checks_failed"\nmore_than = 1')
+    )
+    said = paragraph(viewer)
+    assert "before the data" not in said.replace("No exclusion was declared before", "")
+    assert "changed after 2 visits had begun: attention checks failed." in said
+
+
+def test_a_number_of_checks_that_was_changed_is_not_stated_as_one(
+    client: TestClient, study: StudyInDatabase, viewer: Admin, owner: Admin
+) -> None:
+    assert "Attention was checked" not in paragraph(viewer)
+    complete(client, study.link_token)
+    one = "Attention was checked by 1 instructed answer per block; completed visits hold 2 answers"
+    assert one in paragraph(viewer)
+    save_version(owner, SHORT.replace("per_block = 1", "per_block = 2"))
+    assert one in paragraph(viewer)
+    complete(client, study.link_token)
+    assert one not in paragraph(viewer)
+    assert "their number per visit was changed (2, 4); completed visits hold 6 answers" in paragraph(viewer)
+
+
+def test_warnings_that_nobody_got_were_not_given(
+    client: TestClient, study: StudyInDatabase, viewer: Admin, owner: Admin
+) -> None:
+    save_version(owner, SHORT + '\n[[warnings.rules]]\nrule = "same_answer"\nanswers = 20\n')
+    complete(client, study.link_token)
+    said = paragraph(viewer)
+    assert "people were warned" not in said
+    assert "Warnings of same answer were declared; no visit was warned." in said
+
+
+def test_who_declined_or_began_again_did_not_wish_to_end(
+    client: TestClient, services: Services, tmp_path: Path, viewer: Admin
+) -> None:
+    again = SHORT.replace("lease_minutes = 60", 'lease_minutes = 60\nresume = "restart"')
+    study = add_study(services, tmp_path / "clips", again)
+    declines = Participant(client, study.link_token)
+    declines.start()
+    declines.request("PUT", "/consent", {"agreed": False})
+    person = Participant(client, study.link_token).agree()
+    assert person.start().status_code == 201
+    said = paragraph(viewer)
+    found = values(viewer, services)
+    assert (found["declined"], found["restarted"], found["withdrew"]) == (1, 1, 0)
+    assert "1 was ended because consent was declined" in said
+    assert "1 was replaced by a new visit of the same participant" in said
+
+
+def test_an_empty_series_says_where_the_data_are(
+    client: TestClient, study: StudyInDatabase, viewer: Admin, owner: Admin
+) -> None:
+    for _ in range(3):
+        complete(client, study.link_token)
+    save_version(owner, SHORT.replace("[trial.scale]\n", "[trial.scale]\nmaximum = 9\n"))
+    said = paragraph(viewer)
+    assert said.startswith("3 participants are in series 1 (version 1); data series 2 has no visits yet.")
+    assert "Visits begun: 0" not in said
+    assert "Visits begun: 3" in paragraph(viewer, series=1)
+
+
+@pytest.mark.parametrize("people", [1, 2])
+def test_one_and_several_have_their_own_words(
+    client: TestClient, study: StudyInDatabase, viewer: Admin, people: int
+) -> None:
+    for _ in range(people):
+        complete(client, study.link_token)
+    said = paragraph(viewer)
+    wrong = r"\b1 (were|visits|plays|answers)\b|\b(0|[2-9]|\d\d+) (was|visit|play|answer)\b"
+    assert not re.search(wrong, said), said
