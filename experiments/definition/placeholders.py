@@ -63,7 +63,7 @@ class Unfilled(NamedTuple):
 
 def unfilled(declared: Experiment) -> list[Unfilled]:
     """The texts with placeholders, in the languages that participants are offered; certain ones first."""
-    found = []
+    texts = []
     for path, language, text in participant_texts(declared):
         if language not in declared.languages:
             continue
@@ -71,10 +71,10 @@ def unfilled(declared: Experiment) -> list[Unfilled]:
         if path.startswith("attention.text"):
             plain = plain.replace("{response}", " ")  # the page fills it in
         if certain := tuple(dict.fromkeys(_certain(plain))):
-            found.append(Unfilled(path, language, certain, certain=True))
+            texts.append(Unfilled(path, language, certain, certain=True))
         elif doubtful := tuple(dict.fromkeys(_DOUBTFUL.findall(_RULE.sub(" ", plain)))):
-            found.append(Unfilled(path, language, doubtful, certain=False))
-    return sorted(found, key=lambda text: not text.certain)
+            texts.append(Unfilled(path, language, doubtful, certain=False))
+    return sorted(texts, key=lambda text: not text.certain)
 
 
 def _certain(text: str) -> Iterator[str]:

@@ -54,9 +54,9 @@ class Described:
 
     def begun_with(self, versions: Iterable[int]) -> str:
         """The name of the number of visits that began with one of these versions."""
-        wanted = set(versions)
-        visits = sum(version.begun for version, _ in self.used if version.number in wanted)
-        number = begun_with(self.study, self.origin, self.series, sorted(wanted), visits)
+        numbers = set(versions)
+        visits = sum(version.begun for version, _ in self.used if version.number in numbers)
+        number = begun_with(self.study, self.origin, self.series, sorted(numbers), visits)
         self.numbers[number.name] = number
         return number.name
 

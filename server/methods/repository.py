@@ -125,12 +125,12 @@ def numbers(session: Session, study: int, origin: str, series: int) -> dict[str,
     values = _at_once(session, RUNS, OF_RUNS, of) | _at_once(session, PLAYS, OF_CHECKS, of, EXTRA)
     plays = _plays(session, study, origin, series)
     values |= _play_numbers(plays)
-    found = {name: Number(name, values[name], _filled(query, of)) for name, query in QUERIES.items()}
+    known = {name: Number(name, values[name], _filled(query, of)) for name, query in QUERIES.items()}
     for rule, number in _flagged_by(plays):
         name = f"plays_flagged_by_{rule}"
         query = f"{PLAYS} AND {MAIN} AND t.verdict = 'flagged' AND t.verdict_rule = '{rule}'"
-        found[name] = Number(name, number, _filled(query, of))
-    return found
+        known[name] = Number(name, number, _filled(query, of))
+    return known
 
 
 def used_versions(session: Session, study: int, origin: str, series: int) -> list[UsedVersion]:

@@ -55,8 +55,8 @@ def failing_clips(session: Session, study: Study, chosen: Origin | None) -> list
             seen.rules[play.rule] += 1
     _add_who_met(session, runs, clips)
     _add_reasons(session, with_failures, clips)
-    found = [_of(sha256, seen) for sha256, seen in clips.items()]
-    return sorted(found, key=lambda clip: (not clip.alarm, -clip.failed_for, clip.file))
+    listed = [_of(sha256, seen) for sha256, seen in clips.items()]
+    return sorted(listed, key=lambda clip: (not clip.alarm, -clip.failed_for, clip.file))
 
 
 def _add_who_met(session: Session, runs: dict[int, MetRun], clips: dict[str, _Seen]) -> None:
