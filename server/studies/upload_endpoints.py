@@ -7,7 +7,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Form, UploadFile
 from fastapi.params import File
-from fastapi.responses import PlainTextResponse, StreamingResponse
+from fastapi.responses import FileResponse, PlainTextResponse, StreamingResponse
 
 from experiments.source_video import FrameRate
 from server.accounts.identity import Identity
@@ -77,6 +77,14 @@ def get_upload(services: ServicesDep, identity: Uploader, upload: str) -> Upload
     """Every file of an upload: what it is, how it was changed, or why it cannot be used."""
     folder = uploads.upload_folder(services.settings.upload_folder, upload, identity.account_id)
     return uploads.describe(upload, folder)
+
+
+@router.get("/uploads/{upload}/clips/{sha256}", response_class=FileResponse)
+def get_uploaded_clip(services: ServicesDep, identity: Uploader, upload: str, sha256: str) -> FileResponse:
+    """A clip of an upload as participants would get it, so that the experimenter's browser can try it."""
+    folder = uploads.upload_folder(services.settings.upload_folder, upload, identity.account_id)
+    headers = {"content-disposition": "attachment", "cache-control": "private, no-store"}
+    return FileResponse(uploads.find_clip(folder, sha256), 200, headers, "application/octet-stream")
 
 
 @router.get("/uploads/{upload}/progress")

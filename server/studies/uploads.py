@@ -198,6 +198,16 @@ def _described(path: Path, record: Prepared | None, first_of: dict[str, str], *,
     )
 
 
+def find_clip(folder: Path, sha256: str) -> Path:
+    """The file of an upload's clip, as participants would get it; NotFound where none has this hash."""
+    # Looked up among the clips that there are: nothing that is sent becomes a path.
+    clips = (folder / record.clip for record in records_of(folder).values() if record.sha256 == sha256)
+    clip = next((path for path in clips if path.is_file()), None) if sha256 else None
+    if clip is None:
+        raise NotFound("This upload has no such clip.")
+    return clip
+
+
 def progress(folder: Path) -> UploadProgress:
     """How far an upload's videos have been looked into and converted."""
     clips, records = videos_of(folder), records_of(folder)

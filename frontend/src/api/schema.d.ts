@@ -363,6 +363,11 @@ export interface paths {
   };
   get: operations["get_upload"];
  };
+ "/api/admin/uploads/{upload}/clips/{sha256}": {
+  parameters: {
+  };
+  get: operations["get_uploaded_clip"];
+ };
  "/api/admin/uploads/{upload}/progress": {
   parameters: {
   };
@@ -6807,6 +6812,37 @@ export interface operations {
     };
     content: {
      "application/json": components["schemas"]["UploadOut"];
+    };
+   };
+   422: {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["ErrorBody"];
+    };
+   };
+   "4XX": {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["ErrorBody"];
+    };
+   };
+  };
+ };
+ get_uploaded_clip: {
+  parameters: {
+   path: {
+    upload: string;
+    sha256: string;
+   };
+  };
+  responses: {
+   200: {
+    headers: {
+     [name: string]: unknown;
     };
    };
    422: {

@@ -1,10 +1,11 @@
 """Own videos of several formats in the real page: sent, converted, told of, made a study, shown."""
 
+import hashlib
 import os
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import expect
+from playwright.sync_api import Route, expect
 
 from tests.browser.admin.conftest import Dashboard
 from tests.browser.visit import axe_violations
@@ -83,3 +84,38 @@ def test_videos_of_any_format_become_a_study(
     )
     assert axe_violations(page) == []
     shoot(dashboard, "clips-converted")
+
+
+def test_a_clip_that_the_participant_page_does_not_play_is_named_with_its_reason(
+    dashboard: Dashboard, tmp_path: Path
+) -> None:
+    """As where a browser plays less than the server's rule says: one clip reaches it as QuickTime."""
+    page = dashboard.page
+    clips = [
+        write_video(tmp_path / f"{speed}_1.mp4", size_px=(320, 120)) for speed in ("slow", "fast", "odd")
+    ]
+    clips[2].write_bytes(write_video(tmp_path / "b.mp4", size_px=(320, 120), frames=7).read_bytes())
+    broken = hashlib.sha256(clips[2].read_bytes()).hexdigest()
+
+    def as_quicktime(route: Route) -> None:
+        content = clips[2].read_bytes()
+        route.fulfill(body=content[:8] + b"qt  " + content[12:], content_type="application/octet-stream")
+
+    page.route(f"**/api/admin/uploads/*/clips/{broken}", as_quicktime)
+    dashboard.open("/studies/new")
+    page.get_by_label("Short name").fill("played")
+    page.get_by_role("tab", name="From your own clips").click()
+    panel = page.get_by_role("tabpanel", name="From your own clips")
+    panel.locator('input[type="file"]').first.set_input_files(clips)
+    expect(panel.get_by_text("2 unchanged, 1 that cannot be used")).to_be_visible(timeout=60_000)
+    table = panel.get_by_role("region", name="What became of each file")
+    expect(table.get_by_text("the participant's page does not play it in this browser")).to_have_count(1)
+    expect(table.get_by_text("unsupported or unrecognizable format")).to_be_visible()
+    panel.get_by_label("Pattern", exact=True).fill("{speed}_{exemplar}.mp4")
+    panel.get_by_label("Title of the study").fill("Played")
+    expect(panel.get_by_text("another file for each clip that does not play")).to_be_visible()
+    expect(panel.get_by_role("button", name="Create")).to_be_disabled()
+    assert axe_violations(page) == []
+    table.get_by_label("Leave out odd_1.mp4").click()
+    expect(panel.get_by_text("2 clips received: 2 unchanged")).to_be_visible(timeout=60_000)
+    expect(panel.get_by_role("button", name="Create")).to_be_enabled(timeout=60_000)

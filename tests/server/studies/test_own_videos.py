@@ -1,5 +1,6 @@
 """Own videos of any format on their way to a study: looked into beside the server, kept, told of."""
 
+import hashlib
 import time
 from pathlib import Path
 from typing import Any
@@ -74,6 +75,22 @@ def test_a_participant_is_sent_the_converted_clip(
     for address in addresses:
         answer = client.get(address)
         assert (answer.status_code, answer.content[4:8]) == (200, b"ftyp")
+
+
+def test_a_clip_of_an_upload_can_be_tried_by_its_sender_alone(
+    experimenter: Admin, videos: list[tuple[str, bytes]]
+) -> None:
+    received = upload(experimenter, *videos).json()
+    files = {file["name"]: file for file in received["files"]}
+    address = f"/uploads/{received['id']}/clips/"
+    assert experimenter.get(address + files["slow_2.mp4"]["sha256"]).content == dict(videos)["slow_2.mp4"]
+    converted = experimenter.get(address + files["slow_1.webm"]["sha256"])
+    assert (converted.content[4:8], len(converted.content) > 0) == (b"ftyp", True)
+    assert hashlib.sha256(converted.content).hexdigest() == files["slow_1.webm"]["sha256"]
+    assert converted.headers["content-type"] == "application/octet-stream"
+    assert experimenter.get(address + "0" * 64).status_code == 404
+    assert experimenter.get(address + "..%2F.account").status_code == 404
+    assert experimenter.get(f"/uploads/{'0' * 32}/clips/{files['slow_2.mp4']['sha256']}").status_code == 404
 
 
 def test_what_cannot_be_a_clip_is_named_and_keeps_the_study_from_being_made(

@@ -141,6 +141,17 @@ function Received({ upload, received }: { upload: Upload; received: Schemas["Upl
           <Text size="sm">Correct them as the table says, and choose the corrected file beside each: the others stay.</Text>
         </Alert>
       )}
+      {upload.plays === null && (
+        <Text size="sm" role="status">
+          Trying the clips in this browser…
+        </Text>
+      )}
+      {upload.plays === "unknown" && (
+        <Alert color="yellow">
+          This browser could not try whether participants will see these clips: it has no decoder for H.264 frame by frame, or the address
+          is not https. Open this page in a current Chrome, Edge, Firefox or Safari to try them.
+        </Alert>
+      )}
       {upload.isReplacing && (
         <Text size="sm" role="status">
           Sending the file…

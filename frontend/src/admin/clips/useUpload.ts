@@ -4,6 +4,7 @@ import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
 import { api, type Schemas, unwrap } from "../api";
 import { beginUpload, replaceFile, sendFiles } from "./sending";
+import { type Tried, tryClips, withTried } from "./tried";
 
 const LOOK_EVERY_MS = 700;
 const keyOf = (purpose: string) => `palpebra.upload.${purpose}`;
@@ -19,6 +20,8 @@ export interface Upload {
   received: Schemas["UploadOut"] | null;
   /** The same as it was last, while files are sent or looked into: what stands beside it need not go. */
   last: Schemas["UploadOut"] | null;
+  /** Whether the clips that came play in this browser; null until all have been tried. */
+  plays: "all" | "not all" | "unknown" | null;
   fps: number | null;
   askFps: (fps: number | null) => void;
   send: (files: readonly File[]) => void;
@@ -32,6 +35,19 @@ export interface Upload {
   notLeftOut: Error | null;
   /** Begin anew; what was sent is deleted by the server within a day. */
   forget: () => void;
+}
+
+function playsOf({ data, isError }: { data: Tried | undefined; isError: boolean }): Upload["plays"] {
+  if (isError || data?.canTell === false) return "unknown";
+  if (data === undefined) return null;
+  return data.problems.size > 0 ? "not all" : "all";
+}
+
+/** What keeps the clips from being used as they are; false where nothing does. */
+export function playNeeded({ received, plays }: Upload): string | false {
+  if (received === null || received.files.length === 0) return false;
+  if (plays === null) return "clips that have been tried in this browser";
+  return plays === "not all" && "another file for each clip that does not play, or leave it out";
 }
 
 /** The upload for this purpose, such as a new study; one that was begun before a reload is taken up. */
@@ -53,6 +69,13 @@ export function useUpload(purpose: string): Upload {
     queryFn: () => unwrap(api.GET("/api/admin/uploads/{upload}", path)),
     enabled: id !== null && settled,
     placeholderData: (before, of) => (of?.queryKey[1] === id ? before : undefined),
+  });
+  const files = settled ? received.data?.files : undefined;
+  const tried = useQuery({
+    queryKey: ["tried", id, files?.map(({ name, sha256, fps: rate }) => [name, sha256, rate])],
+    queryFn: ({ signal }) => tryClips(id ?? "", files ?? [], signal),
+    enabled: id !== null && files !== undefined,
+    staleTime: Infinity,
   });
   const forget = () => {
     localStorage.removeItem(keyOf(purpose));
@@ -101,8 +124,9 @@ export function useUpload(purpose: string): Upload {
     broken: send.error,
     goOn: () => send.variables !== undefined && send.mutate(send.variables),
     progress: id === null || gone ? null : (progress.data ?? null),
-    received: settled && !gone ? (received.data ?? null) : null,
-    last: id === null || gone ? null : (received.data ?? null),
+    received: settled && !gone && received.data ? withTried(received.data, tried.data) : null,
+    last: id === null || gone || !received.data ? null : withTried(received.data, tried.data),
+    plays: playsOf(tried),
     fps: received.data?.fps ?? fps,
     askFps: (asked) => {
       setFps(asked);

@@ -6,7 +6,7 @@ import { useState } from "react";
 import { api, unwrap } from "../api";
 import { forgetWork, keptWork } from "../builder/kept";
 import { UploadClips } from "../clips/UploadClips";
-import { useUpload } from "../clips/useUpload";
+import { playNeeded, useUpload } from "../clips/useUpload";
 import { studyQuery } from "../queries";
 import { useChange } from "../ui/useChange";
 import { declaredPattern, patternProblem } from "./file-pattern";
@@ -20,6 +20,7 @@ export function AddClips({ study }: { study: string }) {
   const files = upload?.files.map(({ name }) => name) ?? [];
   const pattern = typed ?? (declaredPattern(detail?.design.factors ?? [], files) || (upload?.suggested_pattern ?? ""));
   const needed = upload?.has_manifest === true ? false : patternProblem(pattern, files);
+  const notPlayed = playNeeded(sent);
   const kept = keptWork(study);
   const save = useChange(
     () => {
@@ -59,10 +60,14 @@ export function AddClips({ study }: { study: string }) {
                 w={340}
               />
             )}
-            <Button loading={save.isPending} disabled={detail === undefined || needed !== false} onClick={() => save.mutate(undefined)}>
+            <Button
+              loading={save.isPending}
+              disabled={detail === undefined || needed !== false || notPlayed !== false}
+              onClick={() => save.mutate(undefined)}
+            >
               Save as a new version
             </Button>
-            <StillNeeded parts={[needed]} />
+            <StillNeeded parts={[needed, notPlayed]} />
           </Group>
         )}
       </Stack>

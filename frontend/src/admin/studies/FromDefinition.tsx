@@ -3,7 +3,7 @@ import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";
 import { api, unwrap } from "../api";
 import { UploadClips } from "../clips/UploadClips";
-import { useUpload } from "../clips/useUpload";
+import { playNeeded, useUpload } from "../clips/useUpload";
 import { DefinitionEditor, useCheck } from "./DefinitionEditor";
 import { StillNeeded } from "./StillNeeded";
 import { useCreate } from "./useCreate";
@@ -22,6 +22,7 @@ export function FromDefinition({ name, onTaken }: { name: string; onTaken: (mess
   const needed = [
     name === "" && "a short name (above)",
     !usable && "a definition without problems",
+    playNeeded(sent),
     upload === null && !hasClips && "clips built for it, or a shipped experiment whose clips are built to begin with",
   ];
   return (

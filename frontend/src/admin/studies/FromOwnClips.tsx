@@ -4,7 +4,7 @@ import { Alert, Button, SegmentedControl, Select, Stack, Table, Text, Textarea, 
 import { useState } from "react";
 import type { Schemas } from "../api";
 import { UploadClips } from "../clips/UploadClips";
-import { useUpload } from "../clips/useUpload";
+import { playNeeded, useUpload } from "../clips/useUpload";
 import { factorsOfTable, fieldsOf, levelsByPattern, patternProblem, reservedProblem, unnamedFactors, withNames } from "./file-pattern";
 import { StillNeeded } from "./StillNeeded";
 import { TEMPLATES } from "./templates";
@@ -19,7 +19,15 @@ export function FromOwnClips({ name, onTaken }: { name: string; onTaken: (messag
     <Stack>
       <UploadClips upload={upload} />
       {last !== null && (
-        <Levels key={last.id} name={name} upload={last} isLooked={received !== null} onTaken={onTaken} onCreated={upload.forget} />
+        <Levels
+          key={last.id}
+          name={name}
+          upload={last}
+          isLooked={received !== null}
+          notPlayed={playNeeded(upload)}
+          onTaken={onTaken}
+          onCreated={upload.forget}
+        />
       )}
     </Stack>
   );
@@ -32,11 +40,13 @@ interface LevelsProps {
   upload: Schemas["UploadOut"];
   /** Whether every file has been looked into. */
   isLooked: boolean;
+  /** What is needed for every clip to play. */
+  notPlayed: string | false;
   onTaken: (message: string) => void;
   onCreated: () => void;
 }
 
-function Levels({ name, upload, isLooked, onTaken, onCreated }: LevelsProps) {
+function Levels({ name, upload, isLooked, notPlayed, onTaken, onCreated }: LevelsProps) {
   const [by, setBy] = useState("pattern");
   // As the files suggest it, also after one was left out or came, until it is written.
   const [written, setWritten] = useState<{ pattern?: string; csv?: string }>({});
@@ -50,6 +60,7 @@ function Levels({ name, upload, isLooked, onTaken, onCreated }: LevelsProps) {
   const refused = refusal(create.error);
   const needed = [
     (!isLooked || files.length === 0) && "clips that have been looked into",
+    notPlayed,
     by === "pattern" ? patternProblem(withNames(pattern, names), files) : reservedProblem(factorsOfTable(csv)),
     name === "" && "a short name (above)",
     asked.title.trim() === "" && "a title of the study",
