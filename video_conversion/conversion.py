@@ -4,13 +4,13 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from video_conversion.frame_times import frame_map
+from video_conversion.prepared import QUICKTIME
 from video_conversion.video_file import MAX_PX, NotAClip, VideoFile, check_amount
 
 PLAYED_PROFILES = ("Constrained Baseline", "Baseline", "Main", "High", "Progressive High", "Constrained High")
 MIN_FPS, MAX_FPS = 1, 240
 MAX_CLIP_FRAMES = 5_000
 """As many as the participant page plays, and the log of a view holds."""
-QUICKTIME = "qt  "
 HD_LINES = 720
 BT601, BT709, RGB, NOT_SAID = 6, 1, 0, 2
 MATRIX_NAMES = {1: "bt709", 4: "fcc", 5: "bt470bg", 6: "smpte170m", 7: "smpte240m"}

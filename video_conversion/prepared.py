@@ -1,6 +1,6 @@
 """What became of one video: the clip that it is now, or why it cannot be one."""
 
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 
 from pydantic import BaseModel, ConfigDict
 
@@ -10,6 +10,8 @@ VIDEO_ENDINGS = (
     ".mp4", ".m4v", ".mov", ".webm", ".mkv", ".avi", ".mpg", ".mpeg", ".m2v", ".ts", ".mts", ".m2ts", ".wmv",
     ".flv", ".gif", ".apng", ".ogv", ".3gp", ".mxf", ".y4m",
 )  # fmt: skip
+QUICKTIME = "qt  "
+"""The brand of files that the participant page does not read."""
 
 
 class Prepared(BaseModel):
@@ -51,3 +53,10 @@ def clip_name(name: str) -> str:
     """What the clip made of this file is called: clips are MP4 files."""
     pure = PurePosixPath(name)
     return name if pure.suffix.lower() in (".mp4", ".m4v", ".mov") else f"{pure.stem}.mp4"
+
+
+def major_brand(path: Path) -> str:
+    """The major brand of a file that begins with it, as the participant page's reader expects it."""
+    with path.open("rb") as stream:
+        begin = stream.read(12)
+    return begin[8:12].decode("latin-1") if begin[4:8] == b"ftyp" else ""

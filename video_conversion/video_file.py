@@ -13,6 +13,7 @@ from av.error import FFmpegError
 
 from experiments.source_video import ColourRange
 from video_conversion.frame_times import LONE_FRAME_RATE, constant_rate, typical_rate
+from video_conversion.prepared import major_brand
 
 MAX_S = 120.0
 MAX_PX = 4096
@@ -121,13 +122,6 @@ def examine(path: Path) -> VideoFile:
         for frame in _decoded(container, stream):
             frames.add(frame)
         return _described(container, stream, frames, brand=major_brand(path), is_edited=is_edited)
-
-
-def major_brand(path: Path) -> str:
-    """The major brand of a file that begins with it, as the participant page's reader expects it."""
-    with path.open("rb") as stream:
-        begin = stream.read(12)
-    return begin[8:12].decode("latin-1") if begin[4:8] == b"ftyp" else ""
 
 
 def _stored_packets(path: Path, *, with_edits: bool) -> list[int | None]:

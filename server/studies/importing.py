@@ -25,6 +25,7 @@ from server.storage.clips import ClipStore
 from server.studies import repository
 from server.studies.series import series_for
 from server.workspaces.repository import default_workspace
+from video_conversion.prepared import QUICKTIME, major_brand
 
 
 class NameTaken(Conflict):
@@ -101,6 +102,12 @@ def store_clips(store: ClipStore, manifest: Manifest, folder: Path) -> int:
     """
     check_files(manifest, folder)
     check_originals(manifest, folder)
+    for clip in manifest.files:
+        if major_brand(folder / clip.file) == QUICKTIME:  # older releases took such files as they are
+            raise InputError(
+                f"'{clip.file}' is a QuickTime file, which no participant's browser can show; write the "
+                "manifest again with `stimuli manifest`, which converts it"
+            )
     for source in manifest.sources:
         with (folder / source.kept_as).open("rb") as stream:
             store.add(stream, source.sha256)

@@ -253,9 +253,14 @@ def test_a_quicktime_clip_of_an_older_manifest_is_named_with_advice_that_can_be_
     again = [clip.model_copy(update={"sha256": file_sha256(clips / clip.file)}) for clip in manifest.clips]
     text = manifest.model_copy(update={"clips": tuple(again)}).model_dump_json()
     (clips / "manifest.json").write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match="is a QuickTime file"):
+        store_clips(FolderStore(clips.parent / "store"), read_manifest(clips), clips)
     assert stimuli(monkeypatch, "verify", clips) != 0
     told = capsys.readouterr()
     assert "was QuickTime" in told.out
     assert "write the manifest again with `stimuli manifest`" in told.err
     assert stimuli(monkeypatch, *arguments, "--out", clips.parent / "again") == 0
     assert stimuli(monkeypatch, "verify", clips.parent / "again") == 0
+    store_clips(
+        FolderStore(clips.parent / "store"), read_manifest(clips.parent / "again"), clips.parent / "again"
+    )
