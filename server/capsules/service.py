@@ -29,7 +29,7 @@ def start(services: Services, name: str, order: NewCapsule, identity: Identity) 
     NotFound where there is no such data series.
     """
     with services.database.write() as session:
-        study = find_study(session, name, identity, "export")
+        study = find_study(session, name, identity, "run")
         version_of_series(session, study, order.series)
         job = begun(
             services,
@@ -68,7 +68,7 @@ def capsule_file(services: Services, session: Session, name: str, identity: Iden
 def remove(services: Services, name: str, public_id: str, identity: Identity) -> None:
     """Delete a capsule for good; NotFound where there is none, Conflict while it is made."""
     with services.database.write() as session:
-        study = find_study(session, name, identity, "export")
+        study = find_study(session, name, identity, "run")
         job = repository.find_job(session, study, "capsule", public_id)
         if job is None:
             raise NotFound("There is no such capsule; reload the page to see which there are.")

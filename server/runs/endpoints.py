@@ -22,15 +22,15 @@ def list_runs(
     identity: PersonalReader,
     study: str,
     show: Show = "everybody",
+    simulated: Annotated[bool, Query(description="List simulated people too.")] = False,
     search: Annotated[str, Query(max_length=200, description="Part of participant or run.")] = "",
     before: Annotated[str | None, Query(max_length=40)] = None,
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
 ) -> RunPage:
     """The runs, the latest first, a page at a time: go on with `before` = `next`."""
     with services.database.read() as session:
-        shown = service.page(
-            session, find_study(session, study, identity, "export"), show, search, before, limit
-        )
+        found = find_study(session, study, identity, "export")
+        shown = service.page(session, found, show, search, before, limit, simulated=simulated)
     with services.database.write() as session:
         record(session, identity, "participants listed", "study", study, number=len(shown.runs))
     return shown

@@ -51,9 +51,12 @@ _SHOWN: dict[Show, tuple[ColumnElement[bool], ...]] = {
 }
 
 
-def _chosen(session: Session, study: Study, show: Show, search: str) -> Select[StudyRun]:
-    """The runs of a study but previews that are to be shown."""
-    query = select(StudyRun).where(StudyRun.study_id == study.id, StudyRun.origin != "preview", *_SHOWN[show])
+def _chosen(session: Session, study: Study, show: Show, search: str, *, simulated: bool) -> Select[StudyRun]:
+    """The runs of a study but previews that are to be shown; those of simulated people where asked for."""
+    left_out = ("preview",) if simulated or show == "simulated" else ("preview", "simulated")
+    query = select(StudyRun).where(
+        StudyRun.study_id == study.id, StudyRun.origin.not_in(left_out), *_SHOWN[show]
+    )
     return query.where(_fits(session, search)) if search else query
 
 
@@ -69,16 +72,25 @@ def _fits(session: Session, search: str) -> ColumnElement[bool]:
     return contains(search, autoescape=True) | in_id
 
 
-def number_of_runs(session: Session, study: Study, show: Show, search: str) -> int:
+def number_of_runs(session: Session, study: Study, show: Show, search: str, *, simulated: bool) -> int:
     """How many runs are to be shown."""
-    return session.scalar(_chosen(session, study, show, search).with_only_columns(func.count())) or 0
+    query = _chosen(session, study, show, search, simulated=simulated)
+    return session.scalar(query.with_only_columns(func.count())) or 0
 
 
 def page_of_runs(
-    session: Session, study: Study, show: Show, search: str, before: int | None, limit: int
+    session: Session,
+    study: Study,
+    show: Show,
+    search: str,
+    before: int | None,
+    limit: int,
+    *,
+    simulated: bool,
 ) -> list[StudyRun]:
     """At most `limit` runs, the latest first, those begun before the run with the number `before`."""
-    query = _chosen(session, study, show, search).order_by(StudyRun.id.desc()).limit(limit)
+    query = _chosen(session, study, show, search, simulated=simulated)
+    query = query.order_by(StudyRun.id.desc()).limit(limit)
     query = query.options(
         joinedload(StudyRun.link), joinedload(StudyRun.version).load_only(StudyVersion.number)
     )

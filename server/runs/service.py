@@ -25,17 +25,28 @@ from server.runs.schemas import (
 )
 
 
-def page(session: Session, study: Study, show: Show, search: str, before: str | None, limit: int) -> RunPage:
+def page(
+    session: Session,
+    study: Study,
+    show: Show,
+    search: str,
+    before: str | None,
+    limit: int,
+    *,
+    simulated: bool = False,
+) -> RunPage:
     """At most `limit` runs that fit, the latest first, those begun before the run `before`."""
     last = None if before is None else repository.find_run(session, study, before).id
-    runs = repository.page_of_runs(session, study, show, search, last, limit + 1)
+    runs = repository.page_of_runs(session, study, show, search, last, limit + 1, simulated=simulated)
     shown = runs[:limit]
     counts = repository.answered(session, [run.id for run in shown])
     refused = repository.refused(session, [run.id for run in shown])
     are_all = last is None and len(runs) <= limit
     return RunPage(
         runs=[summary(run, *counts.get(run.id, (0, 0)), refused.get(run.id, 0)) for run in shown],
-        total=len(shown) if are_all else repository.number_of_runs(session, study, show, search),
+        total=len(shown)
+        if are_all
+        else repository.number_of_runs(session, study, show, search, simulated=simulated),
         next=shown[-1].public_id if len(runs) > limit else None,
     )
 

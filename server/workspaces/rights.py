@@ -1,9 +1,9 @@
 """What somebody may do with a study: five rights, from the role in its workspace and from grants.
 
 view: the study, its progress, its results and the list of its reports, no single person.
-run: links, status, settings, exclusions, the making of reports.
+run: links, status, settings, exclusions, the making of reports and capsules, the deletion of capsules.
 edit: versions, deletion of drafts, erasure of persons.
-export: downloads, the files of reports, and the answers of single persons.
+export: downloads, the files of reports and capsules, and the answers of single persons.
 own: recruiters' ids, grants, the workspace a study belongs to; whoever owns a study may do all of it.
 """
 

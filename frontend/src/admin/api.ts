@@ -40,10 +40,11 @@ export async function unwrap<T>(asked: Promise<Outcome<T>>): Promise<T> {
   throw new Refused(outcome.response.status, detail?.code ?? "unknown", message);
 }
 
-/** Once signed in afresh, the person comes back to this page and asks again. */
+/** The event by which the page asks for a password again; what was typed on the page stays. */
+export const SIGN_IN_AGAIN = "palpebra-sign-in-again";
+
 function signInAgain(): void {
-  const here = window.location.pathname.replace(/^\/admin/, "");
-  window.location.assign(`/admin/sign-in?refused=sign_in_again&next=${encodeURIComponent(here)}`);
+  window.dispatchEvent(new Event(SIGN_IN_AGAIN));
 }
 
 function errorDetail(body: unknown): { code: string; message: string } | null {

@@ -7479,6 +7479,7 @@ export interface operations {
   parameters: {
    query?: {
     show?: "everybody" | "complete" | "not_complete" | "excluded" | "pilot" | "simulated";
+    simulated?: boolean;
     search?: string;
     before?: string | null;
     limit?: number;

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import pytest
 from sqlalchemy import select, text
 
 from server.context import Services
@@ -15,14 +16,16 @@ MORE_THAN_PARAMETERS = 70_000
 """A statement of PostgreSQL takes 65,535 parameters."""
 
 
-def copy_runs(services: Services, count: int) -> None:
-    """Copies of the one run there is, in one statement."""
+def copy_runs(services: Services, count: int, simulated: int = 0) -> None:
+    """Copies of the one run there is, in one statement, the first ones of simulated people."""
     own = {"id", "public_id", "client_id", "token_hash"}
     names = [column.name for column in StudyRun.__table__.columns if column.name not in own]
+    values = {name: f"study_runs.{name}" for name in names}
+    values["origin"] = f"CASE WHEN i <= {simulated} THEN 'simulated' ELSE study_runs.origin END"
     numbers = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < :count)"
     statement = (
         f"{numbers} INSERT INTO study_runs (public_id, client_id, token_hash, {', '.join(names)}) "
-        f"SELECT 'copy' || i, 'copy' || i, 'copy' || i, {', '.join(f'study_runs.{name}' for name in names)} "
+        f"SELECT 'copy' || i, 'copy' || i, 'copy' || i, {', '.join(values.values())} "
         "FROM study_runs, n"
     )
     if services.database.is_sqlite:  # which wants WITH behind INSERT INTO
@@ -79,6 +82,23 @@ def test_runs_are_searched_and_chosen_by_the_server(
     assert listed(viewer, show="not_complete")["total"] == 3
     assert listed(viewer, search="a_a")["total"] == 0  # _ stands for itself
     assert viewer.get(RUNS, params={"before": "nothing"}).status_code == 404
+
+
+@pytest.mark.parametrize("show", ["everybody", "complete", "not_complete", "excluded"])
+def test_simulated_people_are_listed_where_asked_for_alone(
+    services: Services, viewer: Admin, participant: Participant, show: str
+) -> None:
+    participant.agree()
+    copy_runs(services, 3, simulated=1)
+    values = {"complete": {"status": "complete"}, "excluded": {"excluded": True}}
+    with services.database.write() as session:
+        session.query(StudyRun).update(values.get(show, {"status": "active"}))
+    people = listed(viewer, show=show)
+    both = listed(viewer, show=show, simulated=True)
+    assert "copy1" not in {run["run"] for run in people["runs"]}
+    assert people["total"] == len(people["runs"]) == 3
+    assert both["total"] == 4
+    assert [run["run"] for run in listed(viewer, show="simulated")["runs"]] == ["copy1"]
 
 
 def test_runs_are_looked_through_once_where_they_fit_on_a_page(

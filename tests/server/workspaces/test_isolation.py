@@ -78,6 +78,8 @@ NEEDED: dict[Right, set[str]] = {
         "POST rehearsals",
         "POST rehearsals/{rehearsal}/cancel",
         "PUT archive",
+        "POST capsules",
+        "DELETE capsules/{capsule}",
     },
     "edit": {"DELETE ", "POST versions", "POST runs/{run}/erase", "POST copies", "POST seal"},
     "export": {
@@ -92,9 +94,7 @@ NEEDED: dict[Right, set[str]] = {
         "GET data/psych-ds.zip",
         "GET data/{table}.{ending}",
         "GET reports/{report}/{file}",
-        "POST capsules",
         "GET capsules/{capsule}.zip",
-        "DELETE capsules/{capsule}",
     },
     "own": {
         "GET runs/{run}/identity",
@@ -313,6 +313,13 @@ def test_a_right_opens_what_it_is_for_and_nothing_else(
         answer = ask(outsiders["experimenter elsewhere"], endpoint, about, foreign.addresses, known)
         refused = answer.status_code == 403 and answer.json()["error"]["code"] == "not_allowed"
         assert refused == (needed not in ("view", granted)), (short, granted, answer.text[:300])
+
+
+def test_who_may_only_look_and_download_changes_nothing() -> None:
+    """A viewer of a workspace has the rights to view and to export."""
+    reading = {f"{right}: {one}" for right in ("view", "export") for one in NEEDED[right]}
+    changing = {one for one in reading if ": GET " not in one}
+    assert changing == {"view: POST versions/check"}, "asks what a version would change, and stores nothing"
 
 
 def test_a_foreign_study_is_not_compared_with_ones_own(outsiders: dict[str, Admin]) -> None:

@@ -28,8 +28,15 @@ export function Refusal() {
   );
 }
 
+interface Props {
+  next?: string;
+  invitation?: string;
+  /** In another tab, so that this page and what was typed on it stay. */
+  elsewhere?: boolean;
+}
+
 /** A button for each service; with an invitation, they make the account that it is for. */
-export function ProviderButtons({ next = "/", invitation }: { next?: string; invitation?: string }) {
+export function ProviderButtons({ next = "/", invitation, elsewhere = false }: Props) {
   const { data } = useQuery(waysQuery);
   const begin = useMutation({
     mutationFn: (provider: string) =>
@@ -38,7 +45,7 @@ export function ProviderButtons({ next = "/", invitation }: { next?: string; inv
           ? api.POST("/api/admin/session/providers/{provider}", { params: { path: { provider } }, body: { next } })
           : api.POST("/api/admin/invitations/{token}/providers/{provider}", { params: { path: { token: invitation, provider } } }),
       ),
-    onSuccess: ({ url }) => window.location.assign(url),
+    onSuccess: ({ url }) => (elsewhere ? window.open(url, "_blank", "noopener") : window.location.assign(url)),
   });
   const providers = data?.providers ?? [];
   if (providers.length === 0) return null;
@@ -51,6 +58,7 @@ export function ProviderButtons({ next = "/", invitation }: { next?: string; inv
       {providers.map(({ id, label }) => (
         <Button key={id} variant="default" loading={begin.isPending && begin.variables === id} onClick={() => begin.mutate(id)}>
           Sign in with {label}
+          {elsewhere && " (in another tab; then come back)"}
         </Button>
       ))}
     </Stack>

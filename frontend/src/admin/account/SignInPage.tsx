@@ -2,7 +2,7 @@ import { Alert, Anchor, Text } from "@mantine/core";
 import { useMutation, useQuery } from "@tanstack/react-query";
 import { Link, useSearch } from "@tanstack/react-router";
 import { useState } from "react";
-import { api, Refused, unwrap } from "../api";
+import { api, Refused, type Schemas, unwrap } from "../api";
 import { sessionQuery } from "../queries";
 import { CodeField, CodeForm } from "./CodeForm";
 import { EntryForm, EntryPage } from "./EntryPage";
@@ -20,16 +20,28 @@ export function SignInPage() {
   );
 }
 
-function ByPassword() {
-  const [name, setName] = useState("");
+/** The form of the page to sign in, over a page whose session ended: what was typed there stays. */
+export function SignInHere({ name, then }: { name: string; then: (me: Schemas["Me"]) => void }) {
+  return <ByPassword known={name} then={then} />;
+}
+
+interface ByPasswordProps {
+  known?: string;
+  /** What happens next; without it the page asked for opens. */
+  then?: (me: Schemas["Me"]) => void;
+}
+
+function ByPassword({ known = "", then }: ByPasswordProps) {
+  const [name, setName] = useState(known);
   const [password, setPassword] = useState("");
   const [code, setCode] = useState("");
   const next = usePageAskedFor();
   const session = useQuery(sessionQuery);
   const ways = useQuery(waysQuery);
+  const entered = useEntered(next);
   const signIn = useMutation({
     mutationFn: () => unwrap(api.POST("/api/admin/session", { body: { name, password, code: code === "" ? null : code } })),
-    onSuccess: useEntered(next),
+    onSuccess: then ?? entered,
   });
   const error = signIn.error;
   const asksCode = code !== "" || (error instanceof Refused && error.code === "second_factor_required");
@@ -46,15 +58,17 @@ function ByPassword() {
         <PasswordField label="Password" value={password} onChange={setPassword} />
         {asksCode && <CodeField value={code} onChange={setCode} />}
       </EntryForm>
-      {ways.data?.resets_by_mail === true && (
+      {then === undefined && ways.data?.resets_by_mail === true && (
         <Anchor component={Link} to="/letter/forgotten" size="sm" display="block" ta="center" mt="sm">
           Forgotten your password?
         </Anchor>
       )}
-      <ProviderButtons next={next} />
-      <Text size="sm" c="dimmed" ta="center" mt="md">
-        Participants do not sign in: they open the link they were given.
-      </Text>
+      <ProviderButtons next={next} elsewhere={then !== undefined} />
+      {then === undefined && (
+        <Text size="sm" c="dimmed" ta="center" mt="md">
+          Participants do not sign in: they open the link they were given.
+        </Text>
+      )}
     </>
   );
 }

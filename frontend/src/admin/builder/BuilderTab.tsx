@@ -7,10 +7,11 @@ import { useState } from "react";
 import { api, type Schemas, unwrap } from "../api";
 import { studyQuery } from "../queries";
 import { Answer } from "../ui/Answer";
+import { ConfirmButton } from "../ui/ConfirmButton";
 import { when } from "../ui/format";
 import { onDemand } from "../ui/onDemand";
 import { isTable } from "./data";
-import { forgetWork, keptWork } from "./kept";
+import { type Draft, forgetDraft, forgetWork, keptWork, otherWork } from "./kept";
 
 const Workbench = onDemand(async () => (await import("./Workbench")).Workbench);
 
@@ -27,11 +28,23 @@ function Begun({ detail }: { detail: Schemas["StudyDetail"] }) {
     return work !== null && (work.data !== null || work.toml !== detail.toml) ? work : null;
   });
   const [from, setFrom] = useState({ toml: kept?.toml ?? detail.toml, data: kept?.data ?? null });
+  const [others, setOthers] = useState(() => otherWork(name).filter(({ toml, data }) => data !== null || toml !== detail.toml));
   const start = useQuery({
     queryKey: ["builder start", from],
     queryFn: () => unwrap(api.POST("/api/admin/definitions/edit", { body: from })),
     staleTime: Infinity,
   });
+  const without = (draft: Draft) => setOthers((before) => before.filter((one) => one.key !== draft.key));
+  // What it replaces in this tab is asked for first; the other tab's draft stays where it is.
+  const open = (draft: Draft) => {
+    if (keptWork(name) !== null && !window.confirm("Replace the unsaved work in this tab?")) return;
+    without(draft);
+    setFrom({ toml: draft.toml, data: draft.data });
+  };
+  const discard = (draft: Draft) => {
+    forgetDraft(draft.key);
+    without(draft);
+  };
   const anew = () => {
     forgetWork(name);
     setFrom({ toml: detail.toml, data: null });
@@ -52,6 +65,21 @@ function Begun({ detail }: { detail: Schemas["StudyDetail"] }) {
               </Button>
             </Group>
           )}
+          {others.map((draft) => (
+            <Group key={draft.key} gap="xs" role="status">
+              <span>{`Another tab has unsaved work of ${when(draft.at)} on this study${draft.revision === revision ? "" : ", begun from an earlier version"}.`}</span>
+              <Button size="compact-xs" variant="default" onClick={() => open(draft)}>
+                Open it here
+              </Button>
+              <ConfirmButton
+                size="compact-xs"
+                label="Discard it there"
+                question={`The unsaved work of ${when(draft.at)} is deleted for good.`}
+                confirm="Discard the work"
+                onConfirm={() => discard(draft)}
+              />
+            </Group>
+          ))}
           <Workbench detail={detail} start={{ toml: read.toml, data: isTable(read.data) ? read.data : {} }} />
         </Stack>
       )}

@@ -1,4 +1,8 @@
-/** Unsaved work of the builder, kept in this browser: over a closed tab, a lost sign-in, a crash. */
+/**
+ * Unsaved work of the builder, kept in this browser: over a reload, a lost sign-in, a crash, a closed tab.
+ * Each tab has a draft of its own, so that saving in one never touches what another has not saved. What a tab left
+ * behind can be opened from any other.
+ */
 
 import { type Data, isTable } from "./data";
 
@@ -11,11 +15,47 @@ export interface Kept {
   at: string;
 }
 
-const key = (study: string) => `palpebra-builder:${study}`;
+export interface Draft extends Kept {
+  /** Where it is kept. */
+  key: string;
+}
 
-export function keptWork(study: string): Kept | null {
+const TAB = "palpebra-builder-tab";
+const prefix = (study: string) => `palpebra-builder:${study}`;
+const key = (study: string) => `${prefix(study)}:${tab}`;
+
+const tab = thisTab();
+
+/**
+ * A name for this tab that survives a reload. It is in the tab's store only while no page has it: a duplicated tab copies
+ * that store, and would otherwise write over the draft of the first.
+ */
+function thisTab(): string {
+  const name = taken() ?? crypto.randomUUID();
+  window.addEventListener("pagehide", () => {
+    try {
+      sessionStorage.setItem(TAB, name);
+    } catch {
+      // The next page of this tab begins with a name of its own, and offers this draft.
+    }
+  });
+  window.addEventListener("pageshow", () => taken());
+  return name;
+}
+
+function taken(): string | null {
   try {
-    const stored: unknown = JSON.parse(localStorage.getItem(key(study)) ?? "null");
+    const name = sessionStorage.getItem(TAB);
+    sessionStorage.removeItem(TAB);
+    return name;
+  } catch {
+    return null;
+  }
+}
+
+function read(where: string): Kept | null {
+  try {
+    const stored: unknown = JSON.parse(localStorage.getItem(where) ?? "null");
     if (typeof stored !== "object" || stored === null) return null;
     const { toml, data, revision, at } = stored as Partial<Kept>;
     if (typeof toml !== "string" || typeof revision !== "number" || typeof at !== "string") return null;
@@ -23,6 +63,28 @@ export function keptWork(study: string): Kept | null {
   } catch {
     return null;
   }
+}
+
+/** This tab's own draft. */
+export function keptWork(study: string): Kept | null {
+  return read(key(study));
+}
+
+/** Drafts of this study that other tabs have or left behind, the latest first. */
+export function otherWork(study: string): Draft[] {
+  let keys: string[];
+  try {
+    keys = Object.keys(localStorage);
+  } catch {
+    return [];
+  }
+  return keys
+    .filter((one) => (one === prefix(study) || one.startsWith(`${prefix(study)}:`)) && one !== key(study))
+    .flatMap((one) => {
+      const kept = read(one);
+      return kept === null ? [] : [{ ...kept, key: one }];
+    })
+    .sort((a, b) => b.at.localeCompare(a.at));
 }
 
 export function keepWork(study: string, work: Omit<Kept, "at">): void {
@@ -33,9 +95,15 @@ export function keepWork(study: string, work: Omit<Kept, "at">): void {
   }
 }
 
+/** Forget this tab's draft, and none of another tab. */
 export function forgetWork(study: string): void {
+  forgetDraft(key(study));
+}
+
+/** Forget one draft that somebody chose to discard. */
+export function forgetDraft(where: string): void {
   try {
-    localStorage.removeItem(key(study));
+    localStorage.removeItem(where);
   } catch {
     // Nothing was kept.
   }

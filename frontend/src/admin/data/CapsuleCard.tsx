@@ -17,7 +17,8 @@ export function CapsuleCard({ study, origin, series }: { study: string; origin: 
   const path = { params: { path: { study } } };
   const [clips, setClips] = useState(true);
   const [sensitivity, setSensitivity] = useState(true);
-  const mayMake = useMay(study, "export");
+  const mayMake = useMay(study, "run");
+  const mayOpen = useMay(study, "export");
   const capsules = useQuery({
     queryKey: ["capsules", study],
     queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/capsules", path)),
@@ -55,7 +56,7 @@ export function CapsuleCard({ study, origin, series }: { study: string; origin: 
         {(rows) => (
           <Stack gap="xs" role="status" aria-label="Capsules">
             {rows.map((capsule) => (
-              <One key={capsule.id} study={study} capsule={capsule} mayOpen={mayMake} />
+              <One key={capsule.id} study={study} capsule={capsule} mayOpen={mayOpen} mayRemove={mayMake} />
             ))}
           </Stack>
         )}
@@ -64,7 +65,14 @@ export function CapsuleCard({ study, origin, series }: { study: string; origin: 
   );
 }
 
-function One({ study, capsule, mayOpen }: { study: string; capsule: Schemas["CapsuleOut"]; mayOpen: boolean }) {
+interface OneProps {
+  study: string;
+  capsule: Schemas["CapsuleOut"];
+  mayOpen: boolean;
+  mayRemove: boolean;
+}
+
+function One({ study, capsule, mayOpen, mayRemove }: OneProps) {
   const { id, status, progress, message, bytes, sha256 } = capsule;
   const remove = useChange(
     () => unwrap(api.DELETE("/api/admin/studies/{study}/capsules/{capsule}", { params: { path: { study, capsule: id } } })),
@@ -95,7 +103,7 @@ function One({ study, capsule, mayOpen }: { study: string; capsule: Schemas["Cap
           SHA-256 <code>{sha256.slice(0, 12)}</code>
         </Text>
       )}
-      {mayOpen && !isUnderWay(capsule) && (
+      {mayRemove && !isUnderWay(capsule) && (
         <ConfirmButton
           size="compact-sm"
           label="Delete"

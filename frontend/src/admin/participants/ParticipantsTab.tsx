@@ -1,10 +1,11 @@
-import { Anchor, Badge, Group, Select, Stack, TextInput } from "@mantine/core";
+import { Anchor, Badge, Group, Select, Stack, Switch, TextInput } from "@mantine/core";
 import { useDebouncedValue } from "@mantine/hooks";
-import { keepPreviousData, useInfiniteQuery } from "@tanstack/react-query";
+import { keepPreviousData, useInfiniteQuery, useQuery } from "@tanstack/react-query";
 import { Link, useParams } from "@tanstack/react-router";
 import { useState } from "react";
 import type { paths } from "../../api/schema";
 import { api, type Schemas, unwrap } from "../api";
+import { studyQuery } from "../queries";
 import { DataTable } from "../ui/DataTable";
 import { when } from "../ui/format";
 import { PagedAnswer } from "../ui/PagedAnswer";
@@ -19,7 +20,6 @@ const SHOW: { value: Show; label: string }[] = [
   { value: "not_complete", label: "not complete" },
   { value: "excluded", label: "excluded" },
   { value: "pilot", label: "pilot" },
-  { value: "simulated", label: "simulated" },
 ];
 /** So long after the last key the server is asked. */
 const TYPING_MS = 250;
@@ -29,22 +29,27 @@ export function ParticipantsTab() {
   const [search, setSearch] = useState("");
   const [show, setShow] = useState<Show>("everybody");
   const [sought] = useDebouncedValue(search.trim(), TYPING_MS);
-  const chosen = sought !== "" || show !== "everybody";
+  const [simulated, setSimulated] = useState(false);
+  const chosen = sought !== "" || show !== "everybody" || simulated;
   const runs = useInfiniteQuery({
-    queryKey: ["runs", study, show, sought],
+    queryKey: ["runs", study, show, simulated, sought],
     queryFn: ({ pageParam }) =>
       unwrap(
-        api.GET("/api/admin/studies/{study}/runs", { params: { path: { study }, query: { show, search: sought, before: pageParam } } }),
+        api.GET("/api/admin/studies/{study}/runs", {
+          params: { path: { study }, query: { show, simulated, search: sought, before: pageParam } },
+        }),
       ),
     initialPageParam: null as string | null,
     getNextPageParam: (last) => last.next,
     placeholderData: keepPreviousData,
   });
+  // Where nobody but simulated people took part, the switch is what shows them.
+  const hasSimulated = useQuery(studyQuery(study)).data?.series.some(({ runs: by }) => (by["simulated"] ?? 0) > 0) ?? false;
   const rows = runs.data?.pages.flatMap((page) => page.runs) ?? [];
   const total = runs.data?.pages.at(-1)?.total ?? 0;
   return (
     <Stack>
-      {(rows.length > 0 || chosen) && (
+      {(rows.length > 0 || chosen || hasSimulated) && (
         <Group align="end">
           <TextInput label="Find" placeholder="participant" value={search} onChange={(event) => setSearch(event.currentTarget.value)} />
           <Select
@@ -55,6 +60,7 @@ export function ParticipantsTab() {
             onChange={(word) => setShow(SHOW.find(({ value }) => value === word)?.value ?? "everybody")}
             w={160}
           />
+          <Switch label="Simulated people too" checked={simulated} onChange={(event) => setSimulated(event.currentTarget.checked)} mb={8} />
         </Group>
       )}
       <PagedAnswer of={runs} shown={rows.length} total={total} more="Earlier participants">

@@ -1,14 +1,18 @@
 /** The frame of every page: who is signed in, where one can go. */
 
-import { AppShell, Burger, Group, NavLink, Text } from "@mantine/core";
+import { Alert, AppShell, Burger, Group, NavLink, Text } from "@mantine/core";
 import { useDisclosure } from "@mantine/hooks";
 import { useQuery } from "@tanstack/react-query";
 import { Link, Outlet, useLocation, useNavigate } from "@tanstack/react-router";
 import { useEffect, useState } from "react";
+import { type Schemas, SIGN_IN_AGAIN } from "../api";
 import { sessionQuery } from "../queries";
 import { Answer } from "../ui/Answer";
 import { AccountMenu } from "./AccountMenu";
+import { onDemand } from "../ui/onDemand";
 import { usePageTitle } from "./usePageTitle";
+
+const SignInAgain = onDemand(async () => (await import("./SignInAgain")).SignInAgain);
 
 const PAGES = [
   { to: "/", label: "Studies", role: "viewer", group: "Rating" },
@@ -31,15 +35,30 @@ function ToSignIn({ from }: { from: string }) {
   return null;
 }
 
+/** Who was signed in on this page last, and whether a sign-in is asked for over it. */
+function useSignedIn(present: Schemas["AccountOut"] | null | undefined) {
+  const [last, setLast] = useState(present ?? null);
+  const [again, setAgain] = useState(false);
+  if (present && present !== last) setLast(present);
+  useEffect(() => {
+    const ask = () => setAgain(true);
+    window.addEventListener(SIGN_IN_AGAIN, ask);
+    return () => window.removeEventListener(SIGN_IN_AGAIN, ask);
+  }, []);
+  return { last: present ?? last, again, onDone: () => setAgain(false) };
+}
+
 export function Shell() {
   const session = useQuery(sessionQuery);
+  const { last, again, onDone } = useSignedIn(session.data?.account);
   const [opened, { toggle, close }] = useDisclosure(false);
   const { pathname } = useLocation();
   usePageTitle(pathname);
   return (
     <Answer of={session}>
-      {({ account }) =>
-        account === null ? (
+      {({ account: present }) => {
+        const account = present ?? last;
+        return account === null ? (
           <ToSignIn from={pathname} />
         ) : (
           <AppShell header={{ height: 52 }} navbar={{ width: 200, breakpoint: "sm", collapsed: { mobile: !opened } }} padding="md">
@@ -82,11 +101,18 @@ export function Shell() {
               ))}
             </AppShell.Navbar>
             <AppShell.Main id="content">
-              <Outlet />
+              {account.role !== "owner" && PAGES.some(({ to, role }) => role === "owner" && pathname.startsWith(to)) ? (
+                <Alert color="yellow" title="This page is for owners of the server">
+                  Your role on this server is {account.role}. Ask an owner.
+                </Alert>
+              ) : (
+                <Outlet />
+              )}
+              {(present === null || again) && <SignInAgain account={account} ended={present === null} onDone={onDone} />}
             </AppShell.Main>
           </AppShell>
-        )
-      }
+        );
+      }}
     </Answer>
   );
 }

@@ -1,10 +1,24 @@
-import { Stack, Tabs, TextInput, Title } from "@mantine/core";
+import { Alert, Stack, Tabs, TextInput, Title } from "@mantine/core";
 import { useRef, useState } from "react";
 import { FromDefinition } from "./FromDefinition";
 import { FromOwnClips } from "./FromOwnClips";
+import { useOwnWorkspaces } from "../queries";
 import { FromShipped } from "./FromShipped";
 
 export function CreatePage() {
+  const mayCreate = useOwnWorkspaces().length > 0;
+  return mayCreate ? <NewStudy /> : <NoWorkspace />;
+}
+
+function NoWorkspace() {
+  return (
+    <Alert color="yellow" title="You cannot create studies yet">
+      Creating a study needs the role experimenter or owner in a workspace. Ask an owner of a workspace.
+    </Alert>
+  );
+}
+
+function NewStudy() {
   const [name, setName] = useState("");
   const [taken, setTaken] = useState<string | null>(null);
   const field = useRef<HTMLInputElement>(null);

@@ -10,20 +10,21 @@ import { useChange } from "../ui/useChange";
 
 export function LifeCycle({ detail }: { detail: Schemas["StudyDetail"] }) {
   const { summary } = detail;
+  const mayEdit = summary.rights.includes("edit");
   return (
     <Card withBorder>
       <Title order={2} size="h4" mb="sm">
         Copy, archive
       </Title>
       <Stack>
-        <Copy detail={detail} />
+        {mayEdit && <Copy detail={detail} />}
         <Group>
           {summary.archived_at !== null || summary.status === "draft" || summary.status === "closed" ? (
             <Archive summary={summary} />
           ) : (
             <Text size="sm">Close the study before it goes into the archive.</Text>
           )}
-          {summary.status === "draft" && <Delete name={summary.name} />}
+          {summary.status === "draft" && mayEdit && <Delete name={summary.name} />}
         </Group>
       </Stack>
     </Card>

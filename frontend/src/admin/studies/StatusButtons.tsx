@@ -3,7 +3,7 @@ import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";
 import { api, type Schemas, unwrap } from "../api";
 import { launchChecksQuery } from "../queries";
-import { keptWork } from "../builder/kept";
+import { keptWork, otherWork } from "../builder/kept";
 import { ConfirmButton } from "../ui/ConfirmButton";
 import { useChange } from "../ui/useChange";
 import { onDemand } from "../ui/onDemand";
@@ -55,7 +55,7 @@ export function StatusButtons({ summary }: { summary: Schemas["StudySummary"] })
         <ConfirmButton
           key={status}
           label={WORDS[status][0]}
-          question={`${WORDS[status][1]}${keptWork(summary.name) === null ? "" : " The work in the builder is not saved and not part of it."}`}
+          question={`${WORDS[status][1]}${keptWork(summary.name) === null && otherWork(summary.name).length === 0 ? "" : " The work in the builder is not saved and not part of it."}`}
           confirm={WORDS[status][0]}
           harmless={status !== "closed"}
           blocked={status === "live" && isBlocked}

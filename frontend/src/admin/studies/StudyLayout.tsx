@@ -1,6 +1,6 @@
 /** A study's heading and tabs. */
 
-import { Group, Stack, Tabs, Text, Title } from "@mantine/core";
+import { Alert, Group, Stack, Tabs, Text, Title } from "@mantine/core";
 import { useEffect, useRef } from "react";
 import { useQuery } from "@tanstack/react-query";
 import { Outlet, useLocation, useNavigate, useParams } from "@tanstack/react-router";
@@ -28,11 +28,21 @@ const TABS = [
 type Right = Schemas["StudySummary"]["rights"][number];
 const NEEDED: Partial<Record<string, Right>> = { build: "edit", links: "run", settings: "run", data: "export", participants: "export" };
 
+/** In the place of a page that somebody opened by its address and whose right is missing. */
+function RightMissing({ needed, held }: { needed: Right; held: readonly Right[] }) {
+  return (
+    <Alert color="yellow" title={`This page needs the right “${needed}”`}>
+      You have {held.map((right) => `“${right}”`).join(", ")} on this study. An owner of the study can give you more under Settings.
+    </Alert>
+  );
+}
+
 export function StudyLayout() {
   const { study = "" } = useParams({ strict: false });
   const { pathname } = useLocation();
   const navigate = useNavigate();
   const current = pathname.split("/")[3] || "design";
+  const needed = NEEDED[current] ?? "view";
   const line = useRef<HTMLDivElement>(null);
   useEffect(() => {
     // On a phone the tabs are wider than the screen: the open one is brought into view.
@@ -70,7 +80,7 @@ export function StudyLayout() {
               ))}
             </Tabs.List>
             <Tabs.Panel value={current} pt="md">
-              <Outlet />
+              {summary.rights.includes(needed) ? <Outlet /> : <RightMissing needed={needed} held={summary.rights} />}
             </Tabs.Panel>
           </Tabs>
         </Stack>
