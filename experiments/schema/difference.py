@@ -55,6 +55,7 @@ class _Edit:
 
     def __init__(self, below_trial: Mapping[str, Effect]) -> None:
         self._effects = effects_with(below_trial)
+        self._after_trials = False
 
     def _effect(self, path: str) -> Effect:
         # A path that no entry covers is kept apart: the safe side.
@@ -89,12 +90,27 @@ class _Edit:
         before, after = _by_name(old), _by_name(new)
         for name in dict.fromkeys((*before, *after)):
             if name in before and name in after:
+                was_after, self._after_trials = (
+                    self._after_trials,
+                    self._asked_last(path, before[name], after[name]),
+                )
                 yield from self.changes(before[name], after[name], _join(shown, name), path)
+                self._after_trials = was_after
             else:
-                effect = self._effect(f"{path}.name")
+                added_last = name not in before and self._asked_last(path, after[name])
+                effect = "wording" if added_last else self._effect(f"{path}.name")
                 yield Change(_join(shown, name), effect, before.get(name), after.get(name))
-        if list(before) != list(after) and set(before) == set(after):
+        kept_before, kept_after = (
+            [name for name in one if name in before and name in after] for one in (before, after)
+        )
+        if kept_before != kept_after:
             yield Change(shown, self._effect(f"{path}.name"), list(before), list(after))
+
+    def _asked_last(self, path: str, *elements: Any) -> bool:
+        """True of forms after the trials and their questions: what is new there follows every rating."""
+        if path == "forms":
+            return all(form.get("when") == "after" for form in elements)
+        return path == "forms.fields" and self._after_trials
 
 
 def _tag_that_differs(old: Any, new: Any) -> str | None:

@@ -64,6 +64,8 @@ EFFECTS: Mapping[str, Effect] = {
     "screening": "wording",
     "warnings": "wording",
     "exclusions": "wording",
+    # Those after the trials may be added: nothing that is asked after every rating changes a rating
+    # (`experiments.schema.difference`).
     "forms.name": "measured",
     "forms.when": "wording",
     "forms.title": "wording",

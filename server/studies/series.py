@@ -46,17 +46,26 @@ def version_of_series(session: Session, study: Study, series: int | None) -> Stu
 
 
 def series_for(study: Study, experiment: Experiment, manifest: Manifest) -> int:
-    """The series of a further version: that of the latest version which measures the same by the same clips.
+    """The series of a further version: the latest whose versions all measure the same by the same clips.
 
-    Where there is none, a new series begins.
+    Where there is none, a new series begins. One version is not enough: a form may be new to an older version
+    and another form than that of a newer one.
     """
     clips = {(clip.cell, clip.exemplar, clip.sha256) for clip in manifest.clips}
-    for version in reversed(study.versions):
-        known = {(clip.cell, clip.exemplar, clip.clip_sha256) for clip in version.clips if clip.cell}
-        changes = difference(definition_of(version), experiment)
-        if known == clips and not changes_what_is_measured(changes):
-            return version.series
-    return max((version.series for version in study.versions), default=0) + 1
+    by_series: dict[int, list[StudyVersion]] = {}
+    for version in study.versions:
+        by_series.setdefault(version.series, []).append(version)
+    for series in dict.fromkeys(version.series for version in reversed(study.versions)):
+        if all(_measures_the_same(version, experiment, clips) for version in reversed(by_series[series])):
+            return series
+    return max(by_series, default=0) + 1
+
+
+def _measures_the_same(
+    version: StudyVersion, experiment: Experiment, clips: set[tuple[str, int, str]]
+) -> bool:
+    known = {(clip.cell, clip.exemplar, clip.clip_sha256) for clip in version.clips if clip.cell}
+    return known == clips and not changes_what_is_measured(difference(definition_of(version), experiment))
 
 
 def judged(session: Session, study: Study, experiment: Experiment) -> JudgedEdit:

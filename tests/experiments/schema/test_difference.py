@@ -104,3 +104,47 @@ def test_a_text_in_a_language_that_nobody_has_read_may_join() -> None:
 def test_a_rule_instead_of_another_is_one_change() -> None:
     changes = edited(('rule = "incomplete"', 'rule = "failed_plays"'))
     assert [(change.path, change.effect) for change in changes] == [("exclusions.1.rule", "wording")]
+
+
+AFTER = """
+[[forms]]
+name = "comments"
+when = "after"
+title = { en = "Comments", de = "Anmerkungen" }
+[[forms.fields]]
+type = "text"
+name = "remark"
+label = { en = "Anything else?", de = "Noch etwas?" }
+"""
+SECOND_FIELD = """[[forms.fields]]
+type = "number"
+name = "noticed"
+label = { en = "How many?", de = "Wie viele?" }
+"""
+
+
+def measured(old: str, new: str) -> bool:
+    return changes_what_is_measured(difference(parse_experiment(old), parse_experiment(new)))
+
+
+def test_what_is_asked_after_every_rating_can_be_added_without_a_new_series() -> None:
+    text = locate("exp3").read_text(encoding="utf-8")
+    assert not measured(text, text + AFTER)
+    assert not measured(text + AFTER, text + AFTER + SECOND_FIELD)
+    # Asked before the trials it may change how they are rated.
+    assert measured(text, text + AFTER.replace('"after"', '"before"'))
+    assert measured(
+        text + AFTER.replace('"after"', '"before"'),
+        text + AFTER.replace('"after"', '"before"') + SECOND_FIELD,
+    )
+
+
+def test_answers_to_another_question_are_not_pooled_wherever_it_is_asked() -> None:
+    text = locate("exp3").read_text(encoding="utf-8")
+    two = AFTER + SECOND_FIELD
+    assert measured(text + two, text + two.replace('type = "number"', 'type = "text"'))
+    assert measured(text + two, text + AFTER)
+    assert measured(text + AFTER, text)
+    swapped = AFTER.replace(AFTER[AFTER.index("[[forms.fields]]") :], "") + SECOND_FIELD
+    swapped += AFTER[AFTER.index("[[forms.fields]]") :]
+    assert measured(text + two, text + swapped)

@@ -469,3 +469,33 @@ def test_shipped_experiments_say_how_their_clips_are_built(viewer: Admin, servic
     assert (demo["demonstration"], demo["clips_ready"]) == (True, False)
     assert demo["build"] == f"stimuli build pairs-demo --out {folder / 'pairs-demo'}"
     assert not shipped["exp1"]["demonstration"]
+
+
+COMMENTS = """
+[[forms]]
+name = "comments"
+when = "after"
+title = { en = "Comments" }
+[[forms.fields]]
+type = "text"
+name = "remark"
+label = { en = "Anything else?" }
+"""
+
+
+def _saved_series(admin: Admin, toml: str) -> int:
+    revision = admin.get("/studies/short").json()["summary"]["revision"]
+    saved = admin.send("POST", "/studies/short/versions", {"revision": revision, "toml": toml})
+    assert saved.status_code < 300, saved.text
+    newest = max(saved.json()["versions"], key=lambda version: version["number"])
+    return int(newest["series"])
+
+
+def test_a_comments_form_after_the_last_trial_keeps_the_data_series(
+    experimenter: Admin, study: StudyInDatabase
+) -> None:
+    assert _saved_series(experimenter, SHORT + COMMENTS) == 1
+    # It is new to the first version, but another question than that of the second.
+    likert = 'type = "likert"\nlow = { en = "no" }\nhigh = { en = "yes" }'
+    assert _saved_series(experimenter, SHORT + COMMENTS.replace('type = "text"', likert)) == 2
+    assert _saved_series(experimenter, SHORT + COMMENTS) == 1

@@ -1,12 +1,12 @@
 /** What is edited: pages of forms, the TOML beside them, and the bar that saves. */
 
-import { Alert, Button, Group, NavLink, Select, Stack, Switch, Text, TextInput, Title } from "@mantine/core";
+import { Alert, Button, Group, List, Modal, NavLink, Select, Stack, Switch, Text, TextInput, Title } from "@mantine/core";
 import { useHotkeys } from "@mantine/hooks";
 import { Link, useNavigate, useSearch } from "@tanstack/react-router";
 import { useState } from "react";
 import { api, type Schemas, unwrap } from "../api";
 import { Design } from "../studies/Design";
-import { JudgedEdit } from "../studies/JudgedEdit";
+import { consequence, JudgedEdit } from "../studies/JudgedEdit";
 import { TomlText } from "../studies/TomlText";
 import { TurnedAway } from "../studies/TurnedAway";
 import { useChange } from "../ui/useChange";
@@ -64,7 +64,7 @@ export function Workbench({ detail, start }: Props) {
         {beside && <TomlText toml={builder.toml} onChange={builder.setToml} problems={builder.problems} rows={40} />}
       </div>
       {wrong && <Wrong study={name} builder={builder} />}
-      {builder.changed && !builder.writing && !wrong && <JudgedEdit name={name} toml={builder.toml} />}
+      {builder.changed && !builder.writing && !wrong && <JudgedEdit detail={detail} toml={builder.toml} />}
       {builder.design !== null && !wrong && <Design design={builder.design} />}
     </BuilderContext>
   );
@@ -89,6 +89,37 @@ function Page({ section }: { section: Section }) {
   );
 }
 
+interface BeginSeriesProps {
+  edit: Schemas["JudgedEdit"];
+  detail: Schemas["StudyDetail"];
+  onClose: () => void;
+  onConfirm: () => void;
+}
+
+/** Asked before an edit is saved that keeps the answers so far apart from those to come. */
+function BeginSeries({ edit, detail, onClose, onConfirm }: BeginSeriesProps) {
+  return (
+    <Modal opened onClose={onClose} title={`Begin data series ${edit.series}?`} closeButtonProps={{ "aria-label": "Close" }}>
+      <Text>{consequence(edit, detail)}</Text>
+      <List size="sm" mt="xs">
+        {edit.changes
+          .filter(({ effect }) => effect === "measured")
+          .map(({ path, text }) => (
+            <List.Item key={path}>{text}</List.Item>
+          ))}
+      </List>
+      <Group justify="flex-end" mt="md">
+        <Button variant="default" onClick={onClose}>
+          Cancel
+        </Button>
+        <Button color="red" onClick={onConfirm}>
+          Save and begin series {edit.series}
+        </Button>
+      </Group>
+    </Modal>
+  );
+}
+
 interface BarProps {
   detail: Schemas["StudyDetail"];
   builder: Builder;
@@ -109,13 +140,37 @@ function Bar({ detail, builder, beside, onBeside }: BarProps) {
       ),
     { touches: [["study", name]], done: "Saved as a new version.", before: () => forgetWork(name) },
   );
+  const [asked, setAsked] = useState<Schemas["JudgedEdit"] | null>(null);
+  // Judged at the press, not while typing: what is saved is what was judged.
+  const judge = useChange(
+    () =>
+      unwrap(api.POST("/api/admin/studies/{study}/versions/check", { params: { path: { study: name } }, body: { toml: builder.toml } })),
+    {
+      touches: [],
+      then: (edit) => {
+        if (edit.begins_series) setAsked(edit);
+        else save.mutate(undefined);
+      },
+    },
+  );
   const ready = builder.changed && !builder.writing && !builder.broken && builder.problems.length === 0;
   return (
     <div className="builder-bar">
       <Group gap="xs" align="end">
-        <Button disabled={!ready} loading={save.isPending} onClick={() => save.mutate(undefined)}>
+        <Button disabled={!ready} loading={save.isPending || judge.isPending} onClick={() => judge.mutate(undefined)}>
           Save as a new version
         </Button>
+        {asked !== null && (
+          <BeginSeries
+            edit={asked}
+            detail={detail}
+            onClose={() => setAsked(null)}
+            onConfirm={() => {
+              setAsked(null);
+              save.mutate(undefined);
+            }}
+          />
+        )}
         <TextInput
           aria-label="What changed"
           placeholder="What changed (a note)"

@@ -1,18 +1,21 @@
 import { Button, Card, Code, CopyButton, Group, Stack, Text, Title } from "@mantine/core";
 import { useDisclosure } from "@mantine/hooks";
 import { useQuery } from "@tanstack/react-query";
-import { api, unwrap } from "../api";
+import { api, type Schemas, unwrap } from "../api";
 import { Answer } from "../ui/Answer";
+import { Elsewhere } from "./Elsewhere";
 import type { DataOrigin } from "./origins";
 
 interface Props {
   study: string;
   origin: DataOrigin;
   series: number | null;
+  every: Schemas["SeriesOut"][];
+  choose: (series: number) => void;
 }
 
 /** The Methods paragraph, to be copied; each number with the query that gives it. */
-export function MethodsCard({ study, origin, series }: Props) {
+export function MethodsCard({ study, origin, series, every, choose }: Props) {
   const [shown, { toggle }] = useDisclosure(false);
   const query = series === null ? { origin } : { origin, series };
   const methods = useQuery({
@@ -37,6 +40,7 @@ export function MethodsCard({ study, origin, series }: Props) {
               </Group>
             </Group>
             <Text>{data.paragraph}</Text>
+            <Elsewhere every={every} shown={data.series} origin={origin} choose={choose} />
             <Text size="sm" c="dimmed">
               What each declared rule left out stands in the methods files of a report.
             </Text>

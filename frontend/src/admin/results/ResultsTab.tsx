@@ -46,14 +46,21 @@ export function ResultsTab() {
       <Answer of={results}>
         {(data) =>
           data.ratings === 0 ? (
-            <NoAnswers origin={origin} runs={detail?.series.find((one) => one.number === data.series)?.runs ?? {}} choose={setOrigin} />
+            <NoAnswers
+              origin={origin}
+              runs={detail?.series.find((one) => one.number === data.series)?.runs ?? {}}
+              every={detail?.series ?? []}
+              series={data.series}
+              choose={setOrigin}
+              chooseSeries={setSeries}
+            />
           ) : (
             <OfKind study={study} data={data} factors={detail?.design.factors ?? []} />
           )
         }
       </Answer>
       <Reports study={study} origin={origin} series={series} />
-      <MethodsCard study={study} origin={origin} series={series} />
+      <MethodsCard study={study} origin={origin} series={series} every={detail?.series ?? []} choose={setSeries} />
     </Stack>
   );
 }

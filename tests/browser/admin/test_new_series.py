@@ -1,0 +1,48 @@
+"""A new scale of a live study is asked about before it is saved; the data are found afterwards."""
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.browser.admin.conftest import Dashboard
+from tests.browser.admin.test_before_opening import picture
+
+pytestmark = pytest.mark.browser
+
+
+def test_a_new_series_is_confirmed_and_says_where_the_answers_are(dashboard: Dashboard) -> None:
+    page = dashboard.open("/studies/short/build")
+    page.get_by_label("TOML beside").locator("xpath=..").click()
+    text = page.get_by_label("Definition")
+    saved = text.input_value()
+    text.fill(saved.replace("[trial.scale]\n", "[trial.scale]\nmaximum = 9\n"))
+    button = page.get_by_role("button", name="Save as a new version")
+    expect(button).to_be_enabled()
+    button.click()
+    dialog = page.get_by_role("dialog")
+    expect(dialog).to_contain_text("4 participants answered on 1-7. A new data series begins")
+    expect(dialog).to_contain_text("stay separate, in series 1 (version 1)")
+    picture(page, "confirm-series")
+    dialog.get_by_role("button", name="Cancel").click()
+    expect(page.get_by_text("short, version 1")).to_be_visible()
+    button.click()
+    dialog.get_by_role("button", name="Save and begin series 2").click()
+    page.get_by_text("short, version 2").wait_for()
+
+    page = dashboard.open("/studies/short/results")
+    expect(page.get_by_text("4 participants are in series 1 (version 1).").first).to_be_visible()
+    expect(page.get_by_text("No answers of participants")).to_have_count(0)
+    expect(page.get_by_text("Visits begun: 0")).to_have_count(0)
+    expect(page.get_by_text("data series 2 has no visits yet")).to_be_visible()
+    picture(page, "empty-series")
+    page.get_by_role("button", name="Show them").first.click()
+    expect(page.get_by_text("Visits begun: 4")).to_be_visible()
+    expect(page.get_by_text("How clips were shown")).to_be_visible()
+
+    page = dashboard.open("/studies/short/build")
+    page.get_by_label("TOML beside").locator("xpath=..").click()
+    text = page.get_by_label("Definition")
+    text.fill(text.input_value() + "\n# more\n")
+    text.fill(text.input_value().replace('title = "A short study"', 'title = "A shorter study"'))
+    status = page.get_by_role("status").filter(has_text="has no runs yet")
+    expect(status).to_contain_text("Series 2 has no runs yet; 4 runs are in series 1 (version 1).")
+    expect(page.get_by_text("No run has been made yet")).to_have_count(0)
