@@ -172,7 +172,7 @@ def _person_checks(launch: ToLaunch) -> Iterator[LaunchCheck]:
             blocks=False,
             text="Participants are recruited online, and the study has too few attention and motion checks "
             "to separate people from programs: no run can be rated likely a person's. Turn on online "
-            "recruitment under Design, Checks and exclusions: it adds two motion checks and one attention "
+            "recruitment under Build, Checks and exclusions: it adds two motion checks and one attention "
             "question.",
         )
 
