@@ -151,10 +151,10 @@ class ModelData:
 
     def unit(self, effect: str) -> float:
         """Standard deviation of a covariate's column of `slope_columns`, in the covariate's own unit."""
-        found = next((one for one in self.number_effects if one.name == effect), None)
-        if found is None:
+        number_effect = next((one for one in self.number_effects if one.name == effect), None)
+        if number_effect is None:
             return 1.0
-        return float(np.sqrt((self._product(found, self.spread) ** 2).mean()))
+        return float(np.sqrt((self._product(number_effect, self.spread) ** 2).mean()))
 
     def slope_columns(self, effects: Sequence[str]) -> Floats:
         """Columns (n, p) whose coefficients differ between levels of a grouping, in units of `unit`."""
@@ -172,10 +172,10 @@ class ModelData:
 
         The df of a test of several contrasts depend a little on how these are written; lmerTest's are these.
         """
-        found = next((one for one in self.number_effects if one.name == effect), None)
-        members = effect.split(":") if found is None else list(found.factors)
+        number_effect = next((one for one in self.number_effects if one.name == effect), None)
+        members = effect.split(":") if number_effect is None else list(number_effect.factors)
         width = len(self._effect_of_x)
-        if found is not None and not members:
+        if number_effect is not None and not members:
             return np.eye(width)[self.columns(effect)]
         rows: Floats = np.ones((1, 1))
         for factor, names in zip(self.factors, self.levels, strict=True):
@@ -186,10 +186,10 @@ class ModelData:
             )
         contrasts = rows @ self.fixed
         whole = np.zeros((len(contrasts), width))
-        if found is None:
+        if number_effect is None:
             whole[:, : contrasts.shape[1]] = contrasts
         else:
-            whole[:, self.columns(effect)] = contrasts[:, self._of_factors(found)]
+            whole[:, self.columns(effect)] = contrasts[:, self._of_factors(number_effect)]
         return whole
 
     def random_effects(self, slopes: RandomSlopes) -> list[str]:

@@ -48,8 +48,8 @@ def separated_columns(data: ModelData) -> list[str]:
         ]
     )
     # thresholds alone cannot raise a likelihood: every category was given
-    found = optimize.linprog(-slack.sum(axis=0), A_ub=-slack, b_ub=np.zeros(len(slack)), bounds=(-1, 1))
-    if found.x is None or found.fun is None or found.fun > -1e-6:
+    solution = optimize.linprog(-slack.sum(axis=0), A_ub=-slack, b_ub=np.zeros(len(slack)), bounds=(-1, 1))
+    if solution.x is None or solution.fun is None or solution.fun > -1e-6:
         return []
     names = data.column_names[1:]
-    return [name for name, b in zip(names, found.x[k:], strict=True) if abs(b) > 1e-6]
+    return [name for name, b in zip(names, solution.x[k:], strict=True) if abs(b) > 1e-6]

@@ -29,8 +29,8 @@ def list_runs(
 ) -> RunPage:
     """The runs, the latest first, a page at a time: go on with `before` = `next`."""
     with services.database.read() as session:
-        found = find_study(session, study, identity, "export")
-        shown = service.page(session, found, show, search, before, limit, simulated=simulated)
+        known = find_study(session, study, identity, "export")
+        shown = service.page(session, known, show, search, before, limit, simulated=simulated)
     with services.database.write() as session:
         record(session, identity, "participants listed", "study", study, number=len(shown.runs))
     return shown

@@ -102,8 +102,8 @@ def _check_answer(
 
 def refused_trials(connection: Connection, run: int) -> set[int]:
     """Trials of a run whose answer was refused for good: nothing more is asked of them."""
-    found = (data.get("trial_index") for data in repository.refused_records(connection, run))
-    return {index for index in found if isinstance(index, int)}
+    indices = (data.get("trial_index") for data in repository.refused_records(connection, run))
+    return {index for index in indices if isinstance(index, int)}
 
 
 def _evidence(body: dict[str, Any]) -> RatingEvidence | None:
