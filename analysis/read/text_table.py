@@ -99,8 +99,8 @@ def _copies(table: TextTable, names: Sequence[str]) -> str:
         return ""
     every = list(dict.fromkeys(name for name in table.header if name))
     cells = table.reader.cells(every)
-    place = _row_keys(cells.lines, cells.files)
-    where = pd.Index(place).get_indexer(pd.Index(_row_keys(table.lines, table.files)))
+    keys = _row_keys(cells.lines, cells.files)
+    where = pd.Index(keys).get_indexer(pd.Index(_row_keys(table.lines, table.files)))
     return said_of_copies(row_codes(cells.rows.iloc[where]), _Places(table))
 
 

@@ -1,7 +1,7 @@
 """Estimated marginal means with their errors."""
 
 from dataclasses import dataclass
-from itertools import combinations, product
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,12 +33,6 @@ def margin(result: AnovaResult, members: tuple[int, ...]) -> Floats:
     away = tuple(axis + 1 for axis in range(len(result.factors)) if axis not in members)
     means: Floats = result.y.mean(axis=away).reshape(result.n_participants, -1)
     return means
-
-
-def level_combinations(result: AnovaResult, members: tuple[int, ...]) -> list[dict[str, str]]:
-    """Levels of a margin in the column order of `margin`."""
-    names = [result.factors[m] for m in members]
-    return [dict(zip(names, combo, strict=True)) for combo in product(*(result.levels[m] for m in members))]
 
 
 def margins_shown(n_factors: int) -> list[tuple[int, ...]]:

@@ -106,8 +106,8 @@ def simple_effects(
     """
     multivariate = reports_multivariate(result, planned)
     if interactions is None:
-        interactions = [effect for effect in result.effects if _is_interaction(result, effect)]
-        chosen = [effect for effect in interactions if first_p(effect, multivariate) < SIGNIFICANCE]
+        of_interactions = [effect for effect in result.effects if _is_interaction(result, effect)]
+        chosen = [effect for effect in of_interactions if first_p(effect, multivariate) < SIGNIFICANCE]
     else:
         chosen = [result.effect(name) for name in interactions]
         for effect in chosen:

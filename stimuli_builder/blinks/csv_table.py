@@ -107,9 +107,9 @@ def _cells(path: Path, **options: Any) -> pd.DataFrame:
 def write_table(file: Path, table: pd.DataFrame) -> None:
     """Write a table as CSV in which no name or text can run as a formula in a spreadsheet."""
     guarded = table.rename(columns=lambda name: guarded_cell(str(name)))
-    for place, kind in enumerate(guarded.dtypes):
+    for column, kind in enumerate(guarded.dtypes):
         if kind.kind not in "fiub":
-            guarded.isetitem(place, guarded_row(guarded.iloc[:, place]))
+            guarded.isetitem(column, guarded_row(guarded.iloc[:, column]))
     guarded.to_csv(file, index=False, lineterminator="\n")
 
 
