@@ -3,11 +3,14 @@
 import json
 import math
 import re
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from datetime import date
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any, Literal
 
+from analysis.capsule.intended import intended_change
 from experiments.capsule.declaration import WRITTEN_BY_SERVER
 
 Kind = Literal["same", "figure", "rounding", "table"]
@@ -26,8 +29,8 @@ class Compared:
     said: str = ""
 
 
-def compare_reports(names: tuple[str, ...], before: Path, after: Path) -> list[Compared]:
-    """Every file of either report; `names` are those that the capsule promises.
+def compare_reports(names: tuple[str, ...], before: Path, after: Path, made: date) -> list[Compared]:
+    """Every file of either report; `names` are those that the capsule of the day `made` promises.
 
     A file of the capsule's report that it does not promise, and that no server writes, is one that nobody can
     make again: it counts as a table that differs.
@@ -38,28 +41,49 @@ def compare_reports(names: tuple[str, ...], before: Path, after: Path) -> list[C
     foreign = [
         Compared(name, "table", "in the capsule's report, and not made by the analysis") for name in more
     ]
-    return [_of_name(name, names, again, before, after) for name in sorted({*names, *again})] + foreign
+    return [
+        _of_name(name, names, again, (before, after), made) for name in sorted({*names, *again})
+    ] + foreign
 
 
-def _of_name(name: str, names: tuple[str, ...], again: set[str], before: Path, after: Path) -> Compared:
+def _of_name(
+    name: str, names: tuple[str, ...], again: set[str], folders: tuple[Path, Path], made: date
+) -> Compared:
     if name not in again:
         return Compared(name, "table", "in the capsule, and not made now")
     if name not in names:
         return Compared(name, "table", "made now, and not in the capsule")
-    return _compare(name, (before / name).read_bytes(), (after / name).read_bytes())
+    before, after = folders
+    return _compare(name, (before / name).read_bytes(), (after / name).read_bytes(), made)
 
 
-def _compare(name: str, before: bytes, after: bytes) -> Compared:
+def _compare(name: str, before: bytes, after: bytes, made: date) -> Compared:
     if before == after:
         return Compared(name, "same")
     if name.endswith((".svg", ".png")):
         return Compared(name, "figure", f"{len(before):,} bytes became {len(after):,}")
     was, now = before.decode("utf-8", "replace"), after.decode("utf-8", "replace")
     if name.endswith(".json"):
-        return _numbers(name, was, now)
+        return _numbers(name, was, now, made)
     if name.endswith(".html") and _PICTURE.sub("", was) == _PICTURE.sub("", now):
         return Compared(name, "figure", "its pictures differ, its tables do not")
+    if name.endswith(".md"):
+        return Compared(name, "table", _explained(_sections_that_differ(was, now), made))
     return Compared(name, "table", _first_line(_PICTURE.sub("", was), _PICTURE.sub("", now)))
+
+
+def _sections_that_differ(was: str, now: str) -> Iterator[tuple[str, str]]:
+    """The headings below which two reports differ, each with its first line that does."""
+    before, after = _sections(was), _sections(now)
+    for heading in dict.fromkeys((*before, *after)):
+        old, new = before.get(heading, ""), after.get(heading, "")
+        if old != new:
+            yield heading, f"'{heading}', {_first_line(old, new)}"
+
+
+def _sections(report: str) -> dict[str, str]:
+    parts = re.split(r"^#+ (.*)$", report, flags=re.MULTILINE)
+    return {"": parts[0], **dict(zip(parts[1::2], parts[2::2], strict=True))}
 
 
 def _first_line(was: str, now: str) -> str:
@@ -74,29 +98,48 @@ def _short(text: str) -> str:
     return repr(text if len(text) <= 70 else f"{text[:67]}...")
 
 
-def _numbers(name: str, was: str, now: str) -> Compared:
+def _numbers(name: str, was: str, now: str, made: date) -> Compared:
     try:
-        difference = _differs(json.loads(was), json.loads(now), "")
+        spots = list(_differences(json.loads(was), json.loads(now), ""))
     except ValueError:
         return Compared(name, "table", "no JSON")
-    if difference is None:
+    if not spots:
         return Compared(name, "rounding", f"numbers are equal to {RELATIVE:g}")
-    return Compared(name, "table", difference)
+    return Compared(name, "table", _explained(spots, made))
 
 
-def _differs(was: Any, now: Any, path: str) -> str | None:
-    """The first place where two JSON values differ by more than rounding; None where there is none."""
+def _explained(spots: Iterable[tuple[str, str]], made: date) -> str:
+    """What differs, in words: what nothing explains first, then what changed on purpose with its reason."""
+    reasons: dict[str, list[str]] = {}
+    for spot, said in spots:
+        change = intended_change(spot, made)
+        reason = f"changed on purpose on {change.since}: {change.why}" if change else ""
+        reasons.setdefault(reason, []).append(said)
+    unexplained = reasons.pop("", [])
+    parts = [f"{said[0]}{_more(said)}, {reason}" for reason, said in reasons.items()]
+    if parts:
+        parts[-1] += " (CHANGELOG.md, Numbers changed)"
+    if unexplained:
+        parts.insert(0, f"{unexplained[0]}{_more(unexplained)}")
+    return "; ".join(parts)
+
+
+def _more(said: list[str]) -> str:
+    return f" and {len(said) - 1} more" if len(said) > 1 else ""
+
+
+def _differences(was: Any, now: Any, spot: str) -> Iterator[tuple[str, str]]:
+    """Every spot where two JSON values differ by more than rounding, and how."""
     if isinstance(was, dict) and isinstance(now, dict):
-        keys = list(dict.fromkeys((*was, *now)))
-        differences = (_differs(was.get(key), now.get(key), f"{path}.{key}".lstrip(".")) for key in keys)
-        return next((difference for difference in differences if difference), None)
-    if isinstance(was, list) and isinstance(now, list) and len(was) == len(now):
-        pairs = enumerate(zip(was, now, strict=True))
-        differences = (_differs(old, new, f"{path}[{number}]") for number, (old, new) in pairs)
-        return next((difference for difference in differences if difference), None)
-    if _are_numbers(was, now) and math.isclose(was, now, rel_tol=RELATIVE, abs_tol=1e-12):
-        return None
-    return None if was == now else f"{path}: {_short(str(was))} became {_short(str(now))}"
+        for key in dict.fromkeys((*was, *now)):
+            yield from _differences(was.get(key), now.get(key), f"{spot}.{key}".lstrip("."))
+    elif isinstance(was, list) and isinstance(now, list) and len(was) == len(now):
+        for number, (old, new) in enumerate(zip(was, now, strict=True)):
+            yield from _differences(old, new, f"{spot}[{number}]")
+    elif _are_numbers(was, now) and math.isclose(was, now, rel_tol=RELATIVE, abs_tol=1e-12):
+        return
+    elif was != now:
+        yield spot, f"{spot}: {_short(str(was))} became {_short(str(now))}"
 
 
 def _are_numbers(*values: Any) -> bool:
