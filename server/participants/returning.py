@@ -19,6 +19,7 @@ from server.participants import repository
 from server.participants.identities import fits, pseudonym, resume_code, run_prefix
 from server.participants.recruiter import Recruiter
 from server.participants.refusals import (
+    IdentifierInvalid,
     ResumeCodeNeeded,
     ResumeCodeWrong,
     RunLeft,
@@ -51,7 +52,15 @@ def settled_id(session: Session, link: Link, recruiter: Recruiter, parameters: M
     written = recruiter.participant(parameters)
     if written is None:
         return ""
-    canonical = recruiter.same_id(written) if link.kind == "preview" else recruiter.canonical_id(parameters)
+    if link.kind == "preview":
+        return recruiter.same_id(written)
+    try:
+        canonical = recruiter.canonical_id(parameters)
+    except IdentifierInvalid:
+        # Earlier releases took ids of any form.
+        if identities.is_known(session, link.study.pseudonym_key, written):
+            return written
+        raise
     if canonical is None or canonical == written:
         return written
     return written if identities.is_known(session, link.study.pseudonym_key, written) else canonical

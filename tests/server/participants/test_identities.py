@@ -73,6 +73,19 @@ def test_somebody_known_by_an_id_as_it_is_written_stays_known_by_it(
     assert code_of(answer) == (409, "resume_code_needed")
 
 
+def test_somebody_known_by_an_id_of_another_form_is_still_let_in(
+    client: TestClient, link: str, victim: Participant, services: Services
+) -> None:
+    """Earlier releases took ids of any form."""
+    with services.database.write() as session:
+        run = session.query(StudyRun).filter_by(public_id=victim.run_id).one()
+        key = run.study.pseudonym_key
+        run.participant = pseudonym(key, "recruiter:%40177%")
+        session.get_one(RecruiterIdentity, run.id).identifier_hash = identifier_hash(key, "%40177%")
+    answer = Participant(client, link).start(query={"survey_code": "%40177%"})
+    assert code_of(answer) == (409, "resume_code_needed")
+
+
 GOOD_IDS = [
     ("prolific", "PROLIFIC_PID", "5f1a9c0e7b2d3c4e5f6a7b8c"),
     ("prolific", "PROLIFIC_PID", "5F1A9C0E7B2D3C4E5F6A7B8C"),
