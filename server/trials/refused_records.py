@@ -20,7 +20,9 @@ from server.evidence.schemas import RatingEvidence
 from server.tallies.tally import Tally
 from server.tokens import hash_token
 from server.trials import repository
+from server.trials.attention import by_attention
 from server.trials.delivery import TrialNotInRun, answer_to
+from server.trials.kinds import Part
 from server.trials.refusals import ConsentMissing, RunClosed, RunUnknown
 from server.trials.schemas import RefusedRecord
 from server.versions import Versions
@@ -29,6 +31,8 @@ REFUSED = repository.REFUSED
 KEPT_BYTES = 32 * 1024
 MAX_REFUSED = 2_000
 """More than a run has trials and views."""
+MAX_WHOLE = 100
+"""Of a run these first ones are kept whole, of further ones the reason alone: all are read with each answer."""
 
 
 class TooManyRefused(Conflict):
@@ -53,14 +57,18 @@ def keep(
         return
     if run.consented_at is None:
         raise ConsentMissing("Nothing is stored before the participant has agreed; send the consent first.")
-    if len(repository.refused_records(connection, run.id)) >= MAX_REFUSED:
+    before = repository.refused_records(connection, run.id)
+    if len(before) >= MAX_REFUSED:
         raise TooManyRefused(f"This visit has {MAX_REFUSED} refused records; no more are kept.")
     which = record.which
+    part = None
     if which is not None:
-        _check_answer(versions, intake, connection, run, record, received_at)
-    repository.add_event(
-        connection, run.id, str(record.id), repository.REFUSED, _kept(record, which), received_at
-    )
+        known = any((one.get("trial_index"), one.get("play")) == which for one in before)
+        part = _check_answer(versions, intake, connection, run, record, received_at, known=known)
+    kept = _kept(record, which, whole=len(before) < MAX_WHOLE)
+    repository.add_event(connection, run.id, str(record.id), repository.REFUSED, kept, received_at)
+    if part == "attention":  # it counts as failed, as for an answer that is stored
+        by_attention(connection, run.id, versions.get(connection, run.version_id).experiment)
 
 
 def _check_answer(
@@ -70,8 +78,13 @@ def _check_answer(
     run: repository.RunForRating,
     record: RefusedRecord,
     received_at: datetime,
-) -> None:
-    """Refuse what no answer could be: of a run that is over, of no trial, or without its evidence."""
+    *,
+    known: bool,
+) -> Part:
+    """Refuse what no answer could be: of a run that is over, of no trial, or without its evidence.
+
+    The part of the run that its trial is of; evidence is asked for once (`known`).
+    """
     which = record.which or (0, 1)
     trial_index = which[0]
     if run.status != "active":
@@ -79,9 +92,8 @@ def _check_answer(
     trial = repository.trial(connection, run.id, trial_index)
     if trial is None:
         raise TrialNotInRun(f"Trial {trial_index} is not in this run, which has {run.trials_total} trials.")
-    before = repository.refused_records(connection, run.id)
-    if run.evidence != "asked" or any((one.get("trial_index"), one.get("play")) == which for one in before):
-        return
+    if run.evidence != "asked" or known:
+        return trial.kind
     tally = trial.tally or Tally()
     playback = record.body.get("playback")
     was_shown = not isinstance(playback, dict) or playback.get("method") != "none"
@@ -96,8 +108,9 @@ def _check_answer(
         answered_at=None,
         evidence=_evidence(record.body),
     )
-    tally.clip_time = intake.take(connection, answer, tally.clip_time)
+    tally.clip_time = intake.take(connection, answer, tally.clip_time, stores=False)
     repository.keep_tally(connection, run.id, tally, is_new=trial.tally is None)
+    return trial.kind
 
 
 def refused_trials(connection: Connection, run: int) -> set[int]:
@@ -116,12 +129,12 @@ def _evidence(body: dict[str, Any]) -> RatingEvidence | None:
         return None
 
 
-def _kept(record: RefusedRecord, which: tuple[int, int] | None) -> dict[str, Any]:
+def _kept(record: RefusedRecord, which: tuple[int, int] | None, *, whole: bool) -> dict[str, Any]:
     """What is stored: the reason and the record, without what would not fit."""
     body = _storable({key: value for key, value in record.body.items() if key != "evidence"})
     if _size(body) > KEPT_BYTES and isinstance(body.get("playback"), dict):
         body["playback"] = {key: value for key, value in body["playback"].items() if key != "drawn"}
-    if _size(body) > KEPT_BYTES:
+    if _size(body) > KEPT_BYTES or not whole:
         body = {"left_out_bytes": _size(body)}
     told = {"path": record.path, "status": record.status, "code": record.code, "reason": record.message}
     where = {} if which is None else {"trial_index": which[0], "play": which[1]}

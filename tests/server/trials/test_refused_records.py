@@ -18,7 +18,7 @@ from server.trials.schemas import RatingIn
 from server.views.schemas import ViewsIn
 from tests.helpers.admins import Admin
 from tests.helpers.evidence import Watcher
-from tests.helpers.studies import Participant, StudyInDatabase, good_playback
+from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study, good_playback
 
 HASH = "a" * 64
 TRIAL = {"trial_index": 3, "clip_sha256": HASH, "frames": 4}
@@ -265,6 +265,32 @@ def test_a_refused_attention_check_counts_as_failed(participant: Participant, se
         assert failed_checks(session.connection(), run.id, experiment) == 1
 
 
+def test_refused_attention_checks_end_a_run_as_wrong_ones_do(
+    client: Any, services: Services, tmp_path: Any
+) -> None:
+    """Else refused answers would be a way around the screening."""
+    toml = SHORT + '\n[[screening]]\nrule = "attention_checks_failed"\n'
+    study = add_study(services, tmp_path / "clips", toml)
+    person = Participant(client, study.link()).agree()
+    check = next(trial for trial in person.state()["trials"] if trial["kind"] == "attention")
+    assert report(person, unstorable(check)).status_code == 202
+    assert person.request("POST", "/complete").json()["status"] == "screened_out"
+
+
+def test_many_refused_records_of_a_run_are_not_kept_whole(
+    participant: Participant, services: Services, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All of a run are read with each answer: their size is bounded together, not only one by one."""
+    monkeypatch.setattr("server.trials.refused_records.MAX_WHOLE", 1)
+    participant.agree()
+    for number in range(3):
+        told = refused("/api/run/views", {"number": number, "x": "a" * 9000})
+        assert participant.request("POST", "/refused", told).status_code == 202
+    with services.database.read() as session:
+        kept = [event.data["record"] for event in session.query(RunEvent).filter_by(type="record_refused")]
+    assert [list(record) for record in kept] == [["number", "x"], ["left_out_bytes"], ["left_out_bytes"]]
+
+
 class TestEvidence:
     """No completion code for answers that a person cannot have given."""
 
@@ -290,3 +316,14 @@ class TestEvidence:
         assert report(watcher, bare | {"evidence": watcher.evidence(trial)}).status_code == 202
         with services.database.read() as session:
             assert session.query(RunEvent).filter_by(type="record_refused").count() == 1
+
+    def test_an_answer_after_a_refused_one_of_the_same_play_is_stored(
+        self, client: Any, study: StudyInDatabase, services: Services
+    ) -> None:
+        """As from another tab, which does not know of the refusal."""
+        watcher = Watcher(client, study.link_token).begin()
+        trial = main_trials(watcher)[0]
+        watcher.wait(60)
+        sent = unstorable(trial) | {"evidence": watcher.evidence(trial)}
+        assert report(watcher, sent).status_code == 202
+        assert watcher.answer(trial).status_code == 201
