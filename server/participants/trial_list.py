@@ -8,7 +8,7 @@ from experiments.checks import CheckName
 from experiments.trials import KINDS
 from server.models import StudyRun
 from server.participants import repository
-from server.trials.refused_records import refused_trials
+from server.trials.repository import refused_trials
 from server.trials.schemas import SeriesPosition, TrialClip, TrialInfo
 from server.trials.series import service as series
 from server.trials.verdict import is_settled

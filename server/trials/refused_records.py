@@ -32,7 +32,7 @@ KEPT_BYTES = 32 * 1024
 MAX_REFUSED = 2_000
 """More than a run has trials and views."""
 MAX_WHOLE = 100
-"""Of a run these first ones are kept whole, of further ones the reason alone: all are read with each answer."""
+"""The first of a run are kept whole, of further ones the reason alone: all are read with each answer."""
 
 
 class TooManyRefused(Conflict):
@@ -111,12 +111,6 @@ def _check_answer(
     tally.clip_time = intake.take(connection, answer, tally.clip_time, stores=False)
     repository.keep_tally(connection, run.id, tally, is_new=trial.tally is None)
     return trial.kind
-
-
-def refused_trials(connection: Connection, run: int) -> set[int]:
-    """Trials of a run whose answer was refused for good: nothing more is asked of them."""
-    indices = (data.get("trial_index") for data in repository.refused_records(connection, run))
-    return {index for index in indices if isinstance(index, int)}
 
 
 def _evidence(body: dict[str, Any]) -> RatingEvidence | None:

@@ -213,9 +213,15 @@ def refused_records(connection: Connection, run: int) -> list[dict[str, Any]]:
     return list(connection.scalars(_REFUSED, {"run": run}))
 
 
+def refused_trials(connection: Connection, run: int) -> set[int]:
+    """Trials of a run whose answer was refused for good: nothing more is asked of them."""
+    indices = (data.get("trial_index") for data in refused_records(connection, run))
+    return {index for index in indices if isinstance(index, int)}
+
+
 def refused_checks(connection: Connection, run: int) -> int:
     """How many attention checks of a run have an answer that was refused for good."""
-    refused = {data.get("trial_index") for data in refused_records(connection, run)}
+    refused = refused_trials(connection, run)
     return len(refused & set(connection.scalars(_CHECK_INDICES, {"run": run}))) if refused else 0
 
 

@@ -23,7 +23,7 @@ from experiments.trials.threshold.grid import (
 from server.db import Database
 from server.models import StudyRun
 from server.trials.kinds import answer_of
-from server.trials.repository import StoredTrial
+from server.trials.repository import StoredTrial, refused_trials
 from server.trials.schemas import RatingIn
 from server.trials.series import quest, repository
 from server.trials.series.quest import Answers, Estimate
@@ -87,7 +87,9 @@ def follow(database: Database, versions: Versions, token: str) -> Outlook | None
         if run is None or run.status != "active":
             return None
         loaded = versions.get(connection, run.version_id)
-        trials, answers = repository.trials(connection, run.id), repository.answers(connection, run.id)
+        refused = refused_trials(connection, run.id)  # settled: nothing is chosen for them
+        trials = [row for row in repository.trials(connection, run.id) if row.trial_index not in refused]
+        answers = repository.answers(connection, run.id)
     outlook = reckoned(loaded, trials, answers)
     with database.write_connection() as connection:
         return _keep(connection, token, outlook)

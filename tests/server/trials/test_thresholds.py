@@ -131,6 +131,18 @@ def test_the_same_answers_give_the_same_stimuli_to_everybody_and_in_another_work
     assert shown[0] == shown[1]
 
 
+def test_trials_whose_answer_is_refused_do_not_hold_up_their_series(observer: Participant) -> None:
+    """Else stimuli would be chosen for them, and the trials after them would not adapt."""
+    first, second, third = of_series(observer.state(), 0)[:3]
+    for trial in (first, second):
+        body = {"trial_index": trial["trial_index"], "play": 1, "playback": "lost"}
+        ident = str(uuid.uuid4())
+        told = {"id": ident, "path": f"/api/run/ratings/{ident}", "status": 422, "code": "invalid"}
+        assert observer.request("POST", "/refused", told | {"body": body}).status_code == 202
+    following = answer(observer, third, "yes").json()["next"]["trials"]
+    assert [one["series"]["position"] for one in following if one["series"]["number"] == 0] == [4, 5, 6]
+
+
 def test_an_answer_sent_twice_moves_the_series_once(observer: Participant, services: Services) -> None:
     first, name = of_series(observer.state(), 0)[0], str(uuid.uuid4())
     one = answer(observer, first, "yes", name)
