@@ -254,9 +254,10 @@ def _prepare_one(folder: Path, path: Path) -> None:
 
 def _remove_half_made(clips: Path) -> None:
     """Remove what an ended process was writing; whole clips are named by their hash."""
-    for path in clips.iterdir() if clips.is_dir() else ():
-        if path.name.startswith("."):
-            path.unlink(missing_ok=True)
+    with suppress(FileNotFoundError, NotADirectoryError):  # none yet, or the upload was discarded
+        for path in clips.iterdir():
+            if path.name.startswith("."):
+                path.unlink(missing_ok=True)
 
 
 def _record_of(folder: Path, path: Path, asked_fps: float | None) -> Prepared:
