@@ -54,8 +54,8 @@ lengthens and varies the presses that a script makes, so that usual lengths are 
 ENOUGH_BY_CHANCE = 0.05
 """A run can be `likely` where guesses do as well in all its checks together with less than this probability.
 
-With one attention question of seven answers and two motion checks of nine choices, the question and one of
-the checks must be right: 99.7 % of those who read the question and see 95 % of such clips (`SEEN`).
+With one attention question of seven answers and two motion checks of nine choices, two of the three must be
+right: so they are for 99.7 % of those who read the question and see 95 % of such clips (`SEEN`).
 """
 VOID_SHARE = 0.2
 """Share of motion checks that may tell nothing, as plays fail on honest people's machines; one may always."""
