@@ -52,7 +52,7 @@ def read_table(path: Path, *, alone: str = "", as_written: bool = False) -> pd.D
     InputError
         A folder, no UTF-8 text, or no table with rows.
     """
-    skipped, header = _header(path)
+    skipped, header = _header(path, named_by_comment=not alone)
     header = header.strip()
     headless = bool(alone and _POINT_OR_WHOLE.fullmatch(header))
     one_column = headless or header.strip('"') == (alone or None)
@@ -62,6 +62,8 @@ def read_table(path: Path, *, alone: str = "", as_written: bool = False) -> pd.D
     if as_written:
         options |= {"dtype": str, "keep_default_na": False, "na_values": [""], "skip_blank_lines": False}
     table = _cells(path, sep=separator, **options)
+    if header.startswith(COMMENTS):
+        table.columns = table.columns.str.lstrip("".join(COMMENTS) + " ")
     said = [f"{counted(skipped, 'line')} of comment above the header skipped"] if skipped else []
     if separator in _SEPARATORS and not one_column:
         said.append(f"columns parted by {_SEPARATORS[separator]}")
@@ -144,8 +146,12 @@ def _why_not_parsed(message: str) -> str:
     )
 
 
-def _header(path: Path) -> tuple[int, str]:
-    """How many lines of comment come first, and the first other line that is not blank."""
+def _header(path: Path, *, named_by_comment: bool = True) -> tuple[int, str]:
+    """How many lines of comment come first, and the line after them, blank ones left out.
+
+    Where that line holds numbers alone, the comment right above it names the columns (`named_by_comment`), as
+    NumPy writes tables.
+    """
     if path.is_dir():
         raise InputError(f"{path}: expected a CSV file, this is a folder; name a file in it")
     try:
@@ -163,8 +169,21 @@ def _header(path: Path) -> tuple[int, str]:
         if line.startswith(COMMENTS):
             comments = number + 1
         elif line.strip():
+            if named_by_comment and 0 < comments == number and _names_columns(lines[number - 1], line):
+                return comments - 1, lines[number - 1]
             return comments, line
     raise InputError(f"{path} is empty; expected a CSV table with a header line")
+
+
+def _names_columns(comment: str, line: str) -> bool:
+    """Whether a comment has a name for each number of the line below it."""
+    separator = separator_of(line)
+    fields = [field.strip().strip('"') for field in line.split(separator)]
+    forms = (_POINT_OR_WHOLE, _COMMA_OR_WHOLE)
+    numbers = (
+        field.lower() in ("", "nan") or any(form.fullmatch(field) for form in forms) for field in fields
+    )
+    return all(numbers) and len(comment.split(separator)) == len(fields)
 
 
 def _refuse_other_formats(lines: Sequence[str], path: Path) -> None:

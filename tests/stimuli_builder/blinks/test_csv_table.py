@@ -207,6 +207,17 @@ def test_comments_above_the_header_are_skipped_and_lines_counted_with_them(tmp_p
     assert "2 lines of comment" in table.attrs["note"]
 
 
+@pytest.mark.parametrize("names", ["time,left_ear", "left_ear"])
+def test_a_comment_right_above_numbers_names_the_columns(tmp_path: Path, names: str) -> None:
+    """As NumPy writes tables: the first row of numbers is not the header."""
+    columns = names.split(",")
+    values = np.tile(np.arange(5) / 10, (len(columns), 1)).T
+    np.savetxt(tmp_path / "t.csv", values, delimiter=",", header=f"a recording\n{names}")
+    table = read_table(tmp_path / "t.csv")
+    assert (list(table.columns), len(table)) == (columns, 5)
+    assert line_of(tmp_path / "t.csv", 0) == 3
+
+
 @pytest.mark.parametrize("length", [3, 40, 200])
 def test_minus_one_is_a_frame_that_was_not_measured(tmp_path, length):
     values = np.linspace(20.0, 21.0, 1200)
