@@ -24,8 +24,13 @@ _STARTS = (b",", b"\n", b'"', b";", b"\t")
 """What stands before a cell of a line of CSV, or before a part of one."""
 _SUSPICIOUS = (b"=", b"@", b"\t", b"\r", b"\xef\xbc", b"\xef\xb9")
 """Signs that are rare in tables; the last two are the first bytes of the full-width and the small forms."""
-_SIGNED = re.compile(rb'[+-](?<=[,\n;\t"][+-])(?!(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?[,\n";])')
-"""A plus or minus there that does not begin a plain number."""
+_PLAIN = rb"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_SIGNED = re.compile(
+    rb'[+-](?<=[,\n;\t"][+-])(?:(?<=[,\n][+-])(?!' + _PLAIN + rb'[,\n])|(?<="[+-])(?!' + _PLAIN + rb'"(?!"))'
+    rb"|(?<=[;\t][+-])(?!" + _PLAIN + rb'(?:[;\n]|"(?!"))))'
+)
+"""A plus or minus there that does not begin a plain number. In quotes a comma does not end a number: German
+spreadsheets read -1,1+A1 as a formula."""
 
 
 def guarded_cell(cell: str) -> str:

@@ -4,7 +4,7 @@ import csv
 import io
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from experiments.spreadsheet import csv_text, guarded_cell, guarded_csv, guarded_table, unguarded_cell
@@ -36,6 +36,8 @@ def test_no_part_of_a_cell_runs_where_a_spreadsheet_splits_cells_at_semicolons(s
 cells = st.text(alphabet="=+-@＝＠'\";,\t\r\n 1a.e)(", max_size=8)
 
 
+@example([["a", "x;-1,1+A1"]])  # a formula where the comma is the decimal sign
+@example([["a", "-1,1+A1"], ["-1;", "+1"]])
 @given(st.lists(st.lists(cells, min_size=2, max_size=4), min_size=1, max_size=4))
 def test_the_search_of_a_piece_misses_no_cell(rows: list[list[str]]) -> None:
     [guarded] = guarded_csv([csv_text(rows).encode()])
