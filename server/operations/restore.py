@@ -76,8 +76,9 @@ def restore(
             key = _content(tar, KEY)
             _check_key(services.settings, key)
             apart = _key_file(described, key, keys or beside(path), named=keys is not None, stale=stale_keys)
-            if not despite_erasures:
-                _check_ledger(services.settings, copied_ledger, described)
+            covered = _is_covered(services.settings, copied_ledger, described)
+            if not covered and not despite_erasures:
+                raise _not_covered(services.settings, copied_ledger, described)
             _restore_rows(services, tar, described, _Keys(key, apart), told)
             for sha256 in described.clips:
                 _restore_clip(services, tar, sha256)
@@ -90,7 +91,7 @@ def restore(
     _keep_key(services.settings, key)
     _take_over_ledger(services.settings, copied_ledger)
     told(f"{len(described.clips)} clips, secret key")
-    _erase_again(services, told)  # last: what it says of erased people must not be lost among tables
+    _erase_again(services, told, covered=covered)  # last: it must not be lost among tables
     return described
 
 
@@ -100,13 +101,15 @@ def _reason(error: Exception) -> str:
     return "; name a file that it wrote" if reason.endswith(":") else f": {reason}"
 
 
-def _check_ledger(settings: Settings, copy: Path, described: Description) -> None:
-    """Where no ledger is newer than the backup, people who were erased since would come back unnoticed."""
+def _is_covered(settings: Settings, copy: Path, described: Description) -> bool:
+    """Whether a ledger is newer than the backup: else people erased since would come back unnoticed."""
     if ledger(settings).is_file():
-        return
-    if copy.is_file() and erasures.known_until(copy.read_bytes()) > described.created_at:
-        return
-    raise InputError(
+        return True
+    return copy.is_file() and erasures.known_until(copy.read_bytes()) > described.created_at
+
+
+def _not_covered(settings: Settings, copy: Path, described: Description) -> InputError:
+    return InputError(
         f"expected a ledger of erasures that is newer than the backup of {described.created_at}, in the data "
         f"folder ({ledger(settings)}) or next to the backup ({copy}), got none: people erased since would "
         f"come back. Put the newest {erasures.NAME} there; if nobody was erased since, restore with "
@@ -120,17 +123,17 @@ def _take_over_ledger(settings: Settings, path: Path) -> None:
         erasures.take_over(settings, path.read_bytes())
 
 
-def _erase_again(services: Services, told: Callable[[str], None]) -> None:
+def _erase_again(services: Services, told: Callable[[str], None], *, covered: bool) -> None:
     path = ledger(services.settings)
-    if not path.is_file():
+    if path.is_file():
+        with services.database.write() as session:
+            erased = replay(session, services.settings)
+        told(f"{counted(erased, 'run')} erased again, by {path}")
+    if not covered:
         told(
-            f"WARNING: no ledger of erasures at {path}. People who were erased since this backup are back. "
-            "If you find the ledger, put it there and run: server database erase-again"
+            f"WARNING: no ledger of erasures at {path} is newer than this backup. People who were erased "
+            "since are back. If you find the ledger, put it there and run: server database erase-again"
         )
-        return
-    with services.database.write() as session:
-        erased = replay(session, services.settings)
-    told(f"{counted(erased, 'run')} erased again, by {path}")
 
 
 def _description(tar: tarfile.TarFile, path: Path) -> Description:

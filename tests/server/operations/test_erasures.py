@@ -103,3 +103,19 @@ def test_a_restore_replays_the_ledger_that_is_there(
     assert erased_runs(restored) == {participant.run_id}
     assert erasures.ledger(settings).stat().st_mode & 0o077 == 0
     restored.database.close()
+
+
+@pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
+def test_a_ledger_as_old_as_the_backup_is_named_after_a_restore_despite_it(
+    services: Services, participant: Participant, tmp_path: Path
+) -> None:
+    participant.agree()
+    erasures.note(services.settings, ["somebody erased long before"])
+    backup = tmp_path / "before.tar"
+    back_up(services, backup, with_clips=False)
+    folder = tmp_path / "new"
+    settings = Settings(database_url=f"sqlite:///{tmp_path / 'x.sqlite'}", data_folder=folder)
+    restored, lines = open_services(settings), list[str]()
+    restore(restored, backup, lines.append, despite_erasures=True)
+    assert lines[-1].startswith(f"WARNING: no ledger of erasures at {folder}")
+    restored.database.close()
