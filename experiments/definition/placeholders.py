@@ -27,6 +27,16 @@ _KEYS = re.compile(
     re.IGNORECASE,
 )
 """What stands in brackets without being a placeholder: a key to press, one character, a number, `[sic]`."""
+_ASIDES = re.compile(
+    r"optional|required|mandatory|(?:please )?(?:specify|explain|describe)|freiwillig|"
+    r"pflicht(?:feld|angabe)?|"
+    r"erforderlich|bitte (?:angeben|nennen|erläutern)|facultati[fv]e?|obligatoire|(?:veuillez )?préciser|"
+    r"opcional|obligatorio|obrigatório|especifi(?:car|que)|facoltativo|obbligatorio|specificare|optioneel|"
+    r"verplicht|opcjonalne|wymagane|任意|必須|可选|选填|必填|e\.g\..*|i\.e\..*|z\. ?B\..*|"
+    r"[^\W\d_].*\b(?:19|20)\d\d[a-z]?",
+    re.IGNORECASE,
+)
+"""What people are told in brackets: that an answer is optional, to specify it, examples, sources by year."""
 MAX_MARKS_NAMED = 5
 
 
@@ -80,7 +90,7 @@ def unfilled(declared: Experiment) -> list[Unfilled]:
 def _certain(text: str) -> Iterator[str]:
     for match in _BRACKETS.finditer(text):
         inside = match[1].strip()
-        if any(map(str.isalpha, inside)) and not _KEYS.fullmatch(inside):
+        if any(map(str.isalpha, inside)) and not (_KEYS.fullmatch(inside) or _ASIDES.fullmatch(inside)):
             yield match[0]
     for pattern in (_BRACES, _WORDS):
         yield from pattern.findall(text)

@@ -49,6 +49,8 @@ def test_marks_that_nobody_filled_in_are_found_in_every_language(mark: str, lang
         "- [ ] open\n- [x] done",
         "About 20 minutes, sampled at [0, 1].",
         "Above\n\n___\n\nbelow",
+        "Comments [optional], other [please specify], ［任意］, Sonstiges [bitte angeben]",
+        "As in [Smith et al., 2020], a device [e.g. a phone].",
     ],
 )
 def test_links_keys_and_quoted_marks_are_no_placeholders(text: str) -> None:
