@@ -29,6 +29,8 @@ from server.versions import Versions
 
 REFUSED = repository.REFUSED
 KEPT_BYTES = 32 * 1024
+MAX_DEPTH = 16
+"""Levels of nesting that are kept, more than a page's record has."""
 MAX_REFUSED = 2_000
 """More than a run has trials and views."""
 MAX_WHOLE = 100
@@ -135,12 +137,14 @@ def _kept(record: RefusedRecord, which: tuple[int, int] | None, *, whole: bool) 
     return {**_storable(told), **where, "record": body}
 
 
-def _storable(value: Any) -> Any:
-    """The same without what a database cannot hold: numbers beyond all bounds, NUL and half characters."""
+def _storable(value: Any, levels: int = MAX_DEPTH) -> Any:
+    """The same without what no database holds: numbers beyond all bounds, NUL, half characters, depth."""
+    if isinstance(value, dict | list) and not levels:
+        return None
     if isinstance(value, dict):
-        return {_storable(str(key)): _storable(one) for key, one in value.items()}
+        return {_storable(str(key)): _storable(one, levels - 1) for key, one in value.items()}
     if isinstance(value, list):
-        return [_storable(one) for one in value]
+        return [_storable(one, levels - 1) for one in value]
     if isinstance(value, str):
         return value.replace("\0", "").encode("utf-8", "replace").decode("utf-8")
     return None if isinstance(value, float) and not isfinite(value) else value

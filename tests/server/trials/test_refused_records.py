@@ -241,6 +241,15 @@ def test_a_refused_record_is_kept_once_whatever_it_holds(
         assert "drawn" not in event.data["record"]["playback"]
 
 
+@pytest.mark.parametrize("depth", [30, 900])
+def test_a_record_of_any_depth_is_kept_as_far_as_it_can_be(participant: Participant, depth: int) -> None:
+    participant.agree()
+    deep: Any = None
+    for _ in range(depth):
+        deep = [deep]
+    assert participant.request("POST", "/refused", refused("/api/run/views", {"x": deep})).status_code == 202
+
+
 def test_a_refused_view_holds_nothing_up(participant: Participant, viewer: Admin) -> None:
     participant.agree()
     told = refused("/api/run/views", {"views": [{"id": "x"}]})
