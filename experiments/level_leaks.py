@@ -196,7 +196,8 @@ def _judged(
     if not statistics:
         return None
     p_value = chi_square_tail(sum(x for x, _ in statistics), sum(df for _, df in statistics))
-    if all(map(_separates, tables)):
+    apart = _gives_a_level_away if feature in (RATE, SIZE) else _separates
+    if all(map(apart, tables)):
         p_value = 0.0
     shares = {level: _guessed(tables, level) for level in sorted({one for table in tables for one in table})}
     level = max(shares, key=lambda one: sum(shares[one]))
@@ -253,6 +254,18 @@ def _separates(table: Table) -> bool:
     groups = [set(row) for row in table.values()]
     alone = all(len(group) == 1 for group in groups) and len(set().union(*groups)) == len(groups)
     return len(table) > 1 and alone and min(row.total() for row in table.values()) > 1
+
+
+def _gives_a_level_away(table: Table) -> bool:
+    """Whether one level's clips, two or more, all have one value that no other level has.
+
+    For features that do not vary by themselves: rates and sizes are the same unless they were made to differ.
+    """
+    for level, row in table.items():
+        others = set().union(*(set(other) for name, other in table.items() if name != level))
+        if len(row) == 1 and row.total() > 1 and not set(row) & others and others:
+            return True
+    return False
 
 
 def _guessed(tables: Sequence[Table], level: str) -> tuple[float, float]:

@@ -2,9 +2,10 @@
 
 A spreadsheet runs a cell that begins with = + - @ (or a full-width or small form of one, or a tab or line
 end before one) unless the cell is a number. Where its list separator is a semicolon, it also splits a cell at
-each semicolon and runs the parts. `guarded_cell` puts an apostrophe before each such part, which spreadsheets
-read as "this is text" (https://owasp.org/www-community/attacks/CSV_Injection). Our own readers take the
-apostrophe away again (`unguarded_cell`), so that a table keeps its texts on the way out and back.
+each semicolon, tab and line end and runs the parts. `guarded_cell` puts an apostrophe before each such part,
+which spreadsheets read as "this is text" (https://owasp.org/www-community/attacks/CSV_Injection). Our own
+readers take the apostrophe away again (`unguarded_cell`), so that a table keeps its texts on the way out and
+back.
 """
 
 import csv
@@ -16,18 +17,19 @@ from typing import Any
 _SIGNS = "=+\\-@＝＋－＠﹦﹢﹣﹫"
 """The signs that begin a formula, with their full-width and small forms, for a regular expression."""
 _LEADING = re.compile(rf"[{_SIGNS}\t\r\n]")
-# Inside a cell a sign counts where an operand follows it: the ";-)" of a comment is not a formula.
-_INNER = re.compile(rf"(?<=[;\t])(?=[{_SIGNS}][\s\w.(\"'$@+\-={{])")
-_GUARDED = re.compile(rf"(^|[;\t])'(?=[{_SIGNS}\t\r\n])")
+# Inside a cell plus and minus count where an operand may follow: the ";-)" of a comment is not a formula.
+_INNER = re.compile(r"(?<=[;\t\r\n])(?=[=@＝＠﹦﹫]|[+\-＋－﹢﹣][^)\]/|;\t\r\n])")
+_GUARDED = re.compile(rf"(^|[;\t\r\n])'(?=[{_SIGNS}\t\r\n])")
+_PARTED = re.compile(r"[;\t\r\n]")
 _NUMBER = re.compile(r"\s*[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?\s*")
-_STARTS = (b",", b"\n", b'"', b";", b"\t")
+_STARTS = (b",", b"\n", b"\r", b'"', b";", b"\t")
 """What stands before a cell of a line of CSV, or before a part of one."""
 _SUSPICIOUS = (b"=", b"@", b"\t", b"\r", b"\xef\xbc", b"\xef\xb9")
 """Signs that are rare in tables; the last two are the first bytes of the full-width and the small forms."""
 _PLAIN = rb"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _SIGNED = re.compile(
-    rb'[+-](?<=[,\n;\t"][+-])(?:(?<=[,\n][+-])(?!' + _PLAIN + rb'[,\n])|(?<="[+-])(?!' + _PLAIN + rb'"(?!"))'
-    rb"|(?<=[;\t][+-])(?!" + _PLAIN + rb'(?:[;\n]|"(?!"))))'
+    rb'[+-](?<=[,\n\r;\t"][+-])(?:(?<=,[+-])(?!' + _PLAIN + rb'[,\n])|(?<="[+-])(?!' + _PLAIN + rb'"(?!"))'
+    rb"|(?<=[;\t\n\r][+-])(?!" + _PLAIN + rb'(?:[;\n]|"(?!"))))'
 )
 """A plus or minus there that does not begin a plain number. In quotes a comma does not end a number: German
 spreadsheets read -1,1+A1 as a formula."""
@@ -43,11 +45,11 @@ def guarded_cell(cell: str) -> str:
     """
     if _LEADING.match(cell) and not _NUMBER.fullmatch(cell):
         cell = f"'{cell}"
-    return _INNER.sub(_apostrophe, cell) if ";" in cell or "\t" in cell else cell
+    return _INNER.sub(_apostrophe, cell) if _PARTED.search(cell) else cell
 
 
 def _apostrophe(match: re.Match[str]) -> str:
-    part = re.split(r"[;\t]", match.string[match.start() :], maxsplit=1)[0]
+    part = _PARTED.split(match.string[match.start() :], maxsplit=1)[0]
     return "" if _NUMBER.fullmatch(part) else "'"
 
 

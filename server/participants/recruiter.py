@@ -41,8 +41,8 @@ ID_FORMS = {
     "sona": (r"[0-9a-z_-]{1,64}", "letters and digits"),
     "mturk": (r"a[0-9a-z]{7,30}", "the letter A and 8 to 31 letters and digits in all"),
     "generic": (
-        r"[^\W_][^\x00-\x1f\x7f;]{0,199}",
-        "at most 200 characters without a semicolon, the first a letter or digit",
+        r"[\w-][^\x00-\x1f\x7f;]{0,199}",
+        "at most 200 characters without a semicolon, the first a letter, a digit, _ or -",
     ),
 }
 """How each recruiter writes its ids, as a pattern of the canonical id and in words."""

@@ -20,7 +20,7 @@ from server.evidence.verdict import ENOUGH_BY_CHANCE
 from server.models import Study, StudyVersion
 from server.participants.recruiter import Recruiter, stored_recruiter
 from server.studies import links_repository
-from server.studies.lookup import active_version, definition_of, find_study
+from server.studies.lookup import active_version, definition_of, find_study, version_numbered
 from server.studies.schemas import LaunchCheck
 
 MAX_TEXTS_NAMED = 3
@@ -47,23 +47,34 @@ Check = Callable[[ToLaunch], Iterator[LaunchCheck]]
 
 def launch_checks(session: Session, name: str, identity: Identity) -> list[LaunchCheck]:
     """What speaks against opening the active version of a study, blocking findings first."""
-    launch = _to_launch(session, find_study(session, name, identity, "view"))
+    study = find_study(session, name, identity, "view")
+    launch = _to_launch(session, study, active_version(session, study))
     findings = [finding for check in (*_BLOCKING, *_ADVISING) for finding in check(launch)]
     return sorted(findings, key=lambda finding: not finding.blocks)
 
 
 def refuse_unready(session: Session, study: Study) -> None:
     """NotReady, with the sentences of every blocking check, where the study must not be live as it is."""
-    launch = _to_launch(session, study)
-    sentences = [finding.text for check in _BLOCKING for finding in check(launch) if finding.blocks]
-    if sentences:
+    if sentences := _blocking_sentences(_to_launch(session, study, active_version(session, study))):
         raise NotReady(" ".join(sentences))
 
 
 def refuse_if_live(session: Session, study: Study) -> None:
-    """As `refuse_unready`, of a new version of a study that is live."""
-    if study.status == "live":
-        refuse_unready(session, study)
+    """As `refuse_unready`, of a new version of a study that is live; what was live before stays possible."""
+    if study.status != "live":
+        return
+    version = active_version(session, study)
+    found_before: list[str] = []
+    if version.number > 1:
+        before = version_numbered(session, study, version.number - 1)
+        found_before = _blocking_sentences(_to_launch(session, study, before))
+    sentences = _blocking_sentences(_to_launch(session, study, version))
+    if new := [sentence for sentence in sentences if sentence not in found_before]:
+        raise NotReady(" ".join(new))
+
+
+def _blocking_sentences(launch: ToLaunch) -> list[str]:
+    return [finding.text for check in _BLOCKING for finding in check(launch) if finding.blocks]
 
 
 def refuse_recruiter(study: Study, recruiter: Recruiter | None, page: str) -> None:
@@ -72,8 +83,7 @@ def refuse_recruiter(study: Study, recruiter: Recruiter | None, page: str) -> No
         raise NotReady(_CODE_NEEDED.format(page=page))
 
 
-def _to_launch(session: Session, study: Study) -> ToLaunch:
-    version = active_version(session, study)
+def _to_launch(session: Session, study: Study, version: StudyVersion) -> ToLaunch:
     return ToLaunch(
         version,
         definition_of(version),

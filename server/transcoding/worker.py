@@ -32,6 +32,8 @@ MAX_S_A_FILE = 900
 MAX_TRIES = 2
 TURN_S = 2.0
 FIRST_BUDGET_S = 10.0
+LONGEST_BUDGET_S = 30.0
+"""No file keeps other accounts waiting for longer; one that needs more ends once nobody else waits."""
 """Where memory allows no further file, a file that took longer begins again later, with twice the budget."""
 LOOK_S = 0.25
 FORKS = hasattr(os, "fork") and hasattr(signal, "SIGSTOP")
@@ -113,7 +115,7 @@ class Worker:
         budget = self._budget_s.get(longest.video, FIRST_BUDGET_S)
         if longest.used_s < budget:
             return False
-        self._budget_s[longest.video] = 2 * budget
+        self._budget_s[longest.video] = min(2 * budget, LONGEST_BUDGET_S)
         self._end(longest)
         self._turns.put_last(longest.account, longest.video)
         return True

@@ -97,15 +97,14 @@ def _check_answer(
     if run.evidence != "asked" or known:
         return trial.kind
     tally = trial.tally or Tally()
-    playback = record.body.get("playback")
-    was_shown = not isinstance(playback, dict) or playback.get("method") != "none"
     answer = answer_to(
         run,
         trial,
         versions.get(connection, run.version_id),
         which,
         received_at,
-        rated=bool(trial.clips) and was_shown,
+        # What the refused record says of its play counts for nothing: its clips must have been there in time.
+        rated=bool(trial.clips),
         is_check=trial.kind == "check",
         answered_at=None,
         evidence=_evidence(record.body),

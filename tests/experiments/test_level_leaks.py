@@ -56,6 +56,13 @@ LEAKS: dict[str, tuple[str, list[dict[str, object]], list[dict[str, object]]]] =
 }
 
 
+def test_one_level_of_a_small_set_at_another_rate_is_named() -> None:
+    usual = {level: [{}] * 2 for level in "abc"}
+    (found,) = reported_leaks(clips_with(**usual, smooth=[{"fps": 60.0}] * 2))
+    assert "'smooth'" in found
+    assert "frame rate" in found
+
+
 @pytest.mark.parametrize("name", LEAKS)
 def test_a_level_that_something_else_gives_away_is_named(name: str) -> None:
     feature, first, second = LEAKS[name]

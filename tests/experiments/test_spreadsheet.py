@@ -27,7 +27,7 @@ def test_numbers_and_texts_stay(cell: str) -> None:
     assert guarded_cell(cell) == cell
 
 
-@pytest.mark.parametrize("separator", [";", "\t"])
+@pytest.mark.parametrize("separator", [";", "\t", "\n", "\r", "\r\n"])
 def test_no_part_of_a_cell_runs_where_a_spreadsheet_splits_cells_at_semicolons(separator: str) -> None:
     guarded = guarded_cell(f"thanks{separator}=1+1{separator}+cmd{separator}-2")
     assert guarded.split(separator) == ["thanks", "'=1+1", "'+cmd", "-2"]

@@ -13,17 +13,22 @@ export interface Table {
 
 const NUMBER = /^\s*[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?\s*$/i;
 
+/** A plus or minus counts where an operand may follow: the ";-)" of a comment is not a formula. */
+const INNER = /^([=@＝＠﹦﹫]|[+\-＋－﹢﹣][^)\]/|])/;
+
 /** The text of a cell with an apostrophe where a spreadsheet would run it as a formula (experiments/spreadsheet.py). */
 export function guardedText(text: string): string {
   const whole = /^[=+\-@＝＋－＠﹦﹢﹣﹫\t\r\n]/.test(text) && !NUMBER.test(text) ? `'${text}` : text;
-  return whole.replaceAll(/(?<=[;\t])(?=[=+\-@＝＋－＠﹦﹢﹣﹫][\s\w.("'$@+\-={])/g, (_, at: number) =>
-    NUMBER.test(whole.slice(at).split(/[;\t]/)[0] ?? "") ? "" : "'",
-  );
+  // Without lookbehind, which Safari before 16.4 cannot read: the parts keep their separators.
+  return whole
+    .split(/([;\t\r\n])/)
+    .map((part, index) => (index > 0 && INNER.test(part) && !NUMBER.test(part) ? `'${part}` : part))
+    .join("");
 }
 
 /** The text that `guardedText` was given; any other text as it is. */
 function plainText(text: string): string {
-  const plain = text.replaceAll(/(^|[;\t])'(?=[=+\-@＝＋－＠﹦﹢﹣﹫\t\r\n])/g, "$1");
+  const plain = text.replaceAll(/(^|[;\t\r\n])'(?=[=+\-@＝＋－＠﹦﹢﹣﹫\t\r\n])/g, "$1");
   return plain !== text && guardedText(plain) === text ? plain : text;
 }
 

@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import re
 import zipfile
 from collections.abc import Iterator
 from typing import Any
@@ -16,15 +17,31 @@ from tests.helpers.admins import Admin
 from tests.helpers.studies import SHORT, Participant, add_study
 
 RUNS = ("=", "+", "-", "@", "＝", "＋", "－", "＠", "\t", "\r", "\n")
-EVIL = ["=1+1", "＝1+1", "@SUM(1)", "+1+1", "-1+cmd|' /C calc'!A0", "\t=1+1", "thanks;=1+1", "a\r=1+1"]
+EVIL = [
+    "fine\n=1+1;ok",
+    "a;=[book.xlsx]S!A1",
+    "a;=#REF!",
+    "a\n@SUM(1)",
+    "=1+1",
+    "＝1+1",
+    "@SUM(1)",
+    "+1+1",
+    "-1+cmd|' /C calc'!A0",
+    "\t=1+1",
+    "thanks;=1+1",
+    "a\r=1+1",
+]
 
 
 def texts_of(table: bytes) -> Iterator[str]:
     """Every cell as a spreadsheet splits it, whether its separator is a comma, a semicolon or a tab."""
     text = table.decode("utf-8-sig")
+    for separator in (",", ";", "\t"):
+        for row in csv.reader(io.StringIO(text, newline=""), delimiter=separator):
+            yield from row
     for row in csv.reader(io.StringIO(text, newline="")):
         for cell in row:
-            yield from cell.replace("\t", ";").split(";") if cell.strip() else ()
+            yield from re.split(r"[;\t\r\n]", cell) if cell.strip() else ()
 
 
 def runnable(table: bytes) -> list[str]:

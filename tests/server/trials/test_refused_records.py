@@ -317,6 +317,10 @@ class TestEvidence:
         trial = main_trials(watcher)[0]
         bare = unstorable(trial)
         assert report(watcher, bare).json()["error"]["code"] == "ticket_missing"
+        # That no clip was played excuses nobody from having it: a ticket alone would finish a study at once.
+        ticket_alone = {name: watcher.evidence(trial)[name] for name in ("batch", "ticket")}
+        unseen = bare | {"playback": {"method": "none"}, "evidence": ticket_alone}
+        assert report(watcher, unseen).status_code >= 400
         for other in main_trials(watcher)[1:]:
             watcher.answer(other)
         watcher.wait(60)

@@ -84,7 +84,7 @@ const IRREGULAR: Record<string, string> = { series: "series", stimuli: "stimulus
 export function singularOf(plural: string): string {
   const words = plural.split(" ");
   const last = words.pop() ?? "";
-  const one = IRREGULAR[last] ?? (last.endsWith("ies") ? `${last.slice(0, -3)}y` : last.replace(/(?<!s)s$/, ""));
+  const one = IRREGULAR[last] ?? (last.endsWith("ies") ? `${last.slice(0, -3)}y` : last.endsWith("ss") ? last : last.replace(/s$/, ""));
   return [...words, one].join(" ");
 }
 

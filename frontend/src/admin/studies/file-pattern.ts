@@ -35,7 +35,7 @@ const RESERVED: ReadonlySet<string> = new Set(reservedNames.filter((name) => nam
 /** What to do about a factor that has the name of another column of the answers; false where none has. */
 export function reservedProblem(factors: readonly string[]): string | false {
   const name = factors.find((one) => RESERVED.has(one));
-  return name !== undefined && `another name for the factor ‘${name}’, which is a column of the answers: say, ${name}_shown`;
+  return name !== undefined && `a factor name other than ‘${name}’ (a column of the answers), such as ${name}_shown`;
 }
 
 /** The factors of a table of levels, as its header names them. */
