@@ -6,6 +6,7 @@ It names runs by their public ids, which say nothing of a person.
 import json
 import logging
 import os
+from contextlib import suppress
 from pathlib import Path
 from typing import IO
 
@@ -15,7 +16,7 @@ from server.settings import Settings
 
 LOG = logging.getLogger(__name__)
 NAME = "erasures.ndjson"
-KNOWN_UNTIL = "known_until"
+KNOWN_FROM, KNOWN_UNTIL = "known_from", "known_until"
 
 
 def ledger(settings: Settings) -> Path:
@@ -34,10 +35,24 @@ def note_identifiers(settings: Settings, runs: list[str]) -> None:
 
 
 def begin_ledger(settings: Settings) -> None:
-    """Make an empty ledger where there is none: a ledger that is there knows that nobody was erased."""
+    """Make a ledger where there is none, which knows of erasures from now on: an older one may be lost."""
     path = ledger(settings)
     path.parent.mkdir(parents=True, exist_ok=True)
-    os.close(os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600))
+    with suppress(FileExistsError):
+        handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(json.dumps({KNOWN_FROM: iso(now())}).encode() + b"\n")
+
+
+def known_from(content: bytes) -> str:
+    """The first moment from which a ledger knows who was erased; empty where it was never begun anew."""
+    moments = [""]
+    for line in content.splitlines():
+        try:
+            moments.append(str(json.loads(line).get(KNOWN_FROM) or ""))
+        except (ValueError, AttributeError):
+            continue
+    return max(moments)
 
 
 def _append(settings: Settings, key: str, runs: list[str]) -> None:

@@ -102,8 +102,8 @@ def _reason(error: Exception) -> str:
 
 
 def _is_covered(settings: Settings, copy: Path, described: Description) -> bool:
-    """Whether a ledger is newer than the backup: else people erased since would come back unnoticed."""
-    if ledger(settings).is_file():
+    """Whether a ledger knows who was erased since the backup: else they would come back unnoticed."""
+    if ledger(settings).is_file() and erasures.known_from(erasures.content(settings)) <= described.created_at:
         return True
     return copy.is_file() and erasures.known_until(copy.read_bytes()) > described.created_at
 

@@ -87,6 +87,21 @@ def test_a_restore_does_not_bring_an_erased_person_back(
 
 
 @pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
+def test_a_ledger_begun_after_the_backup_knows_of_no_erasure_before_it(
+    services: Services, participant: Participant, tmp_path: Path
+) -> None:
+    """As where the old ledger was lost with its disk, and a server has been started since."""
+    participant.agree()
+    back_up(services, tmp_path / "before.tar", with_clips=False)
+    settings = Settings(database_url=f"sqlite:///{tmp_path / 'x.sqlite'}", data_folder=tmp_path / "new")
+    erasures.begin_ledger(settings)
+    restored = open_services(settings)
+    with pytest.raises(InputError, match="newer than the backup"):
+        restore(restored, tmp_path / "before.tar")
+    restored.database.close()
+
+
+@pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
 def test_a_restore_replays_the_ledger_that_is_there(
     services: Services, participant: Participant, tmp_path: Path
 ) -> None:
