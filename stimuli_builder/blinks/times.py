@@ -77,8 +77,10 @@ def _times_s(column: pd.Series, path: Path) -> tuple[Array, str]:
     # Nanoseconds since 1970 have more digits than a float: the first is taken off before.
     times = (numbers - numbers.iloc[0] if numbers.dtype.kind in "iu" else numbers).to_numpy(dtype=np.float64)
     steps = np.diff(times)
-    if not steps.size or not np.isfinite(steps).all() or (steps == 1).all():
-        got = "counts frames" if steps.size and (steps == 1).all() else "is not a number in every row"
+    if not steps.size:
+        raise InputError(f"{path}: expected two frames or more, got a table of one row")
+    if not np.isfinite(steps).all() or (steps == 1).all():
+        got = "counts frames" if (steps == 1).all() else "is not a number in every row"
         raise InputError(
             f"{path.name}: '{column.name}' {got}; expected times: give the recording's rate with --fps"
         )

@@ -191,3 +191,10 @@ def test_time_codes_of_our_own_export_are_read(tmp_path: Path, fps: float) -> No
     (series,) = read_series(tmp_path / "s.csv", ["eyeBlinkLeft"])
     assert series.fps == pytest.approx(fps, rel=2e-3)
     assert series.distance.size == pytest.approx(len(stamps), abs=1)
+
+
+def test_a_table_of_one_row_is_refused_as_one(stimuli, tmp_path):
+    (tmp_path / "one.csv").write_text("time,left\n0,1\n")
+    ended = stimuli("blinks", tmp_path / "one.csv", "--out", tmp_path / "out.csv")
+    assert ended.code == 2
+    assert "expected two frames or more, got a table of one row" in " ".join(ended.err.split())
