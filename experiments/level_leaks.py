@@ -66,8 +66,8 @@ class LevelLeak:
     def __str__(self) -> str:
         return (
             f"the level '{self.level}' of '{self.factor}' can be recognized by the {self.feature} alone: "
-            f"{self.right:.0%} of its clips are told from the others, and {self.others:.0%} of the others "
-            f"from it ({self.clips} clips). An effect of '{self.factor}' may be due to this: make the clips "
+            f"a guess from it is right for {self.right:.0%} of the level's clips and for {self.others:.0%} of the "
+            f"others ({self.clips} clips). An effect of '{self.factor}' may be due to this: make the clips "
             f"alike in it, unless it is what '{self.factor}' varies"
         )
 

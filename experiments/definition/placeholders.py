@@ -36,7 +36,7 @@ _ASIDES = re.compile(
     r"[^\W\d_].*\b(?:19|20)\d\d[a-z]?",
     re.IGNORECASE,
 )
-"""What people are told in brackets: that an answer is optional, to specify it, examples, sources by year."""
+"""What brackets say to people: that an answer is optional, to specify it, examples, sources by year."""
 MAX_MARKS_NAMED = 5
 
 

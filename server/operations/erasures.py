@@ -45,7 +45,7 @@ def begin_ledger(settings: Settings) -> None:
 
 
 def known_from(content: bytes) -> str:
-    """The first moment from which a ledger knows who was erased; empty where it was never begun anew."""
+    """The first moment from which a ledger knows who was erased; empty where it was there from the start."""
     moments = [""]
     for line in content.splitlines():
         try:
