@@ -66,9 +66,9 @@ class LevelLeak:
     def __str__(self) -> str:
         return (
             f"the level '{self.level}' of '{self.factor}' can be recognized by the {self.feature} alone: "
-            f"a guess from it is right for {self.right:.0%} of the level's clips and for {self.others:.0%} of the "
-            f"others ({self.clips} clips). An effect of '{self.factor}' may be due to this: make the clips "
-            f"alike in it, unless it is what '{self.factor}' varies"
+            f"a guess from it is right for {self.right:.0%} of the level's clips and for "
+            f"{self.others:.0%} of the others ({self.clips} clips). An effect of '{self.factor}' may be due "
+            f"to this: make the clips alike in it, unless it is what '{self.factor}' varies"
         )
 
 
