@@ -1,8 +1,11 @@
 #!/bin/sh
 # Bring a backup back: deploy/restore.sh palpebra-2026-01-31T030000.tar (a name in the volume `backups`).
+# What follows the name is an option of `server restore`, such as --despite-erasures.
 # The database and the secret key there are get another name first; where the restore fails they get theirs back.
 set -eu
-[ $# -eq 1 ] || { echo "usage: deploy/restore.sh NAME.tar" >&2; exit 2; }
+[ $# -ge 1 ] || { echo "usage: deploy/restore.sh NAME.tar [OPTION...]" >&2; exit 2; }
+name=$1
+shift
 before=palpebra_before_$(date -u +%Y%m%dT%H%M%S | tr A-Z a-z)
 sql() { docker compose exec -T database psql -q -v ON_ERROR_STOP=1 -U palpebra -d postgres -c "$1"; }
 in_data() { docker compose run --rm --no-deps -T --entrypoint sh server -c "$1"; }
@@ -23,7 +26,7 @@ sql "ALTER DATABASE palpebra RENAME TO $before" || {
     exit 1
 }
 sql 'CREATE DATABASE palpebra' || put_back
-docker compose run --rm --no-deps -T -v palpebra_backups:/app/backups:ro server restore "backups/$1" || put_back
+docker compose run --rm --no-deps -T -v palpebra_backups:/app/backups:ro server restore "backups/$name" "$@" || put_back
 docker compose up -d
 echo "restored. What there was before is kept as the database $before; once all is well remove it:"
 echo "    docker compose exec database dropdb -U palpebra $before"

@@ -85,7 +85,7 @@ class Deployment:
     def databases(self) -> list[str]:
         return self.admin("SELECT datname FROM pg_database WHERE datname LIKE 'palpebra%' ORDER BY datname")
 
-    def restore(self, name: str) -> subprocess.CompletedProcess[str]:
+    def restore(self, name: str, *options: str) -> subprocess.CompletedProcess[str]:
         environment = {
             **os.environ,
             "PATH": f"{self.app / 'bin'}:{os.environ['PATH']}",
@@ -96,7 +96,7 @@ class Deployment:
             "PALPEBRA_DATA_FOLDER": str(self.app / "data"),
             "PALPEBRA_SECRET_KEY": "",
         }
-        command = ["sh", str(REPOSITORY / "deploy" / "restore.sh"), name]
+        command = ["sh", str(REPOSITORY / "deploy" / "restore.sh"), name, *options]
         return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
 
 
@@ -121,7 +121,10 @@ def test_a_backup_comes_back_onto_a_deployment_in_use(deployment: Deployment, tm
     services = open_services(elsewhere)
     back_up(services, deployment.app / "backups" / "palpebra-2026-01-31T030000.tar")
     services.database.close()
-    done = deployment.restore("palpebra-2026-01-31T030000.tar")
+    refused = deployment.restore("palpebra-2026-01-31T030000.tar")
+    assert (refused.returncode, deployment.who("palpebra")) == (1, "old")
+    assert "newer than the backup" in refused.stderr
+    done = deployment.restore("palpebra-2026-01-31T030000.tar", "--despite-erasures")
     assert done.returncode == 0, done.stderr
     assert deployment.who("palpebra") == "new"
     assert (deployment.app / "data" / "secret_key").read_bytes() == elsewhere.key
