@@ -76,14 +76,19 @@ def guarded_table(rows: Iterable[Iterable[Any]]) -> bytes:
 
 
 def csv_text(rows: Iterable[Iterable[Any]]) -> str:
-    r"""Rows as CSV whose lines end in a line feed, texts as they are.
+    """Rows as CSV whose lines end in a line feed, texts as they are."""
+    return "".join(f"{line}\n" for line in csv_lines(rows))
+
+
+def csv_lines(rows: Iterable[Iterable[Any]]) -> list[str]:
+    r"""Each row as a line of CSV without its end.
 
     The writer quotes what is in its line end alone: with "\n" it would leave a lone "\r" bare, which readers
-    take for the end of a row.
+    take for the end of a row. It calls `write` once per row.
     """
     lines = _Lines()
     csv.writer(lines, lineterminator="\r\n").writerows(rows)
-    return "".join(f"{line[:-2]}\n" for line in lines)
+    return [line[:-2] for line in lines]
 
 
 class _Lines(list[str]):

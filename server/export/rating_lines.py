@@ -3,7 +3,6 @@
 The text is that of `View.csv_row` of every row of the view in a CSV writer's hands.
 """
 
-import csv
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache
 from operator import itemgetter
@@ -15,13 +14,14 @@ from sqlalchemy.orm import Session
 from experiments.columns import View
 from experiments.columns.stretches import Stretch, Stretches
 from experiments.columns.view import Dialect, levels_at, with_levels
+from experiments.spreadsheet import csv_lines
 from server.export import repository
 from server.export.extract import Extract
 from server.export.repository import Rows, Runs
 from server.models import Study
 
 CLIPS_KEPT = 20_000
-_EMPTY = '""\r\n'
+_EMPTY = '""'
 Part = Callable[[Rows], Iterable[str]]
 """The text of one stretch for each of some rows."""
 
@@ -121,13 +121,6 @@ def _text(cells: Iterable[Any]) -> str:
 def csv_texts(rows: Iterable[Iterable[Any]]) -> list[str]:
     """Each row as CSV, to be put beside others, so without the line's end.
 
-    The writer calls `write` once per row. It quotes the characters of its line end alone, so both are in it.
     A line of one empty cell has quotes, which part of a line has not.
     """
-    lines = _Lines()
-    csv.writer(lines, lineterminator="\r\n").writerows(rows)
-    return ["" if line == _EMPTY else line[:-2] for line in lines]
-
-
-class _Lines(list[str]):
-    write = list.append
+    return ["" if line == _EMPTY else line for line in csv_lines(rows)]

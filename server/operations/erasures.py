@@ -44,12 +44,23 @@ def begin_ledger(settings: Settings) -> None:
             stream.write(json.dumps({KNOWN_FROM: iso(now())}).encode() + b"\n")
 
 
-def known_from(content: bytes) -> str:
+def known_from(ledger_lines: bytes) -> str:
     """The first moment from which a ledger knows who was erased; empty where it was there from the start."""
+    return _latest(ledger_lines, KNOWN_FROM)
+
+
+def known_until(ledger_lines: bytes) -> str:
+    """The last moment of which a copy knows who was erased; empty where it says none."""
+    return _latest(ledger_lines, KNOWN_UNTIL, "erased_at")
+
+
+def _latest(ledger_lines: bytes, *keys: str) -> str:
+    """The latest moment under these keys; a line that a crash cut off is passed over."""
     moments = [""]
-    for line in content.splitlines():
+    for line in ledger_lines.splitlines():
         try:
-            moments.append(str(json.loads(line).get(KNOWN_FROM) or ""))
+            entry = json.loads(line)
+            moments += [str(entry.get(key) or "") for key in keys]
         except (ValueError, AttributeError):
             continue
     return max(moments)
@@ -91,18 +102,6 @@ def merged(one: bytes, other: bytes) -> bytes:
 def copy_for_backup(settings: Settings, before: bytes, moment: str) -> bytes:
     """The ledger as it is kept next to backups: what an earlier copy names too, and until when it knows."""
     return merged(before, content(settings)) + json.dumps({KNOWN_UNTIL: moment}).encode() + b"\n"
-
-
-def known_until(copy: bytes) -> str:
-    """The last moment of which a copy knows who was erased; empty where it says none."""
-    moments = [""]
-    for line in copy.splitlines():
-        try:
-            entry = json.loads(line)
-            moments.append(str(entry.get(KNOWN_UNTIL) or entry.get("erased_at") or ""))
-        except (ValueError, AttributeError):
-            continue
-    return max(moments)
 
 
 def take_over(settings: Settings, further: bytes) -> None:
