@@ -7,7 +7,7 @@ export PATH := $(CURDIR)/$(BIN):$(PATH)
 # Where this is set, every start compiles every module anew: seconds for each process that a test starts.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: addon playground help run test check check-style check-types check-imports check-pages check-supply setup setup-test lock format types bench sbom scope load evidence audit screenshots docs api clean
+.PHONY: addon playground help run test check check-style check-types check-imports check-pages check-supply setup setup-test lock format types bench sbom scope load evidence audit house screenshots docs api clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-12s %s\n", $$1, $$2}' Makefile
@@ -84,6 +84,9 @@ load: setup-test ## real servers under load and kill -9, a table at the end (LOA
 
 evidence: setup-test ## people and programs of every manner take part: who is caught, who is warned (EVIDENCE="--runs 20 --honest 100")
 	@$(BIN)/python -m tools.evidence_table $(EVIDENCE)
+
+house: ## how far the tree is from the plan of its files: counts, cycles, chains, names (HOUSE="--files" lists them)
+	@$(PYTHON) -m tools.house $(HOUSE)
 
 sbom: setup-test ## bill of materials (CycloneDX) and licences of all that a server runs: dist/sbom.cdx.json
 	@$(BIN)/python tools/sbom.py
