@@ -7,7 +7,7 @@ export PATH := $(CURDIR)/$(BIN):$(PATH)
 # Where this is set, every start compiles every module anew: seconds for each process that a test starts.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: addon playground help run test check check-style check-types check-imports check-pages check-supply setup setup-test lock format types bench sbom scope load evidence audit house screenshots docs api clean
+.PHONY: addon playground help run test test-all check check-style check-types check-imports check-pages check-supply setup setup-test lock format types bench sbom scope load evidence audit house screenshots docs api clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-12s %s\n", $$1, $$2}' Makefile
@@ -15,9 +15,14 @@ help: ## list the targets
 run: setup ## set everything up and start Exp 1-3 in the browser (PORT=8000)
 	@$(BIN)/python tools/first_run.py
 
-test: setup-test ## set everything up and run all tests: Python, TypeScript, browser, PostgreSQL
+PYTEST = OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n logical --maxprocesses 4 --dist loadscope --no-loadscope-reorder --rerun-show-tracebacks
+test: setup-test ## set everything up and run the tests: Python, TypeScript, Chromium, a slice on PostgreSQL (tests/tiers.py)
 	@cd frontend && npm run --silent test
-	@OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n logical --maxprocesses 4 --dist loadscope --no-loadscope-reorder --rerun-show-tracebacks $(TESTS)
+	@$(PYTEST) -m "not long" $(TESTS)
+
+test-all: setup-test ## run every test, long ones too: Firefox, kill -9, attacks, R, both databases throughout
+	@cd frontend && npm run --silent test
+	@$(PYTEST) $(TESTS)
 
 check: setup-test ## lint and type-check everything, import rules, lock files, known weaknesses
 	@$(MAKE) --no-print-directory --jobs=5 --keep-going check-style check-types check-imports check-pages check-supply

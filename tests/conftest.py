@@ -1,6 +1,7 @@
 """What every test may use: the folder of real recordings, where it lies beside the checkout."""
 
 import os
+import tomllib
 from collections.abc import Generator
 from pathlib import Path
 
@@ -8,6 +9,8 @@ import pytest
 from hypothesis import HealthCheck, settings
 from xdist.remote import Producer
 from xdist.scheduler import LoadFileScheduling
+
+from tests.tiers import SHORT_RUN, entry_of, is_long
 
 # Most tests answer at once and without clips; those of evidence ask for refusals by their settings.
 os.environ.setdefault("PALPEBRA_EVIDENCE", "record")
@@ -50,9 +53,11 @@ LONGEST_FILES = tuple(
     )
 )
 
-# A server draws orders, seeds and tokens by chance, a browser shares its machine with strangers: a defect
-# fails each try.
-RERUNS, RERUNS_BROWSER, RERUNS_TIMED = 1, 2, 3
+# The only tests that are run again when they fail, each with its reason.
+RERUNS = {
+    test["name"]: test["reruns"]
+    for test in tomllib.loads((REPOSITORY / "tests" / "reruns.toml").read_text(encoding="utf-8"))["test"]
+}
 
 
 class FileScheduling(LoadFileScheduling):  # type: ignore[misc]
@@ -72,11 +77,23 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> FileSch
     return FileScheduling(config, log)
 
 
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """A file that is long as a whole is not even imported where long tests are left out."""
+    if config.option.markexpr != SHORT_RUN or collection_path.suffix != ".py":
+        return None
+    return entry_of(collection_path.relative_to(REPOSITORY).as_posix()) is not None or None
+
+
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Those of a screen run after the others, the timed ones last; a failed test is run again."""
+    """Those of a screen run after the others, the timed ones last; tiers and reruns are marked."""
     items.sort(key=lambda item: rank(source_file(item)))
     for item in items:
-        item.add_marker(pytest.mark.flaky(reruns=reruns_of(source_file(item))))
+        name = name_of_item(item)
+        if is_long(name, {marker.name for marker in item.iter_markers()}):
+            item.add_marker(pytest.mark.long)
+        if name in RERUNS:
+            item.add_marker(pytest.mark.flaky(reruns=RERUNS[name]))
 
 
 @pytest.hookimpl(wrapper=True)
@@ -99,13 +116,6 @@ def pytest_runtest_teardown(item: pytest.Item) -> None:
         item.session._setupstate.teardown_exact(None)
 
 
-def reruns_of(path: str) -> int:
-    """How often a failed test of a file is run again."""
-    if path in TIMED_FILES:
-        return RERUNS_TIMED
-    return RERUNS_BROWSER if path.startswith("tests/browser/") else RERUNS
-
-
 def rank(path: str) -> tuple[bool, bool, int]:
     """By what the files are sorted: files of the same rank stay as pytest has them."""
     length = LONGEST_FILES.index(path) if path in LONGEST_FILES else len(LONGEST_FILES)
@@ -115,6 +125,11 @@ def rank(path: str) -> tuple[bool, bool, int]:
 def source_file(item: pytest.Item) -> str:
     """The file of a test, from the repository's root, with forward slashes."""
     return item.location[0].replace(os.sep, "/")
+
+
+def name_of_item(item: pytest.Item) -> str:
+    """`file::test` from the repository's root, with forward slashes and without parameters."""
+    return f"{source_file(item)}::{item.location[2].split('[')[0].replace('.', '::')}"
 
 
 @pytest.fixture(scope="session")

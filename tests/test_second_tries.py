@@ -44,7 +44,18 @@ sys.stdin.read()
 
 def test_a_second_try_finds_nothing_of_the_first(tmp_path: Path) -> None:
     (tmp_path / "test_sharing.py").write_text(SHARING, encoding="utf-8")
-    options = ["-p", "tests.conftest", "-c", os.devnull, "--rootdir", ".", "-raR", "-p", "no:cacheprovider"]
+    options = [
+        "--reruns=1",
+        "-p",
+        "tests.conftest",
+        "-c",
+        os.devnull,
+        "--rootdir",
+        ".",
+        "-raR",
+        "-p",
+        "no:cacheprovider",
+    ]
     done = subprocess.run(
         [sys.executable, "-m", "pytest", *options, "test_sharing.py"],
         cwd=tmp_path,

@@ -15,7 +15,6 @@ PACKAGES = ("experiments", "server")
 OLD, NEW = "fixation_ms", "fixation_length_ms"
 
 pytestmark = [
-    pytest.mark.slow,
     pytest.mark.skipif(
         not (FRONTEND / "node_modules").is_dir(), reason="npm packages are not here: run `make test`"
     ),

@@ -31,7 +31,6 @@ COPIED = (
 NOT_COPIED = ("node_modules", "dist", "__pycache__", "backups", "databases", "browser", "decisions", "*.png")
 
 pytestmark = [
-    pytest.mark.slow,
     pytest.mark.skipif(
         not (FRONTEND / "node_modules").is_dir(), reason="npm packages are not here: run `make test`"
     ),

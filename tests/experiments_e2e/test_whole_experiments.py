@@ -34,7 +34,6 @@ def take_part(address: str, study: StudyInDatabase, link: str, number: int) -> i
     return person.ratings
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("name", "trials"), [("exp1", 320), ("exp2", 400), ("exp3", 160)])
 def test_three_participants_rate_every_trial(
     services: Services, settings: Settings, tmp_path: Path, name: str, trials: int

@@ -9,7 +9,6 @@ import sys
 import time
 import uuid
 
-import pytest
 from sqlalchemy import text
 
 from server.context import Services
@@ -41,7 +40,6 @@ def start(settings: Settings, port: int) -> subprocess.Popen[bytes]:
     raise TimeoutError("the server did not start")
 
 
-@pytest.mark.slow
 def test_no_acknowledged_rating_is_lost_or_doubled(
     services: Services, settings: Settings, study: StudyInDatabase
 ) -> None:

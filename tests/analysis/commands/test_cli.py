@@ -36,7 +36,6 @@ def test_run_prints_the_tables_and_writes_the_json(export, tmp_path) -> None:
     assert json.loads((tmp_path / "a.json").read_text())["exclusions"]["n_runs"] == 8
 
 
-@pytest.mark.slow
 def test_run_writes_the_report_with_its_sensitivity_analyses(export, tmp_path) -> None:
     result = call("run", "exp3", "--csv", export, "--out", tmp_path / "new" / "folder")
     assert result.exit_code == 0, result.output

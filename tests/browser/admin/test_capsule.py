@@ -9,7 +9,7 @@ from playwright.sync_api import expect
 
 from tests.browser.admin.conftest import Dashboard
 
-pytestmark = [pytest.mark.browser, pytest.mark.slow]
+pytestmark = pytest.mark.browser
 LONG_MS = 300_000
 
 

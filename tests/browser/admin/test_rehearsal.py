@@ -7,7 +7,7 @@ from tests.browser.admin.conftest import Dashboard
 from tests.browser.admin.test_walk import shoot
 from tests.browser.visit import axe_violations
 
-pytestmark = [pytest.mark.browser, pytest.mark.slow]
+pytestmark = pytest.mark.browser
 LONG_MS = 300_000
 SIZES = ((1440, 900), (390, 844))
 

@@ -20,7 +20,7 @@ from tests.browser.server_process import ServerProcess
 from tests.browser.visit import axe_violations
 from tests.helpers.simulated import Api
 
-pytestmark = [pytest.mark.browser, pytest.mark.slow]
+pytestmark = pytest.mark.browser
 PEOPLE = {"pairs-demo": 3, "sliders-demo": 2, "threshold-demo": 1, "timing-continuous": 2}
 DEMOS = tuple(PEOPLE)
 FRAMES = {"timing-continuous": 60}

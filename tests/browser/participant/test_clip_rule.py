@@ -27,7 +27,7 @@ from video_conversion.prepare import prepare
 from video_conversion.prepared import Prepared
 from video_conversion.video_file import NotAClip
 
-pytestmark = [pytest.mark.browser, pytest.mark.firefox, pytest.mark.slow]
+pytestmark = [pytest.mark.browser, pytest.mark.firefox]
 
 FRAMES, FPS, SIZE_PX = 12, 25, (128, 96)
 MAX_GREY_ERROR = 3.0

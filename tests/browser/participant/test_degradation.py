@@ -14,7 +14,7 @@ from tests.browser.served import Served, go_back, serve
 from tests.browser.studies import PLAIN
 from tests.browser.visit import axe_violations
 
-pytestmark = [pytest.mark.browser, pytest.mark.slow]
+pytestmark = pytest.mark.browser
 
 GAP_MS = 200
 DEGRADED = (

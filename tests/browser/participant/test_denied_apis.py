@@ -14,7 +14,7 @@ from tests.browser.served import Served, serve
 from tests.browser.studies import PLAIN, without
 from tests.browser.visit import Visit
 
-pytestmark = [pytest.mark.browser, pytest.mark.slow]
+pytestmark = pytest.mark.browser
 SHORT = without(PLAIN, ("per_cell = 3", "per_cell = 1"), ("trials = 1", "trials = 0"))
 DENIED = "const denied = () => { throw new DOMException('denied', 'SecurityError'); };"
 FULL = "const full = () => { throw new DOMException('full', 'QuotaExceededError'); };"

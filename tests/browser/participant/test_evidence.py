@@ -21,7 +21,6 @@ def strict(tmp_path: Path, built_page: Path) -> Iterator[ServerProcess]:
     process.stop()
 
 
-@pytest.mark.slow
 def test_every_answer_of_the_page_brings_its_evidence(
     strict: ServerProcess, tmp_path: Path, page: Page
 ) -> None:

@@ -14,7 +14,7 @@ from tests.browser.server_process import ServerProcess
 from tests.browser.studies import PLAIN, without
 from tests.browser.visit import Visit
 
-pytestmark = [pytest.mark.browser, pytest.mark.slow]
+pytestmark = pytest.mark.browser
 FRAMES = 30
 PAUSE_MS = 1_200
 """As a person looks at a ready screen: the paused first frame was decoded long before the key."""

@@ -22,7 +22,7 @@ from tests.browser.server_process import ServerProcess
 from tests.browser.studies import PLAIN, without
 from tests.browser.visit import Visit
 
-pytestmark = [pytest.mark.browser, pytest.mark.slow]
+pytestmark = pytest.mark.browser
 LOG = logging.getLogger(__name__)
 FULL = os.environ.get("PALPEBRA_FAULTS") == "full"
 PARTICIPANTS, TRIALS = 26, 80

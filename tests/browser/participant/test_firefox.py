@@ -12,7 +12,7 @@ from tests.browser.conftest import REPOSITORY
 from tests.browser.server_process import ServerProcess
 from tests.browser.studies import PLAIN
 
-pytestmark = [pytest.mark.firefox, pytest.mark.slow]
+pytestmark = pytest.mark.firefox
 LOG = logging.getLogger(__name__)
 FRAMES = 30
 

@@ -16,7 +16,6 @@ pytestmark = pytest.mark.browser
 PRACTICE_PAGE = next(line for line in PLAIN.splitlines() if line.startswith('practice = "# Practice'))
 
 
-@pytest.mark.slow
 def test_every_screen_is_accessible_and_the_ratings_arrive(
     server: ServerProcess, tmp_path: Path, page: Page
 ) -> None:

@@ -11,7 +11,7 @@ from tests.browser.served import Served, serve
 from tests.browser.studies import PLAIN, STUDY, without
 from tests.browser.visit import Visit
 
-pytestmark = [pytest.mark.browser, pytest.mark.slow]
+pytestmark = pytest.mark.browser
 UNPRACTISED = without(PLAIN, ("trials = 1", "trials = 0"))
 # Key, code: as the browser reports them on that keyboard.
 KEYS = {

@@ -9,7 +9,7 @@ from tests.browser.server_process import ServerProcess
 from tests.browser.studies import PLAIN, without
 from tests.browser.visit import Visit
 
-pytestmark = [pytest.mark.browser, pytest.mark.slow]
+pytestmark = pytest.mark.browser
 DELAY_MS = 8_000
 STUDY = without(
     PLAIN,

@@ -20,7 +20,6 @@ from tests.browser.visit import Visit
 moto_server = pytest.importorskip("moto.server", reason="moto is not installed")
 pytestmark = [
     pytest.mark.browser,
-    pytest.mark.slow,
     pytest.mark.filterwarnings("ignore::boto3.exceptions.PythonDeprecationWarning"),
     pytest.mark.filterwarnings("ignore:datetime.datetime.utcnow:DeprecationWarning"),
 ]

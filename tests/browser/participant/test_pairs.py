@@ -16,7 +16,7 @@ from tests.browser.served import Served, go_back, reload_in_next_clip, serve, sh
 from tests.browser.studies import PLAIN
 from tests.browser.visit import Visit, axe_violations
 
-pytestmark = [pytest.mark.browser, pytest.mark.slow]
+pytestmark = pytest.mark.browser
 
 PAIRS = (
     PLAIN[: PLAIN.index("[trial]")]

@@ -20,7 +20,7 @@ from tests.browser.studies import PLAIN, without
 from tests.browser.visit import Visit
 from tests.helpers.processor_waits import ProcessorWaits
 
-pytestmark = [pytest.mark.browser, pytest.mark.slow]
+pytestmark = pytest.mark.browser
 LOG = logging.getLogger(__name__)
 FULL = os.environ.get("PALPEBRA_PLAYS") == "full"
 PLAYS, FRAMES = (50, 45) if FULL else (10, 30)

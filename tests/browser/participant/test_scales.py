@@ -14,7 +14,7 @@ from tests.browser.server_process import ServerProcess
 from tests.browser.studies import PLAIN, without
 from tests.browser.visit import Visit, axe_violations
 
-pytestmark = [pytest.mark.browser, pytest.mark.slow]
+pytestmark = pytest.mark.browser
 SCALES = """\
 [trial]
 pointer_delay_ms = 0

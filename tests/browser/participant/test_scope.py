@@ -19,7 +19,7 @@ from tools.scope.pairs import APART_MS, measure_pairs
 from tools.scope.table import cells
 from tools.scope.views import count_views
 
-pytestmark = [pytest.mark.browser, pytest.mark.slow]
+pytestmark = pytest.mark.browser
 LOG = logging.getLogger(__name__)
 PLAYS, FPS = 4, 30
 TRIES, PAIRS = 5, 3

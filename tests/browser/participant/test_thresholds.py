@@ -13,7 +13,7 @@ from tests.browser.studies import PLAIN
 from tests.browser.visit import axe_violations
 from tests.helpers.thresholds import FACTORS, TWO_INTERVAL, YES_NO
 
-pytestmark = [pytest.mark.browser, pytest.mark.slow]
+pytestmark = pytest.mark.browser
 
 
 def declared(trial: str) -> str:

@@ -64,7 +64,6 @@ def test_the_stream_ends_when_the_session_does(
     assert answer.text.count("event: monitor") == 1
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
 def test_a_server_with_open_streams_ends_before_its_grace_is_over(
     client: TestClient, services: Services, settings: Settings, study: StudyInDatabase

@@ -6,7 +6,6 @@ import threading
 import time
 import uuid
 
-import pytest
 from sqlalchemy import text
 
 from server.context import Services
@@ -38,7 +37,6 @@ def rate_until_refused(port: int, link: str, number: int, acknowledged: set[str]
         client.close()
 
 
-@pytest.mark.slow
 def test_what_was_acknowledged_before_the_end_is_stored_and_visits_go_on(
     services: Services, settings: Settings, study: StudyInDatabase
 ) -> None:

@@ -15,7 +15,6 @@ EXAMPLES = 4
 """An operation; about 60 operations."""
 
 pytestmark = [
-    pytest.mark.slow,
     pytest.mark.filterwarnings("ignore::hypothesis.errors.NonInteractiveExampleWarning"),
 ]
 STREAMS = ("/stream",)

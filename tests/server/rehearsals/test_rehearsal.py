@@ -39,7 +39,6 @@ def done(admin: Admin) -> Any:
     return latest
 
 
-@pytest.mark.slow
 def test_a_rehearsal_shows_everything_and_leaves_the_data_alone(
     services: Services, experimenter: Admin, participant: Participant
 ) -> None:

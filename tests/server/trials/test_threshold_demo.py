@@ -24,7 +24,6 @@ DEMO = REPOSITORY / "experiments" / "threshold-demo.toml"
 TRUE_MS = 300.0
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("one_seed")
 def test_simulated_people_have_the_thresholds_that_they_were_given(
     client: TestClient, services: Services, tmp_path: Path

@@ -86,7 +86,6 @@ def workers(services: Services, settings: Settings) -> Iterator[tuple[str, ...]]
             process.wait(30)
 
 
-@pytest.mark.slow
 def test_two_workers_choose_pairs_and_follow_series_as_one(
     services: Services, tmp_path: Path, workers: tuple[str, ...]
 ) -> None:

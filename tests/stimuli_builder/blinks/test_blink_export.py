@@ -145,7 +145,6 @@ def test_the_blender_script_holds_the_curve(curve):
     assert _constant(script, "FPS") == 30
 
 
-@pytest.mark.slow
 def test_the_script_runs_in_blender_itself(tmp_path):
     if not BLENDER_PYTHON.is_file():
         pytest.skip("Blender as a module (bpy) is not installed in .venv-bake")

@@ -129,7 +129,6 @@ def test_a_folder_of_another_experiment_is_left_alone(small_text: str, copied: P
         other.build(copied)
 
 
-@pytest.mark.slow
 def test_processes_and_a_killed_worker_change_nothing(small: Small, built: Path, tmp_path: Path) -> None:
     killed = []
 
@@ -145,7 +144,6 @@ def test_processes_and_a_killed_worker_change_nothing(small: Small, built: Path,
     assert contents(tmp_path / "clips") == contents(built)
 
 
-@pytest.mark.slow
 def test_a_dask_cluster_gives_the_same_clips(small: Small, built: Path, tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed", reason="the extra 'dask' is not installed")
     with distributed.LocalCluster(
@@ -218,7 +216,6 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.slow
 def test_workers_end_with_a_build_that_was_killed(small: Small, built: Path, tmp_path: Path) -> None:
     out, script = tmp_path / "clips", tmp_path / "killed.py"
     script.write_text(KILLED)

@@ -13,7 +13,6 @@ from .conftest import Small
 distributed = pytest.importorskip("distributed", reason="the extra 'dask' is not installed")
 
 
-@pytest.mark.slow
 def test_a_cluster_that_loses_a_worker_gives_the_same_clips(
     small: Small, built: Path, tmp_path: Path
 ) -> None:

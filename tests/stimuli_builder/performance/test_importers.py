@@ -76,7 +76,6 @@ def test_usd_opens_the_layer_and_reads_the_engines_lids(
     np.testing.assert_allclose([list(weights.Get(frame)) for frame in ten], lids(engine, ten), atol=1e-4)
 
 
-@pytest.mark.slow
 def test_blender_plays_the_engines_lids(tmp_path: Path, engine: Performance, ten: list[int]) -> None:
     if not BLENDER_PYTHON.is_file():
         pytest.skip("Blender as a module (bpy) is not installed in .venv-bake")

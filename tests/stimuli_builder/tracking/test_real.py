@@ -16,7 +16,6 @@ CLIPS = {
 }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", CLIPS)
 def test_real_clip_is_tracked_throughout_and_its_blinks_are_found(shared_data, tmp_path, name):
     expected = CLIPS[name]
