@@ -16,7 +16,7 @@ run: setup ## set everything up and start Exp 1-3 in the browser (PORT=8000)
 	@$(BIN)/python tools/first_run.py
 
 PYTEST = OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n logical --maxprocesses 4 --dist loadscope --no-loadscope-reorder --rerun-show-tracebacks
-test: setup-test ## set everything up and run the tests: Python, TypeScript, Chromium, a slice on PostgreSQL (tests/tiers.py)
+test: setup-test ## set everything up and run the tests: Python, TypeScript, Chromium, a slice on PostgreSQL (tests/tiers.toml)
 	@cd frontend && npm run --silent test
 	@$(PYTEST) -m "not long" $(TESTS)
 
@@ -35,6 +35,7 @@ check-style:
 	@$(BIN)/python tools/check_names.py
 	@$(BIN)/python tools/check_unused.py
 	@$(BIN)/python -m tools.check_docstrings
+	@$(BIN)/python tools/reference.py --check
 
 check-types:
 	@$(BIN)/mypy

@@ -2,7 +2,7 @@
 
 import os
 import tomllib
-from collections.abc import Generator
+from collections.abc import Collection, Generator
 from pathlib import Path
 
 import pytest
@@ -90,7 +90,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: rank(source_file(item)))
     for item in items:
         name = name_of_item(item)
-        if is_long(name, {marker.name for marker in item.iter_markers()}):
+        if is_long(name, {marker.name for marker in item.iter_markers()}, fixtures_of(item)):
             item.add_marker(pytest.mark.long)
         if name in RERUNS:
             item.add_marker(pytest.mark.flaky(reruns=RERUNS[name]))
@@ -130,6 +130,11 @@ def source_file(item: pytest.Item) -> str:
 def name_of_item(item: pytest.Item) -> str:
     """`file::test` from the repository's root, with forward slashes and without parameters."""
     return f"{source_file(item)}::{item.location[2].split('[')[0].replace('.', '::')}"
+
+
+def fixtures_of(item: pytest.Item) -> Collection[str]:
+    """The names of the fixtures that a test asks for, by itself or through others."""
+    return tuple(getattr(item, "fixturenames", ()))
 
 
 @pytest.fixture(scope="session")

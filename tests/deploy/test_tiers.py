@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 
 from tests import tiers
-from tests.conftest import REPOSITORY, RERUNS
+from tests.conftest import REPOSITORY, RERUNS, fixtures_of
 
 MARKERS_GIVEN_BY_CONFTEST = {"long", "flaky"}
 SHORTEST_REASON = 20
@@ -52,26 +52,27 @@ def test_the_slice_on_postgres_asks_for_it_and_is_not_long() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "markers", "expected"),
+    ("name", "markers", "fixtures", "expected"),
     [
-        ("tests/server/test_pages.py::test_a", set(), False),
-        ("tests/server/test_pages.py::test_a", {"postgres"}, True),
-        ("tests/server/test_prepared.py::test_a", {"postgres"}, False),
-        ("tests/server/test_durability.py::test_a", set(), True),
-        ("tests/server/attacks/test_lane.py::test_a", set(), True),
-        ("tests/browser/participant/test_flow.py::test_a", {"browser"}, False),
-        ("tests/browser/participant/test_flow.py::test_a", {"firefox"}, True),
+        ("tests/server/test_pages.py::test_a", set(), (), False),
+        ("tests/server/test_pages.py::test_a", {"postgres"}, (), True),
+        ("tests/server/test_prepared.py::test_a", {"postgres"}, (), False),
+        ("tests/server/test_durability.py::test_a", set(), (), True),
+        ("tests/server/attacks/test_lane.py::test_a", set(), (), True),
+        ("tests/browser/participant/test_flow.py::test_a", {"browser"}, (), False),
+        ("tests/browser/participant/test_flow.py::test_a", {"firefox"}, (), True),
+        ("tests/stimuli_builder/test_a.py::test_a", set(), ("shared_data",), True),
     ],
 )
-def test_what_is_long(name: str, markers: set[str], expected: bool) -> None:
-    assert tiers.is_long(name, markers) is expected
+def test_what_is_long(name: str, markers: set[str], fixtures: tuple[str, ...], expected: bool) -> None:
+    assert tiers.is_long(name, markers, fixtures) is expected
 
 
 def test_what_is_collected_here_is_marked_by_the_table(request: pytest.FixtureRequest) -> None:
     for item in request.session.items:
         name = f"{item.location[0]}::{item.location[2].partition('[')[0].replace('.', '::')}"
         markers = {marker.name for marker in item.iter_markers()}
-        assert ("long" in markers) is tiers.is_long(name, markers - {"long"}), name
+        assert ("long" in markers) is tiers.is_long(name, markers - {"long"}, fixtures_of(item)), name
         assert ("flaky" in markers) is (name in RERUNS), name
 
 
