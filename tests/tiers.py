@@ -5,6 +5,7 @@ The others are in both. `tests/conftest.py` marks the long ones; nobody writes t
 
 import tomllib
 from collections.abc import Collection
+from functools import cache
 from pathlib import Path
 
 SHORT_RUN = "not long"
@@ -25,6 +26,7 @@ def is_long(name: str, markers: Collection[str], fixtures: Collection[str] = ())
     return on_postgres or "firefox" in markers or REAL_RECORDINGS in fixtures or entry_of(name) is not None
 
 
+@cache
 def entry_of(name: str) -> str | None:
     """The entry of `LONG` that names a test or a file: itself, its file or a folder."""
     names = (name, name.split("::")[0])
