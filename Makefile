@@ -7,7 +7,7 @@ export PATH := $(CURDIR)/$(BIN):$(PATH)
 # Where this is set, every start compiles every module anew: seconds for each process that a test starts.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: addon playground help run test test-all check check-style check-types check-imports check-pages check-supply setup setup-test lock format types bench sbom scope load evidence audit house screenshots docs api clean
+.PHONY: addon playground help run test test-all check check-style check-types check-imports check-pages check-supply setup setup-test lock format types bench sbom scope load evidence audit house equal screenshots docs api clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-12s %s\n", $$1, $$2}' Makefile
@@ -90,6 +90,9 @@ load: setup-test ## real servers under load and kill -9, a table at the end (LOA
 
 evidence: setup-test ## people and programs of every manner take part: who is caught, who is warned (EVIDENCE="--runs 20 --honest 100")
 	@$(BIN)/python -m tools.evidence_table $(EVIDENCE)
+
+equal: ## make the program's outputs at BASE=COMMIT and here, and compare them byte for byte (PARTS="help exports")
+	@$(BIN)/python -m tools.equal $(BASE) $(PARTS)
 
 house: ## how far the tree is from the plan of its files: counts, cycles, chains, names (HOUSE="--files" lists them)
 	@$(PYTHON) -m tools.house $(HOUSE)
