@@ -81,11 +81,12 @@ def connected_groups(graph: Graph) -> list[list[str]]:
     lowest: dict[str, int] = {}
     waiting: list[str] = []
     groups: list[list[str]] = []
-    for start in graph:
+    # In the order of names, so that of two equally long chains the same one is shown every time.
+    for start in sorted(graph):
         if start in numbers:
             continue
         # A stack instead of recursion: a long chain of imports would exceed Python's recursion limit.
-        steps = [(start, iter(graph[start]))]
+        steps = [(start, iter(sorted(graph[start])))]
         numbers[start] = lowest[start] = len(numbers)
         waiting.append(start)
         while steps:
@@ -102,7 +103,7 @@ def connected_groups(graph: Graph) -> list[list[str]]:
             elif target not in numbers:
                 numbers[target] = lowest[target] = len(numbers)
                 waiting.append(target)
-                steps.append((target, iter(graph[target])))
+                steps.append((target, iter(sorted(graph[target]))))
             elif target in waiting:
                 lowest[node] = min(lowest[node], numbers[target])
     return groups
