@@ -14,7 +14,7 @@ FILES = {
     "server/__init__.py": "",
     "server/app.py": "from server import rows\n\n\ndef start():\n    from server.late import Late\n",
     "server/rows.py": "import server.models\n",
-    "server/models.py": "import server.words\nimport typing\n\nif typing.TYPE_CHECKING:\n    from .rows import Row\n",
+    "server/models.py": "import server.words\nif typing.TYPE_CHECKING:\n    from .rows import Row\n",
     "server/late.py": "from experiments.trials.threshold import plan\n",
     "server/judge.py": 'def judge(kind):\n    return kind == "threshold"\n',
     "server/words.py": 'def name(what):\n    return what == "threshold"  # a word of statistics\n',
