@@ -1,14 +1,14 @@
 """What a detector sees of a video: at looks spread over it, the eyes of one face, and which are covered."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import count, islice
 from typing import Any
 
 import numpy as np
 
 from experiments.errors import InputError
-from stimuli_builder.tracking.covers import covered_frames
+from stimuli_builder.tracking.covers import covered_frames, surroundings_of
 from stimuli_builder.tracking.detector.detection import Detection
 from stimuli_builder.tracking.detector.face_mesh import FaceMesh
 from stimuli_builder.tracking.detector.mesh import open_detector
@@ -90,7 +90,8 @@ def survey(info: VideoInfo, *, one_eye: bool, advance: Callable[[int], None] | N
     if not one_eye:
         _require_agreement(info, [of_face[n] for n in labels])
     unseen = frozenset(seen.keys() - labels.keys())
-    covers = covered_frames(info.path, {n: of_face[n].spreads for n in labels}, FEWEST)
+    around = {n: look for n in labels if (look := of_face[n].surroundings) is not None}
+    covers = covered_frames(info.path, {n: of_face[n].spreads for n in labels}, FEWEST, around)
     open_to_view = {n: points for n, points in labels.items() if n not in covers}
     return Survey(open_to_view, len(seen), several, further, unseen, covers)
 
@@ -107,7 +108,10 @@ def _looked(
         for number, picture in enumerate(islice(pictures, info.frame_count)):
             if not picture.size:
                 continue
-            seen[number] = detector.detect(picture)
+            seen[number] = [
+                replace(one, surroundings=surroundings_of(picture, one.points))
+                for one in detector.detect(picture)
+            ]
             if isinstance(detector, FaceMesh) and seen[number] and number % in_parts == 0:
                 further.append(further_faces(detector, picture, seen[number]))
             if advance is not None:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Protocol, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stimuli_builder.tracking.shapes import Points
 from stimuli_builder.video import Picture
@@ -31,6 +32,8 @@ class Detection:
     mirror_shares : tuple of float
         Of each eye of a face, mean distance of its points as read in the picture from those of its mirror
         image, as part of the eye's width; infinite where the mirror image does not show the face.
+    surroundings : float32 array (eyes, cells) or None
+        What lies around each eye, see `covers.surroundings_of`; None where nobody looked.
     """
 
     points: Points
@@ -38,6 +41,7 @@ class Detection:
     box: Points
     spreads: tuple[float, ...]
     mirror_shares: tuple[float, ...] = ()
+    surroundings: NDArray[np.float32] | None = None
 
     @property
     def area_px2(self) -> float:

@@ -8,8 +8,15 @@ import numpy as np
 import pytest
 
 from experiments.errors import InputError
+from stimuli_builder.characters.atlas import SHIPPED, load_atlas
+from stimuli_builder.characters.colour import linear_to_srgb
 from stimuli_builder.environments import cache_folder
-from stimuli_builder.tracking.covers import LEAST_SPREAD, covered_frames
+from stimuli_builder.tracking.covers import (
+    LEAST_SPREAD,
+    covered_frames,
+    likenesses,
+    surroundings_of,
+)
 from stimuli_builder.tracking.detector.detection import contour_spread
 from stimuli_builder.tracking.detector.face_mesh import FaceMesh
 from stimuli_builder.tracking.faults import Faults
@@ -166,6 +173,86 @@ def test_covers_for_most_of_a_recording_or_all_of_it_are_told(covers):
     assert sorted(covered_frames(VIDEO, seen, fewest=0)) == list(covers)
 
 
+def drawn_face(turn_deg=0.0, size=1.0, lids=0.3, away=(0, 0)):
+    """A picture (300, 400, 3) with brows, cheeks and two eyes of 40 px, and their points (18, 2)."""
+    y, x = np.mgrid[:300, :400] * 1.0
+    grey = 150 + 30 * np.sin(x / 37) * np.cos(y / 29)
+    for middle in (140, 260):
+        grey -= 90 * np.exp(-(((x - middle) / 28) ** 2) - ((y - 122) / 4) ** 2)
+        inside = np.hypot((x - middle) / 20, (y - 150) / max(40 * lids / 2, 0.5)) < 1
+        grey = np.where(inside, 80, grey)
+    curve = np.linspace(-1, 1, 6)
+    upper = np.c_[20 * curve, -6 * (1 - curve**2)]
+    eye = np.concatenate([upper, np.c_[[10, 0, -10], [4, 5, 4]]])
+    points = np.concatenate([eye + np.array([140, 150]), eye * [-1, 1] + np.array([260, 150])])
+    matrix = cv2.getRotationMatrix2D((200, 150), turn_deg, size)
+    matrix[:, 2] += away
+    turned = cv2.warpAffine(grey.astype(np.float32), matrix, (400, 300), borderMode=cv2.BORDER_REFLECT)
+    rgb = np.repeat(turned[..., None], 3, axis=2).clip(0, 255).astype(np.uint8)
+    return rgb, points @ matrix[:, :2].T + matrix[:, 2]
+
+
+def test_surroundings_are_the_same_wherever_the_head_is_and_whatever_the_lids_do():
+    first = surroundings_of(*drawn_face())
+    assert first.shape[0] == 2
+    for other in (drawn_face(8, 1.2, away=(9, -5)), drawn_face(lids=0.02), drawn_face(-5, 0.9, lids=0.02)):
+        for one, two in zip(surroundings_of(*other), first, strict=True):
+            assert likenesses(one, two[None])[0] > 0.95
+    picture, points = drawn_face()
+    cv2.ellipse(picture, (140, 150), (60, 40), 20, 0, 360, (160, 150, 140), -1)
+    covers = surroundings_of(picture, points)
+    assert likenesses(covers[0], first[:1])[0] < 0.5
+    assert likenesses(covers[1], first[1:])[0] > 0.95
+
+
+def test_surroundings_beyond_the_picture_are_not_compared():
+    picture, points = drawn_face()
+    whole, cut = surroundings_of(picture, points), surroundings_of(picture[:, 120:], points - [120, 0])
+    assert np.isfinite(whole).all()
+    assert np.isnan(cut[0]).any()
+    assert np.isfinite(cut[1]).all()
+    assert likenesses(cut[0], whole[:1])[0] > 0.99
+    barely = surroundings_of(picture[120:180, 110:165], points - [110, 120])
+    assert likenesses(barely[0], whole[:1])[0] == 0
+
+
+def surroundings(count=40, eyes=2, others=(), seed=3):
+    """Of looks that all show the same eyes, but for those of `others`, which show something else."""
+    rng = np.random.default_rng(seed)
+    usual, strange = rng.normal(size=(2, eyes, 200))
+    return {
+        n: ((strange if n in others else usual) + 0.3 * rng.normal(size=(eyes, 200))).astype(np.float32)
+        for n in range(count)
+    }
+
+
+@pytest.mark.parametrize("spread", [0.062, 0.075, 0.11])
+def test_shut_and_averted_eyes_in_their_usual_surroundings_are_not_covered(spread):
+    seen = looks(0.025, []) | {n: [spread, 0.9 * spread] for n in range(10, 25)}
+    assert set(covered_frames(VIDEO, seen, 6)) == set(range(10, 25))
+    assert covered_frames(VIDEO, seen, 6, surroundings()) == {}
+
+
+@pytest.mark.parametrize("spread", [0.062, 0.075, 0.11])
+def test_unsteady_eyes_in_strange_surroundings_are_covered(spread):
+    seen = looks(0.025, []) | {n: [spread, 0.02] for n in range(10, 25)}
+    told = covered_frames(VIDEO, seen, 6, surroundings(others=range(10, 25)))
+    assert set(told) == set(range(10, 25))
+    assert all(why.startswith("left eye covered: ") and "surrounds" in why for why in told.values())
+
+
+def test_one_steady_look_at_a_cover_makes_no_cover_familiar():
+    seen = looks(0.025, []) | {n: [0.09, 0.09] for n in range(10, 25)} | {9: [0.03, 0.03]}
+    assert set(covered_frames(VIDEO, seen, 6, surroundings(others=range(9, 25)))) == set(range(10, 25))
+
+
+def test_without_steady_looks_every_unsteady_eye_is_covered_or_shut():
+    seen = {n: [0.05, 0.05] for n in range(40)} | {n: [0.12, 0.12] for n in range(10, 25)}
+    told = covered_frames(VIDEO, seen, 6, surroundings())
+    assert set(told) == set(range(10, 25))
+    assert all("shut tightly or turned away" in why for why in told.values())
+
+
 @pytest.mark.parametrize("kind", ["skin", "cheek"])
 def test_a_model_from_labels_does_not_track_a_textured_cover(kind, lesson, recording, tmp_path):
     """No detector looks here: the model has never seen the cover, and its residual tells it."""
@@ -233,10 +320,25 @@ def test_a_textured_cover_on_a_real_face_is_never_tracked(face, tmp_path, kind, 
     rows, known = tracked(tmp_path / "covered.mp4", spoilt)
     assert set(known.covered) == set(range(first, first + 27, 3))
     assert {row["status"] for row in rows[first : first + 27]} <= {"lost", "doubtful"}
-    words = "left eye covered" if eyes == [0] else "both eyes covered"
+    words = "left eye covered:" if eyes == [0] else "both eyes covered:"
     assert all(words in why for why in known.covered.values())
     assert all("covered" in row["reason"] for row in rows[first : first + 27])
     assert {row["status"] for row in [*rows[: first - 1], *rows[first + 30 :]]} == {"tracked"}
+
+
+def test_a_face_that_keeps_its_eyes_shut_is_not_covered(detector, tmp_path):
+    """Rendered lids that stay shut are read less steadily, in one of two eyes by more than the limit."""
+    atlas = load_atlas(SHIPPED / "alder-face@2")
+    base, rng = linear_to_srgb(atlas.base_linear()), np.random.default_rng(4)
+    pictures = []
+    for closure in np.repeat([0.0, 0.5, 1.0, 1.0, 0.0], 10):
+        base[atlas.crop] = atlas.level_srgb(int(np.abs(atlas.closures - closure).argmin()))
+        small = cv2.resize(base, (454, 568), interpolation=cv2.INTER_AREA).mean(2)
+        pictures.append((small + rng.normal(0, 4, small.shape)).clip(0, 255).astype(np.uint8))
+    write_frames(tmp_path / "shut.mp4", pictures, fps=30)
+    seen = survey(scan_video(tmp_path / "shut.mp4"), one_eye=False)
+    assert seen.covered == {}
+    assert len(seen.points) == seen.looked_at
 
 
 def test_no_look_at_a_real_close_up_is_called_covered(detector, shared_data):
