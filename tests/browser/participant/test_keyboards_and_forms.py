@@ -42,6 +42,7 @@ def test_digits_of_every_keyboard_answer(served: Served, page: Page) -> None:
         page.evaluate(PRESS, [key, code])
         assert scale
         scale.wait_for_element_state("hidden")
+        page.wait_for_selector(".ready, .attention, .break")
         if page.query_selector(".attention, .break"):
             break
     rows = served.rows_of_latest("ratings", "time_elapsed", 3)
