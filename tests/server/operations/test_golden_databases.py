@@ -1,0 +1,98 @@
+"""Golden databases of later revisions: upgraded in place or restored, they arrive complete, row for row."""
+
+import csv
+import gzip
+import io
+import json
+import sqlite3
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from server.accounts.identity import OPERATOR
+from server.context import Services, open_services
+from server.export.extract import Extract
+from server.export.formats import FORMATS
+from server.migrate import current_revision, newest_revision, upgrade
+from server.operations.restore import restore
+from server.settings import Settings
+from server.studies.lookup import find_study
+from tests.helpers.databases import BACKENDS
+from tests.helpers.golden_databases import (
+    FOLDER,
+    REVISIONS,
+    SECRET_KEY,
+    contents_of,
+    golden_contents,
+    golden_ratings,
+    load_golden_database,
+)
+
+both = pytest.mark.parametrize("empty_database_url", BACKENDS, indirect=True)
+each = pytest.mark.parametrize("revision", REVISIONS)
+KINDS = {"clip_rating", "continuous_rating", "paired_comparison", "threshold"}
+
+
+def opened(url: str, folder: Path) -> Services:
+    return open_services(Settings(database_url=url, data_folder=folder / "data", secret_key=SECRET_KEY))
+
+
+def check_complete(services: Services, revision: str) -> None:
+    """Every row of every table, and every study's ratings, as they were when the files were made."""
+    assert current_revision(services.database) == newest_revision()
+    known = golden_contents(revision)
+    assert contents_of(services.database, known) == known
+    ratings = golden_ratings(revision)
+    for name, before in ratings.items():
+        with services.database.read() as session:
+            study = find_study(session, name, OPERATOR, "view")
+            after = b"".join(FORMATS["csv"](session, study, Extract("all")))
+        rows = table_rows(before)
+        assert len(rows) > 5
+        assert [{key: plain(row[key]) for key in rows[0]} for row in table_rows(after)] == [
+            {key: plain(value) for key, value in row.items()} for row in rows
+        ]
+
+
+def plain(cell: str) -> Any:
+    """A cell's value: SQLite and PostgreSQL write a list of numbers with other spaces."""
+    return json.loads(cell) if cell.startswith("[") else cell
+
+
+def table_rows(content: bytes) -> list[dict[str, Any]]:
+    return list(csv.DictReader(io.StringIO(content.decode("utf-8-sig"), newline="")))
+
+
+@each
+def test_a_golden_database_has_answers_of_every_kind(revision: str, tmp_path: Path) -> None:
+    load_golden_database(revision, f"sqlite:///{tmp_path / 'golden.sqlite'}")
+    with sqlite3.connect(tmp_path / "golden.sqlite") as connection:
+        kinds = {row[0] for row in connection.execute("SELECT DISTINCT kind FROM trial_ratings")}
+    assert kinds >= KINDS
+
+
+def test_there_are_golden_databases() -> None:
+    assert REVISIONS
+
+
+@both
+@each
+def test_an_upgrade_in_place_keeps_every_row(revision: str, empty_database_url: str, tmp_path: Path) -> None:
+    load_golden_database(revision, empty_database_url)
+    services = opened(empty_database_url, tmp_path)
+    assert current_revision(services.database) == revision
+    upgrade(services.database)
+    check_complete(services, revision)
+    services.database.close()
+
+
+@both
+@each
+def test_a_restored_backup_has_every_row(revision: str, empty_database_url: str, tmp_path: Path) -> None:
+    services = opened(empty_database_url, tmp_path)
+    backup = tmp_path / f"{revision}.tar"
+    backup.write_bytes(gzip.decompress((FOLDER / f"{revision}.tar.gz").read_bytes()))
+    restore(services, backup, keys=FOLDER / f"{revision}.keys.json", despite_erasures=True)
+    check_complete(services, revision)
+    services.database.close()
