@@ -4,6 +4,7 @@ import csv
 import io
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -27,10 +28,9 @@ PEOPLE = 3
 
 def take_part(address: str, study: StudyInDatabase, link: str, number: int) -> int:
     """One simulated participant; returns how many ratings were sent."""
-    client = JsonClient(address)
-    person = Person(client, Rater(number, 1, {}))
-    assert person.take_part(link)
-    client.close()
+    with closing(JsonClient(address)) as client:
+        person = Person(client, Rater(number, 1, {}))
+        assert person.take_part(link)
     return person.ratings
 
 
