@@ -112,7 +112,7 @@ class ServerProcess:
         limit = time.monotonic() + limit_s
         found = self.rows(statement)
         while len(found) < count and time.monotonic() < limit:
-            time.sleep(0.2)
+            time.sleep(0.05)
             found = self.rows(statement)
         return found
 
@@ -156,5 +156,5 @@ class ServerProcess:
                 with urllib.request.urlopen(f"{self.address}/healthz", timeout=2):
                     return
             except (urllib.error.URLError, ConnectionError, TimeoutError):
-                time.sleep(0.1)
+                time.sleep(0.02)
         raise RuntimeError(f"the server did not answer within {START_LIMIT_S:.0f} s")

@@ -9,4 +9,4 @@ def until(holds: Callable[[], object], limit_s: float = 60.0) -> None:
     limit = time.monotonic() + limit_s
     while not holds():
         assert time.monotonic() < limit, f"still not so after {limit_s:g} s"
-        time.sleep(0.05)
+        time.sleep(0.02)
