@@ -24,6 +24,9 @@ def main():
     words = [word for word in sys.argv[1:] if word != "--help"]
     if words == ["fail"]:
         sys.exit("no such study")
+    if words == ["refuse"]:
+        print("no wide table", file=sys.stderr)
+        sys.exit(2)
     print("Usage:", *words)
     print("Imported from", __file__)
     if not words:
@@ -75,6 +78,14 @@ def test_a_command_that_fails_ends_the_part(tmp_path: Path) -> None:
     tree = small_tree(tmp_path / "tree", "run  Serve.")
     with pytest.raises(PartError, match="base: server fail: ended with no such study"):
         Side("base", tree).commands(command("server", "fail"))
+
+
+def test_a_refusal_is_an_output_where_one_is_expected(tmp_path: Path) -> None:
+    side = Side("base", small_tree(tmp_path / "tree", "run  Serve."))
+    side.commands(command("server", "refuse", refusal=tmp_path / "out" / "refused.txt"))
+    assert (tmp_path / "out" / "refused.txt").read_text(encoding="utf-8") == "no wide table\n"
+    with pytest.raises(PartError, match="ended with 2\nno wide table"):
+        side.commands(command("server", "refuse"))
 
 
 def test_a_planted_difference_is_reported_and_a_declared_one_is_not(

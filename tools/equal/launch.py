@@ -23,6 +23,8 @@ from pathlib import Path
 from typing import Any
 
 Job = dict[str, Any]
+REFUSED = 2
+"""Exit status of a program that refuses its input; with `"refusal": FILE` its message is an output."""
 
 
 def use_only(tree: Path) -> None:
@@ -79,13 +81,20 @@ def run_command(tree: Path, command: Job) -> None:
         except Exception:
             code = traceback.format_exc()
     said, complained = (one.buffer.getvalue() for one in buffers)
-    if code != command.get("code", 0):
+    if code == REFUSED and "refusal" in command:
+        write_bytes(Path(command["refusal"]), complained)
+        return
+    if code:
         text = complained.decode(errors="replace")[-2000:] + said.decode(errors="replace")[-1000:]
         sys.exit(f"{program} {' '.join(arguments)}: ended with {code}\n{text}")
     if "out" in command:
-        out = Path(command["out"])
-        out.parent.mkdir(parents=True, exist_ok=True)
-        out.write_bytes(said)
+        write_bytes(Path(command["out"]), said)
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """A file in a folder that is made."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(content)
 
 
 def write_help(tree: Path, out: Path) -> None:

@@ -108,10 +108,12 @@ class Side:
                     process.wait()
 
 
-def command(program: str, *arguments: object, out: Path | None = None) -> dict[str, Any]:
-    """A command of a job; what it prints goes to `out`."""
+def command(
+    program: str, *arguments: object, out: Path | None = None, refusal: Path | None = None
+) -> dict[str, Any]:
+    """A command of a job; its output goes to `out`, a refusal to `refusal` (without it: an error)."""
     plain: dict[str, Any] = {"program": program, "arguments": [str(one) for one in arguments]}
-    return plain | ({"out": str(out)} if out else {})
+    return plain | {name: str(path) for name, path in (("out", out), ("refusal", refusal)) if path}
 
 
 def answers(url: str) -> bool:
