@@ -9,8 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from fastapi.testclient import TestClient
 
 from server.accounts.identity import OPERATOR
+from server.app import create_app
 from server.context import Services, open_services
 from server.export.extract import Extract
 from server.export.formats import FORMATS
@@ -18,6 +20,7 @@ from server.migrate import current_revision, newest_revision, upgrade
 from server.operations.restore import restore
 from server.settings import Settings
 from server.studies.lookup import find_study
+from tests.helpers.admins import signed_in
 from tests.helpers.databases import BACKENDS
 from tests.helpers.golden_databases import (
     FOLDER,
@@ -96,3 +99,23 @@ def test_a_restored_backup_has_every_row(revision: str, empty_database_url: str,
     restore(services, backup, keys=FOLDER / f"{revision}.keys.json", despite_erasures=True)
     check_complete(services, revision)
     services.database.close()
+
+
+@each
+def test_every_visit_opens_on_its_page(revision: str, tmp_path: Path) -> None:
+    url = f"sqlite:///{tmp_path / 'golden.sqlite'}"
+    load_golden_database(revision, url)
+    services = opened(url, tmp_path)
+    upgrade(services.database)
+    statuses = {}
+    with TestClient(create_app(services.settings)) as client:
+        admin = signed_in(client, services, "owner", "harness")
+        for study in golden_ratings(revision):
+            rows = admin.get(f"/studies/{study}/runs?simulated=true&limit=100").json()["runs"]
+            for row in rows:
+                path = f"/studies/{study}/runs/{row['run']}"
+                for ending in ("", "/replay", "/subject-access"):
+                    statuses[path + ending] = admin.get(path + ending).status_code
+    services.database.close()
+    assert len(statuses) > 60
+    assert {path: status for path, status in statuses.items() if status >= 500} == {}
