@@ -122,7 +122,8 @@ def first_difference(old: bytes, new: bytes) -> str:
     count = len(list(changed_lines(lines[0], lines[1])))
     for number, (a, b) in enumerate(zip(*lines, strict=False), 1):
         if a != b:
-            return f"line {number} ({count} lines differ)\n    - {excerpt(a, b)}\n    + {excerpt(b, a)}"
+            lines_differ = f" ({count} lines differ)" if count else ""
+            return f"line {number}{lines_differ}\n    - {excerpt(a, b)}\n    + {excerpt(b, a)}"
     shorter = min(len(lines[0]), len(lines[1]))
     if len(lines[0]) == len(lines[1]):
         return "line endings differ"

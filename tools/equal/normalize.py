@@ -15,7 +15,7 @@ SUBSTITUTIONS: tuple[tuple[str, str, str], ...] = (
     # A default that is a folder of the tree: its length decides where the line breaks.
     ("help/*.txt", r"\s*\[default:\s+/[^\]]*\]", " [default: <folder>]"),
     # Names that matplotlib draws at random for the parts of an SVG.
-    ("recordings/*.html", r"\b[mp][0-9a-f]{10}\b", "<id>"),
+    ("recordings/*.html", r"\b(?:[mp]|C\d+_\d+_)[0-9a-f]{10}\b", "<id>"),
 )
 """Files (from the part on), what is replaced in them, and by what."""
 TIME = re.compile(rb"20\d\d-\d\d-\d\dT\d\d:\d\d:\d\d(?:\.\d+)?(?:Z|\+00:00)")
