@@ -10,18 +10,14 @@ app = command_group(
 
 
 def _gather() -> None:
-    from analysis.commands.agreement import register as register_agreement
-    from analysis.commands.anova import register as register_anova
-    from analysis.commands.check_paper import register as register_check_paper
-    from analysis.commands.convert import register as register_convert
-    from analysis.commands.models import register as register_models
-    from analysis.commands.opinion import register as register_opinion
-    from analysis.commands.pairs import register as register_pairs
-    from analysis.commands.plan import register as register_plan
-    from analysis.commands.reshape import register as register_reshape
-    from analysis.commands.run import register as register_run
-    from analysis.commands.thresholds import register as register_thresholds
-    from analysis.commands.verify import register as register_verify
+    from analysis.commands.agreement import register_agreement, register_opinion
+    from analysis.commands.anova import register_anova
+    from analysis.commands.checks import register_check_paper, register_verify
+    from analysis.commands.choices import register_pairs, register_thresholds
+    from analysis.commands.models import register_models
+    from analysis.commands.plan import register_plan
+    from analysis.commands.run import register_run
+    from analysis.commands.tables import register_convert, register_reshape
 
     register_run(app)
     register_anova(app)

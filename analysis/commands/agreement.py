@@ -1,4 +1,4 @@
-"""`analysis reliability` and `analysis agreement`."""
+"""`analysis reliability`, `analysis agreement` and `analysis opinion`."""
 
 from dataclasses import asdict
 from enum import StrEnum
@@ -8,6 +8,8 @@ from typing import Annotated
 import typer
 
 from analysis.commands.output import JsonOption, names_in, save_json, saying, show_tables, show_text
+
+# `analysis reliability` and `analysis agreement`.
 
 
 class LevelChoice(StrEnum):
@@ -19,7 +21,7 @@ class LevelChoice(StrEnum):
     RATIO = "ratio"
 
 
-def register(app: typer.Typer) -> None:
+def register_agreement(app: typer.Typer) -> None:
     """Add the commands to `app`."""
     app.command(name="reliability")(reliability)
     app.command(name="agreement")(agreement)
@@ -48,9 +50,9 @@ def reliability(
 
       analysis reliability answers.xlsx --items q1,q2,q3,q4 --case id --scores scores.csv --json out.json
     """
-    from analysis.agreement import reliability as numbers
-    from analysis.commands.scale_option import scale_bounds
-    from analysis.report.agreement_tables import items_table, reliability_text
+    from analysis import agreement as numbers
+    from analysis.commands.output import scale_bounds
+    from analysis.report.rating_tables import items_table, reliability_text
     from experiments.files import check_targets
 
     check_targets([scores])
@@ -82,13 +84,13 @@ def agreement(
 
       analysis agreement votes.csv --item clip --participant id --rating score --level ordinal --json out.json
     """
-    from analysis.agreement import raters
-    from analysis.opinion.scores import read_votes
-    from analysis.report.agreement_tables import agreement_text, intraclass_table
+    from analysis import agreement
+    from analysis.opinion import read_votes
+    from analysis.report.rating_tables import agreement_text, intraclass_table
 
     votes = read_votes(file, item, participant, rating)
     with saying("resampling items"):
-        result = raters.agreement(votes, level.value)
+        result = agreement.agreement(votes, level.value)
     save_json(json, asdict(result), votes.synthetic)
     show_text(agreement_text(result, file.stem, votes.synthetic))
     if result.icc:
@@ -106,3 +108,50 @@ def _save_scores(path: Path, scores: tuple[tuple[str, float], ...], case: str) -
         out.writerow(guarded_row([case, "score"]))
         out.writerows(guarded_row(score) for score in scores)
     typer.echo(f"written: {path} ({len(scores)} scale scores, the mean of the items)")
+
+
+# `analysis opinion`.
+
+
+class RepeatsChoice(StrEnum):
+    """What a person's repeated votes on one item count as."""
+
+    MEAN = "mean"
+    VOTES = "votes"
+
+
+def register_opinion(app: typer.Typer) -> None:
+    """Add the command to `app`."""
+    app.command(name="opinion")(opinion)
+
+
+def opinion(
+    file: Annotated[Path, typer.Argument(help="CSV file, one row a vote, such as the server's export.")],
+    item: Annotated[str, typer.Option(help="Column that names the clip or condition.")] = "stimulus",
+    participant: Annotated[str, typer.Option(help="Column that names the person.")] = "participant",
+    rating: Annotated[str, typer.Option(help="Column with the vote.")] = "response",
+    repeats: Annotated[
+        RepeatsChoice,
+        typer.Option(help="A person's repeated votes on an item: mean (n is people) or votes (n is votes)."),
+    ] = RepeatsChoice.MEAN,
+    json: JsonOption = None,
+) -> None:
+    """Mean opinion scores with 95% intervals; bias and inconsistency of each person (ITU-T P.910).
+
+    Examples:
+
+      analysis opinion ratings.csv
+
+      analysis opinion votes.csv --item clip --participant id --rating score --json mos.json
+    """
+    from analysis.opinion import fit_opinion, read_votes
+    from analysis.report.rating_tables import opinion_text, raters_table, scores_table
+
+    with saying("reading votes"):
+        votes = read_votes(file, item, participant, rating)
+    result = fit_opinion(votes, repeats.value)
+    save_json(json, asdict(result), votes.synthetic)
+    show_text(opinion_text(result, file.stem, votes.synthetic))
+    show_tables(
+        scores_table(result, file.stem, votes.synthetic), raters_table(result, file.stem, votes.synthetic)
+    )

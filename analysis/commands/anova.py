@@ -15,13 +15,13 @@ from analysis.commands.output import (
     save_json,
     save_report,
     saying,
+    scale_bounds,
     show,
 )
-from analysis.commands.scale_option import scale_bounds
 from experiments.errors import InputError
 
 
-def register(app: typer.Typer) -> None:
+def register_anova(app: typer.Typer) -> None:
     """Add the command to `app`."""
     app.command(name="anova")(anova)
 
@@ -89,8 +89,7 @@ def anova(
     The JSON file has effects[], marginal_means[], pairwise[], dropped[], n_participants: docs/analysis.md.
     """
     from analysis.plans.result import analyse_cells
-    from analysis.read.long_csv import read_long_table
-    from analysis.read.participant_columns import design_of
+    from analysis.read.long_csv import design_of, read_long_table
     from analysis.read.text_table import refuse_ids_once
     from analysis.report.within_contents import contents_of
     from analysis.within.cell_means import cell_table
@@ -129,7 +128,7 @@ def anova(
         )
     if robust:
         # scipy.stats takes a second to import, which only those who ask for it pay
-        from analysis.robust.companions import companions_of
+        from analysis.robust import companions_of
 
         with saying("permutations"):
             analysis = replace(analysis, robust=companions_of(analysis.anova))

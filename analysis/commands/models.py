@@ -12,6 +12,7 @@ from analysis.commands.output import JsonOption, LevelsOption, names_in, save_js
 if TYPE_CHECKING:
     from analysis.read.model_csv import ModelInput
 
+
 FileArgument = Annotated[Path, typer.Argument(help="CSV file, one row a trial, such as the server's export.")]
 ParticipantOption = Annotated[str, typer.Option(help="Column that names the participant.")]
 RatingOption = Annotated[str, typer.Option(help="Column with the rating.")]
@@ -74,9 +75,9 @@ class OrdinalSlopesChoice(StrEnum):
     NONE = "none"
 
 
-def register(app: typer.Typer) -> None:
+def register_models(app: typer.Typer) -> None:
     """Add the commands to `app`, those on synthetic participants too."""
-    from analysis.commands.synthetic import register as register_synthetic
+    from analysis.commands.synthetic import register_synthetic
 
     app.command(name="mixed")(mixed)
     app.command(name="ordinal")(ordinal)
@@ -123,7 +124,7 @@ def mixed(
       analysis mixed ratings.csv --df kenward-roger --intervals
     """
     from analysis.models.mixed import fit_mixed
-    from analysis.report.model_tables import (
+    from analysis.report.rating_tables import (
         mixed_coefficients_table,
         mixed_components_table,
         mixed_effects_table,
@@ -193,7 +194,7 @@ def ordinal(
       analysis ordinal table.csv --participant id --rating score --within face --quadrature 10
     """
     from analysis.models.ordinal import fit_ordinal
-    from analysis.report.model_tables import (
+    from analysis.report.rating_tables import (
         ordinal_coefficients_table,
         ordinal_components_table,
         ordinal_effects_table,

@@ -1,4 +1,4 @@
-"""What the commands on models and synthetic data share: tables, JSON, a spinner."""
+"""What the commands share: the option `--scale`, tables, JSON and a spinner."""
 
 import os
 from collections.abc import Callable, Iterator
@@ -13,6 +13,9 @@ from experiments.errors import InputError
 if TYPE_CHECKING:
     from analysis.report.contents import Contents
     from analysis.report.formats import Table
+
+
+# What the commands on models and synthetic data share: tables, JSON, a spinner.
 
 
 def _writable(path: Path | None) -> Path | None:
@@ -110,7 +113,7 @@ def save_json(path: Path | None, numbers: dict[str, Any], synthetic: bool | None
 def save_report(contents: "Contents", folder: Path, more: bool = False, with_r: bool = False) -> None:
     """Write the report; `more` adds what takes long, `with_r` lets R compute its tables anew."""
     from analysis.report.formats import wrap
-    from analysis.report.verify_with_r import rscript, verify_with_r
+    from analysis.report.r_models import rscript, verify_with_r
     from analysis.report.write import write_report
 
     if with_r:
@@ -140,3 +143,20 @@ def saying(what: str) -> Iterator[Callable[[str], None]]:
         return
     with console.status(Text(what)) as status:
         yield lambda step: status.update(Text(f"{what}: {step}"))
+
+
+# The option `--scale 1:7`, which several commands take.
+
+
+def scale_bounds(text: str | None) -> tuple[float, float] | None:
+    """The ends of a scale; None where none was given."""
+    if text is None:
+        return None
+    low, _, high = text.partition(":")
+    try:
+        bounds = float(low), float(high)
+    except ValueError:
+        bounds = (1.0, 0.0)
+    if not bounds[0] < bounds[1]:
+        raise InputError(f"--scale should be like 1:7, got '{text}'")
+    return bounds

@@ -1,26 +1,197 @@
 """`analysis plan`: how many participants, clips and faces a study needs, before there are data."""
 
-from typing import Annotated
+from dataclasses import asdict
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from analysis.commands.output import JsonOption
-from analysis.commands.plan_choices import pairs, thresholds
-from analysis.commands.plan_options import (
-    AlphaOption,
-    PlotOption,
-    PowerOption,
-    SeedOption,
-    SimulationsOption,
-    SizesOption,
-    counts_in,
-    effects_in,
-    levels_in,
-    numbers_in,
-)
-from analysis.commands.plan_simulation import simulate
-from analysis.commands.synthetic import StatisticChoice
+from analysis.commands.output import JsonOption, names_in, save_json
+from analysis.commands.synthetic import StatisticChoice, bar, say_power
 from experiments.command_groups import command_group
+from experiments.errors import InputError
+
+if TYPE_CHECKING:
+    from analysis.power.simulate import Design
+
+
+# Options of `analysis plan`, and what stands in them.
+
+SizesOption = Annotated[
+    str, typer.Option("--n", help="Numbers of participants: first:last:step, or 20,30,43.")
+]
+SimulationsOption = Annotated[int, typer.Option(help="Data sets a number of participants.", min=1)]
+AlphaOption = Annotated[float, typer.Option(help="Level of the tests.", min=1e-6, max=0.5)]
+PowerOption = Annotated[float, typer.Option("--power", help="Power to look for.", min=0.01, max=0.999)]
+SeedOption = Annotated[int, typer.Option(help="Same seed, same numbers.", min=0)]
+PlotOption = Annotated[
+    Path | None, typer.Option(help="Draw the curves into this PNG, SVG or PDF.", show_default=False)
+]
+
+
+class ShapeChoice(StrEnum):
+    """Shapes of psychometric functions."""
+
+    NORMAL = "normal"
+    LOGISTIC = "logistic"
+    WEIBULL = "weibull"
+
+
+def levels_in(text: str, option: str) -> dict[str, int]:
+    """Numbers of levels by factor, of `face:3,blur:2`."""
+    levels: dict[str, int] = {}
+    for part in names_in(text):
+        name, _, count = part.partition(":")
+        if not name or not count.isdecimal() or int(count) < 2 or name in levels:
+            raise InputError(
+                f"{option} should be like face:3,blur:2 (names and numbers of levels), got '{text}'"
+            )
+        levels[name] = int(count)
+    return levels
+
+
+def effects_in(given: list[str]) -> dict[str, float]:
+    """Cohen's f by effect, of texts like `face=0.25`."""
+    sizes: dict[str, float] = {}
+    for text in given:
+        name, _, size = text.partition("=")
+        try:
+            sizes[name.strip()] = float(size)
+        except ValueError:
+            raise InputError(f"--effect should be like face=0.25 or face:group=0.1, got '{text}'") from None
+        if not 0 <= sizes[name.strip()] < 10:
+            raise InputError(
+                f"--effect takes Cohen's f from 0 (small .1, medium .25, large .4), got '{text}'"
+            )
+    return sizes
+
+
+def numbers_in(text: str, option: str) -> tuple[float, ...]:
+    """Numbers separated by commas."""
+    try:
+        return tuple(float(part) for part in names_in(text))
+    except ValueError:
+        raise InputError(f"{option} should be numbers separated by commas, got '{text}'") from None
+
+
+def counts_in(text: str, option: str) -> tuple[int, ...]:
+    """Whole numbers from 1, separated by commas."""
+    parts = names_in(text)
+    if not all(part.isdecimal() and int(part) > 0 for part in parts):
+        raise InputError(f"{option} should be whole numbers separated by commas, got '{text}'")
+    return tuple(int(part) for part in parts)
+
+
+# What every `analysis plan` does with its design: simulate, say, draw, write.
+
+
+def simulate(
+    design: "Design",
+    name: str,
+    asked: tuple[str, int, float, float, int],
+    plot: Path | None,
+    json: Path | None,
+) -> None:
+    """Simulate a design; print its power, and write the figure and the JSON where they are asked for.
+
+    Parameters
+    ----------
+    design : Design
+    name : str
+        Of the design, in the table's title.
+    asked : tuple
+        Sizes as in 10:60:10, data sets of each, alpha, the power wanted, seed.
+    plot, json : Path or None
+    """
+    from importlib.metadata import version
+
+    from analysis.power.simulate import sample_size_text, sample_sizes, simulate_design
+    from analysis.report.formats import wrap
+
+    n, simulations, alpha, target, seed = asked
+    sizes = sample_sizes(n)
+    with bar("simulating", len(sizes) * simulations) as advance:
+        result = simulate_design(design, name, sizes, simulations, alpha, seed, advance)
+    text = sample_size_text(result, design, target, version("palpebra"))
+    numbers = asdict(result) | {"power": result.power.tolist(), "se": result.se.tolist()}
+    save_json(json, numbers | {"smallest_n": result.smallest_n(target), "text": text}, True)
+    if plot is not None:
+        from analysis.power.figure import save_power_figure
+
+        save_power_figure(result, plot, target)
+        typer.echo(f"written: {plot}")
+    say_power(result, target)
+    typer.echo("\n" + "\n".join(wrap(text)))
+
+
+# `analysis plan pairs` and `thresholds`: sample sizes of choices and psychometric trials.
+
+
+def pairs(
+    abilities: Annotated[
+        str, typer.Option(help="Log odds of the items: 0,0.3,0.6. One above another wins 73% of the time.")
+    ],
+    repeats: Annotated[int, typer.Option(help="Comparisons of each pair by a participant.", min=1)] = 1,
+    sd_rater: Annotated[float, typer.Option(help="SD of participants' own log odds of a pair.", min=0)] = 0.0,
+    tie: Annotated[float, typer.Option(help="Probability that two equal items tie (Davidson).")] = 0.0,
+    n: SizesOption = "10:60:10",
+    simulations: SimulationsOption = 500,
+    alpha: AlphaOption = 0.05,
+    target: PowerOption = 0.8,
+    seed: SeedOption = 1,
+    plot: PlotOption = None,
+    json: JsonOption = None,
+) -> None:
+    """Plan paired comparisons: whether items differ, and each item against the next best.
+
+    Examples:
+
+      analysis plan pairs --abilities 0,0.3,0.6,0.9 --n 10:40:10
+
+      analysis plan pairs --abilities 0,0.5 --repeats 4 --sd-rater 0.5
+
+      analysis plan pairs --abilities 0,0.3,0.6 --tie 0.2
+    """
+    from analysis.power.choices import PairsDesign
+
+    design = PairsDesign(numbers_in(abilities, "--abilities"), repeats, sd_rater, tie)
+    simulate(design, "paired comparisons", (n, simulations, alpha, target, seed), plot, json)
+
+
+def thresholds(
+    levels: Annotated[str, typer.Option(help="Stimuli shown: 100,120,140,160.")],
+    threshold: Annotated[float, typer.Option(help="Mean threshold of the first condition.")],
+    difference: Annotated[float, typer.Option(help="How much higher that of the second is.")],
+    spread: Annotated[float, typer.Option(help="Spread of a person's function.")],
+    sd_people: Annotated[float, typer.Option(help="SD of thresholds over people.")] = 0.0,
+    sd_difference: Annotated[float, typer.Option(help="SD of differences over people.")] = 0.0,
+    trials: Annotated[int, typer.Option(help="Trials of each stimulus in a condition.", min=1)] = 10,
+    guess: Annotated[float, typer.Option(help="Guess rate: 0 for yes/no, 0.5 for two alternatives.")] = 0.0,
+    lapse: Annotated[float, typer.Option(help="Lapse rate.")] = 0.0,
+    function: Annotated[ShapeChoice, typer.Option(help="Shape of the function.")] = ShapeChoice.NORMAL,
+    n: SizesOption = "6:30:6",
+    simulations: SimulationsOption = 500,
+    alpha: AlphaOption = 0.05,
+    target: PowerOption = 0.8,
+    seed: SeedOption = 1,
+    plot: PlotOption = None,
+    json: JsonOption = None,
+) -> None:
+    """Plan a comparison of thresholds in two conditions, each person in both.
+
+    Examples:
+
+      analysis plan thresholds --levels 100,120,140,160 --threshold 130 --difference 8 --spread 12
+    """
+    from analysis.power.choices import ThresholdDesign
+
+    design = ThresholdDesign(
+        numbers_in(levels, "--levels"), trials, threshold, difference, sd_people, sd_difference, spread,
+        guess, lapse, function.value, seed,
+    )  # fmt: skip
+    simulate(design, "thresholds", (n, simulations, alpha, target, seed), plot, json)
+
 
 plan = command_group(
     "Sample size by simulation: participants, clips and faces for a power, and a text that says so.",
@@ -28,7 +199,7 @@ plan = command_group(
 )
 
 
-def register(app: typer.Typer) -> None:
+def register_plan(app: typer.Typer) -> None:
     """Add the commands to `app`."""
     plan.command(name="pairs")(pairs)
     plan.command(name="thresholds")(thresholds)
@@ -118,7 +289,7 @@ def mixed(
 
       analysis plan mixed --difference 0.2,0.4 --clips 12,24
     """
-    from analysis.power.mixed_models import MixedDesign, Spreads
+    from analysis.power.models import MixedDesign, Spreads
 
     spreads = Spreads(sd_participant, sd_slope, sd_clip, sd_face, sd_face_slope, sd_residual)
     design = MixedDesign(
@@ -168,7 +339,7 @@ def ordinal(
 
       analysis plan ordinal --difference 0.3,0.6 --shares 1,2,4,2,1 --clips 12
     """
-    from analysis.power.ordinal_models import OrdinalDesign
+    from analysis.power.models import OrdinalDesign
 
     design = OrdinalDesign(
         numbers_in(difference, "--difference"),

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from analysis.power.simulate import PowerResult
     from analysis.synthetic.synthesise import Synthetic
 
+
 MeanOption = Annotated[
     list[str] | None,
     typer.Option(
@@ -39,7 +40,7 @@ class StatisticChoice(StrEnum):
     GREENHOUSE_GEISSER = "greenhouse-geisser"
 
 
-def register(app: typer.Typer) -> None:
+def register_synthetic(app: typer.Typer) -> None:
     """Add the commands to `app`."""
     app.command(name="power")(power)
     app.command(name="synthesise")(synthesise_command)
@@ -122,8 +123,8 @@ def synthesise_command(
 
       analysis synthesise sliders-demo --effect character=9 --effect eeriness/blink=4 --out scales.csv
     """
-    from analysis.synthetic.ratings_file import write_ratings
     from analysis.synthetic.synthesise import make_plans, synthesise
+    from analysis.synthetic.trials import write_ratings
 
     check_targets([out])
     plans = make_plans(experiment, n, mean or (), effect or ())

@@ -1,13 +1,78 @@
-"""Columns of a long table as ratings, groupings and covariates of a mixed model."""
+"""Columns of a long table in a mixed model: their roles, values and units."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from analysis.models.roles import ModelTerms
 from experiments.errors import InputError, did_you_mean
+
+# What the columns of a table are in a mixed or ordinal model, and who may differ in effects.
+
+Slopes = Literal["none", "main", "all", "correlated"]
+RandomSlopes = Literal["none", "main", "all"]
+
+
+@dataclass(frozen=True)
+class ModelTerms:
+    """What a model is of: columns by their role.
+
+    `within` vary within participants, `between` do not; `item` (several columns together) names what was
+    rated; `covariates` are numbers, centred; `interactions` are products of covariates with covariates or
+    factors, by the names of their members; `random` are further groupings with an intercept each, `a/b` for
+    b nested in a.
+    """
+
+    participant: str
+    rating: str
+    within: tuple[str, ...]
+    item: tuple[str, ...] = ()
+    between: tuple[str, ...] = ()
+    covariates: tuple[str, ...] = ()
+    random: tuple[str, ...] = ()
+    interactions: tuple[tuple[str, ...], ...] = ()
+
+
+def split_covariates(
+    named: Sequence[str], factors: Sequence[str]
+) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]:
+    """Covariates, and their interactions: of `Days`, `age:group` the covariates are Days and age.
+
+    Parameters
+    ----------
+    named : sequence of str
+        Columns of numbers, and interactions whose members are separated by colons.
+    factors : sequence of str
+        Columns of factors; what else an interaction names is a covariate, with a slope in the model.
+
+    Raises
+    ------
+    InputError
+        An interaction of factors alone (which the model always has), or with one member twice.
+    """
+    covariates: dict[str, None] = dict.fromkeys(name for name in named if ":" not in name)
+    interactions: dict[tuple[str, ...], None] = {}
+    for name in named:
+        if ":" not in name:
+            continue
+        members = tuple(part.strip() for part in name.split(":"))
+        numbers = [member for member in members if member not in factors]
+        if not numbers:
+            raise InputError(
+                f"'{name}' names factors alone, whose interactions are always in the model; expected an "
+                "interaction with a covariate, such as age:blur"
+            )
+        if len(set(members)) < len(members) or "" in members:
+            raise InputError(f"expected an interaction of different columns, got '{name}'")
+        covariates |= dict.fromkeys(numbers)
+        interactions[members] = None
+    return tuple(covariates), tuple(interactions)
+
+
+# Columns of a long table as ratings, groupings and covariates of a mixed model.
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -118,3 +183,32 @@ def covariate_columns(
         columns.append((values - mean)[:, None])
         said.append(f"{name} centred at its mean over {'participants' if of_people else 'rows'}, {mean:.6g}")
     return np.hstack(columns), tuple(said)
+
+
+# Ratings in units of their own, so that neither a far origin nor a large unit costs a model its digits.
+
+
+@dataclass(frozen=True)
+class Units:
+    """A model is fitted to (rating - middle) / scale: sums of squares of times since 1970 have no digit left.
+
+    `middle` is whole in units of `scale`, a power of two: of ordinary ratings nothing is rounded.
+    """
+
+    middle: float
+    scale: float
+
+    def scaled(self, ratings: Floats) -> Floats:
+        """The ratings in these units."""
+        return (ratings - self.middle) / self.scale
+
+    def interval(self, ends: tuple[float, float], intercept: bool = False) -> tuple[float, float]:
+        """An interval in the ratings' own units."""
+        low, high = (end * self.scale + (self.middle if intercept else 0.0) for end in ends)
+        return low, high
+
+
+def units_of(ratings: Floats) -> Units:
+    """Units in which ratings that vary lie about zero and spread by about one."""
+    scale = float(2.0 ** np.round(np.log2(ratings.std())))
+    return Units(float(np.round(ratings.mean() / scale) * scale), scale)

@@ -8,14 +8,67 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from analysis.models.coding import coded_cells
-from analysis.models.columns import Grouping, covariate_columns, groupings, ratings, refuse_unknown_columns
-from analysis.models.roles import ModelTerms, RandomSlopes, Slopes
-from analysis.models.terms import Term, intercept_term
+from analysis.models.columns import (
+    Grouping,
+    ModelTerms,
+    RandomSlopes,
+    Slopes,
+    covariate_columns,
+    groupings,
+    ratings,
+    refuse_unknown_columns,
+)
+from analysis.models.reml import Term, intercept_term
+from analysis.within.contrasts import effect_members, effect_name, orthonormal_basis
 from analysis.within.level_codes import level_codes
 from experiments.errors import InputError
 
+# Cells of a factorial design as sum-coded effects, and as orthonormal contrasts of unit variance.
+
 Floats = NDArray[np.float64]
+
+
+def _sum_coding(levels: int) -> Floats:
+    """Contrasts of R's contr.sum with a column of ones before them, (levels, levels)."""
+    coding = np.eye(levels)[:, :-1]
+    coding[-1] = -1.0
+    return np.hstack([np.ones((levels, 1)), coding])
+
+
+def coded_cells(
+    factors: list[str], levels: Sequence[Sequence[str]]
+) -> tuple[Floats, Floats, tuple[str, ...], tuple[str, ...]]:
+    """Both codings (cells, cells), the effect of each column, and the columns' names.
+
+    Parameters
+    ----------
+    factors : list of str
+        Names.
+    levels : sequence of sequence of str
+        Their levels; cells vary fastest in the last factor.
+    """
+    sizes = [len(names) for names in levels]
+    fixed, spread = [np.ones((int(np.prod(sizes)), 1))], [np.ones((int(np.prod(sizes)), 1))]
+    effect_of, names = ["intercept"], ["intercept"]
+    for members in effect_members(len(factors)):
+        codings: Floats = np.ones((1, 1))
+        bases: Floats = np.ones((1, 1))
+        for axis, size in enumerate(sizes):
+            inside = axis in members
+            codings = np.asarray(np.kron(codings, _sum_coding(size)[:, 1:] if inside else np.ones((size, 1))))
+            basis = orthonormal_basis(size) * np.sqrt(size)
+            bases = np.asarray(np.kron(bases, basis[:, 1:] if inside else np.ones((size, 1))))
+        fixed.append(codings)
+        spread.append(bases)
+        effect = effect_name([factors[m] for m in members])
+        effect_of += [effect] * codings.shape[1]
+        inner = product(*[levels[m][:-1] for m in members])
+        names += [
+            ":".join(f"{factors[m]}[{lv}]" for m, lv in zip(members, row, strict=True)) for row in inner
+        ]
+    return np.hstack(fixed), np.hstack(spread), tuple(effect_of), tuple(names)
+
+
 Integers = NDArray[np.int64]
 
 
@@ -367,3 +420,68 @@ def _refuse_collinear(data: ModelData) -> None:
             f"the covariates {', '.join(data.terms.covariates)} are determined by the factors or by one "
             "another; leave one out"
         )
+
+
+# Which effects participants may differ in.
+
+
+def slope_groups(data: ModelData, slopes: Slopes) -> tuple[list[str], list[str]]:
+    """Effects with a by-participant slope (`intercept` first), and what had to be left out."""
+    if slopes == "none":
+        return ["intercept"], []
+    if slopes != "all":
+        effects = ["intercept", *data.covariate_slopes, *data.terms.within]
+        if slopes == "correlated":
+            _refuse_too_few(data, effects)
+            return effects, []
+        return _without_residual_slopes(data, effects)
+    inside = data.slope_effects
+    kept, said = _without_residual_slopes(data, ["intercept", *_without_last(data, inside)])
+    last = [effect for effect in inside if effect not in _without_last(data, inside)]
+    return kept, [*(f"no slope of {name}: with one rating a cell it is the residual" for name in last), *said]
+
+
+def _without_last(data: ModelData, inside: list[str]) -> list[str]:
+    """Effects without the highest interaction of factors where each cell has one rating of a participant."""
+    cells, people = len(data.fixed), data.participants
+    counts = np.bincount(people.codes * cells + data.cell, minlength=len(people.names) * cells)
+    of_factors = [effect for effect in inside if effect in data.factorial_effects]
+    if counts.max() > 1 or not of_factors:
+        return inside
+    return [effect for effect in inside if effect != of_factors[-1]]
+
+
+def _without_residual_slopes(data: ModelData, effects: list[str]) -> tuple[list[str], list[str]]:
+    """Effects without slopes of covariates that would leave participants' ratings no residual."""
+    people, ratings = len(data.participants.names), len(data.rating)
+    numbers = {effect.name for effect in data.number_effects}
+    kept, said = list(effects), []
+    for name in reversed([effect for effect in effects if effect in numbers]):
+        own = sum(len(data.columns(effect)) for effect in kept)
+        if own * people < ratings:
+            break
+        kept.remove(name)
+        said.append(f"no slope of {name}: with so few ratings of each participant it is the residual")
+    return kept, said
+
+
+def _refuse_too_few(data: ModelData, effects: Sequence[str]) -> None:
+    """As many correlated random coefficients as ratings leave no residual."""
+    own = sum(len(data.columns(effect)) for effect in effects)
+    people, ratings = len(data.participants.names), len(data.rating)
+    if own * people >= ratings:
+        raise InputError(
+            f"expected more than {own * people} ratings for {own} correlated coefficients of each of "
+            f"{people} participants, got {ratings}; with one rating a cell use --slopes none or all"
+        )
+
+
+def unmodelled_slopes(data: ModelData, slopes: Slopes) -> list[str]:
+    """What is said of covariates that vary within participants, in a model of intercepts alone."""
+    if slopes != "none" or not data.covariate_slopes:
+        return []
+    named = ", ".join(data.covariate_slopes)
+    return [
+        f"{named} varies within participants and has no by-participant slope: where people differ in it its "
+        "p is too small; --slopes all gives it one"
+    ]

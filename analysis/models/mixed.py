@@ -1,36 +1,64 @@
 """Linear mixed models: crossed and nested groupings, by-participant slopes, Satterthwaite tests."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy import special
+from scipy import sparse, special
+from scipy.sparse import linalg
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
-from analysis.models.design import ModelData, model_data
-from analysis.models.exact import refused_where_exact
-from analysis.models.intervals import with_intervals
-from analysis.models.kenward_roger import KenwardRoger, kenward_roger
-from analysis.models.mixed_result import Coefficient, DfMethod, MixedEffect, MixedResult
+from analysis.models.columns import ModelTerms, RandomSlopes, Slopes, Units, split_covariates, units_of
+from analysis.models.design import ModelData, model_data, slope_groups, unmodelled_slopes
+from analysis.models.fixed_effect_tests import KenwardRoger, Uncertainty, kenward_roger, uncertainty
+from analysis.models.profile import with_intervals
 from analysis.models.random_part import (
+    Coefficient,
     Component,
+    DfMethod,
+    MixedEffect,
+    MixedResult,
     components_of_people,
     degenerate_terms,
+    fit_theta,
     formula_of,
     terms_of,
     theta_names,
     untold,
 )
-from analysis.models.reml import CrossProducts, criterion, cross_products
-from analysis.models.roles import ModelTerms, RandomSlopes, Slopes, split_covariates
-from analysis.models.satterthwaite import Uncertainty, uncertainty
-from analysis.models.slopes import slope_groups, unmodelled_slopes
-from analysis.models.terms import Term
-from analysis.models.units import Units, units_of
-from analysis.models.variances import fit_theta
+from analysis.models.reml import CrossProducts, Term, criterion, cross_products
 from experiments.errors import InputError
+
+# Ratings that a mixed model repeats to the last digit: without residual variance nothing is tested.
+
+EXACT = 1e-8
+"""Residuals below this share of the ratings' spread are rounding."""
+
+
+@contextmanager
+def refused_where_exact(data: ModelData, terms: Sequence[Term]) -> Iterator[None]:
+    """Say why a fit in this block divides by zero or a singular matrix.
+
+    Raises
+    ------
+    InputError
+        Where fixed effects and random terms together leave no residual; other errors pass.
+    """
+    try:
+        yield
+    except (np.linalg.LinAlgError, ZeroDivisionError) as error:
+        columns = sparse.hstack([sparse.csr_matrix(data.x), *(term.matrix() for term in terms)], format="csr")
+        residual = float(linalg.lsqr(columns, data.rating, atol=1e-12, btol=1e-12)[3])
+        if residual > EXACT * float(np.linalg.norm(data.rating - data.rating.mean())):
+            raise
+        raise InputError(
+            "the ratings have no residual variance: factors, people and items repeat every one exactly, "
+            "as where each person gives one rating throughout; check the rating column"
+        ) from error
+
 
 Floats = NDArray[np.float64]
 

@@ -1,8 +1,4 @@
-"""Profile likelihood intervals of a linear mixed model: of coefficients, and of standard deviations.
-
-As lme4's `confint(method = "profile")`: maximum likelihood, every other parameter fitted anew at each point
-(Bates et al. 2015, doi:10.18637/jss.v067.i01, section 5.1); the ends are solved for, where lme4 interpolates.
-"""
+"""Profile likelihood intervals of a linear mixed model's coefficients and standard deviations."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
@@ -12,7 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize, special
 
+from analysis.models.columns import Units
+from analysis.models.random_part import MixedResult
 from analysis.models.reml import Criterion, CrossProducts, criterion
+
+# Profile likelihood intervals of a linear mixed model: of coefficients, and of standard deviations.
+#
+# As lme4's `confint(method = "profile")`: maximum likelihood, every other parameter fitted again at each
+# point (Bates et al. 2015, doi:10.18637/jss.v067.i01, section 5.1); the ends are solved for, where lme4
+# interpolates.
 
 Floats = NDArray[np.float64]
 Bound = tuple[float | None, float | None]
@@ -248,3 +252,79 @@ def _without(c: CrossProducts, column: int, value: float) -> CrossProducts:
     turn = np.delete(np.eye(c.f + 1), column, axis=1)
     turn[column, -1] = -value
     return replace(c, pb=c.pb @ turn, cb=c.cb @ turn, bb=turn.T @ c.bb @ turn)
+
+
+# Profile likelihood intervals beside the estimates of a linear mixed model.
+
+
+def with_intervals(
+    result: MixedResult,
+    c: CrossProducts,
+    theta: Floats,
+    units: Units,
+    progress: Callable[[str], None] | None = None,
+    scales: Sequence[float] = (),
+) -> MixedResult:
+    """Add profile intervals; standard deviations of correlated slopes are no parameters and have none.
+
+    Parameters
+    ----------
+    result : MixedResult
+        Without intervals.
+    c : CrossProducts
+        What it was fitted to.
+    theta : (m,) array
+        The REML estimate.
+    units : Units
+        The scale of `c`.
+    progress : callable, optional
+        Takes a word on every interval before it is computed.
+    scales : sequence of float
+        Standard deviations of the covariates whose slopes the components are; 1 of others. Empty for all 1.
+    """
+    profile = Profile(c, theta)
+    own = [row for row in result.components if row.group == result.components[0].group]
+    positions: list[int | None] = list(range(len(own)))
+    if result.slopes == "correlated":
+        positions = [None] * len(own)
+    positions = [None if row.correlations else k for row, k in zip(own, positions, strict=True)]
+    further = len(result.components) - 1 - len(own)
+    positions += [c.blocks[0].theta.stop + k for k in range(further)]
+    known_sds = sum(k is not None for k in positions) + 1
+    count = known_sds + len(result.coefficients)
+
+    def say(number: int, name: str) -> None:
+        if progress:
+            progress(f"interval {number} of {count}, {name}")
+
+    ends: list[tuple[float, float] | None] = []
+    number = 0
+    for row, k, scale in zip(result.components, positions, scales or [1.0] * len(positions), strict=False):
+        if k is None:
+            ends.append(None)
+            continue
+        number += 1
+        say(number, f"SD of {row.group} {row.term}".strip())
+        low, high = profile.sd(k)
+        ends.append((low / scale, high / scale))
+    ends.append(profile.sigma())
+    coefficients = []
+    for column, known in enumerate(result.coefficients):
+        say(count - len(result.coefficients) + column + 1, known.name)
+        ci = units.interval(profile.coefficient(column), intercept=column == 0)
+        coefficients.append(replace(known, ci=ci))
+    components = tuple(
+        replace(row, ci=ci and units.interval(ci)) for row, ci in zip(result.components, ends, strict=True)
+    )
+    return _said(replace(result, coefficients=tuple(coefficients), components=components))
+
+
+def _said(result: MixedResult) -> MixedResult:
+    """With a note on every interval that has no end."""
+    named = [(row.name, row.ci) for row in result.coefficients]
+    named += [(f"{row.group} {row.term}".strip(), row.ci) for row in result.components]
+    open_ended = [name for name, ci in named if ci and not np.isfinite(ci).all()]
+    if not open_ended:
+        return result
+    note = f"the likelihood bounds no profile interval of {', '.join(open_ended)} on at least one side"
+    return replace(result, notes=(*result.notes, note))

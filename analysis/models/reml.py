@@ -1,24 +1,350 @@
-"""The (restricted) likelihood of crossed and nested random terms from cross-products, with its gradient.
+"""The (restricted) likelihood of a mixed model: random terms, cross-products, gradient."""
 
-Model: y = X b + sum_t Z_t (I (x) L_t) u_t + e, u_t and e normal with SD sigma (`terms`). theta are the free
-entries of the L_t, relative to sigma, as in lme4 (Bates et al. 2015, doi:10.18637/jss.v067.i01). After the
-cross-products trials cost nothing. With V = I + Z L L'Z' over sigma^2, the grouping with the most
-coefficients is taken out first, which is a division by its p x p blocks; what is left, S = I + L'K L of the
-J other coefficients, is factored by Cholesky (`schur`).
-"""
-
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
+from scipy import linalg, sparse
 
-from analysis.models.crossing import Crossing, crossing, summed_product
-from analysis.models.schur import Rest
-from analysis.models.terms import Block, Term, intercept_term, placed
+# Random terms: which coefficients differ between the levels of a grouping, and their relative factors.
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Term:
+    """Coefficients of the columns z (n, p) that differ between the levels of one grouping.
+
+    `codes` (n,) name each trial's level. The coefficients of a level are L u sigma, u standard normal;
+    L = sum of theta_k patterns_k, `patterns` (m, p, p).
+    """
+
+    codes: Integers = field(repr=False)
+    levels: int
+    z: Floats = field(repr=False)
+    patterns: Floats = field(repr=False)
+
+    @property
+    def p(self) -> int:
+        """Number of coefficients of a level."""
+        return int(self.z.shape[1])
+
+    @property
+    def size(self) -> int:
+        """Number of coefficients of all levels."""
+        return self.levels * self.p
+
+    def matrix(self) -> sparse.csr_matrix:
+        """Z (n, levels p), the p columns of a level side by side."""
+        n = len(self.codes)
+        columns = self.codes[:, None] * self.p + np.arange(self.p)
+        rows = np.arange(0, n * self.p + 1, self.p)
+        return sparse.csr_matrix((self.z.ravel(), columns.ravel(), rows), shape=(n, self.size))
+
+
+def intercept_term(codes: Integers, levels: int) -> Term:
+    """An intercept of every level."""
+    return Term(codes, levels, np.ones((len(codes), 1)), np.ones((1, 1, 1)))
+
+
+@dataclass(frozen=True)
+class Block:
+    """Where a term stands: `theta` among the parameters, `columns` among the rest (none if it is first)."""
+
+    levels: int
+    patterns: Floats = field(repr=False)
+    theta: slice
+    columns: slice
+
+    def factor(self, theta: Floats) -> Floats:
+        """L (p, p)."""
+        return np.asarray(np.tensordot(theta[self.theta], self.patterns, 1))
+
+    def applied(self, factor: Floats, values: Floats) -> Floats:
+        """`factor` (p, p) times the p rows of every level in values (levels p, m)."""
+        if factor.shape == (1, 1):
+            return np.asarray(factor[0, 0] * values)
+        p, width = factor.shape[0], values.shape[1]
+        return np.asarray(factor @ values.reshape(self.levels, p, width)).reshape(-1, width)
+
+    def diagonal_blocks(self, matrix: Floats) -> Floats:
+        """Sum (p, p) of the diagonal blocks of matrix (levels p, levels p)."""
+        p = self.patterns.shape[1]
+        total = [[matrix.diagonal(b - a)[a::p].sum() if b >= a else 0.0 for b in range(p)] for a in range(p)]
+        upper = np.array(total)
+        return np.asarray(upper + np.triu(upper, 1).T)
+
+
+def placed(terms: Sequence[Term], first: int) -> list[Block]:
+    """The blocks of terms, with term `first` taken out and the others side by side in their order."""
+    blocks, theta, column = [], 0, 0
+    for k, term in enumerate(terms):
+        size = 0 if k == first else term.size
+        columns = slice(column, column + size)
+        column += size
+        blocks.append(Block(term.levels, term.patterns, slice(theta, theta + len(term.patterns)), columns))
+        theta += len(term.patterns)
+    return blocks
+
+
+# Cross-products of the grouping taken out first with all others, dense where most met, sparse where few did.
+#
+# N levels with p columns each are taken out; J is the number of columns of the rest.
+
+SPARSE_BELOW = 0.15
+"""Share of cross-products other than zero below which they are kept sparse, where they are many."""
+
+MANY = 100_000
+"""N p J^2 / p^2 from which sparse products, p^2 of which are waited for, may be faster than dense ones."""
+
+
+class Eliminated(Protocol):
+    """Cross-products with the first grouping taken out, at one Lp; m is any number of columns."""
+
+    def schur(self) -> Floats:
+        """V'W (J, J) with V = Lp'P, W = M^-1 V, P the cross-products, M = I + Lp'Z'Z Lp."""
+
+    def to_rest(self, values: Floats) -> Floats:
+        """V' values (J, m) of values (N, p, m)."""
+
+    def from_rest(self, values: Floats) -> Floats:
+        """W values (N, p, m) of values (J, m)."""
+
+    def plain(self, values: Floats) -> Floats:
+        """P values (N, p, m) of values (J, m)."""
+
+    def quadratic(self, inner: Floats) -> Floats:
+        """Sum over levels of Q inner Q' (p, p), Q = P - Z'Z Lp W, inner (J, J) symmetric."""
+
+
+class Crossing(Protocol):
+    """Cross-products of random-effect columns, (N, p, J)."""
+
+    def eliminated(self, lp: Floats, mp: Floats, gl: Floats) -> Eliminated:
+        """Take the first grouping out: Lp (p, p), M (N, p, p), Z'Z Lp (N, p, p)."""
+
+
+def crossing(first: sparse.csr_matrix, rest: sparse.csr_matrix, p: int) -> Crossing:
+    """Cross-products of `first` (n, N p), the p columns of a level side by side, with `rest` (n, J)."""
+    sums = sparse.csr_matrix(first.T @ rest)
+    rows, columns = sums.shape
+    many = rows * columns**2 > MANY * p**2
+    if many and sums.nnz < SPARSE_BELOW * rows * columns:  # without a rest it is dense
+        return SparseCrossing(sums, p)
+    return DenseCrossing(np.asarray(sums.toarray(), dtype=np.float64).reshape(rows // p, p, columns))
+
+
+@dataclass(frozen=True)
+class DenseCrossing:
+    """`sums` (N, p, J)."""
+
+    sums: Floats = field(repr=False)
+
+    def eliminated(self, lp: Floats, mp: Floats, gl: Floats) -> "DenseEliminated":
+        """See `Crossing`."""
+        v = lp.T @ self.sums
+        return DenseEliminated(self.sums, v, np.asarray(np.linalg.solve(mp, v), dtype=np.float64), gl)
+
+
+@dataclass(frozen=True)
+class DenseEliminated:
+    """See `Eliminated`."""
+
+    p: Floats = field(repr=False)
+    v: Floats = field(repr=False)
+    w: Floats = field(repr=False)
+    gl: Floats = field(repr=False)
+
+    def schur(self) -> Floats:
+        """See `Eliminated`."""
+        return np.asarray(_flat(self.v).T @ _flat(self.w))
+
+    def to_rest(self, values: Floats) -> Floats:
+        """See `Eliminated`."""
+        return np.asarray(_flat(self.v).T @ _flat(values))
+
+    def from_rest(self, values: Floats) -> Floats:
+        """See `Eliminated`."""
+        return np.asarray(self.w @ values)
+
+    def plain(self, values: Floats) -> Floats:
+        """See `Eliminated`."""
+        return np.asarray(self.p @ values)
+
+    def quadratic(self, inner: Floats) -> Floats:
+        """See `Eliminated`."""
+        q = self.p - self.gl @ self.w
+        return summed_product(q @ inner, q)
+
+
+def _flat(values: Floats) -> Floats:
+    """(N p, m) of (N, p, m), also where m is 0."""
+    n, p, width = values.shape
+    return values.reshape(n * p, width)
+
+
+def summed_product(a: Floats, b: Floats) -> Floats:
+    """Sum over levels of a_i b_i', both (N, p, m)."""
+    n, p, width = a.shape
+    turned = (values.transpose(1, 0, 2).reshape(p, n * width) for values in (a, b))
+    return np.asarray(next(turned) @ next(turned).T)
+
+
+@dataclass(frozen=True)
+class SparseCrossing:
+    """`sums` (N p, J): the p rows of a level stand together."""
+
+    sums: sparse.csr_matrix = field(repr=False)
+    p: int
+
+    def eliminated(self, lp: Floats, mp: Floats, gl: Floats) -> "SparseEliminated":
+        """See `Crossing`."""
+        people = self.sums.shape[0] // self.p
+        v = (_blocks(np.broadcast_to(lp.T, (people, self.p, self.p))) @ self.sums).tocsr()
+        w = (_blocks(np.asarray(np.linalg.inv(mp), dtype=np.float64)) @ v).tocsr()
+        q = (self.sums - _blocks(gl) @ w).tocsr()
+        return SparseEliminated(self.sums, v, w, q, self.p)
+
+
+def _blocks(matrices: Floats) -> sparse.bsr_matrix:
+    """Block-diagonal matrix of (N, p, p)."""
+    n, p = matrices.shape[:2]
+    at = (np.ascontiguousarray(matrices), np.arange(n), np.arange(n + 1))
+    return sparse.bsr_matrix(at, shape=(n * p, n * p))
+
+
+@dataclass(frozen=True)
+class SparseEliminated:
+    """See `Eliminated`."""
+
+    sums: sparse.csr_matrix = field(repr=False)
+    v: sparse.csr_matrix = field(repr=False)
+    w: sparse.csr_matrix = field(repr=False)
+    q: sparse.csr_matrix = field(repr=False)
+    p: int
+
+    def schur(self) -> Floats:
+        """See `Eliminated`."""
+        return np.asarray((self.v.T @ self.w).toarray(), dtype=np.float64)
+
+    def to_rest(self, values: Floats) -> Floats:
+        """See `Eliminated`."""
+        return np.asarray(self.v.T @ values.reshape(-1, values.shape[2]))
+
+    def from_rest(self, values: Floats) -> Floats:
+        """See `Eliminated`."""
+        return np.asarray(self.w @ values).reshape(-1, self.p, values.shape[1])
+
+    def plain(self, values: Floats) -> Floats:
+        """See `Eliminated`."""
+        return np.asarray(self.sums @ values).reshape(-1, self.p, values.shape[1])
+
+    def quadratic(self, inner: Floats) -> Floats:
+        """See `Eliminated`."""
+        columns = [self.q[a :: self.p] for a in range(self.p)]
+        total = np.empty((self.p, self.p))
+        for a in range(self.p):
+            for b in range(a + 1):
+                both = sparse.coo_matrix(columns[a].T @ columns[b])
+                total[a, b] = total[b, a] = both.data @ inner[both.row, both.col]
+        return total
+
+
+# What is left of the random terms once the largest is taken out: S = I + L'K L (J, J), factored whole.
+
+WELL_CONDITIONED = 0.02
+"""Relative SDs above this let Z'V^-1 Z be read off the inverse of S."""
+
+
+class Rest:
+    """The rest of the terms at one theta, by a dense Cholesky factor.
+
+    K = Z'V_1^-1 Z (J, J) and `kb` = Z'V_1^-1 [X y] (J, m) are cross-products with the first term taken out.
+    """
+
+    def __init__(
+        self,
+        blocks: Sequence[Block],
+        theta: Floats,
+        cc: sparse.csr_matrix,
+        out: Eliminated,
+        kb: Floats,
+    ) -> None:
+        self._blocks = blocks
+        self._factors = [block.factor(theta) for block in blocks]
+        self._k: Floats = np.asarray(cc.toarray() - out.schur(), dtype=np.float64)
+        self._kb = kb
+        self._lk = self._left(self._k)
+        s = self._left(self._lk.T)
+        s[np.diag_indices(len(s))] += 1.0
+        # LAPACK refuses matrices without rows
+        self._r = linalg.cholesky(s, lower=True, overwrite_a=True, check_finite=False) if len(s) else s
+        self.log_det = 2 * float(np.log(np.diag(self._r)).sum())
+        half = self._solved(self._left(kb))
+        self.explained: Floats = half.T @ half
+        """[X y]'V_1^-1 Z L S^-1 L'Z'V_1^-1 [X y] (m, m)."""
+        self.solution = self._spread(self._solved(half, transposed=True))
+        """L S^-1 L'Z'V_1^-1 [X y] (J, m)."""
+        self._inverse = self._inverted()
+        self.inner = self._spread(self._spread(self._inverse).T)
+        """L S^-1 L' (J, J)."""
+
+    def _left(self, values: Floats) -> Floats:
+        """L' values."""
+        return self._applied([factor.T for factor in self._factors], values)
+
+    def _spread(self, values: Floats) -> Floats:
+        """L values."""
+        return self._applied(self._factors, values)
+
+    def _applied(self, factors: Sequence[Floats], values: Floats) -> Floats:
+        parts = [b.applied(f, values[b.columns]) for b, f in zip(self._blocks, factors, strict=True)]
+        return np.concatenate(parts) if len(parts) > 1 else parts[0] if parts else values.copy()
+
+    def _solved(self, values: Floats, transposed: bool = False) -> Floats:
+        if not len(self._r):
+            return values
+        trans: Literal[0, 1] = 1 if transposed else 0
+        solved = linalg.solve_triangular(self._r, values, lower=True, trans=trans, check_finite=False)
+        return np.asarray(solved, dtype=np.float64)
+
+    def _inverted(self) -> Floats:
+        if not len(self._r):
+            return self._r
+        # the factor's upper triangle is zero, and stays so
+        inverse, _ = linalg.lapack.dpotri(self._r, lower=True)
+        diagonal = np.diag(inverse).copy()
+        inverse = inverse + inverse.T
+        np.fill_diagonal(inverse, diagonal)
+        return np.asarray(inverse)
+
+    def traces_and_scores(self) -> Iterator[tuple[Floats, Floats]]:
+        """Of every term the sum over levels of Z'V^-1 Z (p, p), and Z'V^-1 [X y] (levels, p, m)."""
+        scores = self._kb - self._k @ self.solution
+        for block, factor in zip(self._blocks, self._factors, strict=True):
+            at, p = block.columns, factor.shape[0]
+            if np.linalg.svd(factor, compute_uv=False).min() > WELL_CONDITIONED:
+                # K - K L S^-1 L'K = L^-T (I - S^-1) L^-1
+                lost = block.levels * np.eye(p) - block.diagonal_blocks(self._inverse[at, at])
+                trace = np.linalg.solve(factor.T, np.linalg.solve(factor.T, lost).T)
+            else:
+                half = self._solved(self._lk[:, at])
+                trace = block.diagonal_blocks(self._k[at, at])
+                half = half.reshape(len(half) * block.levels, p)
+                trace = trace - half.T @ half
+            yield trace, scores[at].reshape(block.levels, p, -1)
+
+
+# The (restricted) likelihood of crossed and nested random terms from cross-products, with its gradient.
+#
+# Model: y = X b + sum_t Z_t (I (x) L_t) u_t + e, u_t and e normal with SD sigma (`terms`). theta are the free
+# entries of the L_t, relative to sigma, as in lme4 (Bates et al. 2015, doi:10.18637/jss.v067.i01). After the
+# cross-products trials cost nothing. With V = I + Z L L'Z' over sigma^2, the grouping with the most
+# coefficients is taken out first, which is a division by its p x p blocks; what is left, S = I + L'K L of the
+# J other coefficients, is factored by Cholesky (`schur`).
 
 
 @dataclass(frozen=True)

@@ -1,15 +1,23 @@
 """Abilities of items and their contrasts."""
 
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from analysis.pairs.comparisons import LEFT, RIGHT, Comparisons
-from analysis.pairs.connected import refuse_disconnected, separated
-from analysis.pairs.factors import ItemFactors, factor_tests
-from analysis.pairs.goodness import goodness_of_fit
+from analysis.pairs.comparisons import (
+    LEFT,
+    RIGHT,
+    Comparisons,
+    Transitivity,
+    refuse_disconnected,
+    separated,
+    transitivity,
+)
 from analysis.pairs.likelihood import (
     Counts,
     Fit,
@@ -21,12 +29,256 @@ from analysis.pairs.likelihood import (
     sandwich,
     scores,
 )
-from analysis.pairs.pairs_result import SCALES, Contrast, Item, PairsResult, Parameter
-from analysis.pairs.transitivity import transitivity
+from analysis.read.text_table import names_in_order, read_text_table, texts_required
+from analysis.thresholds.likelihood import fit_p
 from analysis.within.adjustments import holm
 from experiments.errors import InputError
 
+# Abilities as a linear function of the items' factors.
+
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FactorTest:
+    """A likelihood-ratio test of one factor, and its coefficients against its first level.
+
+    `levels` names the levels whose coefficients stand in `estimates`; treatment coding, additive.
+    """
+
+    factor: str
+    reference: str
+    levels: tuple[str, ...]
+    estimates: tuple[float, ...]
+    standard_errors: tuple[float, ...]
+    chi2: float
+    df: int
+    p: float
+
+
+@dataclass(frozen=True)
+class ItemFactors:
+    """The level of each item in each factor; `orders` has the levels of a factor, the first the reference.
+
+    A factor without an order has its levels sorted as text.
+    """
+
+    factors: tuple[str, ...]
+    levels: dict[str, tuple[str, ...]]
+    source: str
+    orders: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    def names(self, factor: str) -> tuple[str, ...]:
+        """Levels of a factor that items have, in order."""
+        index = self.factors.index(factor)
+        there = {levels[index] for levels in self.levels.values()}
+        return tuple(name for name in self.orders.get(factor, sorted(there)) if name in there)
+
+    def design(self, items: tuple[str, ...], without: str | None = None) -> Array:
+        """Return the treatment-coded design (k, p) of the items, without one factor if asked.
+
+        Raises
+        ------
+        InputError
+            Where an item is not in the table, or the factors do not tell the levels apart.
+        """
+        for item in items:
+            if item not in self.levels:
+                raise InputError(f"{self.source}: no row for item '{item}'; every compared item needs one")
+        columns = [
+            [float(self.levels[item][self.factors.index(factor)] == level) for item in items]
+            for factor in self.factors
+            if factor != without
+            for level in self.names(factor)[1:]
+        ]
+        design = np.array(columns).T.reshape(len(items), len(columns))
+        centred = design - design.mean(axis=0)
+        if design.shape[1] and np.linalg.matrix_rank(centred) < design.shape[1]:
+            raise InputError(f"{self.source}: the factors cannot be told apart on these items; leave one out")
+        return design
+
+
+def read_item_factors(path: Path) -> ItemFactors:
+    """Read a CSV whose first column names the item and whose other columns are its factors.
+
+    Raises
+    ------
+    InputError
+        As `read_text_table`; an item twice; a factor with one level.
+    """
+    table = read_text_table(path, None, copies=False)
+    if len(table.header) < 2:
+        raise InputError(f"{path.name}: expected a column of items and a column a factor, got one column")
+    for name in table.header:
+        texts_required(table, name, factor=name != table.header[0])
+    rows = table.columns.astype(str).to_numpy()
+    names = [str(row[0]) for row in rows]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"{path.name}: item '{name}' has two rows; give each item one")
+    everywhere = np.ones(len(rows), dtype=np.bool_)
+    orders = {name: names_in_order(table.columns[name], everywhere) for name in table.header[1:]}
+    levels = {str(row[0]): tuple(row[1:]) for row in rows}
+    factors = ItemFactors(tuple(table.header[1:]), levels, path.name, orders)
+    for factor in factors.factors:
+        if len(factors.names(factor)) < 2:
+            raise InputError(f"{path.name}: factor '{factor}' has one level only; leave it out")
+    return factors
+
+
+def factor_tests(
+    items: tuple[str, ...], factors: ItemFactors, model: Model, counts: Counts
+) -> tuple[FactorTest, ...]:
+    """Test each factor by leaving it out, and last all of them against free abilities (lack of fit)."""
+    whole = fit(model, counts)
+    tests, column = [], 0
+    for factor in factors.factors:
+        names = factors.names(factor)
+        own = slice(column, column + len(names) - 1)
+        column += len(names) - 1
+        smaller = fit(Model(model.method, factors.design(items, factor), model.order_effect), counts)
+        chi2 = 2 * (whole.log_likelihood - smaller.log_likelihood)
+        errors = np.sqrt(np.diag(whole.covariance)[own])
+        tests.append(
+            FactorTest(
+                factor,
+                names[0],
+                names[1:],
+                tuple(whole.parameters[own].tolist()),
+                tuple(errors.tolist()),
+                chi2,
+                len(names) - 1,
+                float(stats.chi2.sf(max(0.0, chi2), len(names) - 1)),
+            )
+        )
+    free = fit(Model(model.method, free_abilities(len(items)), model.order_effect), counts)
+    chi2, df = 2 * (free.log_likelihood - whole.log_likelihood), len(items) - 1 - model.design.shape[1]
+    p = float(stats.chi2.sf(max(0.0, chi2), df)) if df > 0 else float("nan")
+    return (*tests, FactorTest("lack of fit", "", (), (), (), chi2, df, p))
+
+
+# What a model of paired comparisons tells: abilities, contrasts, parameters, fit.
+
+
+@dataclass(frozen=True)
+class Item:
+    """One item: ability against the first item in sorted order, on the method's scale."""
+
+    name: str
+    ability: float
+    se: float
+    p: float
+    ci_low: float
+    ci_high: float
+    se_robust: float | None
+    se_centred: float
+    centred: float
+    rank: int
+    wins: int
+    losses: int
+    ties: int
+
+
+@dataclass(frozen=True)
+class Contrast:
+    """Difference of two abilities, and its Holm-corrected p.
+
+    `se_robust` has raters as clusters, `p_robust` is its t test on as many df as raters less one,
+    `p_robust_holm` corrected like the model's.
+    """
+
+    first: str
+    second: str
+    difference: float
+    se: float
+    z: float
+    p: float
+    p_holm: float
+    se_robust: float | None = None
+    p_robust: float | None = None
+    p_robust_holm: float | None = None
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One more parameter of the model, or a test of it."""
+
+    estimate: float
+    se: float
+    z: float
+    p: float
+
+
+@dataclass(frozen=True)
+class Goodness:
+    """Likelihood-ratio statistic against the saturated model of the pairs."""
+
+    deviance: float
+    df: int
+    p: float
+    ordered: bool
+
+
+@dataclass(frozen=True)
+class PairsResult:
+    """Everything `analysis pairs` knows of a table; `docs/analysis.md` says what each key is."""
+
+    method: Method
+    scale: str
+    reference: str
+    items: tuple[Item, ...]
+    contrasts: tuple[Contrast, ...]
+    covariance: tuple[tuple[float, ...], ...]
+    n_comparisons: int
+    n_ties: int
+    n_participants: int | None
+    log_likelihood: float
+    goodness: Goodness
+    order_effect: Parameter | None
+    log_nu: Parameter | None
+    tie_probability_max: float | None
+    factors: tuple[FactorTest, ...]
+    transitivity: Transitivity
+    firth: bool
+    decisions: tuple[str, ...] = field(default_factory=tuple)
+
+
+SCALES: dict[Method, str] = {
+    "bradley-terry": "log odds of winning",
+    "davidson": "log odds of winning, given that there is no tie",
+    "thurstone": "standard deviations of the difference of two items (case V; x 1.414 for those of an item)",
+}
+
+
+# How well a model of paired comparisons fits the pairs.
+
+
+def goodness_of_fit(model: Model, counts: Counts, fitted: Fit) -> Goodness:
+    """Compare with the saturated model of the pairs: only this pair form tells a fit.
+
+    Pairs are taken together over their two orders unless the model has an order effect.
+    """
+    outcomes, expected = counts.outcomes, counts.totals[:, None] * fitted.shares
+    if not model.order_effect:
+        outcomes, expected = _unordered(counts, outcomes), _unordered(counts, expected)
+    ratio = np.where(outcomes > 0, outcomes / np.where(expected > 0, expected, 1.0), 1.0)
+    deviance = float(2 * np.sum(outcomes * np.log(ratio)))
+    df = outcomes.shape[0] * (outcomes.shape[1] - 1) - model.names
+    return Goodness(deviance, df, fit_p(deviance, df, outcomes.sum(axis=1)), model.order_effect)
+
+
+def _unordered(counts: Counts, values: Array) -> Array:
+    """Add up both orders of a pair (m, o): the item that comes first in the alphabet as the left one."""
+    swapped = counts.left > counts.right
+    turned = values.copy()
+    turned[swapped, LEFT], turned[swapped, RIGHT] = values[swapped, RIGHT], values[swapped, LEFT]
+    low, high = np.minimum(counts.left, counts.right), np.maximum(counts.left, counts.right)
+    _, index = np.unique(np.stack([low, high]), axis=1, return_inverse=True)
+    total = np.zeros((int(index.max()) + 1, values.shape[1]))
+    np.add.at(total, index.ravel(), turned)
+    return total
+
+
 Z_95 = float(stats.norm.ppf(0.975))
 
 

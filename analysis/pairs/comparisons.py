@@ -1,15 +1,18 @@
-"""Read paired comparisons: who won, by side, with every doubt about the table raised as one line."""
+"""Paired comparisons as they were made: reading, connectedness and transitivity."""
 
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
-from analysis.read.exported_rows import EXPORT_COLUMNS, rows_that_count
 from analysis.read.number_columns import MISSING_MARKS
+from analysis.read.reading import EXPORT_COLUMNS, rows_that_count
 from analysis.read.text_table import (
     TextTable,
     name_lines,
@@ -19,6 +22,8 @@ from analysis.read.text_table import (
     texts_required,
 )
 from experiments.errors import InputError
+
+# Read paired comparisons: who won, by side, with every doubt about the table raised as one line.
 
 LEFT, RIGHT, TIE = 0, 1, 2
 EXPORTED_SIDES = {"kind", "left_cell", "right_cell"}
@@ -187,3 +192,166 @@ def _refuse_unknown(
             f"{table.source}: '{winner}' is '{said[row]}' in line {table.line(row)}; expected left, right or "
             f"one of the row's two items (where it means a tie: --tie {said[row]})"
         )
+
+
+# Whether comparisons tie all items together, and whether each has won and lost enough to be placed.
+
+NAMED_MAX = 6
+
+
+def refuse_disconnected(comparisons: Comparisons) -> None:
+    """Refuse items that no chain of comparisons joins: their abilities have no common scale.
+
+    Raises
+    ------
+    InputError
+    """
+    groups = _components(comparisons, strong=False)
+    if len(groups) > 1:
+        told = " | ".join(_named(group) for group in groups[:NAMED_MAX])
+        raise InputError(
+            f"{comparisons.source}: the items fall into {len(groups)} groups that were never compared: "
+            f"{told}; compare some across, or analyse each group by itself"
+        )
+
+
+def separated(comparisons: Comparisons) -> str | None:
+    """Say which items won (or lost) every comparison with the rest; None where none did.
+
+    Ford (1957), American Mathematical Monthly 64(8), 28: the maximum exists if and only if, however the
+    items are parted in two, each part won at least once against the other; a tie counts for both.
+    """
+    groups = _components(comparisons, strong=True)
+    if len(groups) == 1:
+        return None
+    wins = _wins(comparisons)
+    position = {item: index for index, item in enumerate(comparisons.items)}
+    for group in sorted(groups, key=len):
+        inside = np.zeros(len(comparisons.items), dtype=bool)
+        inside[[position[item] for item in group]] = True
+        lost, won = wins[~inside][:, inside].sum(), wins[inside][:, ~inside].sum()
+        if won and not lost:
+            return f"{_named(group)} won every comparison with the others"
+        if lost and not won:
+            return f"{_named(group)} lost every comparison with the others"
+    return f"{_named(groups[0])} won or lost every comparison with the others"
+
+
+def _wins(comparisons: Comparisons) -> np.ndarray:
+    """(k, k): how often the row's item won against the column's, ties for both."""
+    wins = np.zeros((len(comparisons.items),) * 2, dtype=np.int64)
+    for_left, for_right = comparisons.outcome != RIGHT, comparisons.outcome != LEFT
+    np.add.at(wins, (comparisons.left[for_left], comparisons.right[for_left]), 1)
+    np.add.at(wins, (comparisons.right[for_right], comparisons.left[for_right]), 1)
+    return wins
+
+
+def _components(comparisons: Comparisons, *, strong: bool) -> list[list[str]]:
+    graph = coo_array(_wins(comparisons))
+    count, labels = connected_components(graph, directed=True, connection="strong" if strong else "weak")
+    names = np.array(comparisons.items, dtype=object)
+    return [list(names[labels == label]) for label in range(count)]
+
+
+def _named(items: list[str]) -> str:
+    rest = len(items) - NAMED_MAX
+    return ", ".join(items[:NAMED_MAX]) + (f" and {rest} more" if rest > 0 else "")
+
+
+# Whether preferences form an order: triples of items, and circles within a rater.
+
+
+@dataclass(frozen=True)
+class Transitivity:
+    """Triples of items a, b, c with P(a over b) >= .5 and P(b over c) >= .5, all three compared.
+
+    Weak transitivity asks P(a over c) >= .5, moderate >= the smaller, strong >= the greater of the two
+    (Coombs 1964).
+
+    Attributes
+    ----------
+    circular_triads : int
+        Circles a > b > c > a within raters who judged every pair once without a tie (Kendall & Babington
+        Smith 1940, Biometrika 31, 324), with the most that could be.
+    """
+
+    triples: int
+    weak_violations: int
+    moderate_violations: int
+    strong_violations: int
+    raters_with_all_pairs: int
+    circular_triads: int
+    circular_triads_max: int
+
+
+def transitivity(comparisons: Comparisons) -> Transitivity:
+    """Count violations; ties are half a win for each."""
+    shares, compared = _shares(comparisons, np.ones(comparisons.outcome.size, dtype=bool))
+    violations = np.zeros(3, dtype=np.int64)
+    triples = 0
+    for triple in combinations(range(len(comparisons.items)), 3):
+        if all(compared[one, other] for one, other in combinations(triple, 2)):
+            triples += 1
+            violations += _violations(shares, triple)
+    raters, circles, greatest = _circles(comparisons)
+    weak, moderate, strong = violations.tolist()
+    return Transitivity(triples, weak, moderate, strong, raters, circles, greatest)
+
+
+def _violations(shares: NDArray[np.float64], triple: tuple[int, ...]) -> NDArray[np.int64]:
+    """Whether a triple breaks weak, moderate and strong transitivity, by its most favourable order."""
+    best = np.ones(3, dtype=np.int64)
+    first, second, third = triple
+    for a, b, c in (
+        (first, second, third),
+        (first, third, second),
+        (second, first, third),
+        (second, third, first),
+        (third, first, second),
+        (third, second, first),
+    ):
+        ab, bc, ac = shares[a, b], shares[b, c], shares[a, c]
+        if ab >= 0.5 and bc >= 0.5:
+            best = np.minimum(best, np.array([ac < 0.5, ac < min(ab, bc), ac < max(ab, bc)], dtype=np.int64))
+    return best
+
+
+def _shares(
+    comparisons: Comparisons, rows: NDArray[np.bool_]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(k, k) share of wins of the row's item over the column's, and how often they were compared."""
+    size = len(comparisons.items)
+    wins, compared = np.zeros((size, size)), np.zeros((size, size))
+    left, right, outcome = comparisons.left[rows], comparisons.right[rows], comparisons.outcome[rows]
+    for_left = np.where(outcome == LEFT, 1.0, np.where(outcome == TIE, 0.5, 0.0))
+    np.add.at(wins, (left, right), for_left)
+    np.add.at(wins, (right, left), 1.0 - for_left)
+    np.add.at(compared, (left, right), 1.0)
+    np.add.at(compared, (right, left), 1.0)
+    return np.divide(wins, compared, out=np.full_like(wins, np.nan), where=compared > 0), compared
+
+
+def _circles(comparisons: Comparisons) -> tuple[int, int, int]:
+    r"""Raters with all pairs once, their circular triads, and the greatest number possible.
+
+    .. math::
+
+        d &= \binom{n}{3} - \sum_i \binom{w_i}{2} \tag{1} \\
+        d_{\max} &= (n^3 - n) / 24 \text{ for odd } n, \; (n^3 - 4 n) / 24 \text{ for even} \tag{2}
+
+    w_i is how often item i of n won: a triad that is no circle has one item that won both its pairs (Kendall
+    and Babington Smith 1940).
+    """
+    size = len(comparisons.items)
+    raters = circles = 0
+    most_each = (size**3 - size) // 24 if size % 2 else (size**3 - 4 * size) // 24
+    if comparisons.participant is None:
+        return 0, 0, 0
+    for rater in range(len(comparisons.participants)):
+        shares, compared = _shares(comparisons, comparisons.participant == rater)
+        once = compared[np.triu_indices(size, 1)]
+        if np.all(once == 1.0) and not np.any(shares == 0.5):
+            wins = np.nansum(np.where(np.eye(size, dtype=bool), 0.0, shares), axis=1)
+            raters += 1
+            circles += round(size * (size - 1) * (size - 2) / 6 - float(np.sum(wins * (wins - 1) / 2)))
+    return raters, circles, raters * most_each

@@ -7,12 +7,9 @@ import numpy as np
 from scipy import stats
 from scipy.special import xlogy
 
-from analysis.pairs.abilities import fit_abilities
-from analysis.pairs.comparisons import LEFT, RIGHT, Comparisons
-from analysis.pairs.connected import separated
-from analysis.pairs.factors import ItemFactors
+from analysis.pairs.abilities import ItemFactors, PairsResult, Parameter, fit_abilities
+from analysis.pairs.comparisons import LEFT, RIGHT, Comparisons, separated
 from analysis.pairs.likelihood import Method
-from analysis.pairs.pairs_result import PairsResult, Parameter
 from experiments.errors import InputError
 
 

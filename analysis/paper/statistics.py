@@ -4,15 +4,89 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from decimal import Decimal
-from itertools import zip_longest
+from itertools import product, zip_longest
 from typing import Literal
 
 import numpy as np
+from scipy import special
 
-from analysis.paper.clause import own_clause
-from analysis.paper.p_values import Kind, corners, p_range
+from analysis.paper.printed import Rounded
 from analysis.report.numbers import share
 from analysis.within.eta_squared import partial_eta_squared_ci
+
+# How far behind a statistic its own p and effect size stand: to where another clause begins.
+
+_END_OF_SENTENCE = re.compile(r"[.!?][\"')\]]*\s+(?=[A-Z])")
+_CONTRAST = re.compile(r"\b(?:whereas|while|although|though|but|however|nor|and the|or the)\b", re.IGNORECASE)
+_PARTS = re.compile(r";|[^\W\d_]{2,}(?:['’-][^\W\d_]+)*")
+_OF_REPORTS = re.compile(
+    r"partial|generali[sz]ed|eta|omega|epsilon|squared|cohen\S*|hedges\S*|glass\S*|delta|phi|cramer\S*|effect|size"
+    r"|mse|se|sd|sem|ci|cis|confidence|credible|interval|power|observed|bayes|factor|bf|aic|bic"
+    r"|corrected|uncorrected|adjusted|correction|greenhouse\S*|geisser|huynh\S*|feldt|bonferroni\S*|holm\S*"
+    r"|sidak|tukey\S*|wilks\S*|lambda|pillai\S*|trace|hotelling\S*|roy\S*|one|two|tailed|sided|exact|asymptotic"
+    r"|with|all|significant|at|ns|non|not|and|yielded|giving|its|of|an?|level|one-tailed|two-tailed|one-sided"
+    r"|two-sided|monte|carlo|permutation|associated|corresponding|value|values|df|max|min|both|ps",
+    re.IGNORECASE,
+)
+WORDS_MAX = 2
+"""So many words that reports of statistics do not have may stand between one and its p."""
+
+
+def own_clause(tail: str) -> str:
+    """The beginning of `tail`, the text behind a statistic, that can hold its own p and effect size.
+
+    Another clause begins with a sentence, a contrast, the first word behind a semicolon that no report of a
+    statistic has, or with more than `WORDS_MAX` such words elsewhere: what follows is of something else.
+    """
+    ends = [match.start() for pattern in (_END_OF_SENTENCE, _CONTRAST) if (match := pattern.search(tail))]
+    tail = tail[: min(ends, default=len(tail))]
+    semicolon, strange = -1, 0
+    for part in _PARTS.finditer(tail):
+        if part[0] == ";":
+            semicolon = part.start()
+        elif not _OF_REPORTS.fullmatch(part[0]):
+            strange += 1
+            if semicolon >= 0 or strange > WORDS_MAX:
+                return tail[: semicolon if semicolon >= 0 else part.start()]
+    return tail
+
+
+# The p values that a printed statistic and its df allow.
+
+Kind = Literal["F", "t", "chi2", "r", "z"]
+
+
+def corners(printed: str, whole_is_exact: bool = False) -> tuple[float, ...]:
+    """The ends of what rounds to a printed number."""
+    if whole_is_exact and "." not in printed:
+        return (float(printed),)
+    rounded = Rounded.of(printed)
+    return float(rounded.low), float(rounded.high)
+
+
+def p_range(kind: Kind, df: tuple[str, ...], value: str) -> tuple[float, float]:
+    """Smallest and largest p that a printed statistic allows, two-sided for t, r and z."""
+    low, high = corners(value.lstrip("-"))
+    values = [max(low, 0.0), high]  # 0.00 can have been anything from 0 on
+    degrees = product(*(corners(d, whole_is_exact=True) for d in df))
+    p = [_p(kind, at, v) for at in degrees for v in values]
+    return min(p), max(p)
+
+
+def _p(kind: Kind, df: tuple[float, ...], value: float) -> float:
+    if min(df, default=1.0) <= 0:
+        return float("nan")
+    if kind == "F":
+        return float(special.fdtrc(df[0], df[1], value))
+    if kind == "t":
+        return float(2 * special.stdtr(df[0], -value))
+    if kind == "chi2":
+        return float(special.chdtrc(df[0], value))
+    if kind == "r":
+        r = min(value, 1 - 1e-12)
+        return float(2 * special.stdtr(df[0], -r * np.sqrt(df[0] / (1 - r * r))))
+    return float(2 * special.ndtr(-value))
+
 
 Verdict = Literal["consistent", "inconsistent", "decision", "unchecked"]
 

@@ -1,27 +1,129 @@
 """The analysis of single-clip ratings: cell means, their tests, and models beside them."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from analysis.errors import NoRatingsError
-from analysis.plans.plan import Plan
-from analysis.plans.prepare import prepare, refuse_unknown, where
-from analysis.plans.prepared import Prepared
-from analysis.plans.rating_tests import analyse, further_sections, on_scale
-from analysis.plans.result import Analysis
+from analysis.plans.plan import Plan, Prepared, prepare, refuse_unknown, where
+from analysis.plans.result import Analysis, analyse_cells, labels_of
 from analysis.read.pool import Pool
 from analysis.read.reading import Reading
 from analysis.read.study_answers import StudyAnswers
-from analysis.report.contents import Contents
+from analysis.report.contents import Contents, Part, Progress, Section, caption, in_words
+from analysis.report.formats import Table
+from analysis.report.json_output import as_data, exclusions_data, left_out, study_data
+from analysis.report.numbers import DASH, fixed
+from analysis.report.within_contents import methods_of, part_of
+from analysis.within.anova import AnovaResult, linear_anova
+from analysis.within.between import BetweenDesign, between_design, no_groups
+from analysis.within.cell_means import CellTable, cell_table
 from experiments.definition import Experiment
 from experiments.design import rated_levels
 from experiments.errors import InputError
 from experiments.trials.clip_rating.columns import RATINGS
 from experiments.trials.clip_rating.declaration import clip_rating_of
 from experiments.trials.scales import RatedScale, scale_called, scales_of
+
+# Ratings of a study: cell means, their tests, and what is computed beside them.
+
+
+def on_scale(experiment: Experiment, rows: pd.DataFrame, name: str) -> pd.DataFrame:
+    """The rows of one scale: all of them where the study has one."""
+    if len(scales_of(experiment)) == 1:
+        return rows
+    if "scale" not in rows.columns:
+        raise InputError(f"'{experiment.name}' has several scales; the data have no column 'scale'")
+    return rows[(rows["scale"] == name).to_numpy()]
+
+
+class Tested(NamedTuple):
+    """Cell means of prepared rows, and every effect."""
+
+    cells: CellTable
+    anova: AnovaResult
+
+
+def tested(prepared: Prepared) -> Tested:
+    """Average and test, and no more: what each choice of a multiverse needs."""
+    cells, design = _averaged(prepared)
+    return Tested(
+        cells, linear_anova(cells.y, cells.factors, cells.levels, design or no_groups(len(cells.y)))
+    )
+
+
+def _averaged(prepared: Prepared) -> tuple[CellTable, BetweenDesign | None]:
+    """Cell means, and the groups where the design has some."""
+    experiment, rows = prepared.experiment, prepared.rows
+    factors = experiment.compared_factors
+    levels = {f.name: rated_levels(experiment, f.name) for f in experiment.factors}
+    within = [name for name in factors if not experiment.factor(name).between]
+    cells = cell_table(rows, "participant", "response", within, levels)
+    between = [name for name in factors if name not in within]
+    return cells, groups_of(rows, cells.participants, between, levels) if between else None
+
+
+def analyse(prepared: Prepared, rating: str = "response") -> Analysis:
+    """Average and test; `rating` names what was rated."""
+    experiment = prepared.experiment
+    cells, groups = _averaged(prepared)
+    return analyse_cells(
+        cells,
+        name=experiment.name,
+        title=experiment.title,
+        source=prepared.source,
+        rating=rating,
+        synthetic=prepared.synthetic,
+        decisions=prepared.decisions,
+        labels=labels_of(experiment),
+        between=groups,
+        experiment=experiment,
+        exclusions=prepared.exclusions,
+    )
+
+
+def further_sections(analysis: Analysis, prepared: Prepared, progress: Progress) -> tuple[Section, ...]:
+    """Sensitivity analyses and the multiverse of one scale: the one `prepared` names, or the only one."""
+    from analysis.plans.multiverse import multiverse_section
+    from analysis.plans.sensitivity import sensitivity_sections
+
+    sections = sensitivity_sections(analysis, progress)
+    progress("multiverse of exclusions")
+    return (*sections, multiverse_section(analysis, prepared, _tested_named))
+
+
+def _tested_named(prepared: Prepared) -> Tested:
+    """The tests of one scale: the named one, or the only one."""
+    if prepared.scale is None:
+        return tested(prepared)
+    rows = on_scale(prepared.experiment, prepared.rows, prepared.scale)
+    return tested(replace(prepared, exclusions=replace(prepared.exclusions, rows=rows)))
+
+
+def groups_of(
+    rows: pd.DataFrame,
+    participants: Sequence[str],
+    factors: Sequence[str],
+    levels: Mapping[str, Sequence[str]],
+) -> BetweenDesign:
+    """The groups of these participants; InputError where one has rows of two."""
+    codes = np.zeros((len(participants), len(factors)), np.int64)
+    for column, name in enumerate(factors):
+        level_of: dict[str, str] = {}
+        pairs = rows[["participant", name]].astype(str).drop_duplicates()
+        for participant, level in pairs.itertuples(index=False):
+            if level_of.setdefault(participant, level) != level:
+                raise InputError(
+                    f"participant {participant} has ratings of '{level_of[participant]}' and '{level}', but "
+                    f"'{name}' is declared between participants"
+                )
+        codes[:, column] = [levels[name].index(level_of[participant]) for participant in participants]
+    return between_design(factors, [levels[name] for name in factors], codes)
+
 
 READING = Reading(RATINGS, numbers=("response",), further=("exemplar",), beside=("scale", "not_applicable"))
 
@@ -88,11 +190,100 @@ def _ratings(prepared: Prepared) -> Contents:
         analysis = analyse(replace(prepared, decisions=(*prepared.decisions, said)), named.name)
         return contents_of(analysis, partial(further_sections, analysis, prepared))
     if len(scales_of(prepared.experiment)) > 1:
-        from analysis.plans.several_scales import contents_of_scales
-
         return contents_of_scales(prepared)
     analysis = analyse(prepared)
     return contents_of(analysis, partial(further_sections, analysis, prepared))
 
 
 PLAN = Plan(READING, check, contents, keys=("scale",))
+
+
+# Ratings on several scales: each analysed for itself, and how far they measure the same.
+
+METHODS = (
+    "Each scale is analysed for itself, as it was answered. Cronbach's alpha is over the scales as items and "
+    "the participants' ratings of clips as cases, reverse-keyed scales turned. "
+)
+
+
+def contents_of_scales(prepared: Prepared) -> Contents:
+    """A part of the report for each scale, and one for all."""
+    experiment = prepared.experiment
+    scales = scales_of(experiment)
+    analyses = [(scale, _of_scale(prepared, scale)) for scale in scales]
+    alpha = cronbach_alpha(scale_cases(prepared, scales))
+    people = prepared.rows["participant"].astype(str).nunique()
+    parts = [_part(scale, analysis, replace(prepared, scale=scale.name)) for scale, analysis in analyses]
+    return Contents(
+        name=experiment.name,
+        title=experiment.title,
+        lead=f"{people} participants, {len(scales)} scales",
+        source=prepared.source,
+        synthetic=prepared.synthetic,
+        n_participants=people,
+        left_out=left_out(prepared.exclusions),
+        decisions=tuple(dict.fromkeys(said for _, one in analyses for said in one.decisions)),
+        parts=(*parts, _reliability(alpha, len(scales), experiment.name, prepared.synthetic)),
+        methods=METHODS + methods_of(analyses[0][1]),
+        numbers={
+            **study_data(prepared, people),
+            "scales": [
+                {"scale": scale.name, "reverse": scale.reverse, **as_data(one)} for scale, one in analyses
+            ],
+            "cronbach_alpha": alpha,
+            "exclusions": exclusions_data(prepared.exclusions),
+        },
+        given="ratings",
+    )
+
+
+def _of_scale(prepared: Prepared, scale: RatedScale) -> Analysis:
+    rows = on_scale(prepared.experiment, prepared.rows, scale.name)
+    return analyse(replace(prepared, exclusions=replace(prepared.exclusions, rows=rows)), scale.name)
+
+
+def _part(scale: RatedScale, analysis: Analysis, prepared: Prepared) -> Part:
+    """The part of one scale; `prepared` names it."""
+    title = f"{in_words(scale.name)}{' (reverse-keyed)' if scale.reverse else ''}"
+
+    def more(progress: Progress) -> tuple[Section, ...]:
+        return further_sections(analysis, prepared, lambda step: progress(f"{scale.name}: {step}"))
+
+    return part_of(analysis, more, title).under(scale.name, title)
+
+
+def scale_cases(prepared: Prepared, scales: Sequence[RatedScale]) -> pd.DataFrame:
+    """A row a rated trial and a column a scale, reverse-keyed ones turned; trials with every scale alone."""
+    rows = prepared.rows
+    keys = [name for name in ("run", "trial_index", "play") if name in rows.columns]
+    if "trial_index" not in keys:
+        keys = ["run", *prepared.experiment.factor_names]
+    columns = {}
+    for scale in scales:
+        mine = rows[(rows["scale"] == scale.name).to_numpy()]
+        given = mine.groupby(keys, observed=True)["response"].mean()
+        columns[scale.name] = scale.minimum + scale.maximum - given if scale.reverse else given
+    return pd.DataFrame(columns).dropna()
+
+
+def cronbach_alpha(cases: pd.DataFrame) -> dict[str, Any] | None:
+    """Alpha with its 95% interval (Feldt), by pingouin; None where a scale does not vary."""
+    # pingouin takes seconds to import, which one scale need not pay
+    from pingouin import cronbach_alpha as alpha_of
+
+    if len(cases) < 3 or not (np.ptp(cases.to_numpy(dtype=float), axis=0) > 0).all():
+        return None
+    alpha, (low, high) = alpha_of(data=cases)
+    return {"alpha": float(alpha), "ci_low": float(low), "ci_high": float(high), "n": len(cases)}
+
+
+def _reliability(alpha: dict[str, Any] | None, scales: int, name: str, synthetic: bool) -> Part:
+    row = ("all", str(scales), DASH, DASH, DASH)
+    said = "Cronbach's alpha is not defined: a scale does not vary, or too few trials have an answer on each."
+    if alpha is not None:
+        bounds = f"[{fixed(alpha['ci_low'], 3)}, {fixed(alpha['ci_high'], 3)}]"
+        row = ("all", str(scales), fixed(alpha["alpha"], 3), bounds, str(alpha["n"]))
+        said = f"The {scales} scales agree with Cronbach's alpha = {fixed(alpha['alpha'])}, 95% CI {bounds}."
+    header = ("Scales", "Items", "alpha", "95% CI", "Ratings")
+    table = Table("reliability", caption("Reliability of the scales", name, synthetic), header, (row,), 1)
+    return Part((table,), (said,), "Reliability")

@@ -6,12 +6,10 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from analysis.plans.plan import Plan
-from analysis.plans.prepare import where
-from analysis.plans.prepared import Prepared
+from analysis.plans.plan import Plan, Prepared, where
 from analysis.read.reading import Reading
 from analysis.report.contents import Contents
-from analysis.traces.lag import ClipTraces, MeanTrace, lag_of, mean_trace
+from analysis.traces import ClipTraces, MeanTrace, lag_of, mean_trace
 from experiments import design
 from experiments.definition import Experiment
 from experiments.errors import InputError

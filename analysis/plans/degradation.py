@@ -8,10 +8,9 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from analysis.plans.prepared import Prepared
+from analysis.plans.plan import Prepared
 from analysis.plans.result import labels_of
-from analysis.report.captions import caption
-from analysis.report.contents import Contents, Part
+from analysis.report.contents import Contents, Part, caption
 from analysis.report.formats import Table
 from analysis.report.numbers import DASH, fixed, interval
 from experiments import design

@@ -1,20 +1,111 @@
 """The analysis of paired comparisons: abilities of the cells, what their factors do, order, ties and fit."""
 
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pandas as pd
+from scipy import stats
 
-from analysis.pairs.findings import findings_of
-from analysis.plans.plan import Plan
-from analysis.plans.prepare import refuse_unknown
-from analysis.plans.prepared import Prepared
-from analysis.plans.study_comparisons import cells_of, comparisons_of, factors_of, looked_up
+from analysis.pairs.abilities import ItemFactors, fit_abilities
+from analysis.pairs.comparisons import LEFT, RIGHT, TIE, Comparisons
+from analysis.pairs.findings import LikelihoodRatio, findings_of
+from analysis.pairs.likelihood import Method
+from analysis.plans.plan import Plan, Prepared, refuse_unknown
+from analysis.plans.result import labels_of
 from analysis.read.reading import Reading
-from analysis.report.contents import Contents
-from experiments.assignment.groups import groups
+from analysis.report.contents import Contents, Part, caption
+from analysis.report.formats import Table
+from analysis.report.json_output import exclusions_data, left_out, study_data
+from analysis.report.numbers import apa_p, fixed, p_value
+from experiments import design
+from experiments.assignment.groups import groups, name_of, of_group
 from experiments.definition import Experiment
+from experiments.errors import InputError
 from experiments.trials.paired_comparison.answer import CODES
 from experiments.trials.paired_comparison.columns import COMPARISONS
 from experiments.trials.paired_comparison.declaration import paired_comparison_of
+
+# The comparisons of a study: its cells as items, and their levels in the compared factors.
+
+_OUTCOMES = {"left": LEFT, "right": RIGHT, "tie": TIE}
+
+
+def looked_up(column: pd.Series, values: Mapping[str, float], otherwise: float) -> np.ndarray:
+    """The value of each name of a categorical column."""
+    of_category = np.array(
+        [values.get(str(name), otherwise) for name in column.cat.categories] or [otherwise]
+    )
+    looked_up: np.ndarray = of_category[column.cat.codes.to_numpy()]
+    return looked_up
+
+
+def cells_of(experiment: Experiment) -> list[tuple[str, tuple[str, ...]]]:
+    """Label and levels of every cell, in declared order."""
+    levels = [tuple(level for _, level in cell) for cell in design.cells(experiment)]
+    return [("/".join(names), names) for names in levels]
+
+
+def comparisons_of(prepared: Prepared) -> Comparisons:
+    """The comparisons as indices; two clips of one cell tell nothing of the cells and are left out."""
+    rows, decisions = prepared.rows, list(prepared.decisions)
+    same = (rows["left_cell"].astype(str) == rows["right_cell"].astype(str)).to_numpy()
+    if same.any():
+        decisions.append(f"{same.sum()} comparisons of two clips of one cell left out of the abilities")
+        rows = rows[~same]
+    if rows.empty:
+        raise InputError(f"{prepared.source}: every comparison is of two clips of one cell; nothing to rank")
+    decisions += _arrangements(rows)
+    shown = {*rows["left_cell"].astype(str), *rows["right_cell"].astype(str)}
+    items = tuple(name for name, _ in cells_of(prepared.experiment) if name in shown)
+    position = {name: index for index, name in enumerate(items)}
+    people, person = np.unique(rows["participant"].astype(str).to_numpy(), return_inverse=True)
+    return Comparisons(
+        items,
+        looked_up(rows["left_cell"], position, -1).astype(np.int64),
+        looked_up(rows["right_cell"], position, -1).astype(np.int64),
+        looked_up(rows["winner"], _OUTCOMES, -1).astype(np.int64),
+        person.astype(np.int64),
+        tuple(str(name) for name in people),
+        prepared.source,
+        prepared.synthetic,
+        tuple(decisions),
+    )
+
+
+def _arrangements(rows: pd.DataFrame) -> list[str]:
+    """Where the two clips were not shown in one way throughout, how often in which."""
+    if "arrangement" not in rows.columns:
+        return []
+    counts = Counter(name.replace("_", " ") for name in rows["arrangement"].astype(str) if name)
+    named = [f"{number} {name}" for name, number in sorted(counts.items())]
+    return (
+        [f"comparisons were shown in {len(named)} arrangements: {', '.join(named)}"] if len(named) > 1 else []
+    )
+
+
+def factors_of(experiment: Experiment, items: tuple[str, ...]) -> ItemFactors | None:
+    """The levels of the compared cells in the factors in which they differ; None where in none."""
+    levels = {name: names for name, names in cells_of(experiment) if name in items}
+    varied = [
+        index
+        for index in range(len(experiment.factors))
+        if len({names[index] for names in levels.values()}) > 1
+    ]
+    if not varied:
+        return None
+    return ItemFactors(
+        tuple(experiment.factors[index].name for index in varied),
+        {name: tuple(names[index] for index in varied) for name, names in levels.items()},
+        experiment.name,
+        {
+            experiment.factors[index].name: tuple(level.name for level in experiment.factors[index].levels)
+            for index in varied
+        },
+    )
+
 
 READING = Reading(COMPARISONS, texts=("winner", "left_cell", "right_cell", "arrangement"))
 
@@ -36,8 +127,6 @@ def check(experiment: Experiment, rows: pd.DataFrame, source: str) -> None:
 def analyse(prepared: Prepared) -> Contents:
     """Abilities of the cells and all that goes with them, in each group where groups see different cells."""
     if len(groups(prepared.experiment)) > 1:
-        from analysis.plans.pairs_in_groups import contents_of_groups
-
         return contents_of_groups(prepared, analyse)
     from analysis.report.pairs_contents import contents_of
 
@@ -47,3 +136,132 @@ def analyse(prepared: Prepared) -> Contents:
 
 
 PLAN = Plan(READING, check, analyse, numbered)
+
+
+# Paired comparisons of groups of participants: the abilities in each group, and whether groups agree.
+
+METHODS = (
+    "Each group is analysed for itself, since nobody compares clips of two groups. Whether groups agree is a "
+    "likelihood ratio test: abilities of its own in every group against the same abilities in all of them. "
+)
+
+
+def contents_of_groups(prepared: Prepared, analyse: Callable[[Prepared], Contents]) -> Contents:
+    """A part of the report for each group, and one that compares them; `analyse` is of one group."""
+    experiment, labels = prepared.experiment, labels_of(prepared.experiment)
+    made: list[tuple[str, Contents, Comparisons]] = []
+    parts: list[Part] = []
+    for levels in groups(experiment):
+        mine = _of_group(prepared, of_group(experiment, levels))
+        name = name_of(levels)
+        if mine.rows.empty:
+            parts.append(Part((), (f"The group {name} has no comparisons yet.",), name))
+            continue
+        contents = analyse(mine)
+        title = ", ".join(f"{labels.factor(factor)}: {labels.level(factor, one)}" for factor, one in levels)
+        parts += [part.under(name.replace("/", "-"), title) for part in contents.parts]
+        made.append((name, contents, comparisons_of(mine)))
+    agreement, reason = _agreement(experiment, [comparisons for *_, comparisons in made])
+    people = prepared.rows["participant"].astype(str).nunique()
+    first = made[0][1]
+    return replace(
+        first,
+        title=experiment.title,
+        lead=f"{people} participants in {len(made)} groups, {len(prepared.rows)} comparisons",
+        n_participants=people,
+        left_out=left_out(prepared.exclusions),
+        decisions=tuple(dict.fromkeys(said for _, one, _ in made for said in one.decisions)),
+        parts=(*parts, _agreement_part(agreement, reason, experiment.name, prepared.synthetic)),
+        methods=METHODS + first.methods,
+        numbers=_numbers(prepared, people, [(name, one) for name, one, _ in made], agreement, reason),
+    )
+
+
+def _of_group(prepared: Prepared, experiment: Experiment) -> Prepared:
+    """What the participants of one group answered; the experiment is that of the group."""
+    cells = ["/".join(level for _, level in cell) for cell in design.cells(experiment)]
+    rows = prepared.rows
+    rows = rows[rows["left_cell"].astype(str).isin(cells).to_numpy()]
+    return replace(prepared, experiment=experiment, exclusions=replace(prepared.exclusions, rows=rows))
+
+
+def _agreement(
+    experiment: Experiment, every: Sequence[Comparisons]
+) -> tuple[LikelihoodRatio | None, str | None]:
+    """Test that all groups have the same abilities; the reason where it cannot be tested.
+
+    With the maximum log likelihood L_g of each of G groups and L of all groups by one set of abilities, the
+    statistic is
+
+    .. math::
+
+        \\chi^2 = 2 \\Big(\\sum_g L_g - L\\Big) \\tag{1}
+
+    with (G - 1) p degrees of freedom, p being the parameters of one set: abilities but one, and ties.
+    """
+    if len(every) < 2:
+        return None, "one group alone has comparisons"
+    within = [index for index, factor in enumerate(experiment.factors) if not factor.between]
+    named = [_without_groups(one, within) for one in every]
+    if any(set(one.items) != set(named[0].items) for one in named):
+        return None, "the groups compared different cells"
+    pooled = _together(named)
+    method: Method = "davidson" if pooled.ties else "bradley-terry"
+    try:
+        own = [fit_abilities(one, method) for one in named]
+        same = fit_abilities(pooled, method)
+    except InputError as error:
+        return None, str(error)
+    chi2 = max(0.0, 2 * (sum(one.log_likelihood for one in own) - same.log_likelihood))
+    df = (len(every) - 1) * (len(pooled.items) - 1 + (method == "davidson"))
+    return LikelihoodRatio(chi2, df, float(stats.chi2.sf(chi2, df))), None
+
+
+def _without_groups(one: Comparisons, within: list[int]) -> Comparisons:
+    """The cells named by their levels in factors within participants."""
+    return replace(
+        one, items=tuple("/".join(item.split("/")[index] for index in within) for item in one.items)
+    )
+
+
+def _together(every: Sequence[Comparisons]) -> Comparisons:
+    """The comparisons of all groups, items in the order of the first one."""
+    first = every[0]
+    codes = [np.array([first.items.index(item) for item in one.items]) for one in every]
+    return replace(
+        first,
+        left=np.concatenate([code[one.left] for code, one in zip(codes, every, strict=True)]),
+        right=np.concatenate([code[one.right] for code, one in zip(codes, every, strict=True)]),
+        outcome=np.concatenate([one.outcome for one in every]),
+        participant=None,
+        participants=(),
+    )
+
+
+def _agreement_part(test: LikelihoodRatio | None, reason: str | None, name: str, synthetic: bool) -> Part:
+    if test is None:
+        return Part((), (f"Whether the groups agree was not tested: {reason}.",), "Agreement of the groups")
+    verdict = "differ" if test.p < 0.05 else "do not differ significantly"
+    said = f"Abilities {verdict} between the groups, χ²({test.df}) = {fixed(test.chi2)}, {apa_p(test.p)}."
+    row = ("Same abilities in all groups", fixed(test.chi2), str(test.df), p_value(test.p))
+    header = ("Hypothesis", "χ²", "df", "p")
+    table = Table(
+        "agreement-of-groups", caption("Agreement of the groups", name, synthetic), header, (row,), 1
+    )
+    return Part((table,), (said,), "Agreement of the groups")
+
+
+def _numbers(
+    prepared: Prepared,
+    people: int,
+    of_groups: Sequence[tuple[str, Contents]],
+    test: LikelihoodRatio | None,
+    reason: str | None,
+) -> dict[str, Any]:
+    return {
+        **study_data(prepared, people),
+        "groups": [{"group": name, **contents.numbers} for name, contents in of_groups],
+        "agreement": None if test is None else {"chi2": test.chi2, "df": test.df, "p": test.p},
+        "agreement_reason": reason,
+        "exclusions": exclusions_data(prepared.exclusions),
+    }

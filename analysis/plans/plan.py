@@ -1,22 +1,32 @@
-"""What the data of a kind of trial can be asked: a file of its name here, with `PLAN`.
-
-Nothing else joins them: the name in the declaration finds the file.
-"""
+"""From a study's answers to its report: the plan of a kind of trial, and the answers that count."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pandas as pd
 
+from analysis.errors import NoRatingsError
+from analysis.plans.exclusions import Exclusions, apply_exclusions
+from analysis.read.pool import Pool, origins, pooled
 from analysis.read.reading import Reading
-from experiments.errors import InputError
+from analysis.read.study_answers import RunEvidence, StudyAnswers, with_verdicts
+from analysis.report.contents import Contents, evidence_section
+from experiments.definition import Experiment
+from experiments.errors import InputError, did_you_mean
+from experiments.schema.canonical import definition_sha256
+from experiments.trials.scales import scale_called
 
 if TYPE_CHECKING:
-    from analysis.plans.prepared import Prepared
     from analysis.report.contents import Contents
     from experiments.definition import Experiment
+
+
+# What the data of a kind of trial can be asked: a file of its name here, with `PLAN`.
+#
+# Nothing else joins them: the name in the declaration finds the file.
 
 
 def as_they_are(rows: pd.DataFrame) -> pd.DataFrame:
@@ -62,3 +72,141 @@ def plan_of(kind: str) -> Plan:
             f"trials of the kind {kind} have no analysis yet; export their data (server export)"
         ) from error
     return plan
+
+
+# What a plan analyses: a study's answers that count, whatever its kind of trial.
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """What a plan analyses: the main trials that count, what was left out, and every decision on the way."""
+
+    experiment: Experiment
+    source: str
+    synthetic: bool
+    exclusions: Exclusions
+    decisions: tuple[str, ...]
+    checked: StudyAnswers = field(repr=False)
+    """The answers before exclusion."""
+    scale: str | None = None
+    """The scale to analyse, where not all are."""
+
+    @property
+    def rows(self) -> pd.DataFrame:
+        """Main trials with an answer, of the runs that remain."""
+        return self.exclusions.rows
+
+
+# From a study's rows to those that count, whatever the kind of trial: one pool, declared exclusions.
+
+
+def prepare(experiment: Experiment, plan: Plan, answers: StudyAnswers, pool: Pool = Pool()) -> Prepared:
+    """Check and exclude by the declared rules.
+
+    Raises
+    ------
+    NoRatingsError
+        No main trial of this origin, or nobody left after exclusion.
+    InputError
+        An answer that the declaration does not allow, a trial stored twice with different data.
+    """
+    chosen, pooling = pooled(answers.rows, pool, answers.source, definition_sha256(experiment))
+    rows, repeats = _without_repeats(chosen, plan.keys, answers.source)
+    rows = plan.numbered(rows)
+    main = _main(rows)
+    plan.check(experiment, main, answers.source)
+    if (main["participant"] == "").any():
+        raise InputError(
+            f"{answers.source}: 'participant' is empty in {(main['participant'] == '').sum()} rows"
+        )
+    checked = replace(answers, rows=rows)
+    exclusions = apply_exclusions(experiment, checked)
+    _refuse_nobody(exclusions, answers, chosen, pool)
+    decisions = (*answers.decisions, *pooling, *repeats)
+    return Prepared(experiment, answers.source, checked.synthetic, exclusions, decisions, checked)
+
+
+def _main(rows: pd.DataFrame) -> pd.DataFrame:
+    return rows[(rows["kind"] == "main").to_numpy()] if "kind" in rows.columns else rows
+
+
+def where(rows: pd.DataFrame, position: int) -> str:
+    """The participant and trial of a row, in words."""
+    row = rows.iloc[position]
+    trial = f", trial {row['trial_index']:g}" if "trial_index" in rows.columns else ""
+    return f"participant {row['participant']}{trial}"
+
+
+def refuse_unknown(rows: pd.DataFrame, column: str, known: list[str], what: str, source: str) -> None:
+    """Refuse a name that is not `known`, with the nearest one; `what` says what it should have been."""
+    for name in pd.unique(rows[column]):
+        if name not in known:
+            at = int(np.argmax((rows[column] == name).to_numpy()))
+            raise InputError(
+                f"{source}: {where(rows, at)}: '{name}' is no {what}{did_you_mean(str(name), known)}"
+            )
+
+
+def _without_repeats(
+    rows: pd.DataFrame, within: tuple[str, ...], source: str
+) -> tuple[pd.DataFrame, tuple[str, ...]]:
+    """Count a trial stored twice once where its data agree; refuse it where they do not."""
+    if "trial_index" not in rows.columns:
+        return rows, ()
+    unit = "run" if "run" in rows.columns else "participant"
+    keys = [unit, "trial_index", *(name for name in ("play", *within) if name in rows.columns)]
+    again = rows.duplicated(keys).to_numpy()
+    if not again.any():
+        return rows, ()
+    differ = again & ~rows.duplicated().to_numpy()
+    if differ.any():
+        raise InputError(
+            f"{source}: {where(rows, int(np.argmax(differ)))} stands there twice with different data; "
+            "remove the wrong row"
+        )
+    return rows[~again], (f"{again.sum()} repeated rows of trials already there, counted once",)
+
+
+def _refuse_nobody(exclusions: Exclusions, answers: StudyAnswers, chosen: pd.DataFrame, pool: Pool) -> None:
+    source = answers.source
+    if not exclusions.n_runs:
+        aside = f" (set aside: {'; '.join(exclusions.set_aside)})" if exclusions.set_aside else ""
+        raise NoRatingsError(f"{source} has no ratings{pool} yet{aside}")
+    if exclusions.rows.empty:
+        excluded = "; ".join(f"{run.participant} ({', '.join(run.reasons)})" for run in exclusions.runs[:5])
+        raise NoRatingsError(
+            f"{source}: no participant remains after the declared exclusions: {excluded}"
+            f"{_other_origins(answers.rows, chosen)}"
+        )
+
+
+def _other_origins(rows: pd.DataFrame, chosen: pd.DataFrame) -> str:
+    """What to do where there are answers of origins that were not asked for."""
+    others = sorted(set(origins(rows)) - set(origins(chosen)))
+    return "; answers of other origins: " + ", ".join(f"--origin {name}" for name in others) if others else ""
+
+
+# A study's answers to what its report says, by the plan of its kind of trial.
+
+
+def study_contents(
+    experiment: Experiment,
+    answers: StudyAnswers,
+    pool: Pool = Pool(),
+    runs: RunEvidence | None = None,
+    scale: str | None = None,
+) -> Contents:
+    """Analyse a study by the plan of its kind of trial.
+
+    `runs` are verdicts and signals of a runs file; `scale` names the one to analyse, where not all are.
+    """
+    plan = plan_of(experiment.trial.kind)
+    if scale is not None:
+        scale_called(experiment, scale)
+    answers = with_verdicts(answers, runs) if runs else answers
+    contents = plan.analyse(replace(prepare(experiment, plan, answers, pool), scale=scale))
+    chosen, _ = pooled(answers.rows, pool, answers.source, definition_sha256(experiment))
+    evidence, numbers = evidence_section(chosen, runs, contents.synthetic)
+    if evidence is None:
+        return contents
+    return replace(contents, evidence=evidence, numbers=contents.numbers | {"evidence": numbers})

@@ -1,20 +1,141 @@
 """Sensitivity analyses beside the ANOVA: Bayes factors, robust companions, mixed and ordinal models."""
 
+import re
 from collections.abc import Callable
 from functools import partial
 from math import isfinite
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from analysis.plans.model_notes import notes_of
-from analysis.plans.random_factors import fit_with_random, holds_for, said_of_random
-from analysis.plans.result import Analysis
-from analysis.report.captions import caption
-from analysis.report.contents import Section
+from analysis.plans.result import Analysis, Labels
+from analysis.report.contents import Section, caption
 from analysis.report.formats import Table
 from analysis.report.numbers import DASH, fixed, p_value
 from analysis.report.r_models import model_files
 from analysis.within.simple_effects import first_p
 from experiments.errors import InputError
+
+if TYPE_CHECKING:
+    from analysis.models.columns import RandomSlopes
+    from analysis.models.ordinal import OrdinalResult
+    from analysis.models.random_part import MixedResult
+
+
+# What is said under the table of a report's model: its random terms and its doubts, in labels.
+
+_MOVED = re.compile(r"(?P<names>.+)(?P<said>: one level for each participant, taken as between participants)")
+_SLOPES = ("slope", "slopes")
+
+
+def notes_of(result: "MixedResult | OrdinalResult", labels: Labels) -> tuple[str, ...]:
+    """Standard deviations of the random terms, a grouping after another, and what was doubtful; in labels."""
+    by_group: dict[str, list[str]] = {}
+    for one in result.components:
+        group = f"{labels.term(one.group)}:" if one.term else one.group
+        by_group.setdefault(group, []).append(f"{labels.term(one.term)} {fixed(one.sd, 3)}".strip())
+    said = "; ".join(f"{group} {', '.join(terms)}" for group, terms in by_group.items())
+    sds = (f"Standard deviations: {said}.",) if said else ()
+    return (*sds, *(_in_labels(note, result, labels) for note in result.notes))
+
+
+def _in_labels(note: str, result: "MixedResult | OrdinalResult", labels: Labels) -> str:
+    """A note with labels where terms stand; a factor may be called as a word of the note is, such as fit."""
+    if moved := _MOVED.fullmatch(note):
+        return ", ".join(map(labels.term, moved["names"].split(", "))) + moved["said"]
+    said = {
+        f"{one.group} {one.term}": f"{labels.term(one.group)} {labels.term(one.term)}"
+        for one in result.components
+        if one.term
+    }
+    for effect in result.effects:
+        said |= {f"{word} of {effect.effect}": f"{word} of {labels.term(effect.effect)}" for word in _SLOPES}
+    phrases = "|".join(sorted(map(re.escape, said), key=len, reverse=True))
+    return re.sub(rf"(?<![\w:])(?:{phrases})(?!\w|:\w)", lambda one: said[one[0]], note)
+
+
+# The linear mixed model of a report where factors are random: which tests hold for others of them.
+
+MAX_SLOPES = 500
+"""With more coefficients of levels than this the model would keep the report waiting."""
+
+
+def fit_with_random(
+    arguments: dict[str, Any], random: list[str], every: bool
+) -> "tuple[MixedResult, RandomSlopes]":
+    """The fit whose effects may differ between the levels of random factors, as many as the data allow.
+
+    The test of an effect holds for other levels only where it may differ between those shown. Slopes have a
+    variance an effect, as those of participants: nested intercepts (`1 | face:A:B`) would share one variance
+    among all contrasts, and too little of it with an interaction that alone differs between levels.
+
+    Parameters
+    ----------
+    arguments : dict of str to Any
+        Those of `fit_mixed` that are the same for every model.
+    random : list of str
+        The random factors; none for a model without.
+    every : bool
+        Whether participants have slopes of every effect; else of main effects.
+    """
+    import numpy as np
+
+    from analysis.models.mixed import fit_mixed
+
+    for slopes in _tried(arguments, random, every):
+        chosen = _without_items_of_slopes(arguments, random) if slopes == "all" else arguments
+        try:
+            fitted = fit_mixed(
+                **chosen, random=random, slopes="all" if every else "main", random_slopes=slopes
+            )
+        except (InputError, np.linalg.LinAlgError):
+            continue
+        return fitted, slopes
+    return fit_mixed(**arguments, random=random, slopes="all" if every else "main"), "none"
+
+
+def _tried(arguments: dict[str, Any], random: list[str], every: bool) -> "tuple[RandomSlopes, ...]":
+    if not random:
+        return ()
+    rows, factors = arguments["rows"], [*arguments["within"], *arguments["between"]]
+    levels = sum(rows[name].nunique() for name in random)
+    small = levels * len(rows[factors].drop_duplicates()) <= MAX_SLOPES
+    return ("all", "main") if every and small else ("main",)
+
+
+def _without_items_of_slopes(arguments: dict[str, Any], random: list[str]) -> dict[str, Any]:
+    """The same without items where each is a cell of a random factor: its slopes hold what they would."""
+    rows, items = arguments["rows"], list(arguments["item"])
+    own = [name for name in random if name in items]
+    if len(own) != 1:
+        return arguments
+    cells = [*own, *arguments["within"], *arguments["between"]]
+    one_each = len(rows[cells].drop_duplicates()) == len(rows[[*cells, *items]].drop_duplicates())
+    return arguments | {"item": None} if one_each else arguments
+
+
+def holds_for(effect: str, random: list[str], slopes: "RandomSlopes") -> str:
+    """For which levels of the random factors a test holds."""
+    tested = slopes == "all" or (slopes == "main" and ":" not in effect)
+    names = " and ".join(random)
+    return f"others of {names}" if tested else f"the {names} shown"
+
+
+def said_of_random(random: list[str], slopes: "RandomSlopes") -> str:
+    """What the report says of the random factors."""
+    names = ", ".join(random)
+    if slopes == "none":
+        return (
+            f"{names}: random, with an intercept for each level only, since effects that differ "
+            "between levels could not be fitted: the tests hold for those shown."
+        )
+    which = "every effect" if slopes == "all" else "each main effect"
+    text = (
+        f"{names}: random, with an intercept and slopes for {which} at each level, so that tests of these "
+        "hold for others like those shown; with few of them they have few df."
+    )
+    if slopes == "main":
+        text += " Slopes for interactions were too many to fit: tests of interactions hold for those shown."
+    return text
+
 
 MAX_RATINGS = 50_000
 """Above this the models would keep the report waiting; the commands mixed and ordinal still fit them."""
@@ -43,8 +164,8 @@ def sensitivity_sections(
 
 def robust_companions(analysis: Analysis, progress: Callable[[str], None] = lambda _: None) -> Section:
     """Permutations, aligned ranks and trimmed means beside the ANOVA."""
-    from analysis.report.robust_tables import robust_section
-    from analysis.robust.companions import companions_of
+    from analysis.report.rating_tables import robust_section
+    from analysis.robust import companions_of
 
     progress("robust companions")
     return robust_section(analysis, analysis.robust or companions_of(analysis.anova))

@@ -5,21 +5,19 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
-from analysis.plans.plan import Plan
-from analysis.plans.prepare import refuse_unknown, where
-from analysis.plans.prepared import Prepared
-from analysis.plans.series_answers import answers_of, series_labels
+from analysis.plans.plan import Plan, Prepared, refuse_unknown, where
 from analysis.read.reading import Reading
 from analysis.report.contents import Contents
 from analysis.thresholds.answers import Answers, counted
 from analysis.thresholds.people import fit_thresholds
-from analysis.thresholds.series import SeriesFit, differences
+from analysis.thresholds.plane_people import SeriesPlane, fit_planes, points_of
+from analysis.thresholds.series import Difference, SeriesFit, answers_of, differences, series_labels
 from experiments.definition import Experiment
 from experiments.errors import InputError
 from experiments.trials.threshold.answer import CODES
 from experiments.trials.threshold.columns import THRESHOLDS
 from experiments.trials.threshold.declaration import Threshold, YesNo, threshold_of
-from experiments.trials.threshold.grid import series_of
+from experiments.trials.threshold.grid import model, series_of
 
 READING = Reading(THRESHOLDS, texts=("response", "series", "interval"), numbers=("value",))
 
@@ -44,9 +42,7 @@ def check(experiment: Experiment, rows: pd.DataFrame, source: str) -> None:
 def analyse(prepared: Prepared) -> Contents:
     """Every series over all people and of each person, and series compared."""
     if threshold_of(prepared.experiment).stimulus.second:
-        from analysis.plans.threshold_plane import analyse as analyse_plane
-
-        return analyse_plane(prepared)
+        return analyse_planes(prepared)
     from analysis.report.threshold_contents import contents_of
 
     fits = fits_of(prepared)
@@ -74,3 +70,36 @@ def _thresholds(series: SeriesFit) -> Mapping[str, float]:
 
 
 PLAN = Plan(READING, check, analyse, numbered)
+
+
+# The analysis of thresholds over two factors: a function with a line of thresholds for each series.
+
+
+def analyse_planes(prepared: Prepared) -> Contents:
+    """Every series over all people and of each person; thresholds and tilts of series compared."""
+    from analysis.report.plane_contents import contents_of
+
+    trial, labels = threshold_of(prepared.experiment), series_labels(prepared.experiment)
+    # The declared middle, as the server has it: series that lack a level are compared with the others.
+    middle = model(prepared.experiment).middle
+    fits = tuple(
+        _fit_plane(name, labels[name], mine, trial, middle) for name, mine in answers_of(prepared).items()
+    )
+    compared: tuple[Difference, ...] = ()
+    for what in ("threshold", "tilt"):
+        compared += differences([(fit.label, _by_person(fit, what)) for fit in fits], what)
+    return contents_of(prepared, fits, compared)
+
+
+def _fit_plane(name: str, label: str, answers: Answers, trial: Threshold, middle: float) -> SeriesPlane:
+    points, falling = points_of(answers), trial.direction == "falling"
+    try:
+        result = fit_planes(answers, "normal", trial.task.guess, trial.lapse, falling=falling, middle=middle)
+    except InputError as error:
+        return SeriesPlane(name, label, points, None, str(error).removeprefix(f"{answers.source}: "))
+    return SeriesPlane(name, label, points, result, None)
+
+
+def _by_person(series: SeriesPlane, what: str) -> Mapping[str, float]:
+    people = () if series.result is None else series.result.people
+    return {one.participant: getattr(one.fit, what) for one in people if one.fit is not None}

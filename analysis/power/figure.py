@@ -9,8 +9,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from analysis.power.simulate import PowerResult
-from analysis.report.letters import further_letters
-from analysis.report.pictures import COLOURS, MARKERS, STYLE
+from analysis.report.pictures import COLOURS, MARKERS, STYLE, further_letters
 from experiments.errors import InputError
 from experiments.files import whole_file
 

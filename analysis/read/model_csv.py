@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis.models.roles import split_covariates
-from analysis.read.exported_rows import EXPORT_COLUMNS, rows_that_count
+from analysis.models.columns import split_covariates
 from analysis.read.number_columns import IN_COVARIATE, numbers, unusual_numbers
+from analysis.read.reading import EXPORT_COLUMNS, rows_that_count
 from analysis.read.text_table import TextTable, read_text_table, texts_required
 from experiments.errors import InputError
 from experiments.trials.clip_rating.columns import RATINGS

@@ -1,9 +1,15 @@
-"""Which columns the analysis reads of the rows of a kind of trial."""
+"""Which columns and rows of the server's exports the analysis reads."""
 
 from dataclasses import dataclass
 
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
 from experiments.columns import View, names_of
 from experiments.columns.base import EVIDENCE, EXCLUSION, LEVELS, ORIGIN, RUN, STUDY
+
+# Which columns the analysis reads of the rows of a kind of trial.
 
 _NOT_ASKED = ("run", "language")
 _OF_A_RUN = tuple(
@@ -58,3 +64,26 @@ class Reading:
 
     def _there(self, names: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(dict.fromkeys(name for name in names if name in self.view.names))
+
+
+# Which rows of the server's export are answers that count.
+
+EXPORT_COLUMNS = ("kind", "verdict", "excluded", "synthetic")
+_COUNT = (
+    ("kind", ("main", ""), "practice and attention trials"),
+    ("verdict", ("good", "uncertain", "flagged", ""), "failed plays"),
+    ("excluded", ("0", "False", "false", ""), "rows of runs excluded by hand"),
+)
+
+
+def rows_that_count(rows: pd.DataFrame, keep: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], list[str]]:
+    """Of the rows to `keep` (n,) those that count, and a sentence for each reason that leaves some out."""
+    decisions = []
+    for column, good, why in _COUNT:
+        if column not in rows.columns:
+            continue
+        out = keep & ~rows[column].astype(str).isin(good).to_numpy()
+        if out.any():
+            decisions.append(f"{out.sum()} {why} left out")
+        keep = keep & ~out
+    return keep, decisions

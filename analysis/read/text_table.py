@@ -10,11 +10,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from analysis.read.copies import row_codes, said_of_copies
 from analysis.read.files.cells import Cells
 from analysis.read.files.open import Reader, reader_of
 from analysis.read.files.programs import program_of, trials_only
-from analysis.read.wide import wide_hint
+from analysis.read.wide import row_codes, said_of_copies, wide_hint
 from analysis.within.level_codes import natural_order
 from experiments.errors import InputError, nearest
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from analysis.plans.result import Analysis
-from analysis.report.captions import in_words
+from analysis.report.contents import in_words
 from analysis.report.pictures import BESIDE, COLOURS, MARKERS, STYLE, new_figure, wrapped, write_note
 from analysis.within.anova import AnovaResult
 from analysis.within.estimates import margin_of

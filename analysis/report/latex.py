@@ -2,10 +2,9 @@
 
 import re
 
-from analysis.report.column_widths import text_share
 from analysis.report.contents import Contents, DrawnPart, Picture, Section
-from analysis.report.formats import Table
-from analysis.report.italics import heading_pieces, pieces, signed, signed_cell
+from analysis.report.formats import Table, text_share
+from analysis.report.numbers import heading_pieces, pieces, signed, signed_cell
 
 NEEDS = r"\usepackage{array,booktabs,graphicx,longtable}"
 """What a document must load for the tables."""

@@ -1,25 +1,101 @@
 """The report of a study of paired comparisons: tables, sentences and figures."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
+import matplotlib as mpl
+import numpy as np
+
+from analysis.pairs.abilities import Z_95, FactorTest, ItemFactors, PairsResult
 from analysis.pairs.comparisons import Comparisons
-from analysis.pairs.factors import FactorTest, ItemFactors
-from analysis.pairs.findings import Findings
-from analysis.pairs.pairs_result import PairsResult
-from analysis.plans.prepared import Prepared
+from analysis.pairs.findings import Findings, PairCount
+from analysis.plans.plan import Prepared
 from analysis.plans.result import Labels, labels_of
-from analysis.report.captions import caption
-from analysis.report.contents import Contents, Part, Picture
+from analysis.report.choice_tables import abilities_table, contrasts_table, factors_table
+from analysis.report.contents import Contents, Part, Picture, caption
 from analysis.report.formats import Table
-from analysis.report.json_output import exclusions_data, study_data
-from analysis.report.left_out import left_out
-from analysis.report.numbers import fixed, p_value
-from analysis.report.pairs_sentences import sentences
-from analysis.report.pairs_tables import abilities_table, contrasts_table, factors_table
-from analysis.report.r_choices import pairs_files
+from analysis.report.json_output import exclusions_data, left_out, study_data
+from analysis.report.numbers import apa_p, fixed, p_value
+from analysis.report.pictures import COLOURS, STYLE, in_both_formats, new_figure, write_note
+from analysis.report.r_models import pairs_files
 from experiments.definition import Experiment
+
+# Sentences about paired comparisons in APA style.
+
+SIGNIFICANCE = 0.05
+LACK_OF_FIT = "lack of fit"
+
+
+def sentences(findings: Findings, items: Sequence[str]) -> tuple[str, ...]:
+    """Whether items differ and in which order, what each factor does, and how well the model holds."""
+    result = findings.abilities
+    if result is None:
+        return (f"The abilities of {len(items)} cells were not fitted: {findings.abilities_reason}.",)
+    said = [_equality(findings, result), _ranking(result)]
+    if findings.factors is not None:
+        said += [_factor(test) for test in findings.factors.factors if test.df > 0]
+    elif findings.factors_reason:
+        said.append(f"Effects of factors were not fitted: {findings.factors_reason}.")
+    return (*said, *_checks(findings, result))
+
+
+def _equality(findings: Findings, result: PairsResult) -> str:
+    if findings.equal is None:
+        return (
+            "Some cell won or lost every comparison with the others, so that its ability is finite only by "
+            "Firth's penalty; equal abilities were not tested."
+        )
+    test = findings.equal
+    verdict = "differed" if test.p < SIGNIFICANCE else "did not differ significantly"
+    return (
+        f"The {len(result.items)} cells {verdict} in how often they were chosen, χ²({test.df}) = "
+        f"{fixed(test.chi2)}, {apa_p(test.p)}."
+    )
+
+
+def _ranking(result: PairsResult) -> str:
+    ranked = sorted(result.items, key=lambda item: (item.rank, item.name))
+    named = [f"{item.name} ({fixed(item.centred)}, SE = {fixed(item.se_centred)})" for item in ranked]
+    return f"From most to least chosen, abilities in {result.scale}, against their mean: {'; '.join(named)}."
+
+
+def _factor(test: FactorTest) -> str:
+    statistic = f"χ²({test.df}) = {fixed(test.chi2)}, {apa_p(test.p)}"
+    if test.factor == LACK_OF_FIT:
+        fits = "do not tell the whole" if test.p < SIGNIFICANCE else "suffice"
+        return f"Effects of single factors {fits} (free abilities against their sum), {statistic}."
+    verdict = "was significant" if test.p < SIGNIFICANCE else "was not significant"
+    levels = [
+        f"{level} {fixed(estimate)} (SE = {fixed(se)})"
+        for level, estimate, se in zip(test.levels, test.estimates, test.standard_errors, strict=True)
+    ]
+    return (
+        f"The effect of {test.factor} {verdict}, {statistic}. Against {test.reference}: {', '.join(levels)}."
+    )
+
+
+def _checks(findings: Findings, result: PairsResult) -> list[str]:
+    said, fit = [], result.goodness
+    if fit.df > 0 and math.isfinite(fit.p) and not result.firth:
+        holds = "departs from" if fit.p < SIGNIFICANCE else "does not depart significantly from"
+        said.append(
+            f"The share of choices in the pairs {holds} the model, χ²({fit.df}) = {fixed(fit.deviance)}, "
+            f"{apa_p(fit.p)}."
+        )
+    if findings.order is not None:
+        side = findings.order
+        had = "had" if side.p < SIGNIFICANCE else "had no significant"
+        said.append(
+            f"The left (first) clip {had} {'an ' if side.p < SIGNIFICANCE else ''}advantage, "
+            f"b = {fixed(side.estimate)}, SE = {fixed(side.se)}, z = {fixed(side.z)}, {apa_p(side.p)}."
+        )
+    triples = result.transitivity
+    if triples.triples:
+        said.append(f"{triples.weak_violations} of {triples.triples} triples break weak transitivity.")
+    return said
+
 
 METHODS = {
     "bradley-terry": (
@@ -196,9 +272,77 @@ def numbers(prepared: Prepared, comparisons: Comparisons, findings: Findings) ->
 def draw_all(findings: Findings, synthetic: bool, people: int) -> tuple[Picture, ...]:
     """Abilities with their intervals, and the share of choices in each pair."""
     # matplotlib takes a second to import, which commands that draw nothing need not pay
-    from analysis.report.pairs_figures import draw_abilities, draw_choices
 
     choices = draw_choices(findings.pairs, synthetic, people)
     if findings.abilities is None:
         return (choices,)
     return (draw_abilities(findings.abilities, synthetic, people), choices)
+
+
+# Figures of paired comparisons. The same data give the same bytes.
+
+NUMBERED_MAX = 14
+"""More items than this and the shares are colours without numbers."""
+
+
+def draw_abilities(result: PairsResult, synthetic: bool, people: int) -> Picture:
+    """Abilities against their mean with 95% intervals, the ablest on top."""
+    ranked = sorted(result.items, key=lambda item: (-item.rank, item.name))
+    with mpl.rc_context(STYLE):
+        figure = new_figure(7.2, 1.5 + 0.32 * len(ranked))
+        axes = figure.add_subplot()
+        rows = range(len(ranked))
+        axes.axvline(0, color="#999999", linewidth=0.8, zorder=1)
+        axes.errorbar(
+            [item.centred for item in ranked],
+            rows,
+            xerr=[Z_95 * item.se_centred for item in ranked],
+            linestyle="none",
+            marker="o",
+            color=COLOURS[0],
+            capsize=3.2,
+            elinewidth=1.3,
+            markersize=5,
+        )
+        axes.set_yticks(rows, [item.name for item in ranked])
+        axes.set_xlabel(f"Ability against the mean of all, {result.scale}")
+        axes.grid(axis="x", linewidth=0.4, alpha=0.5)
+        axes.set_axisbelow(True)
+        note = f"N = {people}, {result.n_comparisons} comparisons. Bars: 95% intervals, sum-to-zero."
+        write_note(figure, note, synthetic, "comparisons")
+        best = ranked[-1].name
+        alt = f"Abilities of {len(ranked)} cells with 95% intervals, from the most chosen, {best}, down"
+        return Picture("figure-abilities", "Abilities", alt, *in_both_formats(figure))
+
+
+def draw_choices(pairs: Sequence[PairCount], synthetic: bool, people: int) -> Picture:
+    """Share of comparisons in which the row's cell was chosen over the column's, ties as half."""
+    names = list(dict.fromkeys(name for pair in pairs for name in (pair.first, pair.second)))
+    shares = np.full((len(names), len(names)), np.nan)
+    for pair in pairs:
+        one, other = names.index(pair.first), names.index(pair.second)
+        shares[one, other] = (pair.first_chosen + pair.ties / 2) / pair.n
+        shares[other, one] = 1 - shares[one, other]
+    size = len(names)
+    with mpl.rc_context(STYLE):
+        figure = new_figure(7.2, 2.0 + 0.34 * size)
+        axes = figure.add_subplot()
+        drawn = axes.imshow(shares, cmap="PuOr", vmin=0, vmax=1)
+        axes.set_xticks(range(size), names, rotation=30, ha="right")
+        axes.set_yticks(range(size), names)
+        axes.set_xlabel("over")
+        axes.set_ylabel("chosen")
+        for (row, column), share in np.ndenumerate(shares):
+            if np.isfinite(share) and size <= NUMBERED_MAX:
+                ink = "white" if abs(share - 0.5) > 0.3 else "black"
+                axes.text(column, row, f"{share:.2f}", ha="center", va="center", fontsize=8, color=ink)
+        axes.spines[:].set_visible(False)
+        figure.colorbar(drawn, ax=axes, label="share chosen")
+        write_note(figure, f"N = {people}. Ties count half for each.", synthetic, "comparisons")
+        alt = "Share of comparisons in which the cell of the row was chosen over the cell of the column"
+        return Picture(
+            "figure-choices",
+            "Choices in each pair",
+            alt,
+            *in_both_formats(figure),
+        )

@@ -6,16 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from analysis.plans.prepared import Prepared
-from analysis.report.captions import caption
-from analysis.report.contents import Contents, Part, Picture
+from analysis.plans.plan import Prepared
+from analysis.report.choice_tables import interval_text, plane_tables
+from analysis.report.contents import Contents, Part, Picture, caption
 from analysis.report.formats import Table
-from analysis.report.json_output import exclusions_data, study_data
-from analysis.report.left_out import left_out
+from analysis.report.json_output import exclusions_data, left_out, study_data
 from analysis.report.numbers import fixed
-from analysis.report.plane_tables import plane_tables
 from analysis.report.threshold_contents import difference_sentence, differences_table
-from analysis.report.threshold_tables import interval_text
 from analysis.thresholds.plane_people import PlanesResult
 from experiments.trials.threshold.declaration import threshold_of
 

@@ -1,17 +1,108 @@
 """A script in R that computes a report's tables anew with afex, car and emmeans, and compares."""
 
+import csv
+import io
 import itertools
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from importlib.metadata import version
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 
 from analysis.plans.result import Analysis
-from analysis.report.r_sizes import sizes
-from analysis.report.r_text import as_csv, head_of_script, r_number
-from analysis.report.templating import filled
+from analysis.report.write import filled
+from analysis.robust import TRIM, Companions
+from analysis.within.effects import Effect
+from analysis.within.homogeneity import box_test, levene_tests
+from analysis.within.pairwise import Pair
 from analysis.within.simple_effects import SimpleEffect
+
+# Numbers and rows as R reads them.
+
+
+def r_number(value: float | None) -> str:
+    """A number as R reads it; NA where there is none."""
+    return "NA" if value is None or not np.isfinite(value) else repr(float(value))
+
+
+def as_csv(rows: Iterable[Sequence[Any]]) -> str:
+    """Rows as CSV text."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()
+
+
+def head_of_script(title: str, script: str, data: str) -> dict[str, str]:
+    """What every script says first: of which report it is, who wrote it, its name and its data."""
+    return {"title": " ".join(title.split()), "version": version("palpebra"), "script": script, "data": data}
+
+
+# What the R script computes beside the tests: sizes, intervals, Bayes factors, equal spread, equivalence.
+
+Names = Mapping[str, str]
+
+
+def sizes(analysis: Analysis, names: Names) -> dict[str, Any]:
+    """The values of `verify-sizes.R.j2`; `names` are those of factors and covariates in R."""
+    design = analysis.anova.between
+    box = box_test(analysis.anova)
+    known = box is not None and box.m is not None
+    terms = [":".join(names[part] for part in term) for term in design.terms[1:]]
+    return {
+        "sizes": as_csv(_effect(effect, names) for effect in analysis.anova.effects).strip(),
+        "dz": as_csv(_pair(analysis, pair, names) for pair in _of_one_factor(analysis, names)).strip(),
+        "between": [names[name] for name in (*design.factors, *(c.name for c in design.covariates))],
+        "between_terms": " + ".join(terms) or "1",
+        "groups": [names[name] for name in design.factors],
+        "within_names": [names[name] for name in analysis.anova.factors],
+        "levene": as_csv(
+            [f"cell {i}", r_number(test.f_value), r_number(test.p_value)]
+            for i, test in enumerate(levene_tests(analysis.anova))
+        ).strip(),
+        "box": as_csv([[r_number(v) for v in (box.m, box.chi2, box.df, box.p_value)]]).strip()
+        if box is not None and known
+        else "",
+        "equivalence": _equivalence(analysis, names),
+    }
+
+
+def _effect(effect: Effect, names: Names) -> list[str]:
+    several = effect.multivariate
+    exact = several is not None and several.exact and bool(effect.within)
+    numbers = [effect.eta_sq_partial, effect.omega_sq_partial, *effect.eta_sq_partial_ci]
+    numbers.append(effect.eta_sq_generalized)
+    if exact and several is not None:
+        numbers += [*several.eta_sq_partial_ci, several.f_value, several.df_effect, several.df_error]
+    else:
+        numbers += [float("nan")] * 5
+    return [":".join(names[part] for part in (*effect.between, *effect.within)), *map(r_number, numbers)]
+
+
+def _of_one_factor(analysis: Analysis, names: Names) -> list[Pair]:
+    return [pair for pair in analysis.pairs if pair.effect in names]
+
+
+def _pair(analysis: Analysis, pair: Pair, names: Names) -> list[Any]:
+    levels = dict(zip(analysis.anova.all_factors, analysis.anova.all_levels, strict=True))[pair.effect]
+    positions = [levels.index(name) + 1 for name in (pair.level_a, pair.level_b)]
+    numbers = (pair.t, pair.df, pair.dz, *pair.dz_ci, pair.bayes_factor)
+    return [names[pair.effect], *positions, *map(r_number, numbers)]
+
+
+def _equivalence(analysis: Analysis, names: Names) -> str:
+    """Tests of the factors all of whose pairs have one, which are those that R has."""
+    rows = []
+    for name, levels in zip(analysis.anova.all_factors, analysis.anova.all_levels, strict=True):
+        tests = [test for test in analysis.equivalence if test.effect == name]
+        if len(tests) == len(list(combinations(levels, 2))):
+            rows += [
+                [names[name], *map(r_number, (*test.bounds, test.p_lower, test.p_upper, *test.ci))]
+                for test in tests
+            ]
+    return as_csv(rows).strip()
+
 
 SCRIPT, DATA = "verify.R", "cell-means.csv"
 
@@ -206,4 +297,61 @@ def _simple(analysis: Analysis, names: dict[str, str]) -> str:
         within = simple.of in analysis.anova.factors
         how = ("exact" if exact is not None else "corrected") if within else "between"
         rows.append([names[simple.of], *map(r_number, numbers), how])
+    return as_csv(rows).strip()
+
+
+# A script in R that computes the robust companions of a report anew, and compares.
+
+ROBUST_SCRIPT = f"robust-{SCRIPT}"
+
+
+def robust_files(analysis: Analysis, companions: Companions, key: str = "") -> dict[str, bytes]:
+    """The script by its file name; it reads the cell means that lie beside `verify.R`."""
+    script, data = (f"{key}-{name}" if key else name for name in (ROBUST_SCRIPT, DATA))
+    names = safe_names(analysis)
+    design = analysis.anova.between
+    text = filled(
+        "verify-robust.R.j2",
+        **head_of_script(analysis.title, script, data),
+        **design_in_r(analysis, names),
+        between=[names[name] for name in (*design.factors, *(c.name for c in design.covariates))],
+        terms=[":".join(names[part] for part in term) for term in design.terms[1:]],
+        groups=[names[name] for name in design.factors],
+        within=[names[name] for name in analysis.anova.factors],
+        trim=TRIM,
+        permutations=_permutations(analysis, companions, names),
+        ranks=_ranks(analysis, companions, names),
+        trimmed=_trimmed(companions, names),
+    )
+    return {script: text.encode()}
+
+
+def _permutations(analysis: Analysis, companions: Companions, names: dict[str, str]) -> str:
+    rows = []
+    for effect, test in zip(analysis.anova.effects, companions.permutations, strict=True):
+        between, within = (
+            ":".join(names[part] for part in parts) for parts in (effect.between, effect.within)
+        )
+        exact = "TRUE" if test.exact else "FALSE"
+        rows.append(
+            [between, within, r_number(test.f_value), r_number(test.p_value), test.n_rearranged, exact]
+        )
+    return as_csv(rows).strip()
+
+
+def _ranks(analysis: Analysis, companions: Companions, names: dict[str, str]) -> str:
+    rows = []
+    for test in companions.ranks:
+        factors = analysis.anova.effect(test.effect).factors
+        epsilon = test.epsilon_gg if test.epsilon_gg < 1 else float("nan")
+        numbers = (test.f_value, test.df_effect, test.df_error, test.p_value, epsilon)
+        rows.append([":".join(names[part] for part in factors), *map(r_number, numbers)])
+    return as_csv(rows).strip()
+
+
+def _trimmed(companions: Companions, names: dict[str, str]) -> str:
+    rows = []
+    for pair in companions.trimmed:
+        numbers = (pair.difference, pair.se, pair.df, pair.t, pair.p, pair.p_holm, *pair.ci)
+        rows.append([names[pair.effect], *map(r_number, numbers)])
     return as_csv(rows).strip()

@@ -7,19 +7,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.plans.prepared import Prepared
-from analysis.plans.series_answers import answers_of
-from analysis.report.captions import caption
-from analysis.report.contents import Contents, Part, Picture
+from analysis.plans.plan import Prepared
+from analysis.report.choice_tables import means_table, people_table, threshold_decimals, threshold_table
+from analysis.report.contents import Contents, Part, Picture, caption
 from analysis.report.formats import Table
-from analysis.report.json_output import exclusions_data, study_data
-from analysis.report.left_out import left_out
+from analysis.report.json_output import exclusions_data, left_out, study_data
 from analysis.report.numbers import apa_p, decimals, fixed, interval, p_value
-from analysis.report.r_choices import threshold_files
-from analysis.report.threshold_tables import means_table, people_table, threshold_decimals, threshold_table
+from analysis.report.r_models import threshold_files
 from analysis.thresholds.likelihood import function
 from analysis.thresholds.people import ThresholdsResult
 from analysis.thresholds.psychometric import Threshold
+from analysis.thresholds.series import answers_of
 from experiments.trials.threshold.declaration import threshold_of
 
 if TYPE_CHECKING:

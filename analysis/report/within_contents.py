@@ -1,16 +1,143 @@
 """The report of means and their tests: what `analysis anova` and a study of ratings say."""
 
+import math
 from collections.abc import Callable
 
 from analysis.plans.result import Analysis
-from analysis.report.brief import brief
 from analysis.report.contents import Contents, Part, Picture, Progress, Section
 from analysis.report.formats import Table
-from analysis.report.json_output import as_data
-from analysis.report.left_out import left_out
+from analysis.report.json_output import as_data, left_out
+from analysis.report.numbers import apa_p, fixed, share, share_interval
 from analysis.report.r_script import r_files
-from analysis.report.sentences import sentences
-from analysis.report.tables import all_tables
+from analysis.report.within_tables import all_tables, corrected_df, has_sphericity, uses_multivariate
+from analysis.within.effects import Effect
+from analysis.within.multivariate_tests import MultivariateTest
+from analysis.within.simple_effects import SIGNIFICANCE, first_p
+from analysis.within.univariate import UnivariateTest
+
+# Sentences in APA style, one an effect.
+
+
+def sentences(analysis: Analysis) -> tuple[str, ...]:
+    """One sentence an effect: direction of two-level factors, test, effect size with its interval."""
+    multivariate = uses_multivariate(analysis)
+    return tuple(_sentence(analysis, effect, multivariate) for effect in analysis.anova.effects)
+
+
+def _sentence(analysis: Analysis, effect: Effect, multivariate: bool) -> str:
+    kind = "main effect of" if len(effect.factors) == 1 else "interaction of"
+    name = analysis.labels.effect(effect.factors)
+    p = _p(effect, multivariate)
+    if not math.isfinite(p):
+        return f"The {kind} {name} could not be tested: {effect.univariate_reason}."
+    verdict = "was significant" if p < SIGNIFICANCE else "was not significant"
+    sentence = f"The {kind} {name} {verdict}, {_statistics(effect, multivariate)}."
+    return sentence + (
+        _direction(analysis, effect, p < SIGNIFICANCE)
+        if len(effect.factors) == 1 and effect.factors[0] in analysis.anova.all_factors
+        else ""
+    )
+
+
+def effect_p(analysis: Analysis, effect: Effect) -> float:
+    """The p that the effect's sentence gives."""
+    return _p(effect, uses_multivariate(analysis))
+
+
+def statistics_in_brief(analysis: Analysis, effect: Effect) -> str:
+    """F, p and size of the effect as its sentence begins with them, without intervals."""
+    m = effect.multivariate
+    if uses_multivariate(analysis) and m is not None and has_sphericity(effect):
+        return f"{_multivariate_f(m)}, {_share_explained(m.eta_sq_partial)}"
+    return f"{_univariate_f(effect.univariate)}, {_share_explained(effect.eta_sq_partial)}"
+
+
+def _p(effect: Effect, multivariate: bool) -> float:
+    return first_p(effect, multivariate)
+
+
+def _statistics(effect: Effect, multivariate: bool) -> str:
+    m = effect.multivariate
+    if multivariate and m is not None and has_sphericity(effect):
+        test = f"{_multivariate_f(m)}, Pillai's trace = {share(m.pillai, 2)}"
+        return f"{test}, {_size(m.eta_sq_partial, m.eta_sq_partial_ci)} (univariate {_univariate(effect)})"
+    return _univariate(effect)
+
+
+def _univariate(effect: Effect) -> str:
+    """The univariate F with its own df, p and size, corrected where sphericity may fail."""
+    u = effect.univariate
+    correction = f", Greenhouse-Geisser ε = {share(u.epsilon_gg, 2)}" if has_sphericity(effect) else ""
+    return f"{_univariate_f(u)}{correction}, {_size(effect.eta_sq_partial, effect.eta_sq_partial_ci)}"
+
+
+def _multivariate_f(test: MultivariateTest) -> str:
+    return f"F({test.df_effect}, {test.df_error}) = {fixed(test.f_value)}, {apa_p(test.p_value)}"
+
+
+def _univariate_f(test: UnivariateTest) -> str:
+    return f"F({corrected_df(test)}) = {fixed(test.f_value)}, {apa_p(test.p_gg)}"
+
+
+def _size(eta: float, interval: tuple[float, float]) -> str:
+    return f"{_share_explained(eta)}, 95% CI {share_interval(interval)}"
+
+
+def _share_explained(eta: float) -> str:
+    return f"partial η² = {share(eta, 2)}"
+
+
+def _direction(analysis: Analysis, effect: Effect, differs: bool) -> str:
+    factor = effect.factors[0]
+    means = sorted((m for m in analysis.means if m.effect == factor), key=lambda m: -m.mean)
+    said = [
+        f"{analysis.labels.level(factor, m.levels[factor])} (M = {fixed(m.mean)}, SE = {fixed(m.se)})"
+        for m in means
+    ]
+    if not differs:
+        return f" Means: {', '.join(said)}."
+    if len(said) == 2:
+        return (
+            f" Ratings were {fixed(means[0].mean - means[1].mean)} higher for {said[0]} than for {said[1]}."
+        )
+    return f" From highest to lowest: {', '.join(said)}."
+
+
+# What an analysis of means found, in a few lines for the first page.
+
+MAX_LEVELS = 4
+"""Of a factor with more levels the highest and the lowest mean are named."""
+
+
+def brief(analysis: Analysis) -> tuple[str, ...]:
+    """Who was analysed, each effect that was found with its size, and what was not shown."""
+    tested = [effect for effect in analysis.anova.effects if math.isfinite(effect_p(analysis, effect))]
+    shown = [effect for effect in tested if effect_p(analysis, effect) < SIGNIFICANCE]
+    lines = [f"{analysis.n_participants} participants with data in every cell."]
+    lines += [_line(analysis, effect) for effect in shown]
+    rest = [analysis.labels.effect(effect.factors) for effect in tested if effect not in shown]
+    if rest:
+        lines.append(f"No effect was shown, which is no proof of none, of: {', '.join(rest)}.")
+    return tuple(lines)
+
+
+def _line(analysis: Analysis, effect: Effect) -> str:
+    kind = "differ by" if len(effect.factors) == 1 else "differ by the interaction of"
+    said = f"Ratings {kind} {analysis.labels.effect(effect.factors)}"
+    return f"{said}, {statistics_in_brief(analysis, effect)}{_means(analysis, effect)}."
+
+
+def _means(analysis: Analysis, effect: Effect) -> str:
+    """Means of a factor's levels, highest first; nothing of an interaction or a covariate."""
+    if len(effect.factors) > 1 or effect.factors[0] not in analysis.anova.all_factors:
+        return ""
+    factor = effect.factors[0]
+    means = sorted((mean for mean in analysis.means if mean.effect == factor), key=lambda mean: -mean.mean)
+    if len(means) > MAX_LEVELS:
+        means = [means[0], means[-1]]
+    named = [f"{analysis.labels.level(factor, mean.levels[factor])} {fixed(mean.mean)}" for mean in means]
+    return f". Means: {', '.join(named)}"
+
 
 BETWEEN_METHODS = (
     " Groups (sum-to-zero contrasts) and covariates enter the multivariate linear model of the cell means; "
@@ -76,7 +203,7 @@ def tables_of(analysis: Analysis) -> tuple[Table, ...]:
     if analysis.robust is None:
         return tables
     # what only some ask for is imported when it is
-    from analysis.report.robust_tables import robust_tables
+    from analysis.report.rating_tables import robust_tables
 
     return (*tables, *robust_tables(analysis, analysis.robust))
 
@@ -86,7 +213,7 @@ def scripts_of(analysis: Analysis, key: str) -> dict[str, bytes]:
     files = r_files(analysis, key)
     if analysis.robust is None:
         return files
-    from analysis.report.r_robust import robust_files
+    from analysis.report.r_script import robust_files
 
     return {**files, **robust_files(analysis, analysis.robust, key)}
 

@@ -6,10 +6,9 @@ from io import BytesIO
 from typing import TYPE_CHECKING
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
-from analysis.report.column_widths import widths_cm
 from analysis.report.contents import Contents, DrawnPart, Picture, Section
-from analysis.report.formats import Table
-from analysis.report.italics import heading_pieces, pieces, signed, signed_cell
+from analysis.report.formats import Table, widths_cm
+from analysis.report.numbers import heading_pieces, pieces, signed, signed_cell
 
 if TYPE_CHECKING:
     from docx.document import Document

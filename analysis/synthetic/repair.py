@@ -6,10 +6,136 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.synthetic.moves import MoveLoss, value_of
-from analysis.synthetic.targets import Targets
+from analysis.synthetic.targets import MeanTarget, SpreadTarget, Targets, TestTarget
+
+# What every target would be after each possible change of one rating point, all at once.
 
 Floats = NDArray[np.float64]
+
+
+def test_value(y: Floats, contrasts: Floats) -> float:
+    """Multivariate F of contrasts (cells, q) on cell means (n, cells); df q, n - q."""
+    n, q = y.shape[0], contrasts.shape[1]
+    z = y @ contrasts
+    mean = z.mean(axis=0)
+    pillai = n * float(mean @ np.linalg.solve(z.T @ z, mean))
+    return float(pillai / (1 - pillai) * (n - q) / q)
+
+
+def test_after_moves(y: Floats, contrasts: Floats, step: Floats) -> Floats:
+    """F after each single move, (signs, n, cells); `step` holds the signed changes of a cell mean.
+
+    A move changes one row of Z = Y C, hence Z'Z by rank two (Woodbury).
+    """
+    n, q = y.shape[0], contrasts.shape[1]
+    z = y @ contrasts
+    u = z.mean(axis=0)
+    inverse = np.linalg.inv(z.T @ z)
+    zb, cb = z @ inverse, contrasts @ inverse
+    zz, zu = np.einsum("ij,ij->i", zb, z)[:, None], (zb @ u)[:, None]
+    cc, cu = np.einsum("ij,ij->i", cb, contrasts)[None, :], (cb @ u)[None, :]
+    zc, uu = zb @ contrasts.T, float(u @ inverse @ u)
+    e = step[:, None, None]
+    xx = uu + 2 * e / n * cu + (e / n) ** 2 * cc
+    zx, cx = zu + e / n * zc, cu + e / n * cc
+    g11, g12 = zz - 1, zc + 1 / e
+    lost = (cc * zx**2 - 2 * g12 * zx * cx + g11 * cx**2) / (g11 * cc - g12**2)
+    pillai = n * (xx - lost)
+    return np.asarray(pillai / (1 - pillai) * (n - q) / q, dtype=np.float64)
+
+
+def miss(value: Floats, low: Floats | float, high: Floats | float, scale: Floats | float) -> Floats:
+    """Distance outside the window in units of `scale`: squared near, linear far away."""
+    distance = np.maximum(np.maximum(low - value, value - high), 0.0) / scale
+    return np.where(distance < 1, distance**2, 2 * distance - 1)
+
+
+AIM = 0.5
+"""The search aims at this inner share of every closed window, so that what it reaches has room to move."""
+
+
+def _aimed(low: Floats, high: Floats) -> tuple[Floats, Floats]:
+    with np.errstate(invalid="ignore"):
+        inner = np.where(np.isfinite(low) & np.isfinite(high), (1 - AIM) / 2 * (high - low), 0.0)
+    return low + inner, high - inner
+
+
+@dataclass(frozen=True)
+class _Stack:
+    """Targets with one weight vector each, stacked: `weights` (m, cells), windows (m, 1, 1, 1)."""
+
+    weights: Floats = field(repr=False)
+    low: Floats
+    high: Floats
+    scale: Floats
+
+    @classmethod
+    def of(cls, targets: "tuple[MeanTarget | SpreadTarget | TestTarget, ...]", cells: int) -> "_Stack":
+        rows = [t.contrasts[:, 0] if isinstance(t, TestTarget) else t.weights for t in targets]
+        columns = [np.array([getattr(t, name) for t in targets]) for name in ("low", "high", "scale")]
+        low, high, scale = (c.reshape(-1, 1, 1, 1) for c in columns)
+        low, high = _aimed(low, high)
+        return cls(np.array(rows).reshape(len(targets), cells), low, high, scale)
+
+    def loss(self, value: Floats) -> Floats:
+        return np.asarray(miss(value, self.low, self.high, self.scale).sum(axis=0))
+
+
+class MoveLoss:
+    """Loss of the data after every single move, for fixed targets."""
+
+    def __init__(self, targets: Targets, cells: int) -> None:
+        tests = (*targets.tests, *targets.pairs)
+        self.means = _Stack.of((*targets.means, *targets.directions), cells)
+        self.spreads = _Stack.of(targets.spreads, cells)
+        self.single = _Stack.of(tuple(t for t in tests if t.contrasts.shape[1] == 1), cells)
+        self.blocks = tuple(t for t in tests if t.contrasts.shape[1] > 1)
+
+    def after_moves(self, y: Floats, step: Floats) -> Floats:
+        """Loss (signs, n, cells) after changing cell mean (person, cell) of y (n, cells) by each step."""
+        loss = self._means(y, step) + self._single(y, step)
+        if len(self.spreads.weights):
+            loss = loss + self._spreads(y, step)
+        for t in self.blocks:
+            low, high = _aimed(np.array(t.low), np.array(t.high))
+            loss = loss + miss(test_after_moves(y, t.contrasts, step), low, high, t.scale)
+        return loss
+
+    def _means(self, y: Floats, step: Floats) -> Floats:
+        weights = self.means.weights
+        now = weights @ y.mean(axis=0)
+        change = weights[:, None, None, :] * step[None, :, None, None] / len(y)
+        return self.means.loss(now[:, None, None, None] + change)
+
+    def _single(self, y: Floats, step: Floats) -> Floats:
+        n, weights = len(y), self.single.weights
+        z = y @ weights.T
+        change = weights[:, None, None, :] * step[None, :, None, None]
+        mean = z.mean(axis=0)[:, None, None, None] + change / n
+        squares = (z * z).sum(axis=0)[:, None, None, None] + change * (2 * z.T[:, None, :, None] + change)
+        pillai = n * mean**2 / squares
+        return self.single.loss(pillai / (1 - pillai) * (n - 1))
+
+    def _spreads(self, y: Floats, step: Floats) -> Floats:
+        n, weights = len(y), self.spreads.weights
+        v = y @ weights.T
+        v = v - v.mean(axis=0)
+        change = weights[:, None, None, :] * step[None, :, None, None]
+        squares = (v * v).sum(axis=0)[:, None, None, None] + change * (
+            2 * v.T[:, None, :, None] + change * (1 - 1 / n)
+        )
+        return self.spreads.loss(np.sqrt(np.maximum(squares, 0.0) / (n - 1)))
+
+
+def value_of(y: Floats, target: MeanTarget | SpreadTarget | TestTarget) -> float:
+    """The statistic of a target on cell means (n, cells)."""
+    if isinstance(target, MeanTarget):
+        return float(target.weights @ y.mean(axis=0))
+    if isinstance(target, SpreadTarget):
+        return float((y @ target.weights).std(ddof=1))
+    return test_value(y, target.contrasts)
+
+
 Integers = NDArray[np.int64]
 
 FIRST_MOVES = 40

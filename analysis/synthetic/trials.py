@@ -1,17 +1,22 @@
 """From cell sums to single ratings in the order of a visit: rows as the server exports them."""
 
+import csv
 from collections.abc import Iterator, Sequence
 from itertools import product
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.synthetic.space import DesignSpace
-from analysis.synthetic.steps import Steps
+from analysis.synthetic.published import DesignSpace
+from analysis.synthetic.synthesise import Synthetic
+from analysis.synthetic.targets import Steps
 from experiments.definition import Experiment
 from experiments.design import BlockSpec, ClipSpec, blocks, exemplar_key, rated_clips
+from experiments.files import whole_file
 from experiments.schema.canonical import definition_sha256
+from experiments.spreadsheet import guarded_row
 from experiments.trials.clip_rating.columns import RATINGS
 from experiments.trials.scales import RatedScale
 
@@ -199,3 +204,35 @@ def _scale_times(first_ms: float, scales: int, rng: np.random.Generator) -> list
     """Times in ms from the clip's end to the answer on each scale, one after the other."""
     further = MEDIAN_RT_MS * np.exp(0.35 * rng.normal(size=scales - 1))
     return [round(float(time), 1) for time in np.cumsum([first_ms, *further])]
+
+
+# Ratings of synthetic participants as the server's CSV export.
+
+
+def write_ratings(scales: Sequence[Synthetic], out: Path) -> int:
+    """Write the ratings as the server's CSV export, every row marked synthetic.
+
+    Parameters
+    ----------
+    scales : sequence of Synthetic
+        The same participants on every scale of the study, in order.
+    out : Path
+        The CSV file.
+
+    Returns
+    -------
+    int
+        Rows: one a trial and scale.
+    """
+    first = scales[0]
+    header = RATINGS.csv_header(first.experiment.factor_names)
+    rng = np.random.default_rng([first.seed, 1])
+    sums = [Totals(made.scale, made.sums) for made in scales]
+    count = 0
+    with whole_file(out) as temporary, temporary.open("w", newline="", encoding="utf-8") as handle:
+        writer = csv.writer(handle, lineterminator="\n")
+        writer.writerow(guarded_row(header))
+        for row in rating_rows(first.experiment, first.space, sums, rng):
+            writer.writerow(guarded_row(row[name] for name in header))
+            count += 1
+    return count

@@ -1,17 +1,283 @@
 """Thresholds of every person and condition, and their mean over people."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import optimize, special, stats
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from analysis.thresholds.answers import Answers, counted
-from analysis.thresholds.averages import Average, average
-from analysis.thresholds.likelihood import Shape
-from analysis.thresholds.population import Population, fit_population
+from analysis.thresholds.likelihood import CHI2_95, Array, Interval, Shape, Trials
 from analysis.thresholds.psychometric import Threshold, fit_threshold
 from experiments.errors import InputError
+
+# Mean over people of estimates with known errors.
+
+
+@dataclass(frozen=True)
+class Average:
+    """Mean of estimates with known errors over people; see `average`."""
+
+    people: int
+    mean: float
+    se: float
+    ci_low: float
+    ci_high: float
+    tau: float
+
+
+def average(y: Array, errors: Array) -> Average | None:
+    r"""Average estimates y (n,) over people, each weighted by 1 / (se^2 + tau^2); None below two people.
+
+    tau^2 maximises the restricted likelihood of
+
+    .. math::
+
+        y_i &\sim N(\mu, s_i^2 + \tau^2), \quad w_i = 1 / (s_i^2 + \tau^2) \tag{1} \\
+        -\log L_R &= \tfrac{1}{2} \{\log \textstyle\sum_i w_i - \sum_i \log w_i
+            + \sum_i w_i (y_i - \hat\mu)^2\} \tag{2} \\
+        \mathrm{se}^2 &= \textstyle\sum_i w_i (y_i - \hat\mu)^2 / \{(k - 1) \sum_i w_i\} \tag{3}
+
+    with y_i a person's estimate, s_i its standard error, mu the weighted mean and k the people; (3), with
+    t on k - 1 df, is Hartung and Knapp's (2001).
+    """
+    if len(y) < 2:
+        return None
+    s2 = errors**2
+
+    def restricted(log_tau2: float) -> float:
+        weights = 1 / (s2 + np.exp(log_tau2))
+        mu = np.sum(weights * y) / weights.sum()
+        return float(
+            0.5 * (np.log(weights.sum()) - np.sum(np.log(weights)) + np.sum(weights * (y - mu) ** 2))
+        )
+
+    span = float(np.var(y)) + float(s2.mean())
+    optimum = optimize.minimize_scalar(
+        restricted, bounds=(np.log(span) - 25, np.log(span) + 3), method="bounded"
+    )
+    tau2 = float(np.exp(optimum.x)) if optimum.fun < restricted(-np.inf) else 0.0
+    weights = 1 / (s2 + tau2)
+    mean = float(np.sum(weights * y) / weights.sum())
+    count = len(y)
+    se = float(np.sqrt(np.sum(weights * (y - mean) ** 2) / ((count - 1) * weights.sum())))
+    half = float(stats.t.ppf(0.975, count - 1)) * se
+    return Average(count, mean, se, mean - half, mean + half, float(np.sqrt(tau2)))
+
+
+# Thresholds of a population: every person has a threshold and a spread, drawn from one distribution.
+
+NODES = 15
+"""Gauss-Hermite nodes for a person's threshold, and for the spread."""
+
+NEWTON_STEPS = 25
+STEP = 1e-4
+LOG_SD_MIN = -12.0
+SHAPES_WITH_POPULATION = ("normal", "logistic")
+
+
+@dataclass(frozen=True)
+class Population:
+    """What the thresholds a_i and log spreads of people are drawn from.
+
+    Attributes
+    ----------
+    threshold, threshold_se : float
+        Mean over people of a_i, in the unit of x.
+    threshold_ci : Interval
+        Profile likelihood interval (95%): all else is fitted anew.
+    threshold_sd : float
+        SD of a_i between people.
+    spread : float
+        exp of the mean log spread, in the unit of x.
+    log_spread_sd : float
+        SD of the log spread between people.
+    lapse : float
+        As it was held.
+    """
+
+    people: int
+    threshold: float
+    threshold_se: float
+    threshold_ci: Interval
+    threshold_sd: float
+    spread: float
+    log_spread_sd: float
+    lapse: float
+    log_likelihood: float
+
+
+class PopulationLikelihood:
+    r"""Marginal likelihood of people's trials.
+
+    .. math::
+
+        L = \prod_i \int \prod_j P(x_{ij})^{k_{ij}} (1 - P(x_{ij}))^{n_{ij} - k_{ij}}
+            \phi(u_1) \phi(u_2) \, du, \quad a_i = \mu + \tau u_1, \ \log b_i = \nu + \omega u_2 \tag{1}
+
+    by adaptive Gauss-Hermite quadrature around each person's mode. Trials are padded to (people, levels).
+    """
+
+    def __init__(
+        self, trials: Sequence[Trials], shape: Shape, guess: float, lapse: float, falling: bool
+    ) -> None:
+        size = max(len(one.x) for one in trials)
+        self.x, self.n, self.k = (
+            np.array([np.pad(getattr(one, name), (0, size - len(one.x))) for one in trials])[:, None, :]
+            for name in ("x", "n", "k")
+        )
+        self.shape, self.guess, self.lapse, self.falling = shape, guess, lapse, falling
+        nodes, weights = np.polynomial.hermite_e.hermegauss(NODES)
+        self.nodes = np.stack(np.meshgrid(nodes, nodes, indexing="ij"), axis=-1).reshape(-1, 2)
+        # the weights' own normal density is divided out: the integrand is evaluated whole
+        self.log_weights = np.log(np.outer(weights, weights)).ravel() + (self.nodes**2).sum(axis=1) / 2
+        self.modes = np.zeros((len(trials), 2))
+
+    def joint(self, values: Array, u: Array) -> Array:
+        r"""Log of trials' likelihood times both normal densities, at u (people, m, 2): (people, m).
+
+        .. math::
+
+            p &= \gamma + (1 - \gamma - \lambda) F\{(x - \mu - \tau u_1) / e^{\nu + \omega u_2}\} \tag{1} \\
+            \log g &= \textstyle\sum_m k_m \log p_m + (n_m - k_m) \log(1 - p_m) - u'u / 2 - \log 2 \pi \tag{2}
+
+        gamma and lambda are guesses and lapses; mu and tau mean and SD of people's thresholds, nu and omega
+        those of the logs of their spreads; k of n answers at stimulus x were yes.
+        """
+        mu, log_tau, nu, log_omega = values
+        location = mu + np.exp(log_tau) * u[..., :1]
+        log_spread = np.clip(nu + np.exp(log_omega) * u[..., 1:], -30.0, 30.0)
+        z = (self.x - location) * np.exp(-log_spread)
+        rising = special.ndtr(z) if self.shape == "normal" else special.expit(z)
+        f = 1 - rising if self.falling else rising
+        p = np.clip(self.guess + (1 - self.guess - self.lapse) * f, 1e-12, 1 - 1e-12)
+        trials = (self.k * np.log(p) + (self.n - self.k) * np.log1p(-p)).sum(axis=-1)
+        return np.asarray(trials - (u**2).sum(axis=-1) / 2 - np.log(2 * np.pi))
+
+    def _differences(self, values: Array, u: Array) -> tuple[Array, Array]:
+        r"""Gradient (people, 2) and Hessian (people, 2, 2) of `joint` at u (people, 2), by differences.
+
+        .. math::
+
+            g_1 &= (j_{+0} - j_{-0}) / 2h, \quad h_{11} = (j_{+0} + j_{-0} - 2 j_{00}) / h^2 \tag{3} \\
+            h_{12} &= \{(j_{++} + j_{--} - 2 j_{00}) / h^2 - h_{11} - h_{22}\} / 2 \tag{4}
+
+        j is `joint`, its indices the steps of h along the two coefficients.
+        """
+        moves = STEP * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, -1]], dtype=float)
+        at = self.joint(values, u[:, None, :] + moves)
+        gradient = np.stack([at[:, 1] - at[:, 2], at[:, 3] - at[:, 4]], axis=1) / (2 * STEP)
+        first = (at[:, 1] + at[:, 2] - 2 * at[:, 0]) / STEP**2
+        second = (at[:, 3] + at[:, 4] - 2 * at[:, 0]) / STEP**2
+        mixed = (at[:, 5] + at[:, 6] - 2 * at[:, 0]) / STEP**2
+        mixed = (mixed - first - second) / 2
+        return gradient, np.stack([first, mixed, mixed, second], axis=1).reshape(-1, 2, 2)
+
+    def value(self, values: Array) -> float:
+        """Log-likelihood at (mu, log tau, nu, log omega)."""
+        u = self.modes
+        for _ in range(NEWTON_STEPS):
+            gradient, hessian = self._differences(values, u)
+            curvature = _positive(-hessian)
+            step = np.linalg.solve(curvature, gradient[:, :, None])[:, :, 0]
+            step *= np.minimum(1.0, 1.5 / np.maximum(np.abs(step).max(axis=1, keepdims=True), 1e-12))
+            better = self.joint(values, (u + step)[:, None])[:, 0] >= self.joint(values, u[:, None])[:, 0]
+            u = u + np.where(better[:, None], step, step / 8)
+            if np.abs(step).max() < 1e-5:
+                break
+        self.modes = u
+        _, hessian = self._differences(values, u)
+        root = np.linalg.cholesky(np.linalg.inv(_positive(-hessian)))
+        points = u[:, None, :] + self.nodes @ root.transpose(0, 2, 1)
+        total = special.logsumexp(self.joint(values, points) + self.log_weights, axis=1)
+        return float((total + np.log(root[:, 0, 0]) + np.log(root[:, 1, 1])).sum())
+
+
+def _positive(matrices: Array) -> Array:
+    """Symmetric matrices (people, 2, 2) with eigenvalues of at least one half: the prior's are one."""
+    values, vectors = np.linalg.eigh(matrices)
+    return np.asarray((vectors * np.maximum(values, 0.5)[:, None, :]) @ vectors.transpose(0, 2, 1))
+
+
+def fit_population(
+    trials: Sequence[Trials], shape: Shape, guess: float, lapse: float, falling: bool
+) -> Population:
+    """Maximise the marginal likelihood of people's trials over means and SDs of threshold and log spread.
+
+    Raises
+    ------
+    InputError
+        Fewer than three people, or a Weibull function, whose threshold is no normal variable.
+    """
+    if shape not in SHAPES_WITH_POPULATION:
+        raise InputError("thresholds of a population need --function normal or logistic")
+    if len(trials) < 3:
+        raise InputError(f"thresholds of a population need three people or more, got {len(trials)}")
+    model = PopulationLikelihood(trials, shape, guess, lapse, falling)
+    x = np.concatenate([one.x for one in trials])
+    width = float(np.ptp(x)) or 1.0
+    start = np.array([x.mean(), np.log(width / 8), np.log(width / 6), np.log(0.3)])
+    best = _maximum(model, start, width, None)
+    value, mu = model.value(best), float(best[0])
+    h = 1e-3 * width
+    sides = [_profiled(model, best, width, mu + sign * h) for sign in (1, -1)]
+    curvature = (2 * value - sum(sides)) / h**2
+    se = float(1 / np.sqrt(curvature)) if curvature > 0 else float("nan")
+    ends = [
+        _end(model, best, value, width, sign * (se if np.isfinite(se) else width / 8)) for sign in (-1, 1)
+    ]
+    return Population(
+        len(trials),
+        mu,
+        se,
+        Interval(ends[0], ends[1]),
+        float(np.exp(best[1])),
+        float(np.exp(best[2])),
+        float(np.exp(best[3])),
+        lapse,
+        value,
+    )
+
+
+def _maximum(model: PopulationLikelihood, start: Array, width: float, mu: float | None) -> Array:
+    scale = np.array([width, 1.0, 1.0, 1.0])
+
+    def negative(scaled: NDArray[np.float64]) -> float:
+        full = scaled if mu is None else np.concatenate([[mu / width], scaled])
+        return -model.value(full * scale)
+
+    first = start / scale
+    free = first if mu is None else first[1:]
+    bounds = [(None, None), (LOG_SD_MIN + np.log(width), None), (None, None), (LOG_SD_MIN, 2.0)]
+    optimum = optimize.minimize(
+        negative,
+        free,
+        method="L-BFGS-B",
+        bounds=bounds[4 - len(free) :],
+        options={"ftol": 1e-12, "gtol": 1e-6},
+    )
+    whole = optimum.x if mu is None else np.concatenate([[mu / width], optimum.x])
+    return np.asarray(whole * scale)
+
+
+def _profiled(model: PopulationLikelihood, best: Array, width: float, mu: float) -> float:
+    return model.value(_maximum(model, np.concatenate([[mu], best[1:]]), width, mu))
+
+
+def _end(model: PopulationLikelihood, best: Array, value: float, width: float, step: float) -> float | None:
+    """Where the profile has fallen by half the chi-squared quantile, in the direction of `step`."""
+
+    def fall(mu: float) -> float:
+        return 2 * (value - _profiled(model, best, width, mu)) - CHI2_95
+
+    inside, outside = float(best[0]), float(best[0]) + 2 * step
+    for _ in range(8):
+        if fall(outside) > 0:
+            return float(optimize.brentq(fall, inside, outside, xtol=1e-6 * width))
+        inside, outside = outside, outside + 2 * step
+    return None
 
 
 @dataclass(frozen=True)

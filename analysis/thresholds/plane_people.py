@@ -5,13 +5,241 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import optimize, special, stats
 
 from analysis.thresholds.answers import Answers
-from analysis.thresholds.averages import Average, average
-from analysis.thresholds.plane import Plane, fit_plane
-from analysis.thresholds.plane_likelihood import PlaneShape, Points, counted_points
-from analysis.thresholds.plane_population import PEOPLE_MIN, PopulationPlane, fit_plane_population
+from analysis.thresholds.likelihood import Interval, normal_density
+from analysis.thresholds.people import Average, average
+from analysis.thresholds.plane import Plane, PlaneShape, Points, counted_points, fit_plane
 from experiments.errors import InputError
+
+# Lines of thresholds of a population: people's thresholds and tilts are drawn from one distribution.
+
+Array = NDArray[np.float64]
+PEOPLE_MIN = 3
+NODES, END = (41, 11), (5.0, 4.0)
+"""Nodes from -END to END, in SDs, over people's thresholds and over their tilts."""
+
+SECANTS, CLOSE, FARTHEST = 12, 4e-3, 4
+"""Steps to an end of an interval, how near (in the root of the fall) is enough, and how far off it is sought,
+in ranges of the stimuli."""
+
+SMALLEST = 1e-3
+"""Least SD of people's thresholds and tilts, in ranges of the stimuli: below it people are alike."""
+
+MU, TILT, LOG_SPREAD, LOG_SD, LOG_TILT_SD = range(5)
+
+
+@dataclass(frozen=True)
+class PopulationPlane:
+    """What the thresholds (at the middle) and tilts of people are drawn from; see `fit_plane_population`.
+
+    Attributes
+    ----------
+    threshold, tilt : float
+        Means over people; the tilt in units of x a unit of z.
+    threshold_ci, tilt_ci : Interval
+        95% profiles of the likelihood with the quantile of F(1, people - 1).
+    threshold_sd, tilt_sd : float
+        SDs between people.
+    spread : float
+        SD (normal) or scale (logistic) of the function along x, one for all people.
+    """
+
+    people: int
+    threshold: float
+    threshold_ci: Interval
+    threshold_sd: float
+    tilt: float
+    tilt_ci: Interval
+    tilt_sd: float
+    spread: float
+    log_likelihood: float
+
+
+def fit_plane_population(people: Sequence[Points], pooled: Plane) -> PopulationPlane:
+    r"""Fit means and SDs of people's thresholds and tilts by maximum marginal likelihood.
+
+    .. math::
+
+        L = \prod_i \int \prod_j P_i(x_j, z_j)^{k_{ij}} (1 - P_i(x_j, z_j))^{n_{ij} - k_{ij}}
+            \phi(u) \phi(v) \, du \, dv, \quad t_i = \mu + \tau u, \ b_i = \beta + \omega v \tag{1}
+
+    with P_i of equation (1) in `analysis.thresholds.plane.fit_plane`, whose threshold t is t_i and whose tilt
+    b is b_i, and one spread s for all. Nobody is left out: answers that place no threshold of their own, as
+    many do that switch without overlap, still tell of the mean.
+
+    Parameters
+    ----------
+    people : sequence of Points
+        The answers of each person.
+    pooled : Plane
+        The fit over all trials, from which the search starts and which says shape, ends and middle.
+
+    Raises
+    ------
+    InputError
+        Fewer than three people.
+    """
+    if len(people) < PEOPLE_MIN:
+        raise InputError(f"a population needs {PEOPLE_MIN} people or more, got {len(people)}")
+    model = MarginalLikelihood(people, pooled)
+    best, value = model.maximum(model.start)
+    sign = model.sign
+    ends = {part: model.ends(best, value, part) for part in (MU, TILT)}
+    sds = np.exp(best[[LOG_SPREAD, LOG_SD, LOG_TILT_SD]])
+    return PopulationPlane(
+        len(people),
+        float(sign * best[MU]),
+        _turned(ends[MU], sign),
+        float(sds[1]),
+        float(sign * best[TILT]),
+        _turned(ends[TILT], sign),
+        float(sds[2]),
+        float(sds[0]),
+        value,
+    )
+
+
+def _turned(ends: tuple[float | None, float | None], sign: float) -> Interval:
+    low, high = ends
+    if sign > 0:
+        return Interval(low, high)
+    return Interval(None if high is None else -high, None if low is None else -low)
+
+
+class MarginalLikelihood:
+    """Equation (1) and its gradient in (mu, beta, log s, log tau, log omega); x turns where it falls."""
+
+    def __init__(self, people: Sequence[Points], pooled: Plane) -> None:
+        self.pooled, self.sign = pooled, -1.0 if pooled.falling else 1.0
+        stimuli = np.unique(np.concatenate([np.column_stack([one.x, one.z]) for one in people]), axis=0)
+        rows = {(x, z): row for row, (x, z) in enumerate(stimuli.tolist())}
+        self.n, self.k = np.zeros((2, len(people), len(stimuli)))
+        for person, one in enumerate(people):
+            at = [rows[x, z] for x, z in zip(one.x.tolist(), one.z.tolist(), strict=True)]
+            self.n[person, at], self.k[person, at] = one.n, one.k
+        self.x, self.away = self.sign * stimuli[:, :1], stimuli[:, 1:] - pooled.middle
+        u, v = (np.linspace(-end, end, count) for end, count in zip(END, NODES, strict=True))
+        self.u, self.v = (grid.ravel() for grid in np.meshgrid(u, v, indexing="ij"))
+        weights = stats.norm.logpdf(self.u) + stats.norm.logpdf(self.v)
+        self.log_weights = weights - special.logsumexp(weights)
+        self.width = float(np.ptp(self.x))
+        self.slope_unit = self.width / float(np.ptp(self.away))
+        self.limit = float(stats.f.ppf(0.95, 1, len(people) - 1))
+
+    @property
+    def start(self) -> Array:
+        """The pooled fit, with people who differ by half its spread."""
+        fit = self.pooled
+        spread = max(fit.spread, 0.02 * self.width)
+        logs = np.log([spread, spread / 2, 0.1 * self.slope_unit])
+        return np.array([self.sign * fit.threshold, self.sign * fit.tilt, *logs])
+
+    def value(self, theta: Array) -> tuple[float, Array]:
+        r"""The log-likelihood and its gradient (5,).
+
+        Notes
+        -----
+        .. math::
+
+            \eta &= \{x - \mu - \sigma u - (\theta + \omega v)(z - \bar z)\} / s \tag{1} \\
+            \log L &= \sum_i \log \sum_{uv} w_{uv} \prod_m p_m^{k_{im}} (1 - p_m)^{n_{im} - k_{im}} \tag{2}
+
+        u, v are the nodes and w their weights; mu and theta the threshold and tilt on average, sigma and
+        omega their SDs over people, s the spread; k of n answers of person i at stimulus m were yes. The
+        derivatives of (1) by mu, theta and the logs of s, sigma and omega are -1/s, -(z - zbar)/s, -eta,
+        -sigma u/s and -omega v (z - zbar)/s; `score` is that of (2) by eta, the nodes weighted by what the
+        answers say of them.
+        """
+        mu, tilt, (spread, sd, tilt_sd) = theta[MU], theta[TILT], np.exp(theta[LOG_SPREAD:])
+        eta = (self.x - mu - sd * self.u - (tilt + tilt_sd * self.v) * self.away) / spread
+        p, slope = self._share(eta)
+        given = self.k @ np.log(p) + (self.n - self.k) @ np.log1p(-p) + self.log_weights
+        each = special.logsumexp(given, axis=1)
+        weights = np.exp(given - each[:, None])
+        score = (self.k.T @ weights / p - (self.n - self.k).T @ weights / (1 - p)) * slope
+        by_node, by_tilt = score.sum(axis=0), (score * self.away).sum(axis=0)
+        gradient = -np.array(
+            [
+                by_node.sum() / spread,
+                by_tilt.sum() / spread,
+                (score * eta).sum(),
+                sd * (by_node @ self.u) / spread,
+                tilt_sd * (by_tilt @ self.v) / spread,
+            ]
+        )
+        return float(each.sum()), gradient
+
+    def _share(self, eta: Array) -> tuple[Array, Array]:
+        """P and dP/d eta."""
+        fit = self.pooled
+        if fit.shape == "normal":
+            f, slope = special.ndtr(eta), normal_density(eta)
+        else:
+            f = special.expit(eta)
+            slope = f * special.expit(-eta)
+        scale = 1 - fit.guess - fit.lapse
+        return np.clip(fit.guess + scale * f, 1e-12, 1 - 1e-12), scale * slope
+
+    def maximum(self, start: Array, held: int | None = None) -> tuple[Array, float]:
+        """The best parameters and their log-likelihood; the `held` one stays as it is at the start."""
+        free = [part for part in range(5) if part != held]
+        units = np.array([self.width, self.slope_unit, 1.0, 1.0, 1.0])
+
+        def negative(scaled: Array) -> tuple[float, Array]:
+            theta = start.copy()
+            theta[free] = scaled * units[free]
+            value, gradient = self.value(theta)
+            return -value, -(gradient * units)[free]
+
+        low_sd, low_tilt = np.log(SMALLEST * self.width), np.log(SMALLEST * self.slope_unit)
+        far = [(None, None), (None, None), (np.log(self.width / 200), np.log(20 * self.width))]
+        bounds = [*far, (low_sd, np.log(5 * self.width)), (low_tilt, np.log(20 * self.slope_unit))]
+        optimum = optimize.minimize(
+            negative,
+            (start / units)[free],
+            jac=True,
+            method="L-BFGS-B",
+            bounds=[bounds[part] for part in free],
+            options={"ftol": 1e-9, "gtol": 1e-5},
+        )
+        theta = start.copy()
+        theta[free] = optimum.x * units[free]
+        return theta, -float(optimum.fun)
+
+    def ends(self, best: Array, value: float, part: int) -> tuple[float | None, float | None]:
+        """Where the profile of one parameter has fallen by the limit; None where it does not."""
+        unit = self.width if part == MU else self.slope_unit
+        return self._end(best, value, part, -unit), self._end(best, value, part, unit)
+
+    def _end(self, best: Array, value: float, part: int, unit: float) -> float | None:
+        """By secants on the root of twice the fall, which is nearly straight."""
+        root, below, above = np.sqrt(self.limit), (0.0, 0.0), None
+        away = unit / 20
+        for _ in range(SECANTS):
+            held = best.copy()
+            held[part] += away
+            height = float(np.sqrt(max(0.0, 2 * (value - self.maximum(held, part)[1]))))
+            if abs(height - root) < CLOSE * root:
+                return float(best[part] + away)
+            if height < root:
+                below = (away, height)
+            else:
+                above = (away, height)
+            away = _next(below, above, float(root))
+            if abs(away) > FARTHEST * abs(unit):
+                return None
+        return float(best[part] + away)
+
+
+def _next(below: tuple[float, float], above: tuple[float, float] | None, root: float) -> float:
+    """Where a straight line through two points reaches `root`; farther out where none lies above it."""
+    if above is None:
+        away, height = below
+        return away * (min(4.0, max(1.5, 1.1 * root / height)) if height > 0 else 4.0)
+    share = (root - below[1]) / (above[1] - below[1])
+    return below[0] + min(max(share, 0.15), 0.85) * (above[0] - below[0])
 
 
 @dataclass(frozen=True)

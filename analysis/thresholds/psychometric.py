@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special, stats
 
-from analysis.thresholds.deviance import fit_p, too_few_repeats
 from analysis.thresholds.likelihood import (
     BOUND,
     LAPSE_MAX,
@@ -14,7 +13,9 @@ from analysis.thresholds.likelihood import (
     Likelihood,
     Shape,
     Trials,
+    fit_p,
     function,
+    too_few_repeats,
 )
 from experiments.errors import InputError
 

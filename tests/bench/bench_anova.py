@@ -11,7 +11,7 @@ import pytest
 
 from analysis.plans.clip_rating import READING, analyse_study
 from analysis.read.study_answers import load_csv, load_database
-from analysis.report.tables import all_tables
+from analysis.report.within_tables import all_tables
 from analysis.within.anova import within_anova
 from analysis.within.cell_means import cell_table
 from experiments.load import load_experiment

@@ -20,7 +20,7 @@ import pandas as pd
 
 from analysis.models.mixed import fit_mixed
 from analysis.models.ordinal import fit_ordinal
-from analysis.read.participant_columns import design_of
+from analysis.read.long_csv import design_of
 from analysis.within.anova import linear_anova
 from analysis.within.cell_means import cell_table
 

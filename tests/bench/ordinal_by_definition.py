@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from analysis.models.columns import ModelTerms
 from analysis.models.design import model_data
 from analysis.models.ordinal import fit_ordinal
-from analysis.models.roles import ModelTerms
 
 Real = np.longdouble
 GRADIENT_STEP, HESSIAN_STEP = Real("1e-4"), Real("1e-3")

@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from scipy import special, stats
 
 from analysis.thresholds.likelihood import Interval
-from analysis.thresholds.plane import fit_plane
-from analysis.thresholds.plane_likelihood import Points, counted_points
-from analysis.thresholds.plane_population import fit_plane_population
+from analysis.thresholds.plane import Points, counted_points, fit_plane
+from analysis.thresholds.plane_people import fit_plane_population
 from experiments.errors import InputError
 from experiments.load import load_experiment
 from experiments.trials.threshold.declaration import threshold_of

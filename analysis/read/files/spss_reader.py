@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from analysis.read.files.cell_text import cell_text
+from analysis.read.files.cells import cell_text
 
 SPARE_BYTES, BYTES_PER_BYTE = 4 << 30, 64
 """Memory for any file, and for each of its bytes: damaged lengths may ask for any amount."""

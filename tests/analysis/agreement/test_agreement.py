@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from analysis.agreement.raters import LEVELS, agreement
-from analysis.agreement.reliability import _is_maximum, _one_factor, read_items, reliability
+from analysis.agreement import LEVELS, _is_maximum, _one_factor, agreement, read_items, reliability
 from analysis.cli import app
-from analysis.opinion.scores import read_votes
+from analysis.opinion import read_votes
 from experiments.errors import InputError
 
 FOLDER = Path(__file__).parents[2] / "golden/r/agreement"

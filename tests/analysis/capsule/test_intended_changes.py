@@ -5,8 +5,7 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
-from analysis.capsule.compare import Compared, compare_reports
-from analysis.capsule.intended import INTENDED, intended_change
+from analysis.capsule import INTENDED, Compared, compare_reports, intended_change
 
 OLD, NEW = date(2026, 11, 27), date(2026, 12, 24)
 WAS = {

@@ -9,7 +9,7 @@ from pydantic import TypeAdapter
 from typer.testing import CliRunner
 
 from analysis.cli import app
-from analysis.convert.spss import spss_names
+from analysis.convert import spss_names
 from experiments.columns import Column
 from experiments.errors import InputError
 

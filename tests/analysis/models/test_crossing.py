@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from analysis.models import crossing as module
-from analysis.models.reml import criterion, cross_products
-from analysis.models.terms import Term, intercept_term
+from analysis.models import reml as module
+from analysis.models.reml import Term, criterion, cross_products, intercept_term
 
 RNG = np.random.default_rng(3)
 N = 300

@@ -101,10 +101,9 @@ def test_correlated_slopes_of_one_rating_a_cell_are_refused() -> None:
 @pytest.mark.parametrize("categories", [2, 4])
 @pytest.mark.parametrize("n", [5, 60])
 def test_separation_is_named_and_not_blamed_on_few_ratings(categories: int, n: int) -> None:
+    from analysis.models.columns import ModelTerms
     from analysis.models.design import model_data
-    from analysis.models.ordinal import _refuse_undetermined
-    from analysis.models.roles import ModelTerms
-    from analysis.models.separation import separated_columns
+    from analysis.models.ordinal import _refuse_undetermined, separated_columns
 
     rng = np.random.default_rng(n)
     rows = pd.DataFrame(

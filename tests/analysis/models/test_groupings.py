@@ -8,8 +8,8 @@ import pandas as pd
 import pytest
 
 from analysis.models.mixed import fit_mixed
-from analysis.models.mixed_result import MixedResult
 from analysis.models.ordinal import fit_ordinal
+from analysis.models.random_part import MixedResult
 from experiments.errors import InputError
 
 GOLDEN = Path(__file__).parents[2] / "golden" / "r"

@@ -9,11 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from analysis.models.columns import ModelTerms
 from analysis.models.design import model_data
 from analysis.models.mixed import fit_mixed
-from analysis.models.reml import criterion, cross_products
-from analysis.models.roles import ModelTerms
-from analysis.models.terms import Term, intercept_term
+from analysis.models.reml import Term, criterion, cross_products, intercept_term
 from experiments.errors import InputError
 
 GOLDEN = Path(__file__).parents[2] / "golden" / "r" / "models"

@@ -8,10 +8,10 @@ import pandas as pd
 import pytest
 from scipy import optimize
 
-from analysis.models.kenward_roger import _df_and_scale
+from analysis.models.fixed_effect_tests import _df_and_scale
 from analysis.models.mixed import fit_mixed
-from analysis.models.mixed_result import MixedResult
 from analysis.models.profile import _Path
+from analysis.models.random_part import MixedResult
 from experiments.errors import InputError
 
 GOLDEN = Path(__file__).parents[2] / "golden" / "r"

@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 from scipy.special import expit
 
-from analysis.models.laplace import LaplaceLikelihood
+from analysis.models.laplace import LaplaceLikelihood, OrdinalData, Parameters
 from analysis.models.ordinal import fit_ordinal
-from analysis.models.ordinal_data import OrdinalData, Parameters
 from experiments.errors import InputError
 
 GOLDEN = Path(__file__).parents[2] / "golden" / "r" / "models"

@@ -8,10 +8,9 @@ import pandas as pd
 import pytest
 from scipy import integrate, special
 
-from analysis.models.laplace import LaplaceLikelihood
+from analysis.models.laplace import LaplaceLikelihood, OrdinalData, Parameters
 from analysis.models.ordinal import fit_ordinal
-from analysis.models.ordinal_data import OrdinalData, Parameters
-from analysis.models.quadrature import QuadratureLikelihood
+from analysis.models.ordinal_maximum import QuadratureLikelihood
 from experiments.errors import InputError
 
 GOLDEN = Path(__file__).parents[2] / "golden" / "r"
@@ -134,8 +133,7 @@ def test_laplace_is_warned_of_where_it_is_not_accurate_and_only_there() -> None:
 
 def test_the_warning_knows_how_far_the_estimates_are_off() -> None:
     """One step from Laplace's maximum goes most of the way to that of the integrals."""
-    from analysis.models.approximation import laplace_step
-    from analysis.models.ordinal_maximum import maximise, pooled_start
+    from analysis.models.ordinal_maximum import laplace_step, maximise, pooled_start
 
     rng = np.random.default_rng(8)
     participant = np.repeat(np.arange(80), 6)
@@ -156,8 +154,7 @@ def test_the_warning_knows_how_far_the_estimates_are_off() -> None:
 
 def test_points_of_many_dimensions_find_nothing_where_laplace_is_nearly_exact() -> None:
     """Many ratings of each participant: a warning would be the points' own error."""
-    from analysis.models.approximation import laplace_step
-    from analysis.models.ordinal_maximum import maximise, pooled_start
+    from analysis.models.ordinal_maximum import laplace_step, maximise, pooled_start
 
     rng = np.random.default_rng(9)
     n, each = 12, 200

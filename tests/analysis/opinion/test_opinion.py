@@ -9,8 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from analysis.cli import app
-from analysis.opinion.people import bt500_rejects
-from analysis.opinion.scores import OpinionResult, fit_opinion, read_votes
+from analysis.opinion import OpinionResult, bt500_rejects, fit_opinion, read_votes
 from experiments.errors import InputError
 
 FOLDER = Path(__file__).parents[2] / "golden/r/opinion"

@@ -9,8 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from analysis.cli import app
-from analysis.opinion.projection import alternating_projection
-from analysis.opinion.scores import fit_opinion, read_votes
+from analysis.opinion import alternating_projection, fit_opinion, read_votes
 
 CALL = ["--item", "clip", "--participant", "id", "--rating", "score"]
 

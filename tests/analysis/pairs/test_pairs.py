@@ -12,9 +12,8 @@ from scipy import stats
 from typer.testing import CliRunner
 
 from analysis.cli import app
-from analysis.pairs.abilities import fit_abilities
+from analysis.pairs.abilities import PairsResult, fit_abilities
 from analysis.pairs.comparisons import read_comparisons
-from analysis.pairs.pairs_result import PairsResult
 from experiments.errors import InputError
 
 # Agresti (2013), Categorical Data Analysis, section 11.6: American League 1987, wins of row over column.

@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.pairs.abilities import fit_abilities
+from analysis.pairs.abilities import fit_abilities, read_item_factors
 from analysis.pairs.comparisons import Comparisons, read_comparisons
-from analysis.pairs.factors import read_item_factors
 
 FOLDER = Path(__file__).parents[2] / "golden/r/pairs"
 REFERENCE: dict[str, Any] = json.loads((FOLDER / "reference.json").read_text(encoding="utf-8"))

@@ -2,8 +2,7 @@
 
 import pytest
 
-from analysis.paper.check import Finding, check_paper, check_study
-from analysis.paper.joint_means import possible
+from analysis.paper.check import Finding, check_paper, check_study, possible
 from analysis.paper.printed import SHIPPED, PrintedStudy, Rounded, load_figures
 from experiments.errors import InputError
 

@@ -12,7 +12,7 @@ import pytest
 
 from analysis.plans.degradation import CellScore, extremes, scores
 from analysis.plans.exclusions import Exclusions
-from analysis.plans.prepared import Prepared
+from analysis.plans.plan import Prepared
 from analysis.read.study_answers import StudyAnswers
 from experiments.load import parse_experiment
 from tests.conftest import REPOSITORY

@@ -4,10 +4,10 @@ import numpy as np
 import pandas as pd
 
 from analysis.models.mixed import fit_mixed
-from analysis.models.mixed_result import MixedResult
 from analysis.models.ordinal import fit_ordinal
-from analysis.plans.model_notes import notes_of
+from analysis.models.random_part import MixedResult
 from analysis.plans.result import Labels
+from analysis.plans.sensitivity import notes_of
 
 LABELS = Labels({"fit": "Fit quality", "residual": "Left over"})
 

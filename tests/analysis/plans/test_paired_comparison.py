@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from analysis.cli import app
 from analysis.plans.paired_comparison import READING
-from analysis.plans.study import study_contents
+from analysis.plans.plan import study_contents
 from analysis.read.pool import Origin, Pool
 from analysis.read.study_answers import load_csv
 from experiments import rules

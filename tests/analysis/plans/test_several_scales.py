@@ -11,9 +11,9 @@ from typer.testing import CliRunner
 
 from analysis.cli import app
 from analysis.plans.clip_rating import READING
-from analysis.plans.study import study_contents
+from analysis.plans.plan import study_contents
 from analysis.read.study_answers import load_csv
-from analysis.report.captions import in_words
+from analysis.report.contents import in_words
 from analysis.report.write import write_report
 from experiments import design
 from experiments.load import load_experiment

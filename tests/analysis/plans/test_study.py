@@ -10,8 +10,7 @@ from analysis.errors import NoRatingsError
 from analysis.plans.clip_rating import READING, analyse_study
 from analysis.read.pool import Origin, Pool
 from analysis.read.study_answers import load_csv, load_database
-from analysis.report.json_output import as_data
-from analysis.report.left_out import left_out
+from analysis.report.json_output import as_data, left_out
 from experiments import rules
 from experiments.errors import InputError
 from experiments.load import load_experiment, locate, parse_experiment

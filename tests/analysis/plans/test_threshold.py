@@ -12,7 +12,7 @@ from scipy import stats
 from typer.testing import CliRunner
 
 from analysis.cli import app
-from analysis.plans.study import study_contents
+from analysis.plans.plan import study_contents
 from analysis.plans.threshold import READING
 from analysis.read.study_answers import load_csv
 from analysis.thresholds.answers import counted

@@ -10,14 +10,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.plans.study import study_contents
+from analysis.plans.plan import study_contents
 from analysis.plans.threshold import READING
 from analysis.read.study_answers import load_csv
 from analysis.report.contents import Contents
 from analysis.report.numbers import fixed
 from analysis.report.write import write_report
-from analysis.thresholds.plane import fit_plane
-from analysis.thresholds.plane_likelihood import counted_points
+from analysis.thresholds.plane import counted_points, fit_plane
 from experiments.definition import Experiment
 from experiments.errors import InputError
 from experiments.load import parse_experiment

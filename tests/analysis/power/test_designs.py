@@ -9,13 +9,11 @@ from hypothesis import strategies as st
 from scipy import special, stats
 
 from analysis.cli import app
-from analysis.power import thresholds
-from analysis.power.designs import sample_size_text, simulate_design
+from analysis.power import choices
+from analysis.power.choices import PairsDesign, ThresholdDesign
 from analysis.power.factorial import FactorialDesign
-from analysis.power.mixed_models import MixedDesign, Spreads
-from analysis.power.ordinal_models import OrdinalDesign
-from analysis.power.paired_comparisons import PairsDesign
-from analysis.power.thresholds import ThresholdDesign
+from analysis.power.models import MixedDesign, OrdinalDesign, Spreads
+from analysis.power.simulate import sample_size_text, simulate_design
 from experiments.command_line import run_command_line
 from experiments.errors import InputError
 
@@ -223,7 +221,7 @@ def test_an_item_that_always_wins_is_still_tested() -> None:
 
 
 def test_differences_of_thresholds_come_back_from_their_trials(monkeypatch) -> None:
-    monkeypatch.setattr(thresholds, "POOL", 60)
+    monkeypatch.setattr(choices, "POOL", 60)
     design = ThresholdDesign((100, 120, 140, 160, 180), 10, 140, 5, 5, 2, 12)
     assert np.isfinite(design.differences).all()
     error = design.differences.std(ddof=1) / np.sqrt(60)
@@ -282,7 +280,7 @@ def call(capsys, monkeypatch, tmp_path):
     ],
 )
 def test_the_commands_write_table_text_figure_and_json(call, tmp_path, monkeypatch, arguments) -> None:
-    monkeypatch.setattr(thresholds, "POOL", 20)
+    monkeypatch.setattr(choices, "POOL", 20)
     code, out, err = call(f"{arguments} --n 8,12 --simulations 10 --plot power.svg --json power.json")
     assert (code, err) == (0, "")
     assert "Sample size was planned by simulation" in " ".join(out.split())

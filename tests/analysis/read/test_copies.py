@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from analysis.cli import app
-from analysis.read.copies import copied_block, row_codes
+from analysis.read.wide import copied_block, row_codes
 
 RNG = np.random.default_rng(27)
 

@@ -6,7 +6,7 @@ import pandas as pd
 import pyreadstat
 import pytest
 
-from analysis.read.files import raggedness
+from analysis.read.files import delimited
 from analysis.read.long_csv import read_long_table
 from analysis.read.text_table import _names_to_read
 from analysis.within.cell_means import cell_table
@@ -179,7 +179,7 @@ def test_lines_are_those_of_an_editor_where_blank_ones_are_skipped(tmp_path, bod
 
 
 def test_lines_stay_true_over_blocks(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(raggedness, "_BLOCK", 7)
+    monkeypatch.setattr(delimited, "_BLOCK", 7)
     path = tmp_path / "a.csv"
     path.write_text("id,face,score\n" + "\np1,a,3\n" * 20 + "p2,a,x\n", encoding="utf-8")
     with pytest.raises(InputError, match=r"got 'x' in line 42;"):

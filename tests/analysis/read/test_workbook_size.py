@@ -5,7 +5,7 @@ import zipfile
 import openpyxl
 import pytest
 
-from analysis.read.files import workbook_size
+from analysis.read.files import workbook as workbook_reader
 from analysis.read.files.workbook import _pages
 from analysis.read.long_csv import read_long_table
 from experiments.errors import InputError
@@ -74,7 +74,7 @@ MANY = f"<row>{'<c/>' * 1000}</row>{END}"
 
 @pytest.mark.parametrize("first", [b"<a>", b"no XML", b""], ids=["cut off", "text", "empty"])
 def test_a_broken_part_before_the_sheet_ends_no_count(tmp_path, monkeypatch, first) -> None:
-    monkeypatch.setattr(workbook_size, "MAX_ELEMENTS", 1000)
+    monkeypatch.setattr(workbook_reader, "MAX_ELEMENTS", 1000)
     with pytest.raises(InputError, match="has more than 500 cells"):
         read(workbook(tmp_path / "a.xlsx", END, MANY, {"customXml/item1.xml": first}))
 
@@ -87,7 +87,7 @@ def test_a_note_over_billions_of_cells_is_refused(tmp_path) -> None:
 
 def test_a_sheet_of_any_name_is_counted(tmp_path, monkeypatch) -> None:
     assert read(workbook(tmp_path / "b.xlsx", END, END, name="xl/worksheets/sheet1.bin")) == 2
-    monkeypatch.setattr(workbook_size, "MAX_ELEMENTS", 1000)
+    monkeypatch.setattr(workbook_reader, "MAX_ELEMENTS", 1000)
     with pytest.raises(InputError, match="has more than 500 cells"):
         read(workbook(tmp_path / "a.xlsx", END, MANY, name="xl/worksheets/sheet1.bin"))
 
@@ -103,7 +103,7 @@ def test_a_row_behind_the_last_of_any_sheet_ends_in_one_line(tmp_path) -> None:
 
 
 def test_what_unpacks_to_too_much_is_refused(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(workbook_size, "MAX_BYTES", 5 << 20)
+    monkeypatch.setattr(workbook_reader, "MAX_BYTES", 5 << 20)
     path = workbook(tmp_path / "a.xlsx", END, " " * (6 << 20) + END)
     assert path.stat().st_size < 1 << 16
     with pytest.raises(InputError, match=r"a.xlsx unpacks to 6 MiB, and at most 5 are read; save its sheet"):
@@ -111,7 +111,7 @@ def test_what_unpacks_to_too_much_is_refused(tmp_path, monkeypatch) -> None:
 
 
 def test_too_many_cells_are_refused(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(workbook_size, "MAX_ELEMENTS", 1000)
+    monkeypatch.setattr(workbook_reader, "MAX_ELEMENTS", 1000)
     with pytest.raises(InputError, match="has more than 500 cells; save its sheet as CSV"):
         read(workbook(tmp_path / "a.xlsx", END, MANY))
 

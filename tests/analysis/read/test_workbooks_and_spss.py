@@ -7,11 +7,11 @@ import pandas as pd
 import pyreadstat
 import pytest
 
+from analysis.models.columns import ModelTerms
 from analysis.models.design import model_data
-from analysis.models.roles import ModelTerms
-from analysis.opinion.scores import read_votes
+from analysis.opinion import read_votes
+from analysis.pairs.abilities import read_item_factors
 from analysis.pairs.comparisons import read_comparisons
-from analysis.pairs.factors import read_item_factors
 from analysis.read.long_csv import LongData, read_long_table
 from analysis.read.model_csv import read_model_input
 from analysis.thresholds.answers import read_answers

@@ -6,9 +6,8 @@ from dataclasses import replace
 import pytest
 
 from analysis.plans.clip_rating import READING
-from analysis.plans.study import study_contents
-from analysis.read.runs_file import read_runs
-from analysis.read.study_answers import load_csv
+from analysis.plans.plan import study_contents
+from analysis.read.study_answers import load_csv, read_runs
 from analysis.report.write import write_report
 from experiments.errors import InputError
 from experiments.load import load_experiment

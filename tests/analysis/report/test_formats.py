@@ -6,9 +6,9 @@ import docx
 
 from analysis.report.contents import Contents, DrawnPart
 from analysis.report.formats import Table, as_text, wrap
-from analysis.report.italics import heading_pieces, signed, signed_cell
-from analysis.report.templating import filled
+from analysis.report.numbers import heading_pieces, signed, signed_cell
 from analysis.report.word import as_docx
+from analysis.report.write import filled
 
 
 def lines_of(header: tuple[str, ...], *rows: tuple[str, ...], text_columns: int = 1) -> list[str]:

@@ -12,10 +12,9 @@ from matplotlib import font_manager
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 
 from analysis.plans.result import analyse_cells
-from analysis.report import letters
+from analysis.report import pictures
 from analysis.report.figures import draw, figures_of
-from analysis.report.letters import further_letters, lacking
-from analysis.report.pictures import STYLE, in_both_formats, new_figure
+from analysis.report.pictures import STYLE, further_letters, in_both_formats, lacking, new_figure
 from analysis.within.cell_means import cell_table
 
 CHINESE = "眨眼"
@@ -72,7 +71,7 @@ def test_a_font_of_the_machine_draws_what_the_own_font_lacks(monkeypatch) -> Non
     names = {"DejaVu Sans", "DejaVu Sans Mono"}
     fonts = [font for font in font_manager.fontManager.ttflist if font.name in names]
     monkeypatch.setattr(font_manager.fontManager, "ttflist", fonts)
-    own, name = letters._charmap, "analysis.report.letters._charmap"
+    own, name = pictures._charmap, "analysis.report.pictures._charmap"
     chinese = frozenset(map(ord, CHINESE))
     monkeypatch.setattr(name, lambda path: own(path) | (chinese if "Mono" in path else set()))
     with further_letters(figure):

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 from analysis.plans.paired_comparison import READING as PAIRS
-from analysis.plans.study import study_contents
+from analysis.plans.plan import study_contents
 from analysis.plans.threshold import READING as THRESHOLDS
 from analysis.read.study_answers import load_csv
 from analysis.report.contents import Contents
-from analysis.report.verify_with_r import verify_with_r
+from analysis.report.r_models import verify_with_r
 from experiments.errors import InputError
 from experiments.load import load_experiment
 from tests.analysis.comparisons_file import compare, write_comparisons

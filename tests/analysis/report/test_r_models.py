@@ -8,9 +8,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from analysis.plans.clip_rating import PLAN, READING
-from analysis.plans.prepare import prepare
-from analysis.plans.rating_tests import analyse
+from analysis.plans.clip_rating import PLAN, READING, analyse
+from analysis.plans.plan import prepare
 from analysis.plans.sensitivity import mixed_model, ordinal_model
 from analysis.read.study_answers import load_csv
 from analysis.report.contents import Section

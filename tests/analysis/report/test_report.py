@@ -20,10 +20,8 @@ from analysis.report.formats import Table, as_markdown, as_text, wrap
 from analysis.report.json_output import as_data
 from analysis.report.latex import as_latex, latex_text
 from analysis.report.numbers import apa_p, fixed, interval, p_value, share, sum_text
-from analysis.report.sentences import sentences
-from analysis.report.table_cells import corrected_df
-from analysis.report.tables import all_tables, paper_table
-from analysis.report.within_contents import contents_of
+from analysis.report.within_contents import contents_of, sentences
+from analysis.report.within_tables import all_tables, corrected_df, paper_table
 from analysis.report.write import self_check, write_report
 from experiments.json import json_text
 from experiments.load import load_experiment
@@ -230,9 +228,8 @@ def test_the_note_under_a_figure_names_what_is_drawn(analysis: Analysis) -> None
 def test_one_f_is_reported_first_everywhere(people: int) -> None:
     """Five people have no multivariate test of the interaction (6 contrasts): every F is univariate then."""
     from analysis.plans.result import analyse_cells
-    from analysis.report.margin_tables import simple_effects_table
-    from analysis.report.sentences import effect_p
-    from analysis.report.tables import paper_table
+    from analysis.report.within_contents import effect_p
+    from analysis.report.within_tables import paper_table, simple_effects_table
     from analysis.within.cell_means import cell_table
 
     rng = np.random.default_rng(12)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from analysis.report.verify_with_r import verify_with_r
+from analysis.report.r_models import verify_with_r
 from experiments.errors import InputError
 from tests.analysis.report.r_process import needed
 

@@ -8,11 +8,10 @@ import pytest
 from docx.oxml.ns import qn
 
 from analysis.plans.clip_rating import PLAN, READING, contents
-from analysis.plans.prepare import prepare
+from analysis.plans.plan import prepare
 from analysis.read.study_answers import load_csv
-from analysis.report.column_widths import widths_cm
-from analysis.report.formats import Table
-from analysis.report.italics import pieces
+from analysis.report.formats import Table, widths_cm
+from analysis.report.numbers import pieces
 from analysis.report.write import write_report
 from experiments.load import load_experiment
 from tests.analysis.ratings_file import rows_of, simulate, write_export

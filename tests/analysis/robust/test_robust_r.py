@@ -10,10 +10,8 @@ import pytest
 from typer.testing import CliRunner
 
 from analysis.cli import app
-from analysis.read.participant_columns import design_of
-from analysis.robust.permutation import permutation_tests
-from analysis.robust.ranks import rank_tests
-from analysis.robust.trimmed import trimmed_pairs
+from analysis.read.long_csv import design_of
+from analysis.robust import permutation_tests, rank_tests, trimmed_pairs
 from analysis.within.anova import AnovaResult, linear_anova, within_anova
 from analysis.within.between import Covariate, between_design
 from analysis.within.cell_means import cell_table

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from analysis.cli import app
-from analysis.synthetic.moves import value_of
-from analysis.synthetic.ratings_file import write_ratings
-from analysis.synthetic.steps import Steps
+from analysis.synthetic.repair import value_of
 from analysis.synthetic.synthesise import make_plan, make_plans, synthesise
+from analysis.synthetic.targets import Steps
+from analysis.synthetic.trials import write_ratings
 from analysis.within.anova import within_anova
 from analysis.within.cell_means import cell_table
 from experiments.errors import InputError

@@ -8,13 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from analysis.synthetic.feasible import make_feasible
-from analysis.synthetic.moves import MoveLoss, test_after_moves, test_value
-from analysis.synthetic.published import PrintedMean, load_published, prints_as, window
-from analysis.synthetic.ratings_file import write_ratings
-from analysis.synthetic.space import DesignSpace
+from analysis.synthetic.published import DesignSpace, PrintedMean, load_published, prints_as, window
+from analysis.synthetic.repair import MoveLoss, test_after_moves, test_value
 from analysis.synthetic.synthesise import make_plan, synthesise
-from analysis.synthetic.trials import split_sum
+from analysis.synthetic.targets import make_feasible
+from analysis.synthetic.trials import split_sum, write_ratings
 from analysis.within.anova import within_anova
 from analysis.within.cell_means import cell_table
 from analysis.within.pairwise import one_factor_pairs

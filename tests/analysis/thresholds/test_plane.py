@@ -12,8 +12,7 @@ from typer.testing import CliRunner
 
 from analysis.cli import app
 from analysis.thresholds.answers import read_answers
-from analysis.thresholds.plane import fit_plane
-from analysis.thresholds.plane_likelihood import Points, counted_points
+from analysis.thresholds.plane import Points, counted_points, fit_plane
 from analysis.thresholds.plane_people import fit_planes
 from experiments.errors import InputError
 

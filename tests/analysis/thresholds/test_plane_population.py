@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 from scipy import integrate, special, stats
 
-from analysis.report.plane_tables import plane_tables
+from analysis.report.choice_tables import plane_tables
 from analysis.thresholds.answers import Answers
-from analysis.thresholds.plane import Plane, fit_plane
-from analysis.thresholds.plane_likelihood import Points
-from analysis.thresholds.plane_people import fit_planes
-from analysis.thresholds.plane_population import MarginalLikelihood, PopulationPlane, fit_plane_population
+from analysis.thresholds.plane import Plane, Points, fit_plane
+from analysis.thresholds.plane_people import (
+    MarginalLikelihood,
+    PopulationPlane,
+    fit_plane_population,
+    fit_planes,
+)
 from experiments.errors import InputError
 
 X, Z = (grid.ravel() for grid in np.meshgrid([150.0, 225.0, 300.0, 375.0, 450.0], [0.0, 1.0, 2.0]))

@@ -10,8 +10,7 @@ from scipy import special
 
 from analysis.thresholds.answers import Answers, counted
 from analysis.thresholds.likelihood import Trials
-from analysis.thresholds.people import fit_thresholds, with_population
-from analysis.thresholds.population import PopulationLikelihood, fit_population
+from analysis.thresholds.people import PopulationLikelihood, fit_population, fit_thresholds, with_population
 from experiments.errors import InputError
 
 GOLDEN = Path(__file__).parents[2] / "golden" / "r"

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analysis.traces.lag import ClipTraces, correlogram, event_train, lag_of, mean_trace
+from analysis.traces import ClipTraces, correlogram, event_train, lag_of, mean_trace
 
 RATE_HZ, LENGTH_S = 10.0, 20.0
 EVENTS_S = ((2.2, 7.9, 12.4, 17.0), (1.0, 5.5, 9.1, 15.3))

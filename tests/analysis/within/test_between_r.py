@@ -6,7 +6,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from analysis.read.participant_columns import design_of
+from analysis.read.long_csv import design_of
 from analysis.within.anova import AnovaResult, linear_anova
 from analysis.within.cell_means import cell_table
 from analysis.within.estimates import margin_of

@@ -9,8 +9,7 @@ from typing import Any
 
 from fastapi.testclient import TestClient
 
-from analysis.plans.plan import plan_of
-from analysis.plans.study import study_contents
+from analysis.plans.plan import plan_of, study_contents
 from analysis.read.study_answers import load_csv
 from analysis.report.write import write_report
 from server.accounts.identity import OPERATOR

@@ -36,8 +36,7 @@ def run(command: list[str]) -> str:
 
 def own_f(answers: Path, study: Experiment = EXP3) -> float:
     """F of the first effect by this repository's own analysis of the same file."""
-    from analysis.plans.plan import plan_of
-    from analysis.plans.study import study_contents
+    from analysis.plans.plan import plan_of, study_contents
     from analysis.read.study_answers import load_csv
 
     contents = study_contents(study, load_csv(answers, study, plan_of("clip_rating").reading))

@@ -10,8 +10,7 @@ from typing import Any
 
 import pytest
 
-from analysis.plans.plan import plan_of
-from analysis.plans.study import study_contents
+from analysis.plans.plan import plan_of, study_contents
 from analysis.read.study_answers import load_csv
 from experiments.definition import Experiment
 from experiments.load import load_experiment

@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from analysis.plans.continuous_rating import cell_traces, clips_of
-from analysis.plans.plan import plan_of
-from analysis.plans.prepare import prepare
+from analysis.plans.plan import plan_of, prepare
 from analysis.read.study_answers import load_csv
 from server.clock import now
 from server.context import Services

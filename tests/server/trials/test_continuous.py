@@ -11,8 +11,7 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from analysis.plans.plan import plan_of
-from analysis.plans.study import study_contents
+from analysis.plans.plan import plan_of, study_contents
 from analysis.read.study_answers import load_csv
 from experiments.trials.continuous_rating import CONTINUOUS_RATING
 from server.context import Services

@@ -2,13 +2,11 @@
 
 import pandas as pd
 
-from analysis.plans.plan import Plan
-from analysis.plans.prepared import Prepared
+from analysis.plans.plan import Plan, Prepared
 from analysis.read.reading import Reading
-from analysis.report.captions import caption
-from analysis.report.contents import Contents, Part
+from analysis.report.contents import Contents, Part, caption
 from analysis.report.formats import Table
-from analysis.report.left_out import left_out
+from analysis.report.json_output import left_out
 from analysis.report.numbers import fixed
 from experiments.definition import Experiment
 from tests.experiments.trials.toy import TOY

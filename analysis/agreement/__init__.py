@@ -1,1 +1,0 @@
-"""Whether items measure one thing (reliability), and whether people say the same (agreement)."""

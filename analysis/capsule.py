@@ -1,0 +1,248 @@
+"""Rebuild a capsule's report, and compare it with the one in the capsule, file by file."""
+
+import json
+import math
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from datetime import date
+from itertools import zip_longest
+from pathlib import Path
+from typing import Any, Literal
+
+from analysis.plans.plan import plan_of, study_contents
+from analysis.read.pool import Origin, Pool
+from analysis.read.study_answers import load_csv, read_runs
+from analysis.report.contents import Progress, held_against
+from analysis.report.write import write_report
+from experiments.capsule.declaration import MANIFEST, WRITTEN_BY_SERVER, ReportSource
+from experiments.capsule.packing import report_input
+from experiments.load import load_experiment
+from experiments.seal import read_clips_sha256, read_seal
+
+# Make the report of a capsule again, from its declaration and its table of answers alone.
+
+ANSWERS = "answers.csv"
+"""Name of the table while it is analysed, which stands in the report."""
+
+
+def rebuild(source: ReportSource, folder: Path, work: Path, progress: Progress = lambda _: None) -> Path:
+    """Write the report into `work`, an empty folder; return the folder of the report.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the capsule's files, checked.
+    """
+    table, report = work / ANSWERS, work / "report"
+    report_input(folder / source.answers, table, source.renamed)
+    experiment = load_experiment(str(folder / source.definition), has_data=True)
+    progress("reading answers")
+    runs = read_runs(folder / source.runs)
+    answers = load_csv(table, experiment, plan_of(experiment.trial.kind).reading)
+    contents = study_contents(experiment, answers, Pool(Origin(source.origin), source.series), runs)
+    if source.seal is not None:
+        clips = read_clips_sha256(folder / MANIFEST)
+        contents = held_against(contents, read_seal(folder / source.seal), experiment, clips)
+    write_report(contents, report, more=source.sensitivity, progress=progress)
+    return report
+
+
+# What changed on purpose in reports: what `analysis verify` says of it in an older capsule.
+#
+# Each has its line under "Numbers changed" in CHANGELOG.md: the command, the wrong number, how to notice it.
+
+CHANGED = date(2026, 11, 28)
+"""The day of the changes of 0.2.0's last week."""
+
+
+@dataclass(frozen=True)
+class IntendedChange:
+    """A part of a report that a release changed.
+
+    Attributes
+    ----------
+    since : date
+        The day of the change: capsules made later than that have the new numbers.
+    part : str
+        Regular expression of places in `results.json`, such as `pairwise[3].cell_a`, and of headings in
+        `report.md`.
+    why : str
+        What is different now, without a full stop.
+    """
+
+    since: date
+    part: str
+    why: str
+
+
+INTENDED = (
+    IntendedChange(CHANGED, r"pairwise\[\d+\]\.cell_[ab]\b.*", "pairs name their cells as levels by factor"),
+    IntendedChange(
+        CHANGED,
+        "Ordinal mixed model",
+        "the ordinal model has slopes of every effect, interactions included, and accurate integrals; the p "
+        "next to it is that of the F reported first",
+    ),
+    IntendedChange(
+        CHANGED,
+        "Linear mixed model",
+        "covariates that vary within participants have slopes by participant; the p next to the model is "
+        "that of the F reported first",
+    ),
+    IntendedChange(
+        CHANGED,
+        r"Multiverse of exclusions|In brief|In sentences|Method|simple_effects\b.*",
+        "the F that is reported first is the same in every part of a report",
+    ),
+    IntendedChange(
+        CHANGED,
+        r"Evidence that answers are a person's|evidence\b.*",
+        "the verdict 'likely' needs checks that were passed",
+    ),
+    IntendedChange(
+        CHANGED,
+        r"Who and what was left out|decisions\b.*",
+        "copied rows and repeated ids are named as decisions",
+    ),
+)
+
+
+def intended_change(spot: str, made: date) -> IntendedChange | None:
+    """The change that explains a difference at this spot in a capsule made on this day; None elsewhere."""
+    return next((one for one in INTENDED if made <= one.since and re.fullmatch(one.part, spot)), None)
+
+
+# Hold a report that was made again against the one in the capsule, file by file.
+
+Kind = Literal["same", "figure", "rounding", "table"]
+RELATIVE = 1e-9
+"""Numbers that differ by less than this share of themselves differ by rounding: other processors add up in
+another order."""
+_PICTURE = re.compile(r"data:image/[a-z+]+;base64,[A-Za-z0-9+/=]+")
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One file: `same` byte for byte, or what differs: a `figure`, `rounding` of numbers, or a `table`."""
+
+    name: str
+    kind: Kind
+    said: str = ""
+
+
+def compare_reports(names: tuple[str, ...], before: Path, after: Path, made: date) -> list[Compared]:
+    """Every file of either report; `names` are those that the capsule of the day `made` promises.
+
+    A file of the capsule's report that it does not promise, and that no server writes, is one that nobody can
+    make again: it counts as a table that differs.
+    """
+    again = {path.name for path in after.iterdir()}
+    held = {path.relative_to(before).as_posix() for path in before.rglob("*") if path.is_file()}
+    more = sorted(held - {*names, *again, *WRITTEN_BY_SERVER})
+    foreign = [
+        Compared(name, "table", "in the capsule's report, and not made by the analysis") for name in more
+    ]
+    return [
+        _of_name(name, names, again, (before, after), made) for name in sorted({*names, *again})
+    ] + foreign
+
+
+def _of_name(
+    name: str, names: tuple[str, ...], again: set[str], folders: tuple[Path, Path], made: date
+) -> Compared:
+    if name not in again:
+        return Compared(name, "table", "in the capsule, and not made now")
+    if name not in names:
+        return Compared(name, "table", "made now, and not in the capsule")
+    before, after = folders
+    return _compare(name, (before / name).read_bytes(), (after / name).read_bytes(), made)
+
+
+def _compare(name: str, before: bytes, after: bytes, made: date) -> Compared:
+    if before == after:
+        return Compared(name, "same")
+    if name.endswith((".svg", ".png")):
+        return Compared(name, "figure", f"{len(before):,} bytes became {len(after):,}")
+    was, now = before.decode("utf-8", "replace"), after.decode("utf-8", "replace")
+    if name.endswith(".json"):
+        return _numbers(name, was, now, made)
+    if name.endswith(".html") and _PICTURE.sub("", was) == _PICTURE.sub("", now):
+        return Compared(name, "figure", "its pictures differ, its tables do not")
+    if name.endswith(".md"):
+        return Compared(name, "table", _explained(_sections_that_differ(was, now), made))
+    return Compared(name, "table", _first_line(_PICTURE.sub("", was), _PICTURE.sub("", now)))
+
+
+def _sections_that_differ(was: str, now: str) -> Iterator[tuple[str, str]]:
+    """The headings below which two reports differ, each with its first line that does."""
+    before, after = _sections(was), _sections(now)
+    for heading in dict.fromkeys((*before, *after)):
+        old, new = before.get(heading, ""), after.get(heading, "")
+        if old != new:
+            yield heading, f"'{heading}', {_first_line(old, new)}"
+
+
+def _sections(report: str) -> dict[str, str]:
+    parts = re.split(r"^#+ (.*)$", report, flags=re.MULTILINE)
+    return {"": parts[0], **dict(zip(parts[1::2], parts[2::2], strict=True))}
+
+
+def _first_line(was: str, now: str) -> str:
+    for number, (old, new) in enumerate(zip_longest(was.splitlines(), now.splitlines(), fillvalue=""), 1):
+        if old != new:
+            return f"line {number}: {_short(old)} became {_short(new)}"
+    return "line ends differ"
+
+
+def _short(text: str) -> str:
+    text = text.strip()
+    return repr(text if len(text) <= 70 else f"{text[:67]}...")
+
+
+def _numbers(name: str, was: str, now: str, made: date) -> Compared:
+    try:
+        spots = list(_differences(json.loads(was), json.loads(now), ""))
+    except ValueError:
+        return Compared(name, "table", "no JSON")
+    if not spots:
+        return Compared(name, "rounding", f"numbers are equal to {RELATIVE:g}")
+    return Compared(name, "table", _explained(spots, made))
+
+
+def _explained(spots: Iterable[tuple[str, str]], made: date) -> str:
+    """What differs, in words: what nothing explains first, then what changed on purpose with its reason."""
+    reasons: dict[str, list[str]] = {}
+    for spot, said in spots:
+        change = intended_change(spot, made)
+        reason = f"changed on purpose on {change.since}: {change.why}" if change else ""
+        reasons.setdefault(reason, []).append(said)
+    unexplained = reasons.pop("", [])
+    parts = [f"{said[0]}{_more(said)}, {reason}" for reason, said in reasons.items()]
+    if parts:
+        parts[-1] += " (CHANGELOG.md, Numbers changed)"
+    if unexplained:
+        parts.insert(0, f"{unexplained[0]}{_more(unexplained)}")
+    return "; ".join(parts)
+
+
+def _more(said: list[str]) -> str:
+    return f" and {len(said) - 1} more" if len(said) > 1 else ""
+
+
+def _differences(was: Any, now: Any, spot: str) -> Iterator[tuple[str, str]]:
+    """Every spot where two JSON values differ by more than rounding, and how."""
+    if isinstance(was, dict) and isinstance(now, dict):
+        for key in dict.fromkeys((*was, *now)):
+            yield from _differences(was.get(key), now.get(key), f"{spot}.{key}".lstrip("."))
+    elif isinstance(was, list) and isinstance(now, list) and len(was) == len(now):
+        for number, (old, new) in enumerate(zip(was, now, strict=True)):
+            yield from _differences(old, new, f"{spot}[{number}]")
+    elif _are_numbers(was, now) and math.isclose(was, now, rel_tol=RELATIVE, abs_tol=1e-12):
+        return
+    elif was != now:
+        yield spot, f"{spot}: {_short(str(was))} became {_short(str(now))}"
+
+
+def _are_numbers(*values: Any) -> bool:
+    return all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)

@@ -1,0 +1,200 @@
+"""`analysis check-paper` and `analysis verify`."""
+
+from dataclasses import asdict
+from datetime import date
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from analysis.commands.output import saying
+
+if TYPE_CHECKING:
+    from analysis.capsule import Compared
+    from experiments.capsule.declaration import Capsule
+
+
+# `analysis check-paper`: what printed figures and sentences say about themselves.
+
+
+def register_check_paper(app: typer.Typer) -> None:
+    """Add the command to `app`."""
+    app.command(name="check-paper")(check_paper)
+
+
+def check_paper(
+    file: Annotated[
+        Path | None,
+        typer.Argument(
+            help="A manuscript or report (HTML, TeX, DOCX, PDF, Markdown, text), or a TOML file of printed "
+            "figures; the shipped figures of the paper if left out."
+        ),
+    ] = None,
+    json: Annotated[Path | None, typer.Option(help="Write the findings to this JSON file too.")] = None,
+) -> None:
+    """Check a paper from what it prints: p, df and effect sizes of its statistics; SE or SD; joint means.
+
+    Examples:
+
+      analysis check-paper manuscript.docx
+
+      analysis check-paper out/analysis/exp1/report.html --json findings.json
+
+      analysis check-paper figures.toml
+
+    Exit code 1 where a statistic or figure does not fit.
+    The shipped analysis/paper/published/FIGURES.toml shows the format of figures (docs/analysis.md).
+    """
+    from analysis.paper.printed import SHIPPED
+
+    if file is None or file.suffix.lower() == ".toml":
+        wrong = _check_figures(file or SHIPPED, json)
+    else:
+        wrong = _check_document(file, json)
+    if wrong:
+        raise typer.Exit(1)
+
+
+def _check_document(file: Path, json: Path | None) -> int:
+    """Print what a manuscript's statistics say; how many do not fit."""
+    from analysis.paper.document import read_document
+    from analysis.paper.statistics import check_text
+    from analysis.report.formats import wrap
+    from experiments.files import whole_file
+    from experiments.json import json_text
+
+    result = check_text(read_document(file))
+    if json is not None:
+        counts = {"read": len(result.statistics), "checked": result.n_checked, "wrong": result.n_wrong}
+        with whole_file(json) as temporary:
+            temporary.write_text(json_text({"file": file.name, **counts, **asdict(result)}), encoding="utf-8")
+    typer.echo(
+        f"{file.name}: {len(result.statistics)} statistics read, {result.n_checked} checked, "
+        f"{result.n_wrong} do not fit, {len(result.unread)} could not be read"
+    )
+    for statistic in result.statistics:
+        for problem in statistic.problems:
+            grave = " (significant by one, not by the other)" if statistic.verdict == "decision" else ""
+            typer.echo("\n".join(wrap(f"- {statistic.text}: {problem}{grave}")))
+    for fragment in result.unread:
+        typer.echo("\n".join(wrap(f"- could not be read: {fragment}")))
+    return result.n_wrong
+
+
+def _check_figures(figures: Path, json: Path | None) -> int:
+    """Print what printed figures say of each other; how many problems they have, notes not counted."""
+    from analysis.paper import check as checks
+    from analysis.paper.printed import load_figures
+    from analysis.report.formats import wrap
+    from experiments.files import whole_file
+    from experiments.json import json_text
+
+    paper = load_figures(figures)
+    findings = checks.check_paper(paper)
+    if json is not None:
+        with whole_file(json) as temporary:
+            temporary.write_text(json_text([asdict(finding) for finding in findings]), encoding="utf-8")
+    typer.echo("\n".join(wrap(f"{paper.title}. {paper.source}")))
+    for study in paper.study:
+        typer.echo(f"\n{study.name}, N = {study.participants}")
+        mine = [finding for finding in findings if finding.study == study.name]
+        for finding in mine or []:
+            text = f"- {finding.kind}, {finding.check}: {finding.about}: {finding.why}"
+            typer.echo("\n".join(wrap(text)))
+        if not mine:
+            typer.echo("- nothing found")
+    grave = sum(finding.kind != "note" for finding in findings)
+    typer.echo(f"\n{grave} problems and {len(findings) - grave} notes")
+    return grave
+
+
+# `analysis verify`: is a capsule whole, and does its report come out again?
+
+
+def register_verify(app: typer.Typer) -> None:
+    """Add the command to `app`."""
+    app.command(name="verify")(verify)
+
+
+def verify(
+    capsule: Annotated[
+        Path, typer.Argument(help="The zip of a capsule, or the folder it was unpacked into.")
+    ],
+    report: Annotated[
+        bool, typer.Option(help="Make the report again, or only compare every file with its hash.")
+    ] = True,
+) -> None:
+    """Verify a capsule: every file is as listed, and the report comes out again from the data in it.
+
+    Every table is rebuilt as printed, and under the same versions every figure byte for byte. What differs is
+    named, with the versions that differ, and numbers that a later release changed on purpose with the reason.
+    Ends with code 0 where all is well, or only figures differ under
+    other versions; 1 where the report differs; 2 where a file was changed, is missing or foreign.
+
+    Examples:
+
+      analysis verify exp3-capsule.zip
+
+      analysis verify exp3-capsule.zip --no-report
+    """
+    from experiments.capsule.declaration import REPORT_FOLDER
+    from experiments.capsule.opening import open_capsule
+    from experiments.software import differences, present_software
+
+    with TemporaryDirectory(prefix="capsule-") as temporary, saying("verifying") as say:
+        files, work = Path(temporary) / "files", Path(temporary) / "work"
+        files.mkdir()
+        work.mkdir()
+        say("hashes")
+        listed, folder = open_capsule(capsule, files)
+        typer.echo(f"capsule of the study {listed.study}, made {listed.made}, sha256 {listed.sha256}")
+        typer.echo(f"{len(listed.files)} files, every one as listed")
+        if not report:
+            return
+        from analysis.capsule import compare_reports, rebuild
+
+        again = rebuild(listed.report, folder, work, say)
+        made = date.fromisoformat(listed.made[:10])
+        compared = compare_reports(listed.report.rebuilt, folder / REPORT_FOLDER, again, made)
+        _check_software(listed, folder)
+    versions = differences(listed.software, present_software())
+    _tell(compared, versions)
+
+
+def _check_software(listed: "Capsule", folder: Path) -> None:
+    """The versions of the list are those of the capsule's other file of them; else one was changed alone."""
+    import json
+
+    from experiments.capsule.declaration import SOFTWARE_FILE
+    from experiments.errors import InputError
+
+    path = folder / SOFTWARE_FILE
+    if not path.is_file() or json.loads(path.read_text(encoding="utf-8")) != listed.software.model_dump(
+        mode="json"
+    ):
+        raise InputError(
+            f"{SOFTWARE_FILE}: expected the versions that the list names, got others; nothing says by which "
+            "versions the report was made"
+        )
+
+
+def _tell(compared: "list[Compared]", versions: list[str]) -> None:
+    """Say what differs; exit code 1 where a table does, or a figure under the same versions."""
+    same = sum(one.kind == "same" for one in compared)
+    typer.echo(f"the report made again: {same} of {len(compared)} files are the same byte for byte")
+    for one in compared:
+        if one.kind != "same":
+            typer.echo(f"{one.name}: {one.said}")
+    if same == len(compared):
+        typer.echo("verified: every table as printed, every figure byte for byte")
+        return
+    said = "; ".join(versions) or "none: the software is the same"
+    typer.echo(f"versions that differ, by what the capsule says of itself: {said}")
+    if any(one.kind == "table" for one in compared):
+        typer.echo("NOT verified: tables differ", err=True)
+        raise typer.Exit(1)
+    if any(one.kind == "figure" for one in compared) and not versions:
+        typer.echo("NOT verified: figures differ under the same versions", err=True)
+        raise typer.Exit(1)
+    typer.echo("verified: every table as printed; what differs is due to other versions or processors")

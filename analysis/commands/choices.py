@@ -1,0 +1,233 @@
+"""`analysis pairs` and `analysis thresholds`."""
+
+from dataclasses import asdict
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from analysis.commands.output import JsonOption, save_json, saying, show_tables, show_text
+
+if TYPE_CHECKING:
+    from analysis.thresholds.answers import Answers
+
+
+# `analysis pairs`.
+
+
+class MethodChoice(StrEnum):
+    """Model of the comparisons."""
+
+    BRADLEY_TERRY = "bradley-terry"
+    DAVIDSON = "davidson"
+    THURSTONE = "thurstone"
+
+
+def register_pairs(app: typer.Typer) -> None:
+    """Add the command to `app`."""
+    app.command(name="pairs")(pairs)
+
+
+def pairs(
+    file: Annotated[
+        Path, typer.Argument(help="CSV file, one row a comparison, such as the server's export.")
+    ],
+    left: Annotated[str, typer.Option(help="Column of the item on the left (or shown first).")] = "left",
+    right: Annotated[str, typer.Option(help="Column of the item on the right (or shown second).")] = "right",
+    winner: Annotated[
+        str, typer.Option(help="Column of the winner: left, right, or the item's name.")
+    ] = "winner",
+    tie: Annotated[str | None, typer.Option(help="What stands in the winner's column for a tie.")] = None,
+    participant: Annotated[
+        str | None, typer.Option(help="Column that names the rater, for robust standard errors.")
+    ] = None,
+    method: Annotated[
+        MethodChoice | None,
+        typer.Option(help="bradley-terry, davidson (ties) or thurstone (case V); by the ties if not given."),
+    ] = None,
+    factors: Annotated[
+        Path | None,
+        typer.Option(
+            help="CSV of the items: first column the item, the others factors; abilities are linear in them."
+        ),
+    ] = None,
+    order_effect: Annotated[
+        bool, typer.Option("--order-effect", help="Let the left (first) side have an advantage.")
+    ] = False,
+    firth: Annotated[
+        bool, typer.Option("--firth", help="Finite estimates also where an item always wins (penalised).")
+    ] = False,
+    json: JsonOption = None,
+) -> None:
+    """Abilities of items from paired comparisons.
+
+    Examples:
+
+      analysis pairs comparisons.csv --json abilities.json
+
+      analysis pairs table.csv --left a --right b --winner choice --tie same --participant id
+
+      analysis pairs table.csv --method thurstone --factors items.csv
+    """
+    from analysis.pairs.abilities import fit_abilities, read_item_factors
+    from analysis.pairs.comparisons import read_comparisons
+    from analysis.pairs.likelihood import Method
+    from analysis.report.choice_tables import abilities_table, contrasts_table, factors_table, pairs_text
+
+    with saying("reading comparisons"):
+        comparisons = read_comparisons(file, left, right, winner, tie, participant)
+        design = None if factors is None else read_item_factors(factors)
+    usual: Method = "davidson" if comparisons.ties else "bradley-terry"
+    chosen: Method = method.value if method else usual
+    with saying("fitting"):
+        result = fit_abilities(comparisons, chosen, order_effect=order_effect, firth=firth, factors=design)
+    save_json(json, asdict(result), comparisons.synthetic)
+    show_text(pairs_text(result, file.stem, comparisons.synthetic))
+    show_tables(abilities_table(result, file.stem, comparisons.synthetic))
+    if design is not None:
+        show_tables(factors_table(result, file.stem, comparisons.synthetic))
+    show_tables(contrasts_table(result, file.stem, comparisons.synthetic))
+
+
+# `analysis thresholds`.
+
+
+class FunctionChoice(StrEnum):
+    """Shape of the psychometric function."""
+
+    NORMAL = "normal"
+    LOGISTIC = "logistic"
+    WEIBULL = "weibull"
+
+
+def register_thresholds(app: typer.Typer) -> None:
+    """Add the command to `app`."""
+    app.command(name="thresholds")(thresholds)
+
+
+def thresholds(
+    file: Annotated[Path, typer.Argument(help="CSV file, one row a trial.")],
+    x: Annotated[str, typer.Option(help="Column of the stimulus, a number.")] = "x",
+    response: Annotated[
+        str, typer.Option(help="Column of the answer: 1 or 0, yes or no, correct or wrong.")
+    ] = "response",
+    guess: Annotated[
+        float, typer.Option(help="Lower asymptote: 0 for yes/no, 0.5 for two-interval forced choice.")
+    ] = 0.0,
+    lapse: Annotated[
+        str, typer.Option(help="Upper asymptote is 1 minus this: a number, or 'fit' (0 to 0.1).")
+    ] = "0",
+    function: Annotated[FunctionChoice, typer.Option(help="Shape of the function.")] = FunctionChoice.NORMAL,
+    participant: Annotated[
+        str | None, typer.Option(help="Column that names the person: each is fitted, and their mean.")
+    ] = None,
+    by: Annotated[
+        str | None, typer.Option(help="Column of a condition: each of its levels is fitted.")
+    ] = None,
+    second: Annotated[
+        str | None,
+        typer.Option(
+            help="Column of a second stimulus variable, a number: the threshold is a straight line over it."
+        ),
+    ] = None,
+    hierarchical: Annotated[
+        bool,
+        typer.Option(
+            help="One model over all people: threshold and spread differ between them (--participant)."
+        ),
+    ] = False,
+    json: JsonOption = None,
+) -> None:
+    """Psychometric functions: thresholds with profile likelihood intervals.
+
+    Examples:
+
+      analysis thresholds trials.csv --x duration --response seen
+
+      analysis thresholds trials.csv --x duration --response correct --guess 0.5 --participant id
+
+      analysis thresholds trials.csv --x duration --participant id --hierarchical --lapse 0.02
+
+      analysis thresholds trials.csv --x contrast --function weibull --lapse fit --by eye
+
+      analysis thresholds trials.csv --x duration --second asymmetry --response correct --participant id
+    """
+    from analysis.report.choice_tables import (
+        means_table,
+        people_table,
+        population_table,
+        threshold_table,
+        threshold_text,
+    )
+    from analysis.thresholds.answers import read_answers
+    from analysis.thresholds.people import fit_thresholds, with_population
+    from experiments.errors import InputError
+
+    if not 0 <= guess < 1:
+        raise InputError(f"expected --guess from 0 to below 1, got {guess:g}")
+    upper = _lapse(lapse, guess)
+    with saying("reading trials"):
+        answers = read_answers(file, x, response, participant, by, second)
+    if second is not None:
+        if hierarchical:
+            raise InputError("--hierarchical is of one stimulus variable; leave out --second or it")
+        _planes(answers, function, guess, upper, (x, second), file.stem, json)
+        return
+    with saying("fitting"):
+        result = fit_thresholds(answers, function.value, guess, upper)
+        if hierarchical:
+            result = with_population(result, answers, function.value, guess, upper)
+    save_json(json, asdict(result), answers.synthetic)
+    show_text(threshold_text(result, file.stem, answers.synthetic))
+    if result.population:
+        show_tables(population_table(result, file.stem, answers.synthetic))
+    if result.means:
+        show_tables(means_table(result, file.stem, answers.synthetic))
+    show_tables(threshold_table(result, file.stem, answers.synthetic))
+    if result.people:
+        show_tables(people_table(result, file.stem, answers.synthetic))
+
+
+def _planes(
+    answers: "Answers",
+    function: FunctionChoice,
+    guess: float,
+    lapse: float | None,
+    variables: tuple[str, str],
+    name: str,
+    json: Path | None,
+) -> None:
+    """Fit the threshold over a second variable, for each condition and person, and show it."""
+    from analysis.report.choice_tables import plane_tables, plane_text
+    from analysis.thresholds.plane_people import fit_planes
+    from experiments.errors import InputError
+
+    if function is FunctionChoice.WEIBULL:
+        raise InputError("--second: expected --function normal or logistic, whose thresholds may pass 0")
+    if lapse is None:
+        raise InputError("--second: expected --lapse as a number; it is not fitted beside a tilt")
+    with saying("fitting"):
+        result = fit_planes(
+            answers, "logistic" if function is FunctionChoice.LOGISTIC else "normal", guess, lapse
+        )
+    save_json(json, asdict(result), answers.synthetic)
+    show_text(plane_text(result, variables, name, answers.synthetic))
+    for table in plane_tables(result, variables, name, answers.synthetic):
+        show_tables(table)
+
+
+def _lapse(text: str, guess: float) -> float | None:
+    from experiments.errors import InputError
+
+    if text == "fit":
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0 <= value < 1 - guess:
+        raise InputError(
+            f"expected --lapse as a number from 0 to below {1 - guess:g}, or 'fit'; got '{text}'"
+        )
+    return value

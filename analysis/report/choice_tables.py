@@ -1,0 +1,362 @@
+"""Paired comparisons and thresholds as tables and words."""
+
+from collections.abc import Sequence
+
+from analysis.pairs.abilities import Contrast, PairsResult
+from analysis.report.contents import caption, marked
+from analysis.report.formats import Table
+from analysis.report.numbers import DASH, apa_p, decimals, fixed, interval, p_value
+from analysis.thresholds.likelihood import Interval
+from analysis.thresholds.people import Average, PersonThreshold, ThresholdsResult
+from analysis.thresholds.plane_people import PersonPlane, PlanesResult
+
+# Paired comparisons as tables and words.
+
+
+def abilities_table(result: PairsResult, name: str, synthetic: bool = False) -> Table:
+    """Items from the ablest down, against the reference."""
+    robust = any(item.se_robust is not None for item in result.items)
+    header = ["Item", "Rank", "Ability", "SE", *(["robust SE"] if robust else []), "95% CI", "p", "W/L/T"]
+    rows = []
+    for item in sorted(result.items, key=lambda one: (one.rank, one.name)):
+        errors = [item.se, *([item.se_robust] if item.se_robust is not None else [])]
+        row = [item.name, str(item.rank), fixed(item.ability, 3), *(fixed(error, 3) for error in errors)]
+        is_reference = item.name == result.reference
+        row += [DASH if is_reference else interval((item.ci_low, item.ci_high)), p_value(item.p)]
+        rows.append((*row, f"{item.wins}/{item.losses}/{item.ties}"))
+    said = f"Abilities in {result.scale}; '{result.reference}' is 0. W/L/T: won, lost, tied."
+    if robust:
+        said += " CI and p by the model's SE; robust p of every difference stand with the differences."
+    notes = (said,)
+    title = caption("Abilities", name, synthetic)
+    return Table("abilities", title, tuple(header), tuple(rows), 1, notes)
+
+
+def contrasts_table(result: PairsResult, name: str, synthetic: bool = False) -> Table:
+    """Every pair of items, Holm-corrected: by the model's errors, and by those that count raters."""
+    robust = any(c.se_robust is not None for c in result.contrasts)
+    rows = tuple(
+        (
+            f"{c.first} - {c.second}",
+            *(fixed(c.difference, 3), fixed(c.se, 3), fixed(c.z), p_value(c.p_holm)),
+            *(_robust_cells(c) if robust else ()),
+        )
+        for c in result.contrasts
+    )
+    title = caption("Differences between items", name, synthetic)
+    header = ("Items", "Difference", "SE", "z", "p", *(("robust SE", "t", "robust p") if robust else ()))
+    return Table("pair-contrasts", title, header, rows, 1, (_which_errors(result, robust),), True)
+
+
+def _robust_cells(contrast: Contrast) -> tuple[str, str, str]:
+    se, p = contrast.se_robust, contrast.p_robust_holm
+    if se is None or p is None:
+        return "" if se is None else fixed(se, 3), DASH, DASH
+    return fixed(se, 3), fixed(contrast.difference / se), p_value(p)
+
+
+def _which_errors(result: PairsResult, robust: bool) -> str:
+    """Which errors the p of the contrasts go by, and which to read."""
+    if not robust:
+        return (
+            "SE, z and p by the model, which takes every comparison for one of another rater; with "
+            "raters named there are robust ones too. p corrected by Holm."
+        )
+    return (
+        "SE, z and p by the model, which takes every comparison for one of another rater; robust: raters as "
+        f"clusters, t on {(result.n_participants or 1) - 1} df. Where raters gave several comparisons and "
+        "differ, the robust p are those to report. p corrected by Holm."
+    )
+
+
+def factors_table(result: PairsResult, name: str, synthetic: bool = False) -> Table:
+    """Likelihood-ratio tests of the factors, and their coefficients in treatment coding."""
+    rows = []
+    for test in result.factors:
+        rows.append((test.factor, fixed(test.chi2, 3), str(test.df), p_value(test.p), ""))
+        for level, estimate, se in zip(test.levels, test.estimates, test.standard_errors, strict=True):
+            rows.append(
+                (f"  {level} - {test.reference}", "", "", "", f"{fixed(estimate, 3)} ({fixed(se, 3)})")
+            )
+    title = caption("Factors of the items", name, synthetic)
+    return Table("pair-factors", title, ("Factor", "χ²", "df", "p", "b (SE)"), tuple(rows), 1)
+
+
+def pairs_text(result: PairsResult, name: str, synthetic: bool = False) -> str:
+    """What was fitted and how well it holds, in words."""
+    people = "" if result.n_participants is None else f" by {result.n_participants} raters"
+    said = [
+        f"{marked(name, synthetic)}: {result.method}{' with Firth penalty' if result.firth else ''}, "
+        f"{result.n_comparisons} comparisons of {len(result.items)} items{people}, {result.n_ties} ties."
+    ]
+    fit = result.goodness
+    if fit.df > 0:
+        said.append(f"Fit of the pairs: G2({fit.df}) = {fixed(fit.deviance)}, {apa_p(fit.p)}.")
+    if result.order_effect is not None:
+        advantage = result.order_effect
+        said.append(f"Advantage of the left side: {fixed(advantage.estimate)}, {apa_p(advantage.p)}.")
+    if result.tie_probability_max is not None:
+        said.append(f"Two equal items tie with probability {fixed(result.tie_probability_max)}.")
+    triples = result.transitivity
+    if triples.triples:
+        said.append(f"{triples.weak_violations} of {triples.triples} triples break weak transitivity.")
+    return " ".join([*said, *(f"{decision}." for decision in result.decisions)])
+
+
+# Thresholds as tables and words.
+
+
+def threshold_decimals(result: ThresholdsResult) -> int:
+    """Decimals of every threshold of a result: what the most certain of them supports."""
+    return decimals(
+        [
+            *(fit.threshold_se for fit in result.pooled.values()),
+            *(fit.threshold_se for fit in result.population.values()),
+            *(mean.se for mean in result.means),
+        ]
+    )
+
+
+def threshold_table(result: ThresholdsResult, name: str, synthetic: bool = False) -> Table:
+    """The fit over all trials of each condition."""
+    digits = threshold_decimals(result)
+    rows = tuple(
+        (
+            condition,
+            fixed(fit.threshold, digits),
+            interval_text(fit.threshold_ci, digits),
+            fixed(fit.spread, digits),
+            DASH if fit.x75 is None else fixed(fit.x75, digits),
+            fixed(fit.lapse, 3),
+            p_value(fit.p),
+            str(fit.n_trials),
+        )
+        for condition, fit in result.pooled.items()
+    )
+    header = ("Condition", "Threshold", "95% CI", "Spread", "x .75", "Lapse", "fit p", "Trials")
+    notes = (
+        ("All trials pooled: where people differ the slope is flatter and the interval too narrow.",)
+        if result.means
+        else ()
+    )
+    title = caption("Thresholds over all trials", name, synthetic)
+    return Table("thresholds", title, header, rows, 1, notes)
+
+
+def means_table(result: ThresholdsResult, name: str, synthetic: bool = False) -> Table:
+    """Each condition's threshold as the mean of those of single people, which is the answer for people."""
+    digits = threshold_decimals(result)
+    rows = tuple(
+        (
+            mean.condition,
+            str(mean.people),
+            fixed(mean.mean, digits),
+            fixed(mean.se, digits),
+            interval((mean.ci_low, mean.ci_high), digits),
+            fixed(mean.tau, digits),
+        )
+        for mean in result.means
+    )
+    header = ("Condition", "People", "Threshold", "SE", "95% CI", "SD")
+    notes = (
+        "Mean of the thresholds of single people, weighed by their errors (random effects by REML, Hartung "
+        "and Knapp's interval). SD: how far people's own thresholds differ.",
+        *_without_threshold(result),
+    )
+    title = caption("Thresholds, mean over people", name, synthetic)
+    return Table("threshold-means", title, header, rows, 1, notes)
+
+
+def _without_threshold(result: ThresholdsResult) -> list[str]:
+    """Who is in no mean: it then is of people whose thresholds lie among what was shown, and may be off."""
+    said = []
+    for mean in result.means:
+        everybody = [one.participant for one in result.people if one.condition == mean.condition]
+        if lacking := len(everybody) - mean.people:
+            said.append(
+                f"{mean.condition}: {lacking} of {len(everybody)} people have no threshold of their own and "
+                "are not in the mean, which is off where theirs lie outside the levels shown; "
+                "--hierarchical counts everybody."
+            )
+    return said
+
+
+def population_table(result: ThresholdsResult, name: str, synthetic: bool = False) -> Table:
+    """The model over all people of each condition."""
+    digits = threshold_decimals(result)
+    rows = tuple(
+        (
+            condition,
+            fixed(fit.threshold, digits),
+            interval_text(fit.threshold_ci, digits),
+            fixed(fit.threshold_sd, digits),
+            fixed(fit.spread, digits),
+            fixed(fit.log_spread_sd, 3),
+            str(fit.people),
+        )
+        for condition, fit in result.population.items()
+    )
+    header = ("Condition", "Threshold", "95% CI", "SD", "Spread", "SD of log", "People")
+    notes = ("Threshold and log spread are normal over people; profile likelihood interval of the mean.",)
+    return Table("population", caption("Thresholds over people", name, synthetic), header, rows, 1, notes)
+
+
+def people_table(result: ThresholdsResult, name: str, synthetic: bool = False) -> Table:
+    """Every person's threshold."""
+    digits = threshold_decimals(result)
+    rows = [
+        (
+            one,
+            None
+            if one.fit is None
+            else (*estimate(one.fit.threshold, one.fit.threshold_ci, digits), fixed(one.fit.spread, digits)),
+        )
+        for one in result.people
+    ]
+    return table_of_people(rows, ("Threshold", "95% CI", "Spread"), name, synthetic)
+
+
+def estimate(value: float, interval: Interval, digits: int = 3) -> tuple[str, str]:
+    """The cells of an estimate and its interval."""
+    return fixed(value, digits), interval_text(interval, digits)
+
+
+def table_of_people(
+    people: Sequence[tuple[PersonThreshold | PersonPlane, tuple[str, ...] | None]],
+    measures: tuple[str, ...],
+    name: str,
+    synthetic: bool,
+) -> Table:
+    """What was measured of every person in every condition, or why nothing could be."""
+    rows = tuple(
+        (one.participant, one.condition, *(cells or (one.reason, *[""] * (len(measures) - 1))))
+        for one, cells in people
+    )
+    title = caption("Thresholds by person", name, synthetic)
+    return Table("threshold-people", title, ("Person", "Condition", *measures), rows, 2, (), True)
+
+
+def threshold_text(result: ThresholdsResult, name: str, synthetic: bool = False) -> str:
+    """What was fitted, in words."""
+    first = next(iter(result.pooled.values()))
+    lapse = "fitted lapse rate" if first.lapse_fitted else f"lapse rate {first.lapse:g}"
+    said = [
+        f"{marked(name, synthetic)}: {first.shape} psychometric function, guess rate "
+        f"{first.guess:g}, {lapse}, {result.n_trials} trials; profile likelihood intervals."
+    ]
+    for condition, fit in result.pooled.items():
+        said += [f"{'' if condition == 'all' else condition + ': '}{note}." for note in fit.notes]
+    return " ".join([*said, *(f"{decision}." for decision in result.decisions)])
+
+
+def interval_text(interval: Interval, digits: int = 3) -> str:
+    """Both ends; `open` where the likelihood never falls far enough."""
+    low = "open" if interval.low is None else fixed(interval.low, digits)
+    high = "open" if interval.high is None else fixed(interval.high, digits)
+    return f"[{low}, {high}]"
+
+
+# Thresholds over two stimulus variables as tables and words.
+
+
+def plane_tables(
+    result: PlanesResult, variables: tuple[str, str], name: str, synthetic: bool = False
+) -> tuple[Table, ...]:
+    """Parameters, the threshold along the second variable, and every person."""
+    tables = [_parameters(result, variables, name, synthetic), _line(result, variables, name, synthetic)]
+    return (*tables, _people(result, name, synthetic)) if result.people else tuple(tables)
+
+
+def _parameters(result: PlanesResult, variables: tuple[str, str], name: str, synthetic: bool) -> Table:
+    rows = [
+        (
+            f"{condition}, {fit.people} people",
+            *estimate(fit.threshold, fit.threshold_ci),
+            *estimate(fit.tilt, fit.tilt_ci),
+            fixed(fit.spread, 3),
+            DASH,
+            DASH,
+        )
+        for condition, fit in result.population.items()
+    ]
+    rows += [
+        (
+            f"{condition}, all trials" if result.people else condition,
+            *estimate(fit.threshold, fit.threshold_ci),
+            *estimate(fit.tilt, fit.tilt_ci),
+            fixed(fit.spread, 3),
+            p_value(fit.p),
+            str(fit.n_trials),
+        )
+        for condition, fit in result.pooled.items()
+    ]
+    for condition, means in result.means.items():
+        if means.threshold is not None and means.tilt is not None:
+            label = f"{condition}, mean of {means.threshold.people} own fits"
+            cells = (*_average(means.threshold), *_average(means.tilt))
+            rows.append((label, *cells, DASH, DASH, DASH))
+    header = ("Condition", "Threshold", "95% CI", "Tilt", "95% CI", "Spread", "fit p", "Trials")
+    middle = next(iter(result.pooled.values())).middle
+    notes = (
+        f"Threshold: in {variables[0]}, where {variables[1]} is {middle:g}. "
+        f"Tilt: change of the threshold per unit of {variables[1]}.",
+        *_of_people(result),
+    )
+    title = caption("Thresholds over two variables", name, synthetic)
+    return Table("thresholds", title, header, tuple(rows), 1, notes)
+
+
+def _of_people(result: PlanesResult) -> tuple[str, ...]:
+    """What the rows are of, and how people differ."""
+    if not result.people:
+        return ()
+    differ = [
+        f"{condition}: {fixed(fit.threshold_sd, 3)} and {fixed(fit.tilt_sd, 3)}"
+        for condition, fit in result.population.items()
+    ]
+    said = "All trials: as if one person had given them, too sure where people differ."
+    return (said, f"SD between people of threshold and tilt: {'; '.join(differ)}.") if differ else (said,)
+
+
+def _average(one: Average) -> tuple[str, str]:
+    return fixed(one.mean, 3), interval((one.ci_low, one.ci_high), 3)
+
+
+def _line(result: PlanesResult, variables: tuple[str, str], name: str, synthetic: bool) -> Table:
+    rows = tuple(
+        (condition, f"{point.z:g}", *estimate(point.threshold, point.ci))
+        for condition, fit in result.pooled.items()
+        for point in fit.line
+    )
+    title = caption(f"Threshold along {variables[1]}", name, synthetic)
+    return Table("threshold-line", title, ("Condition", variables[1], "Threshold", "95% CI"), rows, 2)
+
+
+def _people(result: PlanesResult, name: str, synthetic: bool) -> Table:
+    rows = [
+        (
+            one,
+            None
+            if one.fit is None
+            else (
+                *estimate(one.fit.threshold, one.fit.threshold_ci),
+                *estimate(one.fit.tilt, one.fit.tilt_ci),
+            ),
+        )
+        for one in result.people
+    ]
+    return table_of_people(rows, ("Threshold", "95% CI", "Tilt", "95% CI"), name, synthetic)
+
+
+def plane_text(result: PlanesResult, variables: tuple[str, str], name: str, synthetic: bool = False) -> str:
+    """What was fitted, in words."""
+    first = next(iter(result.pooled.values()))
+    said = [
+        f"{marked(name, synthetic)}: {first.shape} psychometric function of {variables[0]} whose threshold "
+        f"is a straight line over {variables[1]}, guess rate {first.guess:g}, lapse rate {first.lapse:g}, "
+        f"{result.n_trials} trials; profile likelihood intervals."
+    ]
+    said += [
+        f"{condition}: no function was fitted, {reason}." for condition, reason in result.reasons.items()
+    ]
+    return " ".join([*said, *(f"{decision}." for decision in result.decisions)])

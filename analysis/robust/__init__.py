@@ -1,1 +1,0 @@
-"""Companions of the ANOVA that assume less: aligned ranks, permutations, trimmed means."""
