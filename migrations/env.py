@@ -5,10 +5,10 @@ from typing import Literal
 from alembic import context
 from sqlalchemy import Connection
 
-from server.db import open_database
-from server.migrate import migrating, with_wall, without_wall
+from server.core.db import open_database
+from server.core.migrate import migrating, with_wall, without_wall
+from server.core.settings import Settings
 from server.models import Base, UtcDateTime
-from server.settings import Settings
 
 
 def render_item(kind: str, item: object, _context: object) -> str | Literal[False]:

@@ -9,51 +9,30 @@ from fastapi import APIRouter, FastAPI
 from fastapi.routing import APIRoute
 from starlette.routing import BaseRoute
 
-from server import health, pages
-from server.accounts import credential_endpoints as credentials
+from server import web
 from server.accounts import endpoints as accounts
-from server.accounts import people
-from server.accounts.refusals import note_refusal
-from server.capsules import endpoints as capsules
-from server.changes import ChangesTold
-from server.clips import endpoints as clips
+from server.accounts import provider_endpoints, reset_endpoints, workspace_endpoints
+from server.accounts.audit import note_refusal
 from server.context import open_services
-from server.door import Door
-from server.errors import install_error_handlers
-from server.evidence.later import digests_judged_later
-from server.export import endpoints as export
-from server.lane import ExperimentersLane
-from server.library import endpoints as library
-from server.library import strips
-from server.methods import endpoints as methods
-from server.middleware import RowSecurity, SecurityHeaders
-from server.monitor import endpoints as monitor
+from server.core.changes import ChangesTold
+from server.core.errors import install_error_handlers
+from server.core.settings import Settings
+from server.exports import endpoints as exports
 from server.operations import endpoints as operations
-from server.operations.drill_schedule import weekly_drill
-from server.operations.observer import Observer
-from server.operations.snapshot_schedule import snapshots_taken
-from server.participants import endpoints as participants
-from server.participants import rating_endpoints as trials
-from server.participants import view_endpoints as views
-from server.persons import endpoints as persons
-from server.providers import endpoints as providers
+from server.operations.drill import weekly_drill
+from server.operations.metrics import Observer
+from server.operations.snapshots import snapshots_taken
+from server.participation import endpoints as participation
+from server.participation.judgement import digests_judged_later
+from server.privacy import endpoints as privacy
+from server.privacy.retention import hourly_retention
 from server.rehearsals import endpoints as rehearsals
-from server.replay import endpoints as replay
-from server.reports import endpoints as reports
-from server.resets import endpoints as resets
+from server.request_limits import Door, ExperimentersLane
 from server.results import endpoints as results
-from server.results.ahead import results_counted_ahead
-from server.retention import endpoints as retention
-from server.retention.schedule import hourly_retention
-from server.runs import endpoints as runs
-from server.seals import endpoints as seals
-from server.settings import Settings
+from server.results.counting import results_counted_ahead
+from server.studies import clip_endpoints, library
 from server.studies import endpoints as studies
-from server.studies import life_endpoints as life_cycle
-from server.studies import link_endpoints as links
-from server.studies import upload_endpoints as uploads
-from server.workspaces import endpoints as workspaces
-from server.workspaces import grant_endpoints as grants
+from server.web import RowSecurity, SecurityHeaders
 
 API_VERSION = "1"
 """Of the API, not of the program: which weaknesses that may have is nobody's business who asks."""
@@ -62,39 +41,39 @@ API_VERSION = "1"
 def _routers() -> tuple[APIRouter, ...]:
     """Every router: the busiest first, and `pages` last, which answers for whole folders of addresses."""
     return (
-        trials.router,
-        views.router,
-        participants.router,
-        clips.router,
-        health.router,
+        participation.rating_router,
+        participation.view_router,
+        participation.router,
+        clip_endpoints.clip_router,
+        web.health_router,
         operations.router,
         operations.admin_router,
         accounts.router,
-        credentials.router,
-        providers.router,
-        resets.router,
-        people.router,
-        workspaces.router,
-        grants.router,
+        accounts.credential_router,
+        provider_endpoints.router,
+        reset_endpoints.router,
+        accounts.people_router,
+        workspace_endpoints.workspace_router,
+        workspace_endpoints.grant_router,
         studies.router,
-        uploads.router,
-        life_cycle.router,
-        links.router,
-        monitor.router,
+        clip_endpoints.upload_router,
+        studies.life_router,
+        studies.link_router,
+        results.monitor_router,
         results.router,
-        runs.router,
-        replay.router,
-        persons.router,
-        retention.router,
-        seals.router,
-        export.router,
-        reports.router,
+        results.run_router,
+        results.replay_router,
+        privacy.person_router,
+        privacy.retention_router,
+        exports.seal_router,
+        exports.router,
+        exports.report_router,
         rehearsals.router,
-        capsules.router,
-        methods.router,
-        library.router,
-        strips.router,
-        pages.router,
+        exports.capsule_router,
+        results.methods_router,
+        library.blink_router,
+        library.strip_router,
+        web.page_router,
     )
 
 

@@ -13,28 +13,28 @@ COMMANDS = {
         "Serve participants and experimenters until stopped (Ctrl-C); what is under way is finished first.",
     ),
     "export": (
-        "server.export.cli",
+        "server.exports.cli",
         "Write a study's data: as csv, the columns of experiments/columns and one column a factor.",
     ),
     "capsule": (
-        "server.capsules.cli",
+        "server.exports.cli",
         "Write the capsule of a study: a Psych-DS dataset and an RO-Crate with data, materials and report.",
     ),
     "seal": (
-        "server.seals.cli",
+        "server.exports.cli",
         "Seal design, exclusions, analysis plan and power before the first participant; or write the seal "
         "again.",
     ),
     "methods": (
-        "server.methods.cli",
+        "server.exports.cli",
         "Write a study's Methods paragraph; each number is followed by the query that gives it.",
     ),
     "simulate": (
-        "server.simulation.cli",
+        "server.rehearsals.cli",
         "Let simulated participants take part through the HTTP API; their runs have the origin `simulated`.",
     ),
     "retention": (
-        "server.retention.cli",
+        "server.privacy.cli",
         "Erase what is due by the retention that studies declare; the server does so each hour.",
     ),
     "doctor": (
@@ -58,14 +58,14 @@ COMMANDS = {
         "Bring the newest backup back beside the data, examine it and remove it; exit code 1 where it "
         "failed.",
     ),
-    "database": ("server.cli_database", "The database's tables."),
+    "database": ("server.operations.cli", "The database's tables."),
     "study": ("server.studies.cli", "Studies on this server."),
     "link": ("server.studies.cli", "Links for participants."),
     "admin": ("server.accounts.cli", "Accounts of experimenters."),
     "account": ("server.accounts.cli", "Let somebody in again who lost a password or a phone."),
-    "audit": ("server.audit.cli", "The audit log: verify its chain of hashes, export it."),
-    "workspace": ("server.workspaces.cli", "Workspaces: laboratories that share this server."),
-    "person": ("server.persons.cli", "One participant: subject access and erasure."),
+    "audit": ("server.accounts.audit_cli", "The audit log: verify its chain of hashes, export it."),
+    "workspace": ("server.accounts.workspace_cli", "Workspaces: laboratories that share this server."),
+    "person": ("server.privacy.cli", "One participant: subject access and erasure."),
 }
 """Command -> the module whose `register` adds it, and the line of help that lists it."""
 
@@ -83,7 +83,7 @@ def _call(*, standalone_mode: bool) -> object:
         raise
     except Exception as error:
         # What these errors are is imported only where there is one.
-        from server.cli_refusals import refusal
+        from server.cli_common import refusal
 
         message = refusal(error)
         if message is None:

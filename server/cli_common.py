@@ -1,18 +1,25 @@
-"""What the command groups share: the migrated database of the settings."""
+"""What the command groups share: the migrated database of the settings, and how refusals are put."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
 
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
 from rich.console import Console
-from sqlalchemy.exc import OperationalError
+from sqlalchemy.exc import DBAPIError, OperationalError
+from sqlalchemy.exc import TimeoutError as PoolTimeout
 
 from experiments.errors import InputError, did_you_mean
+from experiments.wrong_values import wrong_value
 from server.context import Services, open_services
-from server.db import checked_url
-from server.migrate import current_revision, known_revision, upgrade
-from server.settings import KEY_LENGTH_MIN, Settings
+from server.core.db import checked_url, is_away, is_busy
+from server.core.errors import ApiError
+from server.core.migrate import current_revision, known_revision, upgrade
+from server.core.settings import KEY_LENGTH_MIN, Settings
+
+# What the command groups share: the migrated database of the settings.
 
 out = Console(soft_wrap=True, highlight=False, markup=False)
 Word = TypeVar("Word", bound=str)
@@ -88,3 +95,28 @@ def one_of(words: Sequence[Word], word: str, what: str) -> Word:
     if known is None:
         raise InputError(f"expected {what} {', '.join(words)}, got '{word}'{did_you_mean(word, words)}")
     return known
+
+
+# What a command was refused for, in one line: by the server itself, or by its settings.
+
+
+def refusal(error: Exception) -> str | None:
+    """The line; None for what is no refusal."""
+    if isinstance(error, ApiError):
+        return error.message
+    if isinstance(error, ValidationError) and error.title == Settings.__name__:
+        return "; ".join(map(_setting, error.errors()))
+    if isinstance(error, PoolTimeout):
+        return "no connection to the database came free: try again, or raise PALPEBRA_DATABASE_POOL"
+    if is_busy(error):
+        return "another program keeps the database locked: end it, or try again when it is done"
+    if isinstance(error, DBAPIError) and is_away(error):
+        said = str(error.orig).strip().splitlines() or ["it does not answer"]
+        return f"the database is away ({said[0]}); see DATABASE_URL, then run: server doctor"
+    return None
+
+
+def _setting(problem: ErrorDetails) -> str:
+    name = "__".join(map(str, problem["loc"])).upper() or "a setting"
+    shown = name if name.startswith(("PALPEBRA_", "DATABASE_")) else f"PALPEBRA_{name}"
+    return f"{shown}: {wrong_value(problem)}; see docs/settings.md"

@@ -14,15 +14,14 @@ import uvicorn
 from experiments.errors import InputError
 from server.accounts import invitations
 from server.accounts import service as accounts
-from server.accounts.people import invitation_url
+from server.accounts.endpoints import invitation_url
 from server.cli_common import migrated_services, out
 from server.context import Services
-from server.logs import logging_configuration
-from server.operations.erasures import begin_ledger
+from server.core.logs import logging_configuration
+from server.core.settings import Settings, close_to_others
 from server.operations.metrics import MULTIPROCESS_VARIABLE
-from server.operations.modes import close_to_others
-from server.protocol import BoundedHttp
-from server.settings import Settings
+from server.privacy.erasures import begin_ledger
+from server.request_limits import BoundedHttp
 from server.studies.links import general_links, link_url
 from server.studies.repository import open_studies
 

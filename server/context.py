@@ -6,26 +6,22 @@ from typing import Annotated
 
 from fastapi import Depends, Request
 
-from server.accounts.passwords import PasswordWork
+from server.accounts.credentials import PasswordWork
+from server.accounts.provider_protocol import Providers
 from server.accounts.throttle import SignInThrottle
-from server.changes import Changes
-from server.clock import now
-from server.db import REQUEST_BUSY_S, Database, open_database
-from server.evidence.clip_bytes import ClipBytes
-from server.evidence.intake import Intake
-from server.group_commit import GroupCommit
-from server.locks import Locks, open_locks
-from server.open_streams import OpenStreams
-from server.providers.clients import Providers
-from server.rate_limit import BoundedRecords, RateLimit
+from server.core.changes import Changes, Stopping
+from server.core.commit import GroupCommit
+from server.core.db import REQUEST_BUSY_S, Database, open_database
+from server.core.limits import BoundedRecords, OpenStreams, RateLimit, SharedCounts
+from server.core.locks import Locks, open_locks
+from server.core.settings import Settings
+from server.core.storage import ClipStore, FolderStore, open_s3
+from server.core.values import now
+from server.participation.clip_bytes import ClipBytes
+from server.participation.intake import Intake
 from server.results.cache import ResultsCache
-from server.settings import Settings
-from server.shared_counts_repository import SharedCounts
-from server.stopping import Stopping
-from server.storage.clips import ClipStore, FolderStore
-from server.storage.s3 import open_s3
+from server.studies.versions import Versions
 from server.transcoding.preparing import Preparing
-from server.versions import Versions
 
 SIMULATED_TIME = "x-palpebra-simulated-time"
 REFUSALS_PER_MINUTE, REFUSALS_OF_A_KIND = 20, 3

@@ -18,11 +18,10 @@ from pathlib import Path
 from typing import Any
 
 from server.context import open_services
-from server.evidence.signals import GUESSED_BY_CHANCE
-from server.evidence.verdict import BANDS, VERDICTS, points_of
-from server.migrate import upgrade
-from server.settings import Settings
-from server.simulation.manners import MANNERS
+from server.core.migrate import upgrade
+from server.core.settings import Settings
+from server.participation.evidence import BANDS, GUESSED_BY_CHANCE, VERDICTS, points_of
+from server.rehearsals.manners import MANNERS
 from tests.helpers.motion_checks import CHECKS, checked
 from tests.helpers.studies import SHORT, add_study
 

@@ -26,11 +26,11 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
-from server.clock import now
-from server.evidence.clip_bytes import clip_digest, clip_hash
-from server.evidence.tickets import evidence_key, issue, ticket
-from server.simulation.http import JsonClient, Refused
-from server.simulation.person import Person, Rater
+from server.core.values import now
+from server.participation.clip_bytes import clip_digest, clip_hash
+from server.participation.intake import evidence_key, issue, ticket
+from server.rehearsals.http import JsonClient, Refused
+from server.rehearsals.person import Person, Rater
 from tests.browser.server_process import ServerProcess
 from tests.helpers.studies import SHORT
 
@@ -262,7 +262,7 @@ def session(folder: Path, seconds: float, raters: int) -> Counts:
     try:
         victim = Visit(server.address, link, 1)
         victim.http.close()
-        target = Target(server.address, link, server.settings.key, victim.state["tickets"])
+        target = Target(server.address, link, server.core.settings.key, victim.state["tickets"])
         lines = len(server.log.read_text().splitlines())
         end = time.monotonic() + seconds
         with ProcessPoolExecutor(1) as attackers, ThreadPoolExecutor(raters) as pool:

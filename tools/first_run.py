@@ -38,8 +38,8 @@ def studies_made() -> dict[str, bool]:
     """Every study that the server's database has or had, and whether it is still there and not archived."""
     from sqlalchemy import text
 
-    from server.db import open_database
-    from server.settings import Settings
+    from server.core.db import open_database
+    from server.core.settings import Settings
 
     database = open_database(Settings())
     try:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from server.simulation.person import Person, Rater
+from server.rehearsals.person import Person, Rater
 from tools.load_connection import Connection
 
 RETRY_S = 0.2

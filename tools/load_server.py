@@ -17,8 +17,8 @@ from pathlib import Path
 import psutil
 
 from server.context import Services, open_services
-from server.migrate import upgrade
-from server.settings import Settings
+from server.core.migrate import upgrade
+from server.core.settings import Settings
 from tests.helpers.studies import SHORT, add_study
 from tools.load_database import LoadDatabase, load_database
 

@@ -17,7 +17,7 @@ const program = [
   "from experiments.schema.editor import editor_schema",
   "from experiments.trials import reserved_names",
   "from server.app import create_app",
-  "from server.settings import Settings",
+  "from server.core.settings import Settings",
   "print(json.dumps([create_app(Settings()).openapi(), editor_schema(), sorted(reserved_names())], ensure_ascii=True))",
 ].join("; ");
 

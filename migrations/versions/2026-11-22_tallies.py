@@ -19,7 +19,7 @@ INDICES = {
     "ix_study_runs_study_id_origin_status": ["study_id", "origin", "status", "stage", "completed_at"],
 }
 RUNS_AT_ONCE = 200
-# Frozen as of this revision: server/tallies/tally.py may change, what is stored here may not.
+# Frozen as of this revision: server/participation/tallies.py may change, what is stored here may not.
 LETTERS = {"good": "g", "uncertain": "u", "flagged": "f", "failed": "x"}
 BETTER = {".": 0, "x": 1, "f": 2, "u": 3, "g": 4}
 CODES = {"left": 1, "right": 2, "tie": 3}

@@ -1,14 +1,266 @@
-"""The audit log: one row for every change an experimenter makes, and for every look at single persons."""
+"""The audit log: one row for every change and every look at single persons, chained by hashes."""
 
-from typing import Any, Literal
+import hashlib
+import hmac
+import json
+import logging
+import queue
+import secrets
+import socket
+import ssl
+import threading
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from functools import lru_cache
+from logging.handlers import SysLogHandler
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
 
+from fastapi import Request
+from fastapi.concurrency import run_in_threadpool
+from sqlalchemy import event
+from sqlalchemy.exc import SQLAlchemyError
 from sqlalchemy.orm import Session
 
+from experiments.errors import InputError
+from server.accounts import repository
 from server.accounts.identity import OPERATOR, Identity, Operator
-from server.audit import repository
-from server.audit.sealing import join_at_commit
-from server.clock import now
+from server.context import Services, services_of
+from server.core.db import SIGNING_KEY, SYSLOG
+from server.core.errors import ApiError
+from server.core.logs import described
+from server.core.settings import syslog_address
+from server.core.values import now
 from server.models import AuditEntry
+
+# The chain of the audit log: each entry's hash holds the one before it, keyed by the server's secret.
+#
+# With k a key derived from the secret key, s an entry's salt and d its details as JSON,
+#
+#     D = HMAC-SHA256(k, "details" | s | d)                                               (1)
+#     H_n = HMAC-SHA256(k, "entry" | H_(n-1) | n | time | actor | action | kind | target | D)   (2)
+#
+# Whoever can write to the database, but has not the key, cannot change, remove or put in an entry without
+# breaking (2) at it. What the database alone cannot tell is that the last entries were cut off, or the whole
+# chain taken away from rows that stay: keep the newest hash elsewhere (export, syslog) and verify with it.
+# Details can be erased with their salt, as data protection asks; D stays, and tells nothing without s.
+
+START = "0" * 64
+"""What stands for the hash before the first entry."""
+
+
+class Entry(NamedTuple):
+    """What the chain holds of an entry of the audit log."""
+
+    position: int
+    at: datetime
+    actor: str
+    action: str
+    target_kind: str
+    target: str
+
+
+def chain_key(secret: bytes) -> bytes:
+    """The key of the chain: of this purpose alone."""
+    return hmac.new(secret, b"audit chain", hashlib.sha256).digest()
+
+
+def details_digest(key: bytes, salt: str, details: dict[str, Any]) -> str:
+    """Equation (1), 64 hexadecimal digits.
+
+    >>> a = details_digest(b"k", "s", {"a": 1, "b": [2]})
+    >>> a == details_digest(b"k", "s", {"b": [2], "a": 1}) != details_digest(b"k", "t", {"a": 1, "b": [2]})
+    True
+    """
+    return _keyed(key, ["details", salt, details])
+
+
+def entry_hash(key: bytes, previous: str, entry: Entry, digest: str) -> str:
+    """Equation (2), 64 hexadecimal digits; `previous` is the hash of the entry before, or `START`."""
+    at = entry.at.astimezone(UTC).isoformat(timespec="microseconds")
+    return _keyed(key, ["entry", previous, entry.position, at, *entry[2:], digest])
+
+
+def _keyed(key: bytes, parts: list[Any]) -> str:
+    text = json.dumps(parts, sort_keys=True, ensure_ascii=True, separators=(",", ":"))
+    return hmac.new(key, text.encode("ascii"), hashlib.sha256).hexdigest()
+
+
+# Entries of the audit log to syslog, where `PALPEBRA_AUDIT_SYSLOG` names one.
+
+log = logging.getLogger("palpebra")
+CONNECT_S = 5.0
+WAITING_MAX = 1000
+"""Entries that may wait for a syslog that is slow."""
+
+
+def forward(address: str, entries: list[dict[str, object]]) -> None:
+    """Send entries, details left out, by a thread of their own: a syslog that is away holds up no request.
+
+    Entries that cannot be sent, or wait while `WAITING_MAX` others do, are dropped with a line of log: the
+    log in the database has them.
+    """
+    waiting = _queue(address)
+    for entry in entries:
+        kept = {name: value for name, value in entry.items() if name != "details"}
+        try:
+            waiting.put_nowait(json.dumps(kept))
+        except queue.Full:
+            log.warning("the audit log could not be sent to syslog: %d entries wait already", WAITING_MAX)
+            return
+
+
+@lru_cache(maxsize=4)
+def _queue(address: str) -> "queue.Queue[str]":
+    waiting: queue.Queue[str] = queue.Queue(WAITING_MAX)
+    threading.Thread(target=_send, args=(address, waiting), name="audit-syslog", daemon=True).start()
+    return waiting
+
+
+def _send(address: str, waiting: "queue.Queue[str]") -> None:
+    handler: SysLogHandler | None = None
+    while True:
+        line = waiting.get()
+        try:
+            handler = handler or _handler(address)
+            handler.emit(logging.makeLogRecord({"msg": line, "levelno": logging.INFO}))
+        except (OSError, ValueError) as error:  # ValueError: what is no name for DNS, or no socket
+            log.warning("the audit log could not be sent to syslog: %s", error)
+
+
+class _Handler(SysLogHandler):
+    def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802, ARG002 - as logging calls it
+        log.warning("the audit log could not be sent to syslog")
+
+
+class _Stream(_Handler):
+    """Syslog over TCP (RFC 6587), or TLS with the certificate checked (RFC 5425): lengths before messages."""
+
+    def __init__(self, host: str, port: int, *, tls: bool) -> None:
+        self._host, self._port, self._tls = host, port, tls
+        self._connection: socket.socket | None = None
+        super().__init__((host, port), facility=SysLogHandler.LOG_AUTH, socktype=socket.SOCK_STREAM)
+
+    def createSocket(self) -> None:  # noqa: N802 - as logging calls it
+        """Connect; a syslog that is away is asked again with the next entry."""
+        connection = socket.create_connection((self._host, self._port), timeout=CONNECT_S)
+        if self._tls:
+            context = ssl.create_default_context()
+            connection = context.wrap_socket(connection, server_hostname=self._host.partition("%")[0])
+        self._connection = connection
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Send one message, over a new connection where the last was ended; OSError where that fails too."""
+        line = f"<{self.encodePriority(self.facility, 'info')}>{self.format(record)}".encode()
+        if self._connection is not None and not _ended(self._connection):
+            try:
+                self._send(line)
+            except OSError:
+                log.info("the connection to syslog was lost; the same message is sent over a new one")
+            else:
+                return
+        self._hang_up()
+        self.createSocket()
+        try:
+            self._send(line)
+        except OSError:
+            self._hang_up()
+            raise
+
+    def _send(self, line: bytes) -> None:
+        if self._connection is not None:
+            self._connection.sendall(b"%d " % len(line) + line)
+
+    def _hang_up(self) -> None:
+        if self._connection is not None:
+            self._connection.close()
+        self._connection = None
+
+
+def _ended(connection: socket.socket) -> bool:
+    """Whether the other side has hung up, as one that restarts does: what is sent then is lost, unsaid."""
+    connection.settimeout(0)
+    try:
+        return connection.recv(1) == b""
+    except (BlockingIOError, ssl.SSLWantReadError):
+        return False
+    except OSError:
+        return True
+    finally:
+        connection.settimeout(CONNECT_S)
+
+
+def _handler(address: str) -> SysLogHandler:
+    listening = syslog_address(address)
+    handler: SysLogHandler
+    if listening.transport in ("tcp", "tls"):
+        handler = _Stream(listening.host, listening.port, tls=listening.transport == "tls")
+    elif listening.transport == "udp":
+        handler = _Handler((listening.host, listening.port), facility=SysLogHandler.LOG_AUTH)
+    elif Path(listening.host).exists():
+        handler = _Handler(listening.host, facility=SysLogHandler.LOG_AUTH)
+    else:
+        raise InputError(f"PALPEBRA_AUDIT_SYSLOG: there is no socket {listening.host}")
+    handler.setFormatter(logging.Formatter("palpebra-audit: %(message)s"))
+    return handler
+
+
+# Entries join the chain as the last thing before their transaction is committed, one at a time.
+
+_WAITING = "audit entries"
+
+
+def join_at_commit(session: Session, entry: AuditEntry) -> None:
+    """Have an entry of this session put into the chain when it is committed.
+
+    Not before: the lock on the chain is then the last that a transaction asks for, so that two cannot wait
+    for one another, and is held for the shortest time.
+    """
+    waiting = session.info.setdefault(_WAITING, [])
+    if not waiting:
+        event.listen(session, "before_commit", _join, once=True)
+    waiting.append(entry)
+
+
+def _join(session: Session) -> None:
+    entries: Sequence[AuditEntry] = session.info.pop(_WAITING, ())
+    session.flush()
+    repository.hold_chain(session)
+    key = chain_key(session.info[SIGNING_KEY]() if SIGNING_KEY in session.info else b"")
+    position, previous = repository.last_link(session) or (0, START)
+    for entry in entries:
+        position += 1
+        entry.position, entry.details_salt = position, secrets.token_hex(16)
+        entry.details_digest = details_digest(key, entry.details_salt, entry.details)
+        previous = entry_hash(key, previous, linked(entry), entry.details_digest)
+        entry.chain_hash = previous
+    session.flush()
+    if address := session.info.get(SYSLOG):
+        lines = [written(entry) for entry in entries]
+        event.listen(session, "after_commit", lambda _session: forward(address, lines), once=True)
+
+
+def linked(entry: AuditEntry) -> Entry:
+    """What the chain holds of a row."""
+    return Entry(entry.position or 0, entry.at, entry.actor, entry.action, entry.target_kind, entry.target)
+
+
+def written(entry: AuditEntry) -> dict[str, object]:
+    """An entry as a line of an export, without the salt of its details."""
+    return {
+        "position": entry.position,
+        "at": entry.at.isoformat(),
+        "actor": entry.actor,
+        "action": entry.action,
+        "target_kind": entry.target_kind,
+        "target": entry.target,
+        "details": entry.details,
+        "details_digest": entry.details_digest,
+        "hash": entry.chain_hash,
+    }
+
+
+# The audit log: one row for every change an experimenter makes, and for every look at single persons.
 
 NOBODY: Literal["nobody"] = "nobody"
 """The actor where somebody tried and was not recognised."""
@@ -48,4 +300,40 @@ def record(
 
 def latest(session: Session, before: int | None, limit: int) -> list[AuditEntry]:
     """The latest entries with a number below `before`, newest first."""
-    return repository.latest(session, before, limit)
+    return repository.latest_entries(session, before, limit)
+
+
+# Refusals that are written down: rights that somebody has not, others' studies, unknown tokens.
+
+ADMIN = "/api/admin/"
+
+
+async def note_refusal(request: Request, refusal: ApiError) -> None:
+    """Put a refusal of the admin API into the audit log, so many a minute; the rest are counted.
+
+    Where it cannot be written the refusal is answered all the same, and the log has a line.
+    """
+    services = services_of(request)
+    if request.url.path.startswith(ADMIN):
+        route = str(getattr(request.scope.get("route"), "path", "unmatched"))
+        try:
+            await run_in_threadpool(_note, services, request, route, refusal)
+        except (SQLAlchemyError, OSError, ValueError) as error:
+            log.error("a refusal could not be put into the audit log: %s", described(error))
+
+
+def _note(services: Services, request: Request, route: str, refusal: ApiError) -> None:
+    actor = getattr(request.state, "identity", None) or NOBODY
+    name, records = (NOBODY, services.strangers) if actor == NOBODY else (actor.name, services.refusals)
+    unwritten = records.written(f"{name} {request.method} {route} {refusal.code}")
+    if unwritten is None:
+        return
+    details = {"code": refusal.code, "status": refusal.status}
+    details |= {"not_written_before": unwritten} if unwritten else {}
+    # No column of PostgreSQL holds a NUL.
+    study = str(request.path_params.get("study", "")).replace("\0", "\ufffd")
+    with services.database.write() as session:
+        record(
+            session, actor, "refused", "study" if study else "route", study or f"{request.method} {route}",
+            **details, **({"route": f"{request.method} {route}"} if study else {}),
+        )  # fmt: skip

@@ -7,14 +7,14 @@ from rich.console import Console
 
 from experiments.command_groups import command_group
 from experiments.errors import InputError
-from server.accounts import invitations, notices, service
-from server.accounts.passwords import hash_password
-from server.accounts.people import invitation_url
+from server.accounts import invitations, letters, service
+from server.accounts.credentials import hash_password
+from server.accounts.endpoints import invitation_url
 from server.cli_common import migrated_services, one_of, out, stored_services
-from server.db import open_database
-from server.errors import ApiError
+from server.core.db import open_database
+from server.core.errors import ApiError
+from server.core.settings import Settings
 from server.models import ROLES
-from server.settings import Settings
 
 app = command_group("Accounts of experimenters.")
 account_app = command_group("Let somebody in again who lost a password or a phone.")
@@ -85,7 +85,7 @@ def reset_password(
         fresh = hash_password(given, name)
         with services.database.write() as session:
             account_id, logins = service.reset_password(session, name, fresh)
-        notices.tell(services, account_id, notices.PASSWORD_RESET)
+        letters.send_notice(services, account_id, letters.PASSWORD_RESET)
     out.print(f"the password of '{name}' is changed; its sessions and API tokens have ended")
     if logins:
         out.print(logins)
@@ -101,5 +101,5 @@ def reset_second_factor(name: Annotated[str, typer.Argument(help="Name of the ac
     with stored_services() as services:
         with services.database.write() as session:
             account_id = service.reset_second_factor(session, name)
-        notices.tell(services, account_id, notices.SECOND_FACTOR_REMOVED)
+        letters.send_notice(services, account_id, letters.SECOND_FACTOR_REMOVED)
     out.print(f"the second factor of '{name}' is off; its sessions and API tokens have ended")

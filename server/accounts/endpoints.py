@@ -1,31 +1,56 @@
-"""Endpoints of signing in and out: sessions, and accounts made from invitations."""
+"""Endpoints of signing in and out, of one's own credentials, and of owners over accounts."""
 
 from typing import Annotated
 
-from fastapi import APIRouter, BackgroundTasks, Cookie, Header, Request, Response
+from fastapi import APIRouter, BackgroundTasks, Cookie, Header, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.orm import Session
 
-from server.accounts import invitations, notices, second_factor, service, signing_in, tokens
-from server.accounts.identity import COOKIE, Identity, NotSignedIn, account_of, check_origin, identify
-from server.accounts.passwords import checked_password, hash_password
-from server.accounts.permission import Myself
+from server.accounts import audit, credentials, invitations, letters, service, signing_in
+from server.accounts.credentials import checked_password, hash_password
+from server.accounts.identity import (
+    COOKIE,
+    FreshMyself,
+    FreshOwner,
+    Identity,
+    Myself,
+    NotSignedIn,
+    Owner,
+    account_of,
+    check_origin,
+    identify,
+)
+from server.accounts.invitations import must_fit, must_prove
 from server.accounts.schemas import (
     AccountOut,
+    AuditOut,
+    ChangeAccount,
+    ChangePassword,
+    ConfirmCode,
+    ConfirmPassword,
+    InvitationOut,
     InvitationState,
     Me,
     MyWorkspace,
     NewAccount,
+    NewInvitation,
+    NewInvitationOut,
+    NewToken,
+    NewTokenOut,
+    RecoveryCodes,
+    SecondFactorSetup,
     SessionOut,
     SignIn,
+    TokenOut,
 )
 from server.accounts.throttle import DEVICE_COOKIE, known_device, new_device
-from server.clock import now
+from server.accounts.workspaces import own_workspaces
 from server.context import Services, ServicesDep
-from server.errors import ERROR_RESPONSES
+from server.core.errors import ERROR_RESPONSES
+from server.core.values import Number, now
 from server.models import Account
-from server.numbers import Number
-from server.workspaces.service import own_workspaces
+
+# Endpoints of signing in and out: sessions, and accounts made from invitations.
 
 router = APIRouter(prefix="/api/admin", tags=["account"], responses=ERROR_RESPONSES)
 DEVICE_DAYS = 365
@@ -113,16 +138,16 @@ async def sign_in(
     me = await run_in_threadpool(_just_signed_in, services, token)
     notice = _notice(services, body, device_cookie)
     if me.account is not None and notice is not None:
-        after.add_task(notices.tell, services, me.account.id, notice)
+        after.add_task(letters.send_notice, services, me.account.id, notice)
     return me
 
 
-def _notice(services: Services, body: SignIn, device_cookie: str | None) -> notices.Notice | None:
+def _notice(services: Services, body: SignIn, device_cookie: str | None) -> letters.Notice | None:
     """What of a sign-in its account is told by mail; None of one in a browser as always."""
-    if second_factor.is_recovery_code(body.code or ""):
-        return notices.RECOVERY_CODE_USED
+    if credentials.is_recovery_code(body.code or ""):
+        return letters.RECOVERY_CODE_USED
     known = known_device(services.settings.key, body.name, device_cookie)
-    return None if known else notices.NEW_BROWSER
+    return None if known else letters.NEW_BROWSER
 
 
 async def attempt(
@@ -172,7 +197,7 @@ def _just_signed_in(services: Services, token: str) -> Me:
 @router.delete("/session", status_code=204)
 def sign_out(services: ServicesDep, me: Myself, response: Response) -> None:
     """End this session."""
-    tokens.revoke_session(services.database, me, me.session_id)
+    service.revoke_session(services.database, me, me.session_id)
     response.delete_cookie(COOKIE, path="/api/admin")
 
 
@@ -223,11 +248,138 @@ def list_sessions(services: ServicesDep, me: Myself) -> list[SessionOut]:
                 last_seen_at=row.last_seen_at,
                 expires_at=row.expires_at,
             )
-            for row in tokens.open_sessions(session, me, services.settings.session_idle)
+            for row in service.open_sessions(session, me, services.settings.session_idle)
         ]
 
 
 @router.delete("/sessions/{session_id}", status_code=204)
 def revoke_session(services: ServicesDep, me: Myself, session_id: Number) -> None:
     """Sign another of one's own browsers out."""
-    tokens.revoke_session(services.database, me, session_id)
+    service.revoke_session(services.database, me, session_id)
+
+
+# Endpoints for owners: accounts, invitations and the audit log.
+
+people_router = APIRouter(prefix="/api/admin", tags=["people"], responses=ERROR_RESPONSES)
+
+
+@people_router.get("/accounts")
+def list_accounts(services: ServicesDep, _identity: Owner) -> list[AccountOut]:
+    """Every account."""
+    with services.database.read() as session:
+        return [account_out(row) for row in service.accounts(session)]
+
+
+@people_router.patch("/accounts/{account_id}")
+def change_account(
+    services: ServicesDep, identity: FreshOwner, account_id: Number, body: ChangeAccount
+) -> AccountOut:
+    """Change a role, or disable an account."""
+    return account_out(
+        service.change_account(services.database, identity, account_id, body.role, body.disabled)
+    )
+
+
+@people_router.get("/invitations")
+def list_invitations(services: ServicesDep, _identity: Owner) -> list[InvitationOut]:
+    """Invitations that have neither been used nor expired."""
+    with services.database.read() as session:
+        return [InvitationOut.model_validate(row) for row in invitations.open_invitations(session)]
+
+
+@people_router.post("/invitations", status_code=201)
+def create_invitation(services: ServicesDep, identity: FreshOwner, body: NewInvitation) -> NewInvitationOut:
+    """Invite somebody by a one-time link, shown this once."""
+    invitation, token = invitations.invite(
+        services.database, body.role, body.label, identity, body.workspace, body.workspace_role
+    )
+    shown = InvitationOut.model_validate(invitation)
+    return NewInvitationOut(**shown.model_dump(), url=invitation_url(services.settings.public_url, token))
+
+
+def invitation_url(public_url: str, token: str) -> str:
+    """The page an invited person opens. The token stands behind '#', where no log and no referrer sees it."""
+    return f"{public_url}/admin/invitation#{token}"
+
+
+@people_router.delete("/invitations/{invitation_id}", status_code=204)
+def revoke_invitation(services: ServicesDep, identity: Owner, invitation_id: Number) -> None:
+    """Take an invitation back."""
+    invitations.revoke_invitation(services.database, identity, invitation_id)
+
+
+@people_router.get("/audit")
+def list_audit(
+    services: ServicesDep,
+    _identity: Owner,
+    before: Annotated[int | None, Query(ge=1, le=2**62)] = None,
+    limit: Annotated[int, Query(ge=1, le=500)] = 100,
+) -> list[AuditOut]:
+    """The audit log, newest first; `before` pages on."""
+    with services.database.read() as session:
+        return [AuditOut.model_validate(row) for row in audit.latest(session, before, limit)]
+
+
+# Endpoints of what one signs in with: password, second factor, API tokens.
+
+credential_router = APIRouter(prefix="/api/admin", tags=["account"], responses=ERROR_RESPONSES)
+
+
+@credential_router.put("/password", status_code=204)
+async def change_password(
+    services: ServicesDep, me: Myself, body: ChangePassword, after: BackgroundTasks
+) -> None:
+    """Change the password; every other session and every API token ends."""
+    await must_fit(services, me, body.password)
+    fresh = await services.passwords.run(lambda: hash_password(body.new_password, me.name))
+    await run_in_threadpool(service.change_password, services, me, fresh)
+    after.add_task(letters.send_notice, services, me.account_id, letters.PASSWORD_CHANGED)
+
+
+@credential_router.post("/second-factor")
+def start_second_factor(services: ServicesDep, me: FreshMyself) -> SecondFactorSetup:
+    """Begin the set-up of a second factor: a secret for an authenticator app."""
+    secret = service.start_second_factor(services, me)
+    uri = credentials.provisioning_uri(secret, me.name)
+    return SecondFactorSetup(secret=secret, uri=uri, qr_svg=credentials.qr_svg(uri))
+
+
+@credential_router.put("/second-factor")
+def confirm_second_factor(
+    services: ServicesDep, me: FreshMyself, body: ConfirmCode, after: BackgroundTasks
+) -> RecoveryCodes:
+    """Turn the second factor on with the app's first code; gives the recovery codes, this once."""
+    codes = service.confirm_second_factor(services, me, body.code)
+    after.add_task(letters.send_notice, services, me.account_id, letters.SECOND_FACTOR_ADDED)
+    return RecoveryCodes(codes=codes)
+
+
+@credential_router.delete("/second-factor", status_code=204)
+async def remove_second_factor(
+    services: ServicesDep, me: Myself, body: ConfirmPassword, after: BackgroundTasks
+) -> None:
+    """Turn the second factor off; asks for the password, and where the account has none for a code."""
+    await must_prove(services, me, body.password)
+    await run_in_threadpool(service.remove_second_factor, services, me)
+    after.add_task(letters.send_notice, services, me.account_id, letters.SECOND_FACTOR_REMOVED)
+
+
+@credential_router.get("/tokens")
+def list_tokens(services: ServicesDep, me: Myself) -> list[TokenOut]:
+    """One's own API tokens."""
+    with services.database.read() as session:
+        return [TokenOut.model_validate(row) for row in service.open_tokens(session, me)]
+
+
+@credential_router.post("/tokens", status_code=201)
+def create_token(services: ServicesDep, me: FreshMyself, body: NewToken) -> NewTokenOut:
+    """Make an API token; its secret is shown this once. It can do no more than the account."""
+    with services.database.write() as session:
+        row, secret = service.create_token(session, me, body.name, list(body.scopes), body.days_granted)
+        return NewTokenOut(**TokenOut.model_validate(row).model_dump(), token=secret)
+
+
+@credential_router.delete("/tokens/{token_id}", status_code=204)
+def revoke_token(services: ServicesDep, me: Myself, token_id: Number) -> None:
+    """Revoke one's own API token."""
+    service.revoke_token(services.database, me, token_id)

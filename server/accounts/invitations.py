@@ -1,22 +1,24 @@
-"""Invitations: one-time links by which an owner lets somebody have an account."""
+"""Invitations to have an account, and proof that who is signed in is the account's owner."""
 
 from datetime import timedelta
 
+from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.orm import Session
 
-from server.accounts import repository
+from server.accounts import repository, service, signing_in
 from server.accounts.audit import record
 from server.accounts.identity import Identity
 from server.accounts.service import add_account, known_role
 from server.accounts.signing_in import begin_session
-from server.clock import now
+from server.accounts.workspace_repository import default_workspace
+from server.accounts.workspaces import Membership, find_workspace
 from server.context import Services
-from server.db import Database
-from server.errors import Conflict, NotFound
+from server.core.db import Database
+from server.core.errors import Conflict, NotFound
+from server.core.values import hash_token, new_token, now
 from server.models import DEFAULT_WORKSPACE, Account, Invitation, Role
-from server.tokens import hash_token, new_token
-from server.workspaces.repository import default_workspace
-from server.workspaces.service import Membership, find_workspace
+
+# Invitations: one-time links by which an owner lets somebody have an account.
 
 INVITATION_DAYS = 7
 INVITATION_USED = Conflict("This invitation was used or has expired; ask for a new one.")
@@ -100,3 +102,33 @@ def invited_account(
     workspace = repository.workspace_of(session, invitation) or default_workspace(session)
     membership = Membership(workspace, known_role(invitation.workspace_role or invitation.role))
     return add_account(session, name, password_hash, role, membership)
+
+
+# Who is signed in proves once more to be the account's owner, within the limits of wrong attempts.
+
+
+async def must_fit(services: Services, me: Identity, password: str) -> None:
+    """Ask for the present password; a stolen session may not try many."""
+    key = f"session {me.session_id}"
+    await run_in_threadpool(services.sign_ins.names.check, key)
+    stored = await run_in_threadpool(service.own_password, services, me)
+    try:
+        await services.passwords.run(lambda: service.must_fit(password, stored))
+    except signing_in.WrongCredentials:
+        await run_in_threadpool(services.sign_ins.names.failed, key)
+        raise
+    await run_in_threadpool(services.sign_ins.names.succeeded, key)
+
+
+async def must_prove(services: Services, me: Identity, proof: str) -> None:
+    """Ask for the present password, and where the account has none for a code of its second factor."""
+    if await run_in_threadpool(service.own_password, services, me):
+        await must_fit(services, me, proof)
+        return
+    key = f"session {me.session_id}"
+    await run_in_threadpool(services.sign_ins.names.check, key)
+    failure = await run_in_threadpool(service.own_code_failure, services, me, proof)
+    if failure is not None:
+        await run_in_threadpool(services.sign_ins.names.failed, key)
+        raise failure
+    await run_in_threadpool(services.sign_ins.names.succeeded, key)

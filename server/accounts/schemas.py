@@ -1,4 +1,4 @@
-"""What the account endpoints take and give."""
+"""What the endpoints of accounts, providers, resets and workspaces take and give."""
 
 import re
 from datetime import datetime
@@ -6,10 +6,11 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
 
-from server.accounts.permission import Scope
-from server.models import Role
-from server.request_body import RequestBody
-from server.text import VisibleObject
+from server.accounts.identity import Scope
+from server.core.values import RequestBody, VisibleObject
+from server.models import Right, Role
+
+# What the account endpoints take and give.
 
 NAME = re.compile(r"[\w.@+ -]{2,100}")
 
@@ -204,3 +205,187 @@ class AuditOut(_Out):
     target_kind: str
     target: str
     details: VisibleObject
+
+
+# What the endpoints of reset by mail take and give.
+
+_ATOM = r"[A-Za-z0-9!#$%&'*+/=?^_`{|}~-]+"
+_LABEL = r"[A-Za-z0-9]([A-Za-z0-9-]*[A-Za-z0-9])?"
+
+
+def _is_an_addr_spec(address: str) -> str:
+    if len(address.rpartition("@")[0]) > 64:
+        raise ValueError("expected at most 64 characters before the @")
+    if "=?" in address:
+        raise ValueError("expected no '=?', with which encoded words of a letter's head begin")
+    return address
+
+
+Address = Annotated[
+    str,
+    StringConstraints(
+        strip_whitespace=True, max_length=200, pattern=rf"^{_ATOM}(\.{_ATOM})*@{_LABEL}(\.{_LABEL})+$"
+    ),
+    AfterValidator(_is_an_addr_spec),
+]
+"""Dot-atoms (RFC 5322, 3.4.1): no quotes, comments, routes or literals, which parsers of mail read each their
+own way; names of hosts beyond ASCII in their `xn--` form."""
+OneTimeToken = Annotated[str, StringConstraints(min_length=1, max_length=100)]
+
+
+class ForgottenPassword(RequestBody):
+    """Whose password is forgotten: the name to sign in with, or the address of mail."""
+
+    name: Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=200)]
+
+
+class NewPassword(RequestBody):
+    """The link's token and the password to be."""
+
+    token: OneTimeToken
+    password: Password
+
+
+class NewAddress(RequestBody):
+    """An address of mail for the own account, with the present password."""
+
+    address: Address
+    password: Password
+
+
+class ConfirmAddress(RequestBody):
+    """The link's token."""
+
+    token: OneTimeToken
+
+
+class OwnAddress(BaseModel):
+    """Where a link for a new password goes; null where no address is confirmed."""
+
+    address: str | None
+
+
+# What the endpoints of sign-in by providers take and give.
+
+NextPage = Annotated[
+    str, StringConstraints(max_length=300, pattern=r"^/([^/\\\x00-\x20\x7f][^\\\x00-\x20\x7f]*)?$")
+]
+"""A page of the admin site, from its root on; never an address elsewhere."""
+
+
+class ProviderOut(BaseModel):
+    """A service that one can sign in with."""
+
+    id: str
+    label: str
+
+
+class WaysIn(BaseModel):
+    """How one can sign in here, besides by name and password."""
+
+    providers: list[ProviderOut]
+    resets_by_mail: bool = Field(description="Whether forgotten passwords are reset by mail.")
+
+
+class BeginSignIn(RequestBody):
+    """Where to go after signing in."""
+
+    next: NextPage = "/"
+
+
+class BeginLink(RequestBody):
+    """Who asks proves that she is the account's own person, not only somebody at her open browser."""
+
+    proof: Annotated[str, StringConstraints(min_length=1, max_length=200)] = Field(
+        description="The present password; where the account has none, a code of its second factor."
+    )
+
+
+class Elsewhere(BaseModel):
+    """An address of the provider to which the browser goes."""
+
+    url: str
+
+
+class SecondFactorCode(RequestBody):
+    """The code of the authenticator app, or a recovery code."""
+
+    code: Annotated[str, StringConstraints(strip_whitespace=True, min_length=6, max_length=40)]
+
+
+class LoginOut(BaseModel):
+    """A way by which the own account is signed in to."""
+
+    model_config = ConfigDict(from_attributes=True)
+
+    id: int
+    provider: str = Field(description="Name of the provider, as declared on this server.")
+    issuer: str
+    label: str
+    created_at: datetime
+    last_used_at: datetime | None
+
+
+# What the endpoints of workspaces and grants take and give.
+
+WorkspaceName = Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9-]{0,59}$")]
+Title = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=200)]
+
+
+class NewWorkspace(RequestBody):
+    """A workspace: its name in addresses, and the title people read."""
+
+    name: WorkspaceName
+    title: Title
+
+
+class ChangeWorkspace(RequestBody):
+    """What an owner may change of a workspace."""
+
+    title: Title
+    second_factor_required: bool
+
+
+class WorkspaceOut(BaseModel):
+    """A workspace, and the role of the account that asks; null where it is no member."""
+
+    name: str
+    title: str
+    second_factor_required: bool
+    role: Role | None
+    members: int
+    studies: int
+
+
+class MemberOut(BaseModel):
+    """Somebody who belongs to a workspace."""
+
+    account: str
+    role: Role
+    second_factor: bool
+    disabled: bool
+
+
+class SetMember(RequestBody):
+    """The role somebody shall have in a workspace."""
+
+    role: Role
+
+
+class GrantOut(BaseModel):
+    """Rights on a study that were granted to an account, beside those of its role in the workspace."""
+
+    account: str
+    rights: list[Right]
+
+
+class SetGrant(RequestBody):
+    """The rights an account shall have on a study beside those of its role; an empty list takes them back."""
+
+    rights: Annotated[list[Right], Field(max_length=5)]
+
+
+class MoveStudy(RequestBody):
+    """Where a study shall belong."""
+
+    workspace: Annotated[str, StringConstraints(max_length=60)]

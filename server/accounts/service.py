@@ -1,22 +1,88 @@
 """Accounts, passwords, second factor, roles: the rules behind the account endpoints."""
 
+from datetime import timedelta
+
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
 from experiments.errors import did_you_mean
-from server.accounts import repository, second_factor
+from server.accounts import credentials, repository
 from server.accounts.audit import SECOND_FACTOR_SET_UP, record
+from server.accounts.credentials import hash_password, password_fits
 from server.accounts.identity import Identity, account_of
-from server.accounts.passwords import hash_password, password_fits
 from server.accounts.signing_in import WrongCredentials, WrongProof, identity_of, second_factor_failure
-from server.accounts.tokens import end_everything
-from server.clock import now
+from server.accounts.workspace_repository import default_workspace, set_member
+from server.accounts.workspaces import Membership
 from server.context import Services
-from server.db import Database
-from server.errors import ApiError, Conflict, NotFound
-from server.models import ROLES, Account, Role
-from server.workspaces.repository import default_workspace, set_member
-from server.workspaces.service import Membership
+from server.core.db import Database
+from server.core.errors import ApiError, Conflict, NotFound
+from server.core.values import hash_token, new_token, now
+from server.models import ROLES, Account, AdminSession, ApiToken, Role
+
+# What is open in one's own name: signed-in browsers and API tokens.
+
+
+def open_sessions(session: Session, owner: Identity, idle: timedelta) -> list[AdminSession]:
+    """One's own sessions that are neither revoked nor expired, nor unused for longer than `idle`."""
+    return repository.open_sessions(session, owner.account_id, now() - idle)
+
+
+def revoke_session(database: Database, owner: Identity, session_id: int | None) -> None:
+    """Sign one of one's own browsers out; NotFound where it is somebody else's."""
+    with database.write() as session:
+        row = repository.session_of(session, owner.account_id, session_id)
+        if row is None:
+            raise NotFound("There is no such session.")
+        row.revoked_at = row.revoked_at or now()
+        record(session, owner, "session ended", "session", str(session_id))
+
+
+def open_tokens(session: Session, owner: Identity) -> list[ApiToken]:
+    """One's own API tokens that are not revoked."""
+    return [token for token in repository.tokens(session, owner.account_id) if token.revoked_at is None]
+
+
+def create_token(
+    session: Session, owner: Identity, name: str, scopes: list[str], days: int
+) -> tuple[ApiToken, str]:
+    """Make an API token and its secret, of which only the hash is kept; it ends after `days`."""
+    secret = new_token()
+    row = ApiToken(
+        account_id=owner.account_id,
+        name=name,
+        token_hash=hash_token(secret),
+        scopes=sorted(set(scopes)),
+        expires_at=now() + timedelta(days=days),
+    )
+    session.add(row)
+    session.flush()
+    record(session, owner, "token created", "token", name, scopes=row.scopes)
+    return row, secret
+
+
+def revoke_token(database: Database, owner: Identity, token_id: int) -> None:
+    """Revoke one of one's own API tokens; NotFound where it is somebody else's."""
+    with database.write() as session:
+        row = repository.token_of(session, owner.account_id, token_id)
+        if row is None:
+            raise NotFound("There is no such token.")
+        row.revoked_at = row.revoked_at or now()
+        record(session, owner, "token revoked", "token", row.name)
+
+
+def end_everything(session: Session, account_id: int, keep_session: int | None = None) -> None:
+    """End the sessions of an account, but for one, revoke its API tokens, and take back what is under way.
+
+    Whoever was in a stolen session may have asked for a link that makes an address of hers the account's, or
+    begun to add a login of hers.
+    """
+    repository.hold(session, account_id)
+    for row in repository.sessions(session, account_id):
+        if row.id != keep_session:
+            row.revoked_at = row.revoked_at or now()
+    for token in repository.tokens(session, account_id):
+        token.revoked_at = token.revoked_at or now()
+    repository.forget_under_way(session, account_id)
 
 
 def accounts_exist(session: Session) -> bool:
@@ -174,25 +240,25 @@ def start_second_factor(services: Services, identity: Identity) -> str:
         account = account_of(session, identity)
         if account.totp_confirmed_at is not None:
             raise Conflict("A second factor is set up already; remove it first.")
-        account.totp_secret = second_factor.new_seed()
-        return second_factor.secret_of(services.settings.key, account.totp_secret)
+        account.totp_secret = credentials.new_seed()
+        return credentials.secret_of(services.settings.key, account.totp_secret)
 
 
 def confirm_second_factor(services: Services, identity: Identity, code: str) -> list[str]:
     """Turn the second factor on once the app's first code fits; return the recovery codes."""
-    codes = second_factor.new_recovery_codes()
+    codes = credentials.new_recovery_codes()
     with services.database.write() as session:
         account = account_of(session, identity)
         if account.totp_secret is None or account.totp_confirmed_at is not None:
             raise Conflict("There is no second factor to confirm; start its set-up first.")
-        secret = second_factor.secret_of(services.settings.key, account.totp_secret)
-        step = second_factor.accepted_step(secret, code, None)
+        secret = credentials.secret_of(services.settings.key, account.totp_secret)
+        step = credentials.accepted_step(secret, code, None)
         if step is None:
             raise WrongCredentials("That code does not fit; check the clock of your phone and try again.")
         account.totp_confirmed_at, account.totp_last_step = now(), step
         if (current := repository.session_of(session, identity.account_id, identity.session_id)) is not None:
             current.second_factor = True
-        account.recovery_code_hashes = [second_factor.hash_recovery_code(c) for c in codes]
+        account.recovery_code_hashes = [credentials.hash_recovery_code(c) for c in codes]
         record(session, identity, SECOND_FACTOR_SET_UP, "account", identity.name)
     return codes
 

@@ -4,15 +4,14 @@ from datetime import timedelta
 
 from sqlalchemy.orm import Session
 
-from server.accounts import repository, second_factor
+from server.accounts import credentials, repository
 from server.accounts.audit import NOBODY, record
+from server.accounts.credentials import Checked
 from server.accounts.identity import Identity
-from server.accounts.passwords import Checked
-from server.clock import now
 from server.context import Services
-from server.errors import ApiError
+from server.core.errors import ApiError
+from server.core.values import hash_token, new_token, now
 from server.models import Account, AdminSession
-from server.tokens import hash_token, new_token
 
 
 class WrongCredentials(ApiError):
@@ -95,12 +94,12 @@ def second_factor_failure(services: Services, account: Account, code: str | None
         return None
     if not code:
         return SecondFactorRequired("Please enter the code of your authenticator app, or a recovery code.")
-    secret = second_factor.secret_of(services.settings.key, account.totp_secret)
-    step = second_factor.accepted_step(secret, code, account.totp_last_step)
+    secret = credentials.secret_of(services.settings.key, account.totp_secret)
+    step = credentials.accepted_step(secret, code, account.totp_last_step)
     if step is not None:
         account.totp_last_step = step
         return None
-    hashed = second_factor.hash_recovery_code(code)
+    hashed = credentials.hash_recovery_code(code)
     if hashed in account.recovery_code_hashes:
         account.recovery_code_hashes = [kept for kept in account.recovery_code_hashes if kept != hashed]
         return None

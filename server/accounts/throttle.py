@@ -16,11 +16,10 @@ from contextlib import asynccontextmanager
 
 from fastapi.concurrency import run_in_threadpool
 
-from server.errors import ApiError, TooManyRequests
-from server.rate_limit import BoundedRecords, RateLimit
-from server.settings import Settings
-from server.shared_counts_repository import SharedCounts
-from server.tokens import derived_token, new_token
+from server.core.errors import ApiError, TooManyRequests
+from server.core.limits import BoundedRecords, RateLimit, SharedCounts
+from server.core.settings import Settings
+from server.core.values import derived_token, new_token
 
 DEVICE_COOKIE = "palpebra_device"
 PURPOSE = "device"

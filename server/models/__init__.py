@@ -1,34 +1,50 @@
 """All tables, one module a subject; import them from here."""
 
 from server.models.accounts import (
+    DEFAULT_WORKSPACE,
+    RIGHTS,
     ROLES,
     Account,
+    AccountLogin,
     AdminSession,
     ApiToken,
     AuditEntry,
     Invitation,
     Job,
-    Role,
-)
-from server.models.base import Base, UtcDateTime
-from server.models.evidence import AnswerEvidence
-from server.models.limits import SharedCount
-from server.models.logins import AccountLogin, LoginAttempt, Purpose
-from server.models.mail import LetterPurpose, MailedLink
-from server.models.runs import NO_SLOT, RUN_STATUSES, STAGES, IdentityKey, RecruiterIdentity, StudyRun
-from server.models.series import SeriesAnswer, SeriesOffer, SeriesTrial
-from server.models.studies import Clip, Link, Study, StudyVersion, VersionClip
-from server.models.tallies import RunTally
-from server.models.trials import AssignedTrial, Rating, TrialClip
-from server.models.views import View, ViewClip
-from server.models.visit import Calibration, FormAnswer, RunEvent
-from server.models.workspaces import (
-    DEFAULT_WORKSPACE,
-    RIGHTS,
+    LetterPurpose,
+    LoginAttempt,
+    MailedLink,
+    Purpose,
     Right,
+    Role,
     StudyGrant,
     Workspace,
     WorkspaceMember,
+)
+from server.models.base import Base, SharedCount, UtcDateTime
+from server.models.runs import (
+    NO_SLOT,
+    RUN_STATUSES,
+    STAGES,
+    Calibration,
+    FormAnswer,
+    IdentityKey,
+    RecruiterIdentity,
+    RunEvent,
+    RunTally,
+    StudyRun,
+)
+from server.models.studies import Clip, Link, Study, StudyVersion, VersionClip
+from server.models.trials import (
+    AnswerEvidence,
+    AssignedTrial,
+    Rating,
+    SeriesAnswer,
+    SeriesOffer,
+    SeriesTrial,
+    TrialClip,
+    View,
+    ViewClip,
 )
 
 __all__ = [

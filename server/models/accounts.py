@@ -1,13 +1,15 @@
-"""Experimenters: accounts, sessions, API tokens, the audit log; and long jobs."""
+"""Experimenters: accounts, sessions, tokens, logins, workspaces, the audit log; long jobs."""
 
 from datetime import datetime
 from typing import Any, Literal, get_args
 
-from sqlalchemy import ForeignKey, Index, String, Text
+from sqlalchemy import ForeignKey, Index, String, Text, UniqueConstraint
 from sqlalchemy.orm import Mapped, mapped_column, relationship
 
-from server.clock import now
+from server.core.values import now
 from server.models.base import Base, one_of
+
+# Experimenters: accounts, sessions, API tokens, the audit log; and long jobs.
 
 Role = Literal["viewer", "experimenter", "owner"]
 ROLES: tuple[Role, ...] = get_args(Role)
@@ -110,7 +112,7 @@ class ApiToken(Base):
 
 
 class AuditEntry(Base):
-    """Who did what and when; rows are only ever added, and chained by hashes (`server.audit.chain`).
+    """Who did what and when; rows are only ever added, and chained by hashes (`server.accounts.audit`).
 
     Attributes
     ----------
@@ -159,3 +161,155 @@ class Job(Base):
     created_by: Mapped[int | None] = mapped_column(ForeignKey("accounts.id", ondelete="SET NULL"))
     started_at: Mapped[datetime | None]
     finished_at: Mapped[datetime | None]
+
+
+# Workspaces: the laboratories of one server, who belongs to them, and rights on single studies.
+
+Right = Literal["view", "run", "edit", "export", "own"]
+RIGHTS: tuple[Right, ...] = get_args(Right)
+"""What may be done with a study; see `server.accounts.workspace_repository`."""
+DEFAULT_WORKSPACE = "default"
+"""Name of the workspace that holds whatever is put into no other."""
+
+
+class Workspace(Base):
+    """A laboratory: its people and its studies.
+
+    Attributes
+    ----------
+    second_factor_required : bool
+        Its studies open only to who signed in with a second factor.
+    """
+
+    __tablename__ = "workspaces"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    name: Mapped[str] = mapped_column(String(60), unique=True)
+    title: Mapped[str] = mapped_column(String(200))
+    second_factor_required: Mapped[bool] = mapped_column(default=False)
+    created_at: Mapped[datetime] = mapped_column(default=now)
+    created_by: Mapped[int | None] = mapped_column(ForeignKey("accounts.id", ondelete="SET NULL"))
+
+
+class WorkspaceMember(Base):
+    """Somebody's role in a workspace; it holds for all its studies."""
+
+    __tablename__ = "workspace_members"
+    __table_args__ = (one_of("role", *ROLES),)
+
+    workspace_id: Mapped[int] = mapped_column(
+        ForeignKey("workspaces.id", ondelete="CASCADE"), primary_key=True
+    )
+    account_id: Mapped[int] = mapped_column(
+        ForeignKey("accounts.id", ondelete="CASCADE"), primary_key=True, index=True
+    )
+    role: Mapped[str] = mapped_column(String(20))
+    added_at: Mapped[datetime] = mapped_column(default=now)
+
+
+class StudyGrant(Base):
+    """A right on one study, given to somebody whether she belongs to its workspace or not."""
+
+    __tablename__ = "study_grants"
+    __table_args__ = (one_of("granted", *RIGHTS),)
+
+    study_id: Mapped[int] = mapped_column(ForeignKey("studies.id", ondelete="CASCADE"), primary_key=True)
+    account_id: Mapped[int] = mapped_column(
+        ForeignKey("accounts.id", ondelete="CASCADE"), primary_key=True, index=True
+    )
+    granted: Mapped[str] = mapped_column(String(10), primary_key=True)
+    granted_at: Mapped[datetime] = mapped_column(default=now)
+    granted_by: Mapped[int | None] = mapped_column(ForeignKey("accounts.id", ondelete="SET NULL"))
+
+
+# Signing in by a university's or ORCID's own service: whom its subjects are here, and sign-ins under way.
+
+Purpose = Literal["sign in", "link", "code"]
+PURPOSES: tuple[Purpose, ...] = get_args(Purpose)
+
+
+class AccountLogin(Base):
+    """A subject of an issuer, and the account that it signs in to; nothing else recognises anybody.
+
+    Attributes
+    ----------
+    label : str
+        How the person shows her logins apart: her name with the provider.
+    """
+
+    __tablename__ = "account_logins"
+    __table_args__ = (UniqueConstraint("issuer", "subject"),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    account_id: Mapped[int] = mapped_column(ForeignKey("accounts.id", ondelete="CASCADE"), index=True)
+    provider: Mapped[str] = mapped_column(String(30))
+    issuer: Mapped[str] = mapped_column(String(300))
+    subject: Mapped[str] = mapped_column(String(255))
+    label: Mapped[str] = mapped_column(String(100), default="")
+    created_at: Mapped[datetime] = mapped_column(default=now)
+    last_used_at: Mapped[datetime | None]
+
+    account: Mapped[Account] = relationship()
+
+
+class LoginAttempt(Base):
+    """A sign-in that a browser began and the provider has not finished; removed when it is used.
+
+    Attributes
+    ----------
+    state_hash, browser_hash : str
+        Of the request's state and of the browser's cookie. Nonce and PKCE's verifier are derived from that
+        cookie with the server's key, so that neither lies here.
+    purpose : {"sign in", "link", "code"}
+        `code`: the provider has recognised the account, whose second factor is asked for still.
+    session_id : int or None
+        The session that asked to link; it must be open still when the browser comes back.
+    invitation_hash : str or None
+        `Invitation.token_hash` of what the person was invited by, who is to be given an account. Not its
+        number, which another invitation may get once it is taken back.
+    """
+
+    __tablename__ = "login_attempts"
+    __table_args__ = (one_of("purpose", *PURPOSES),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    state_hash: Mapped[str] = mapped_column(String(64), unique=True)
+    browser_hash: Mapped[str] = mapped_column(String(64))
+    provider: Mapped[str] = mapped_column(String(30))
+    purpose: Mapped[str] = mapped_column(String(10))
+    next_page: Mapped[str] = mapped_column(String(300), default="/")
+    account_id: Mapped[int | None] = mapped_column(ForeignKey("accounts.id", ondelete="CASCADE"), index=True)
+    session_id: Mapped[int | None]
+    invitation_hash: Mapped[str | None] = mapped_column(String(64))
+    expires_at: Mapped[datetime] = mapped_column(index=True)
+
+
+# One-time links that were sent by mail.
+
+LetterPurpose = Literal["new password", "address"]
+LETTER_PURPOSES: tuple[LetterPurpose, ...] = get_args(LetterPurpose)
+
+
+class MailedLink(Base):
+    """A one-time link sent by mail, by its token's hash; it is removed when it is used, or after a day.
+
+    Attributes
+    ----------
+    purpose : {"new password", "address"}
+        What it is good for: a new password, or to confirm that the address is the account's.
+    address : str
+        Where it went.
+    """
+
+    __tablename__ = "mailed_links"
+    __table_args__ = (one_of("purpose", *LETTER_PURPOSES),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    token_hash: Mapped[str] = mapped_column(String(64), unique=True)
+    account_id: Mapped[int] = mapped_column(ForeignKey("accounts.id", ondelete="CASCADE"), index=True)
+    purpose: Mapped[str] = mapped_column(String(20))
+    address: Mapped[str] = mapped_column(String(200))
+    created_at: Mapped[datetime] = mapped_column(default=now)
+    expires_at: Mapped[datetime] = mapped_column(index=True)
+
+    account: Mapped[Account] = relationship()

@@ -4,9 +4,9 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from typing import Any
 
-from sqlalchemy import JSON, CheckConstraint, DateTime, Dialect, MetaData
+from sqlalchemy import JSON, CheckConstraint, DateTime, Dialect, Index, MetaData, String
 from sqlalchemy.dialects import sqlite
-from sqlalchemy.orm import DeclarativeBase
+from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 from sqlalchemy.types import TypeDecorator, TypeEngine
 
 CONVENTION = {
@@ -78,3 +78,30 @@ def one_of(column: str, *words: str) -> CheckConstraint:
     """A check that `column` holds one of `words`."""
     listed = ", ".join(f"'{word}'" for word in words)
     return CheckConstraint(f"{column} IN ({listed})", name=f"{column}_known")
+
+
+# What the processes of a server on PostgreSQL count together: who may do something how often.
+
+
+class SharedCount(Base):
+    """A share that is used up and refilled, or a row of failures; it is no data and in no backup or copy.
+
+    Attributes
+    ----------
+    key : str
+        Keyed hash of what is counted, such as a range of addresses; it cannot be read back.
+    amount : float
+        What is left of the share, or how many failures there were.
+    before : float
+        What was left, refilled, before the last event.
+    at : datetime
+        When it was changed last; it goes some hours later.
+    """
+
+    __tablename__ = "shared_counts"
+    __table_args__ = (Index("ix_shared_counts_at", "at"),)
+
+    key: Mapped[str] = mapped_column(String(32), primary_key=True)
+    amount: Mapped[float]
+    before: Mapped[float]
+    at: Mapped[datetime]

@@ -1,4 +1,4 @@
-"""A participant's visit: the run, and its identity at the recruiter."""
+"""A participant's visit: the run, its recruiter's id, its events, forms and counts."""
 
 from datetime import datetime
 from typing import Any
@@ -6,9 +6,11 @@ from typing import Any
 from sqlalchemy import BigInteger, ForeignKey, Index, String, Text, UniqueConstraint
 from sqlalchemy.orm import Mapped, mapped_column, relationship
 
-from server.clock import now
+from server.core.values import now
 from server.models.base import Base, one_of
 from server.models.studies import Link, Study, StudyVersion
+
+# A participant's visit: the run, and its identity at the recruiter.
 
 STAGES = (
     "consent",
@@ -32,7 +34,7 @@ class StudyRun(Base):
     Attributes
     ----------
     participant : str
-        The study's pseudonym of the person, see `server.participants.identities`.
+        The study's pseudonym of the person, see `server.participation.returning`.
     slot : int
         Place in the counterbalancing, held while the run is complete, or active and seen within the lease;
         NO_SLOT while an answer of a form is still to decide the group, and once a run that one decided is
@@ -151,3 +153,120 @@ class IdentityKey(Base):
         ForeignKey("study_runs.id", ondelete="CASCADE"), primary_key=True, autoincrement=False
     )
     wrapped_key: Mapped[str] = mapped_column(String(80))
+
+
+# What a visit leaves beside its ratings: events, answers to forms, measurements of the screen.
+
+
+class RunEvent(Base):
+    """What happened around a run (or before one: `link_id` only, where a browser was refused)."""
+
+    __tablename__ = "run_events"
+    __table_args__ = (UniqueConstraint("study_run_id", "event_id"),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    event_id: Mapped[str] = mapped_column(String(40))
+    study_run_id: Mapped[int | None] = mapped_column(ForeignKey("study_runs.id", ondelete="CASCADE"))
+    link_id: Mapped[int | None] = mapped_column(ForeignKey("links.id", ondelete="CASCADE"), index=True)
+    type: Mapped[str] = mapped_column(String(30))
+    at_client: Mapped[datetime | None]
+    received_at: Mapped[datetime] = mapped_column(default=now)
+    data: Mapped[dict[str, Any]] = mapped_column(default=dict)
+
+
+class FormAnswer(Base):
+    """The answers of one declared form; the latest version a participant sent."""
+
+    __tablename__ = "form_answers"
+    __table_args__ = (UniqueConstraint("study_run_id", "form"),)
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    study_run_id: Mapped[int] = mapped_column(ForeignKey("study_runs.id", ondelete="CASCADE"))
+    form: Mapped[str] = mapped_column(String(40))
+    answers: Mapped[dict[str, Any]]
+    saved_at: Mapped[datetime] = mapped_column(default=now)
+
+
+class Calibration(Base):
+    """One size calibration of a run; every one is kept, the latest counts.
+
+    Attributes
+    ----------
+    occasion : str
+        Why it was made.
+    repeats, spread_percent : int or None, float or None
+        How many measurements there were, how well they agree.
+    ruler_check : str or None
+        What a ruler said of a card's size.
+    distance_spread_mm : float or None
+        Standard deviation of the blind-spot rounds.
+    recheck_percent : float or None
+        How far a look in mid-run was off.
+    """
+
+    __tablename__ = "calibrations"
+    __table_args__ = (
+        one_of("method", "card", "ruler"),
+        one_of("occasion", "first", "screen_changed", "zoom", "recheck"),
+        one_of("ruler_check", "agrees", "no_ruler", "differs"),
+        one_of("distance_method", "blind_spot", "typed"),
+    )
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    study_run_id: Mapped[int] = mapped_column(ForeignKey("study_runs.id", ondelete="CASCADE"), index=True)
+    px_per_mm: Mapped[float]
+    method: Mapped[str] = mapped_column(String(10))
+    viewing_distance_mm: Mapped[float | None]
+    device_pixel_ratio: Mapped[float]
+    screen_width_px: Mapped[int]
+    screen_height_px: Mapped[int]
+    window_width_px: Mapped[int]
+    window_height_px: Mapped[int]
+    zoom: Mapped[float]
+    saved_at: Mapped[datetime] = mapped_column(default=now)
+    occasion: Mapped[str] = mapped_column(String(14), default="first", server_default="first")
+    repeats: Mapped[int | None]
+    spread_percent: Mapped[float | None]
+    ruler_check: Mapped[str | None] = mapped_column(String(10))
+    distance_method: Mapped[str | None] = mapped_column(String(10))
+    distance_spread_mm: Mapped[float | None]
+    distance_typed_mm: Mapped[float | None]
+    recheck_percent: Mapped[float | None]
+
+
+# What was counted of each run, kept in the transaction of each rating.
+
+
+class RunTally(Base):
+    """The counts of one run; `server.participation.tallies` reads and writes the two texts.
+
+    Attributes
+    ----------
+    heat : str
+        A letter a trial.
+    not_good : int
+        Plays that were flagged or failed.
+    counts : str
+        Of plays, times and cells, as JSON.
+    answers : str
+        Packed, by scale, as JSON.
+    clip_ms, newest_clip_ms : float
+        Of the answers' evidence, in ms: `server.participation.clip_bytes.ClipTime`.
+    first_issued_at, newest_issued_at, last_received_at : datetime or None
+        Of the same.
+    """
+
+    __tablename__ = "run_tallies"
+
+    study_run_id: Mapped[int] = mapped_column(
+        ForeignKey("study_runs.id", ondelete="CASCADE"), primary_key=True, autoincrement=False
+    )
+    heat: Mapped[str] = mapped_column(Text)
+    not_good: Mapped[int]
+    counts: Mapped[str] = mapped_column(Text)
+    answers: Mapped[str] = mapped_column(Text)
+    clip_ms: Mapped[float] = mapped_column(default=0.0)
+    newest_clip_ms: Mapped[float] = mapped_column(default=0.0)
+    first_issued_at: Mapped[datetime | None]
+    newest_issued_at: Mapped[datetime | None]
+    last_received_at: Mapped[datetime | None]

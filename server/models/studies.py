@@ -6,9 +6,8 @@ from typing import Any
 from sqlalchemy import ForeignKey, Index, String, Text, UniqueConstraint
 from sqlalchemy.orm import Mapped, mapped_column, relationship
 
-from server.clock import now
+from server.core.values import new_pseudonym_key, now
 from server.models.base import Base, one_of
-from server.tokens import new_pseudonym_key
 
 
 class Study(Base):
@@ -25,7 +24,7 @@ class Study(Base):
     revision : int
         Counts edits, so that of two people editing at once the second is told.
     recruiter : dict of str to Any or None
-        See `server.participants.recruiter`.
+        See `server.participation.recruiter`.
     archived_at : datetime or None
         Since when it is out of the list of studies; it can be read, and not changed.
     pseudonym_key : str

@@ -1,35 +1,40 @@
-"""`server backup`: database, clips and secret key of one moment in one file.
-
-The file is a tar: `backup.json` (what is in it), `tables/NAME.ndjson.gz` (the rows, of neither database's own
-form, so that a backup of SQLite can be restored to PostgreSQL and back), `clips/SHA256.mp4`, `secret_key`.
-The keys of recruiters' ids are in a file of their own, see `server.operations.keys_apart`.
-"""
+"""`server backup`: database, clips and secret key of one moment in one file, encrypted where asked."""
 
 import gzip
 import io
 import json
+import os
 import tarfile
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from importlib.metadata import version
 from pathlib import Path
 from typing import IO
 
+import pyrage
 from alembic.runtime.migration import MigrationContext
 from pydantic import BaseModel, Field
+from pyrage import x25519
 from sqlalchemy import Connection, Table
 
 from experiments.errors import InputError
 from experiments.files import check_targets, whole_private_file
-from server.clock import iso, now
 from server.context import Services
-from server.file_locks import locked
-from server.operations import erasures, keys_apart
-from server.operations.keys_apart import KeyFile
+from server.core.locks import locked
+from server.core.values import iso, now
+from server.operations import key_escrow
+from server.operations.key_escrow import KeyFile
 from server.operations.repository import clip_hashes
-from server.operations.rows import Content, Digest
-from server.operations.rows_repository import read_rows, snapshot, tables_of
+from server.privacy import erasures
+from server.privacy.rows import Content, Digest, read_rows, snapshot, tables_of
+
+# `server backup`: database, clips and secret key of one moment in one file.
+#
+# The file is a tar: `backup.json` (what is in it), `tables/NAME.ndjson.gz` (the rows, of neither database's
+# own form, so that a backup of SQLite can be restored to PostgreSQL and back), `clips/SHA256.mp4`,
+# `secret_key`. The keys of recruiters' ids are in a file of their own, see `server.operations.key_escrow`.
 
 DESCRIPTION, TABLES, CLIPS, KEY = "backup.json", "tables/", "clips/", "secret_key"
 SPOOL_BYTES = 1 << 24
@@ -68,9 +73,9 @@ def back_up(
         A folder is missing, or a file cannot be written or holds the keys of another installation.
     """
     erasures.begin_ledger(services.settings)
-    key_path = keys or keys_apart.beside(path)
+    key_path = keys or key_escrow.key_file_of(path)
     check_targets([path, key_path, key_path.parent / erasures.NAME])
-    keys_apart.check_replaceable(key_path, services.settings.key)
+    key_escrow.check_replaceable(key_path, services.settings.key)
     with _written(path) as stream:
         described, kept = write_backup(services, stream, with_clips=with_clips)
         _write_keys(services, key_path, kept)
@@ -80,8 +85,8 @@ def back_up(
 def _write_keys(services: Services, path: Path, kept: KeyFile) -> None:
     """Key file and ledger, by one backup of the installation at a time."""
     with locked(services.settings.common_folder / "backup-keys.lock"):
-        keys_apart.check_replaceable(path, services.settings.key)
-        keys_apart.write_keys(path, kept)
+        key_escrow.check_replaceable(path, services.settings.key)
+        key_escrow.write_keys(path, kept)
         _write_ledger(services, path.parent / erasures.NAME, kept.written_at)
 
 
@@ -99,7 +104,7 @@ def write_backup(
     with tarfile.open(fileobj=stream, mode="w|") as tar:
         with snapshot(services.database) as connection, tempfile.TemporaryDirectory() as folder:
             described = _describe(connection, services, Path(folder), with_clips)
-            kept = keys_apart.read_keys(connection, services.settings.key, described.created_at)
+            kept = key_escrow.read_keys(connection, services.settings.key, described.created_at)
             _add_bytes(tar, DESCRIPTION, described.model_dump_json(indent=2).encode())
             for name in described.tables:
                 tar.add(Path(folder) / name, TABLES + name + ".ndjson.gz", filter=_plain)
@@ -115,7 +120,7 @@ def _describe(connection: Connection, services: Services, folder: Path, with_cli
     moment = iso(now())
     if revision is None:
         raise InputError("the database has no tables yet; there is nothing to back up")
-    dumped = [table for table in tables_of(connection) if table.name != keys_apart.APART]
+    dumped = [table for table in tables_of(connection) if table.name != key_escrow.APART]
     tables = {table.name: _dump(connection, table, folder / table.name) for table in dumped}
     clips = clip_hashes(connection)
     return Description(
@@ -132,7 +137,7 @@ def _dump(connection: Connection, table: Table, path: Path) -> Content:
     digest = Digest()
     with gzip.open(path, "wt", encoding="utf-8", compresslevel=6) as stream:
         for stored in read_rows(connection, table):
-            row = keys_apart.without_key(stored) if table.name == keys_apart.STUDIES else stored
+            row = key_escrow.without_key(stored) if table.name == key_escrow.STUDIES else stored
             digest.add(row)
             stream.write(json.dumps(row, ensure_ascii=False) + "\n")
     return digest.content()
@@ -175,3 +180,129 @@ def _written(path: Path) -> Iterator[IO[bytes]]:
             yield stream
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror or error}") from error
+
+
+# Backups encrypted in the age format (age-encryption.org/v1, X25519).
+#
+# The server needs the public key alone. `age -d` of any implementation opens them. What is encrypted
+# is streamed: nothing in the open is on a disk.
+
+ENDING = ".age"
+
+
+def recipient_of(text: str) -> x25519.Recipient:
+    """The public key of this text; InputError where it is none."""
+    try:
+        return x25519.Recipient.from_str(text.strip())
+    except pyrage.RecipientError as error:
+        raise InputError(
+            f"expected a public key age1..., as server backup-key makes one, got '{text[:20]}'"
+        ) from error
+
+
+def identity_in(path: Path) -> x25519.Identity:
+    """The private key in a file of `server backup-key` or `age-keygen`; InputError where none is."""
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path} cannot be read as a private key: {error}") from error
+    keys = [line.strip() for line in lines if line.strip() and not line.startswith("#")]
+    try:
+        [key] = keys
+        return x25519.Identity.from_str(key)
+    except (ValueError, pyrage.IdentityError) as error:
+        raise InputError(f"{path}: expected one line AGE-SECRET-KEY-..., as of server backup-key") from error
+
+
+def make_identity(path: Path) -> str:
+    """Write a new private key, mode 600, and give its public key; a file that is there is never replaced."""
+    if path.exists():
+        raise InputError(f"{path} is there already; a private key is never replaced, name another file")
+    identity = x25519.Identity.generate()
+    public = str(identity.to_public())
+    with whole_private_file(path) as stream:
+        stream.write(f"# public key: {public}\n{identity}\n".encode())
+    return public
+
+
+@contextmanager
+def encrypted(write: Callable[[IO[bytes]], None], recipient: x25519.Recipient) -> Iterator[IO[bytes]]:
+    """What `write` writes, encrypted, to be read while it is written; its error comes out of the reader.
+
+    Parameters
+    ----------
+    write : callable
+        Given a stream, in a thread of its own.
+    """
+    with (
+        _produced(write) as plain,
+        _produced(lambda target: pyrage.encrypt_io(plain, target, [recipient])) as sealed,
+    ):
+        yield sealed
+
+
+def decrypt(source: IO[bytes], target: IO[bytes], identity: x25519.Identity, name: str) -> None:
+    """Write what the source holds in the open.
+
+    Raises
+    ------
+    InputError
+        It was encrypted for another key, is cut short or was changed.
+    """
+    try:
+        pyrage.decrypt_io(source, target, [identity])
+    except (pyrage.DecryptError, OSError) as error:
+        raise InputError(
+            f"{name} cannot be decrypted: damaged, cut short, or encrypted for another key ({error})"
+        ) from error
+
+
+class _Reader:
+    """The end of a pipe; there the writer's error is raised, so that nobody takes a part for the whole."""
+
+    def __init__(self, stream: IO[bytes], thread: threading.Thread, errors: list[BaseException]) -> None:
+        self._stream, self._thread, self._errors = stream, thread, errors
+
+    def read(self, size: int = -1) -> bytes:
+        """At most so many bytes; none at the end."""
+        piece = self._stream.read(size)
+        if not piece or size < 0:
+            self._thread.join()
+            if self._errors:
+                raise self._errors[0]
+        return piece
+
+    def close(self) -> None:
+        """Close it: the writer is told by its next write."""
+        self._stream.close()
+
+
+@contextmanager
+def _produced(write: Callable[[IO[bytes]], None]) -> Iterator[IO[bytes]]:
+    outlet, inlet = os.pipe()
+    errors: list[BaseException] = []
+
+    def run() -> None:
+        try:
+            with os.fdopen(inlet, "wb") as stream:
+                try:
+                    write(stream)
+                except BaseException as error:
+                    errors.append(error)  # before the reader sees the end
+                    raise
+        except BaseException as error:
+            errors.append(error)
+
+    thread = threading.Thread(target=run, daemon=True)
+    reader = _Reader(os.fdopen(outlet, "rb"), thread, errors)
+    thread.start()
+    try:
+        yield reader  # type: ignore[misc]
+    except BaseException as error:
+        if errors and not isinstance(errors[0], BrokenPipeError):
+            raise errors[0] from error
+        raise
+    finally:
+        with suppress(OSError):
+            reader.close()
+        thread.join()

@@ -1,7 +1,9 @@
-"""`server doctor` and `server database copy`."""
+"""`server doctor` and `server database`."""
 
 import json
 from dataclasses import asdict
+from datetime import UTC, datetime
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -9,12 +11,31 @@ from rich.console import Console
 from rich.table import Column, Table
 from rich.text import Text
 
-from server.cli_common import out
+from experiments.command_groups import command_group
+from experiments.counted import counted
+from experiments.errors import InputError
+from server.cli_common import migrated_services, out, stored_services
 from server.context import open_services
-from server.operations.copying import address, copy_database
+from server.core.db import open_database
+from server.core.migrate import current_revision, newest_revision
+from server.core.settings import Settings
+from server.core.values import iso, now
+from server.operations.copying import address, carry_over, copy_database
 from server.operations.doctor import examine
-from server.operations.rows import Content
-from server.settings import Settings
+from server.operations.snapshots import (
+    database_file,
+    go_back,
+    remove_superfluous,
+    runs_in,
+    snapshot_at,
+    snapshots_of,
+    take_snapshot,
+)
+from server.participation.tally_pools import repair
+from server.privacy.erasures import replay
+from server.privacy.rows import Content
+
+# `server doctor` and `server database copy`.
 
 FILE_WIDTH = 1_000
 """Characters: wider than any finding."""
@@ -22,6 +43,12 @@ COLORS = {"ok": "green", "warning": "yellow", "failed": "red"}
 
 
 def register(parent: typer.Typer) -> None:
+    """Add `server doctor` and `server database` to the command line."""
+    _register_doctor(parent)
+    _register_database(parent)
+
+
+def _register_doctor(parent: typer.Typer) -> None:
     """Add the commands of whoever operates the server."""
     parent.command("doctor")(doctor)
 
@@ -72,3 +99,179 @@ def copy(
     copied = copy_database(source, target, told)
     rows = sum(content.rows for content in copied.values())
     out.print(f"{rows} rows in {len(copied)} tables; now set DATABASE_URL to {address(target)}")
+
+
+# `server database snapshot`, `snapshots` and `go-back`.
+
+
+def register_snapshots(app: typer.Typer) -> None:
+    """Add the commands to `server database`."""
+    app.command("snapshot")(snapshot)
+    app.command("snapshots")(snapshots)
+    app.command("go-back")(back)
+
+
+def snapshot() -> None:
+    """Take a snapshot of the SQLite database now, while the server goes on.
+
+    The server takes them by itself where PALPEBRA_SNAPSHOT_MINUTES is set. They stay in the data folder: all
+    of the last hour, one an hour of the last day, one a day of the last week.
+
+    Example: server database snapshot
+    """
+    settings = Settings()
+    taken = take_snapshot(settings)
+    out.print(f"{taken.path}: {taken.path.stat().st_size / 1e6:.1f} MB")
+    for one in remove_superfluous(settings, now()):
+        out.print(f"removed {one.path}")
+
+
+def snapshots() -> None:
+    """List the snapshots, oldest first, with their size.
+
+    Example: server database snapshots
+    """
+    settings = Settings()
+    database_file(settings)
+    there = snapshots_of(settings)
+    for one in there:
+        out.print(f"{iso(one.taken_at)}  {one.path.stat().st_size / 1e6:.1f} MB")
+    if not there:
+        out.print("no snapshots; set PALPEBRA_SNAPSHOT_MINUTES, or run: server database snapshot")
+
+
+def back(
+    moment: Annotated[
+        str,
+        typer.Argument(
+            help="The last snapshot up to this moment (UTC) is taken, as 2026-11-24T10:15:00Z; or newest.",
+            show_default=False,
+        ),
+    ],
+) -> None:
+    """Make the SQLite database as it was at a moment; stop the server first.
+
+    What is there now is set aside beside it under another name: remove it once all is well. Whoever was
+    erased since is erased again; clips stay, they are kept by their content.
+
+    Examples:
+
+      server database go-back 2026-11-24T10:15:00Z
+
+      server database go-back newest
+    """
+    settings = Settings()
+    database_file(settings)
+    chosen = snapshot_at(settings, _moment(moment))
+    before = go_back(settings, chosen, out.print)
+    runs = counted(runs_in(settings), "run")
+    out.print(f"the database is as it was at {iso(chosen.taken_at)}, with {runs}")
+    out.print(f"what was there before: {before}")
+
+
+def _moment(given: str) -> datetime:
+    if given == "newest":
+        return now()
+    try:
+        moment = datetime.fromisoformat(given)
+    except ValueError:
+        raise InputError(f"expected a moment as 2026-11-24T10:15:00Z, or newest; got '{given}'") from None
+    return moment.astimezone(UTC) if moment.tzinfo else moment.replace(tzinfo=UTC)
+
+
+# `server database`: bring the database to the newest revision, say which one it has, copy it, count anew.
+
+app = command_group("The database's tables.")
+
+
+def _register_database(parent: typer.Typer) -> None:
+    """Add `server database` to the command line."""
+    parent.add_typer(app, name="database")
+    app.command("copy")(copy)
+    register_snapshots(app)
+
+
+@app.command("upgrade")
+def upgrade() -> None:
+    """Make or change the tables so that they fit this program; nothing happens where they do.
+
+    The database is DATABASE_URL, or SQLite in the data folder.
+    Example: DATABASE_URL=postgresql://me@localhost/palpebra server database upgrade
+    """
+    with migrated_services() as services:
+        address = services.database.url.render_as_string(hide_password=True)
+        out.print(f"{address}: revision {current_revision(services.database)}")
+
+
+@app.command("status")
+def status() -> None:
+    """Say which revision the database has, and which this program expects.
+
+    Example: server database status
+    """
+    database = open_database(Settings())
+    revision, expected = current_revision(database), newest_revision()
+    database.close()
+    advice = "" if revision == expected else "; run `server database upgrade`"
+    out.print(f"found {revision or 'no tables'}, expected {expected}{advice}")
+
+
+@app.command("recount")
+def recount() -> None:
+    """Count every run's ratings anew and mend the counts that differ; the server may go on meanwhile.
+
+    Results, monitor and participants read these counts; `server doctor` says whether they are right.
+    Example: server database recount
+    """
+    with stored_services() as services:
+        mended, runs = repair(services.database, services.versions)
+    out.print(f"{counted(runs, 'run')} counted, {mended} mended")
+
+
+@app.command("rewrap")
+def rewrap(
+    old_key_file: Annotated[
+        Path, typer.Argument(help="The secret key of before, as data/secret_key was.", show_default=False)
+    ],
+) -> None:
+    """Carry over what was kept under the old key, after the secret key was changed.
+
+    Recruiters' ids, second factors and the audit log's chain are made to fit the key of the settings. Move
+    the key file away from beside your backups afterwards and back up anew, but keep it: the backups made so
+    far open with it alone (server restore FILE --keys).
+    Example: server database rewrap /media/safe/secret_key
+    """
+    try:
+        old = old_key_file.read_bytes().strip()
+    except OSError as error:
+        raise InputError(f"{old_key_file} cannot be read: {error.strerror or error}") from error
+    with stored_services() as services, services.database.write() as session:
+        carried = carry_over(session, old, services.settings.key)
+    out.print(f"{carried.identities} keys wrapped anew; {carried.unreadable} are not under that key")
+    out.print(f"{counted(carried.second_factors, 'second factor')} carried over")
+    out.print(
+        "move palpebra-keys.json away and keep it with the backups made so far, which open with it alone "
+        "(server restore FILE --keys); then back up anew"
+    )
+    if carried.broken is not None:
+        raise InputError(
+            "second factors and the audit log were left as they are, as the log fits neither key: "
+            f"{carried.broken}; recruiters' ids are carried over. Where the key was changed twice, set the "
+            "one between, carry over the first to it, then that one to the last"
+        )
+    out.print(
+        "the audit log's chain is made anew; note its head (server audit verify), older ones fit no more"
+    )
+
+
+@app.command("erase-again")
+def erase_again() -> None:
+    """Erase the runs that the ledger of erasures names (erasures.ndjson in the data folder).
+
+    `server restore` does so by itself; this is for a ledger that was put there afterwards, or for a database
+    that was brought back by other means.
+    Example: server database erase-again
+    """
+    with stored_services() as services, services.database.write() as session:
+        erased = replay(session, services.settings)
+    out.print(f"{counted(erased, 'run')} erased")

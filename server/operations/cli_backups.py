@@ -13,18 +13,23 @@ from pyrage import x25519
 
 from experiments.errors import InputError
 from server.cli_common import out, stored_services
-from server.clock import now
 from server.context import open_services
+from server.core.settings import Settings
+from server.core.values import now
 from server.operations import backup as backups
 from server.operations import drill as drills
 from server.operations import restore as restoring
-from server.operations.backup_stores import SCHEME, backup_store
+from server.operations.backup import ENDING, identity_in, make_identity, recipient_of
+from server.operations.backup_stores import (
+    SCHEME,
+    KeptBackup,
+    back_up_to,
+    backup_store,
+    brought_here,
+    ending_of,
+)
 from server.operations.drill import identity_of
-from server.operations.encryption import ENDING, identity_in, make_identity, recipient_of
-from server.operations.off_host import KeptBackup, back_up_to, brought_here, ending_of
-from server.operations.retention import superfluous
-from server.operations.watched_backups import newest_backup
-from server.settings import Settings
+from server.operations.watched_backups import newest_backup, superfluous
 
 LOWEST_PRIORITY = 19
 

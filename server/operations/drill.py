@@ -1,15 +1,14 @@
-"""`server drill`: bring the newest backup back beside the data, examine it, and say how it went.
+"""The newest backup brought back beside the data, examined and removed: on request and each week."""
 
-A backup that nobody has ever brought back is a hope. The server makes the drill itself once a week where it
-knows the folder of its backups.
-"""
-
+import asyncio
+import logging
 import shutil
+import sys
 import tarfile
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import AsyncIterator, Iterator
+from contextlib import ExitStack, asynccontextmanager, contextmanager, suppress
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -17,23 +16,24 @@ from pyrage import x25519
 
 from experiments.errors import InputError
 from experiments.files import whole_file
-from server.clock import now
 from server.context import Services, open_services
-from server.db import open_database
-from server.file_locks import locked
-from server.locks import open_locks
-from server.locks_repository import LockTaken
-from server.operations.backup import TABLES, Description
-from server.operations.backup_stores import backup_store
-from server.operations.checks import counts, database, identities
-from server.operations.encryption import ENDING, identity_in
-from server.operations.erasures import ledger
-from server.operations.findings import Finding
-from server.operations.keys_apart import beside
-from server.operations.off_host import KeptBackup, brought_here
+from server.core.changes import watched
+from server.core.db import open_database
+from server.core.locks import LockTaken, locked, open_locks
+from server.core.settings import Settings
+from server.core.values import now
+from server.operations.backup import ENDING, TABLES, Description, identity_in
+from server.operations.backup_stores import KeptBackup, backup_store, brought_here
+from server.operations.doctor import Finding, counts, database, identities
+from server.operations.key_escrow import key_file_of
 from server.operations.restore import restore
 from server.operations.watched_backups import DrillResult, drill_file, last_drill, newest_backup
-from server.settings import Settings
+from server.privacy.erasures import ledger
+
+# `server drill`: bring the newest backup back beside the data, examine it, and say how it went.
+#
+# A backup that nobody has ever brought back is a hope. The server makes the drill itself once a week where it
+# knows the folder of its backups.
 
 EVERY = timedelta(days=7)
 AGAIN_AFTER_FAILURE = timedelta(days=1)
@@ -119,7 +119,7 @@ def _brought_back(apart: Settings, backup: Path, keys: Path | None) -> DrillResu
     services = open_services(apart)
     try:
         described = restore(services, backup, keys=keys, despite_erasures=True)
-        missing = keys is None and not beside(backup).exists()
+        missing = keys is None and not key_file_of(backup).exists()
         failed = [_key_file_missing(backup)] if missing and _needs_key_file(described) else []
         failed += [
             f"{finding.subject}: {finding.state}"
@@ -146,7 +146,7 @@ def _needs_key_file(described: Description) -> bool:
 
 def _key_file_missing(backup: Path) -> str:
     return (
-        f"no key file {beside(backup)}: recruiters' ids would be lost; name it by --keys or "
+        f"no key file {key_file_of(backup)}: recruiters' ids would be lost; name it by --keys or "
         "PALPEBRA_BACKUP_KEYS, or run: server backup"
     )
 
@@ -257,3 +257,55 @@ def _alone(settings: Settings) -> Iterator[None]:
         for copy in settings.data_folder.glob(f"{COPIES}*"):
             shutil.rmtree(copy, ignore_errors=True)
         yield
+
+
+# The weekly drill that the server makes by itself, in a process of its own at the lowest priority.
+
+LOG = logging.getLogger(__name__)
+FIRST_LOOK_S, LOOK_FOR_DRILL_S, STOP_S = 300.0, 3600.0, 10.0
+
+
+@asynccontextmanager
+async def weekly_drill(settings: Settings, first_look_s: float = FIRST_LOOK_S) -> AsyncIterator[None]:
+    """Look every hour whether a drill is due while the server runs; nothing where no folder is known."""
+    if not settings.backup_folder:
+        yield
+        return
+    await asyncio.to_thread(sweep, settings)
+    async with watched(lambda _: _watch_drills(settings, first_look_s)):
+        yield
+
+
+async def _watch_drills(settings: Settings, first_look_s: float) -> None:
+    await asyncio.sleep(first_look_s)
+    while True:
+        try:
+            if is_due(last_drill(settings), now()):
+                await _drill_in_a_process()
+        except Exception:  # the next look comes, whatever went wrong with this one
+            LOG.exception("restore drill")
+        await asyncio.sleep(LOOK_FOR_DRILL_S)
+
+
+async def _drill_in_a_process() -> None:
+    """Run the command: whatever happens in it, the server goes on."""
+    process = await asyncio.create_subprocess_exec(
+        sys.executable,
+        *("-m", "server", "drill", "--when-due"),
+        stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.STDOUT,
+    )
+    try:
+        said, _ = await process.communicate()
+    except asyncio.CancelledError:
+        with suppress(ProcessLookupError):
+            process.terminate()  # it removes its copy
+        with suppress(TimeoutError):
+            await asyncio.wait_for(process.communicate(), STOP_S)
+            raise
+        with suppress(ProcessLookupError):
+            process.kill()
+        await process.communicate()
+        raise
+    level = logging.INFO if process.returncode == 0 else logging.ERROR
+    LOG.log(level, "restore drill: %s", said.decode("utf-8", "replace").strip())

@@ -18,16 +18,13 @@ from sqlalchemy.exc import InterfaceError, OperationalError, StatementError
 from experiments.counted import counted
 from experiments.errors import InputError
 from server.context import Services
-from server.migrate import alembic_config, known_revision, with_wall, without_wall
-from server.operations import erasures
+from server.core.migrate import alembic_config, known_revision, with_wall, without_wall
+from server.core.settings import Settings, put_key, secret_key_path
 from server.operations.backup import CLIPS, DESCRIPTION, KEY, TABLES, Description
-from server.operations.erasures import ledger
-from server.operations.keys_apart import NAME, KeyFile, beside, check_fits, key_file, put_back
-from server.operations.rows import Content, Row
-from server.operations.rows_repository import refuse_unless_empty, tables_of, write_rows
-from server.runs.erasure import replay
-from server.secret_key_file import put_key, secret_key_path
-from server.settings import Settings
+from server.operations.key_escrow import NAME, KeyFile, check_fits, key_file, key_file_of, put_back
+from server.privacy import erasures
+from server.privacy.erasures import ledger, replay
+from server.privacy.rows import Content, Row, refuse_unless_empty, tables_of, write_rows
 
 FORMAT = 1
 
@@ -69,13 +66,15 @@ def restore(
         has another secret key; the key file is another installation's or older than the backup; no ledger of
         erasures knows who was erased since the backup.
     """
-    copied_ledger = (keys or beside(path)).parent / erasures.NAME
+    copied_ledger = (keys or key_file_of(path)).parent / erasures.NAME
     try:
         with tarfile.open(path) as tar:
             described = _description(tar, path)
             key = _content(tar, KEY)
             _check_key(services.settings, key)
-            apart = _key_file(described, key, keys or beside(path), named=keys is not None, stale=stale_keys)
+            apart = _key_file(
+                described, key, keys or key_file_of(path), named=keys is not None, stale=stale_keys
+            )
             covered = _is_covered(services.settings, copied_ledger, described)
             if not covered and not despite_erasures:
                 raise _not_covered(services.settings, copied_ledger, described)

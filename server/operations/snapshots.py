@@ -1,22 +1,73 @@
-"""Snapshots of a SQLite database: whole copies, from which it goes back to a moment between two backups."""
+"""Snapshots of a SQLite database, taken by schedule, and going back to one."""
 
+import asyncio
+import logging
 import os
+import shutil
 import sqlite3
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractAsyncContextManager, closing, contextmanager, nullcontext
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
+from experiments.counted import counted
 from experiments.errors import InputError
-from server.clock import now
-from server.db import Database, checked_url, open_database
-from server.file_locks import locked
-from server.migrate import upgrade
-from server.operations.erasures import ledger
-from server.operations.snapshot_repository import copied, put_into_one_file
-from server.runs.erasure import replay
-from server.settings import Settings
+from server.accounts.audit import record
+from server.core.changes import watched
+from server.core.db import Database, checked_url, open_database
+from server.core.locks import locked
+from server.core.migrate import upgrade
+from server.core.settings import Settings
+from server.core.values import iso, now
+from server.operations.repository import run_counts
+from server.privacy.erasures import ledger, replay
+
+# What snapshots ask of SQLite itself: a copy, one file without a WAL, a database that nobody else uses.
+
+
+def copied(source: Path, target: Path) -> str:
+    """Copy by SQLite's backup API, in one step: it sees one moment, and in WAL mode holds up no writer.
+
+    Returns
+    -------
+    str
+        `ok`, or what is not sound about the copy.
+    """
+    with closing(sqlite3.connect(source)) as reading, closing(sqlite3.connect(target)) as connection:
+        reading.backup(connection)
+        connection.execute("PRAGMA journal_mode=DELETE")
+        (said,) = connection.execute("PRAGMA quick_check(1)").fetchone()
+    return str(said)
+
+
+def put_into_one_file(path: Path) -> None:
+    """Leave WAL mode, so that the file says all by itself; the next connection of a server takes it up."""
+    with closing(sqlite3.connect(path)) as connection:
+        connection.execute("PRAGMA journal_mode=DELETE")
+
+
+@contextmanager
+def closed_to_others(path: Path) -> Iterator[None]:
+    """Hold the database alone; one that is damaged beyond opening is let through: it is to be replaced."""
+    if not path.is_file():
+        yield
+        return
+    with closing(sqlite3.connect(path, timeout=1, isolation_level=None)) as connection:
+        try:
+            # SQLite leaves WAL mode only where nobody else has the file open; what waited goes into it then.
+            connection.execute("PRAGMA journal_mode=DELETE").fetchone()
+            connection.execute("BEGIN EXCLUSIVE")
+        except sqlite3.OperationalError as error:
+            raise InputError(
+                f"another program has {path} open ({error}); stop the server first, nothing was changed"
+            ) from error
+        except sqlite3.DatabaseError:
+            pass
+        yield
+
+
+# Snapshots of a SQLite database: whole copies, from which it goes back to a moment between two backups.
 
 FOLDER, LOCK = "snapshots", "snapshots.lock"
 ALL_OF, HOURLY_OF, DAILY_OF = timedelta(hours=1), timedelta(days=1), timedelta(days=7)
@@ -205,3 +256,114 @@ def opened_copy(settings: Settings, path: Path) -> Iterator[Database]:
     finally:
         database.close()
     put_into_one_file(path)
+
+
+# `server database go-back`: a SQLite database as a snapshot has it, with what was there before set aside.
+
+BESIDE = ("", "-wal", "-shm")
+"""Endings of a SQLite database's files: itself, what is to be put into it, and the index of that."""
+
+
+def snapshot_at(settings: Settings, moment: datetime) -> Snapshot:
+    """The last snapshot taken up to a moment; InputError, naming those there are, where there is none."""
+    there = snapshots_of(settings)
+    earlier = [one for one in there if one.taken_at <= moment]
+    if not there:
+        raise InputError(
+            "there are no snapshots; set PALPEBRA_SNAPSHOT_MINUTES and let the server run, or go back to a "
+            "backup: server restore FILE"
+        )
+    if not earlier:
+        raise InputError(
+            f"no snapshot was taken up to {iso(moment)}; the first is of {iso(there[0].taken_at)}, the last "
+            f"of {iso(there[-1].taken_at)}"
+        )
+    return earlier[-1]
+
+
+def go_back(settings: Settings, snapshot: Snapshot, told: Callable[[str], None]) -> Path:
+    """Put a snapshot in the place of the database; return where the database of before was set aside.
+
+    The snapshot is copied, brought to the newest revision and the ledger of erasures carried out in it before
+    anything is moved, so that nothing is changed where any of it fails.
+
+    Raises
+    ------
+    InputError
+        Another program has the database open, or there is no room for the copy.
+    """
+    path = database_file(settings)
+    before = aside(path, now())
+    coming = path.with_name(f".{path.name}.coming")
+    with closed_to_others(path):
+        try:
+            shutil.copyfile(snapshot.path, coming)
+            coming.chmod(0o600)
+            erased = erase_again(settings, coming)
+            told(f"{counted(erased, 'run')} erased again, by the ledger of erasures")
+            _note(settings, coming, snapshot)
+            for ending in BESIDE:
+                if (file := path.with_name(path.name + ending)).exists():
+                    file.rename(before.with_name(before.name + ending))
+            coming.rename(path)
+        except OSError as error:
+            raise InputError(f"{coming} cannot be written: {error.strerror or error}") from error
+        finally:
+            for ending in BESIDE:
+                coming.with_name(coming.name + ending).unlink(missing_ok=True)
+    return before
+
+
+def _note(settings: Settings, coming: Path, snapshot: Snapshot) -> None:
+    """In the audit log, which goes back too."""
+    with opened_copy(settings, coming) as database, database.write() as session:
+        record(session, None, "database taken back", "database", iso(snapshot.taken_at))
+
+
+def runs_in(settings: Settings) -> int:
+    """How many runs the database holds."""
+    database = open_database(settings)
+    try:
+        with database.read() as session:
+            return sum(int(count) for *_, count in run_counts(session))
+    finally:
+        database.close()
+
+
+# The snapshots that the server takes by itself of a SQLite database.
+
+LOG = logging.getLogger(__name__)
+LOOK_EVERY_S = 20.0
+
+
+def snapshots_taken(
+    settings: Settings, look_every_s: float = LOOK_EVERY_S
+) -> AbstractAsyncContextManager[None]:
+    """Take snapshots while the server runs; nothing where the settings ask for none, or on PostgreSQL."""
+    url = checked_url(settings.resolved_database_url)
+    if not settings.snapshot_minutes or url.get_backend_name() != "sqlite":
+        return nullcontext()
+    return watched(lambda _: _watch(settings, look_every_s))
+
+
+async def _watch(settings: Settings, look_every_s: float) -> None:
+    while True:
+        await asyncio.sleep(look_every_s)
+        try:
+            await asyncio.to_thread(look, settings)
+        except InputError as error:  # such as no room: in words, and the next look comes
+            LOG.error("snapshot: %s", error)
+        except Exception:  # the next look comes, whatever went wrong with this one
+            LOG.exception("snapshot")
+
+
+def look(settings: Settings) -> None:
+    """Take a snapshot if one is due, remove what is too many, and erase in the others who was erased."""
+    if is_due(settings, now()):
+        try:
+            snapshot = take_snapshot(settings)
+        except SnapshotUnderWayError:  # another worker is at it
+            return
+        LOG.info("snapshot %s", snapshot.path.name)
+        remove_superfluous(settings, now())
+    erase_in_snapshots(settings)

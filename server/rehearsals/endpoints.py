@@ -3,12 +3,12 @@
 from fastapi import APIRouter
 from fastapi.responses import FileResponse
 
-from server.accounts.permission import Viewer, Writer
+from server.accounts.identity import Viewer, Writer
 from server.context import ServicesDep
-from server.errors import ERROR_RESPONSES
+from server.core.errors import ERROR_RESPONSES
+from server.exports.endpoints import REPORT_POLICY
 from server.rehearsals import service
 from server.rehearsals.schemas import NewRehearsal, RehearsalOut, RehearsalResult
-from server.reports.endpoints import REPORT_POLICY
 
 router = APIRouter(
     prefix="/api/admin/studies/{study}/rehearsals", tags=["studies"], responses=ERROR_RESPONSES

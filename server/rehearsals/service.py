@@ -19,11 +19,10 @@ from sqlalchemy.orm import Session
 from experiments.json import json_text
 from server.accounts.audit import record
 from server.accounts.identity import OPERATOR, Identity
-from server.clock import now
 from server.context import Services
-from server.errors import NotFound
-from server.file_locks import locked
-from server.locks import LONGEST_S
+from server.core.errors import NotFound
+from server.core.locks import LONGEST_S, locked
+from server.core.values import now
 from server.models import Job
 from server.rehearsals.schemas import (
     DEFINITION,
@@ -37,8 +36,8 @@ from server.rehearsals.schemas import (
     RehearsalResult,
     Step,
 )
-from server.reports import repository
-from server.reports.jobs import begun, in_background, is_under_way, note, shown
+from server.results import job_repository
+from server.results.jobs import begun, in_background, is_under_way, note, shown
 from server.studies.lookup import active_version, find_study
 
 _KEPT_VARIABLES = ("PATH", "LANG", "LC_ALL", "HOME", "TMPDIR", "VIRTUAL_ENV", "PYTHONPATH")
@@ -61,9 +60,9 @@ def start(services: Services, name: str, order: NewRehearsal, identity: Identity
         record(session, identity, "rehearsal asked for", "study", name, **order.model_dump())
         session.flush()
         rehearsal = _out(services, job)
-        before = [one.public_id for one in repository.jobs(session, study, "rehearsal") if one is not job]
+        before = [one.public_id for one in job_repository.jobs(session, study, "rehearsal") if one is not job]
         for public_id in before:
-            repository.remove_job(session, study, "rehearsal", public_id)
+            job_repository.remove_job(session, study, "rehearsal", public_id)
     for public_id in before:
         shutil.rmtree(_folder(services, public_id), ignore_errors=True)
     in_background(services, rehearsal.id, partial(_run, services, name, rehearsal.id, order))
@@ -73,7 +72,7 @@ def start(services: Services, name: str, order: NewRehearsal, identity: Identity
 def latest(services: Services, session: Session, name: str, identity: Identity) -> RehearsalOut | None:
     """The rehearsal of a study; None where there is none."""
     study = find_study(session, name, identity, "view")
-    jobs = repository.latest_jobs(session, study, "rehearsal")
+    jobs = job_repository.latest_jobs(session, study, "rehearsal")
     return _out(services, jobs[0]) if jobs else None
 
 
@@ -83,7 +82,7 @@ def result(
     """What a rehearsal showed; NotFound while there is nothing."""
     study = find_study(session, name, identity, "view")
     path = _folder(services, public_id) / RESULT
-    if repository.find_job(session, study, "rehearsal", public_id) is None or not path.is_file():
+    if job_repository.find_job(session, study, "rehearsal", public_id) is None or not path.is_file():
         raise NotFound("There is no such rehearsal, or it is not done; reload the page to see how far it is.")
     return RehearsalResult.model_validate_json(path.read_text(encoding="utf-8"))
 
@@ -115,7 +114,7 @@ def cancel(services: Services, name: str, identity: Identity, public_id: str) ->
     """End a rehearsal that waits or goes on, with all that it started; one that is over stays as it is."""
     with services.database.write() as session:
         study = find_study(session, name, identity, "run")
-        job = repository.find_job(session, study, "rehearsal", public_id)
+        job = job_repository.find_job(session, study, "rehearsal", public_id)
         if job is None:
             raise NotFound("There is no such rehearsal; reload the page.")
         if not is_under_way(services, job):
@@ -171,7 +170,7 @@ def _run(services: Services, name: str, public_id: str, order: NewRehearsal) -> 
 
 def _status(services: Services, public_id: str) -> str | None:
     with services.database.read() as session:
-        return repository.status_of(session, public_id)
+        return job_repository.status_of(session, public_id)
 
 
 def _write_inputs(services: Services, name: str, folder: Path, order: NewRehearsal) -> None:

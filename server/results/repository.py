@@ -20,7 +20,7 @@ from server.models import (
     VersionClip,
 )
 from server.results.cache import Revision
-from server.results.mean_traces import Trace
+from server.results.summary import Trace
 
 
 class Pool(NamedTuple):

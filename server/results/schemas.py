@@ -1,9 +1,18 @@
-"""What the results page shows."""
+"""What the pages of results, monitor, runs and replay show."""
 
 from datetime import datetime
-from typing import Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+
+from experiments.definition.display import Display
+from experiments.trials.union import AnyPage
+from server.core.values import VisibleObject
+from server.participation.answer_schemas import Outcome, Role, ViewShowing
+from server.participation.evidence import Verdict
+from server.participation.run_schemas import Origin
+
+# What the results page shows.
 
 
 class Mean(BaseModel):
@@ -207,3 +216,355 @@ class OtherResults(StudyResults):
 
 
 AnyResults = Results | PairResults | ThresholdResults | TraceResults | OtherResults
+
+
+# What the live monitor shows.
+
+
+class MonitoredRun(BaseModel):
+    """One visit in the monitor's table."""
+
+    run: str
+    participant: str
+    phase: str
+    origin: str
+    status: str
+    stage: str
+    presence: Literal["here", "away", "dropped", "finished"] = Field(
+        description="here: seen within a minute; away: active but silent; dropped: silent beyond the lease."
+    )
+    started_at: datetime
+    last_seen_at: datetime
+    answered: int
+    trials: int
+    uncertain: int
+    flagged: int
+    failed: int
+    excluded: bool
+    evidence_verdict: Verdict | None = Field(
+        description="Whether the answers are likely a person's; null while the run goes on."
+    )
+    heat: str = Field(description="One letter a trial: . open, g good, u uncertain, f flagged, x failed.")
+
+
+class FunnelStep(BaseModel):
+    """How many runs came at least this far."""
+
+    stage: str
+    runs: int
+
+
+class GroupCount(BaseModel):
+    """How many took part in one group."""
+
+    name: str
+    quota: int | None
+    complete: int
+    active: int
+
+
+class MonitorSnapshot(BaseModel):
+    """Everything the monitor shows at one moment."""
+
+    study: str
+    study_status: str
+    quota: int | None
+    server_time: datetime
+    origin: Origin = Field(description="Whose runs are listed and counted.")
+    others: dict[str, int] = Field(description="Runs of other origins, previews left out.")
+    complete: int
+    active: int
+    dropped: int
+    screened_out: int
+    withdrawn: int
+    refused_browsers: int
+    groups: list[GroupCount] = Field(description="Groups of participants; empty where there is one only.")
+    funnel: list[FunnelStep]
+    expected_finish: datetime | None = Field(
+        description="When the quota will be full at the pace of the last day; null where it cannot be said."
+    )
+    total: int = Field(description="Runs of this origin.")
+    runs: list[MonitoredRun] = Field(description="The latest, in the order they began; not more than 500.")
+
+
+class FailingClip(BaseModel):
+    """A clip that people could not see: no play of its trial was better than failed."""
+
+    clip_sha256: str
+    file: str
+    cell: str
+    people: int = Field(description="Who came to a trial with this clip, in the latest 500 runs.")
+    failed_for: int = Field(description="Of these people, those who could not see it.")
+    rules: dict[str, int] = Field(description="Why its plays failed: rule and number of plays.")
+    reason: str = Field(description="What most browsers said of it; empty where none did.")
+    alarm: bool = Field(description="It failed for everybody, or for half of several people or more.")
+
+
+# One participant's visit as the experimenter sees it.
+
+
+class Exclude(BaseModel):
+    """Why a run is excluded; kept with the data."""
+
+    model_config = ConfigDict(extra="forbid")
+    reason: Annotated[str, StringConstraints(strip_whitespace=True, min_length=3, max_length=500)]
+
+
+class Erase(BaseModel):
+    """The run's identifier once more, as a guard against a slip."""
+
+    model_config = ConfigDict(extra="forbid")
+    confirm: Annotated[str, StringConstraints(max_length=40)]
+
+
+class HeldReport(BaseModel):
+    """A report that was made while the person's data were there."""
+
+    report: str
+    finished_at: datetime | None
+
+
+class Erased(BaseModel):
+    """What was erased, and what still holds the person until it is made again or removed."""
+
+    runs: list[str] = Field(description="The run asked for, and other visits of the same person.")
+    reports: list[HeldReport] = Field(description="Reports of the study; make them again.")
+    ledger: str = Field(
+        description="File from which a restore of an older backup erases these runs again; keep it."
+    )
+
+
+class RunIdentity(BaseModel):
+    """Who a participant is to the recruiter."""
+
+    run: str
+    participant: str = Field(description="The study's pseudonym.")
+    identifier: str = Field(description="The recruiter's id; empty where the address named nobody.")
+    parameters: VisibleObject = Field(description="Of the address by which the participant came.")
+    link: str = Field(description="Label of the link.")
+
+
+Show = Literal["everybody", "complete", "not_complete", "excluded", "pilot", "simulated"]
+
+
+class RunSummary(BaseModel):
+    """One line of the participants page."""
+
+    run: str
+    participant: str
+    phase: str
+    origin: str
+    status: str
+    stage: str
+    language: str
+    started_at: datetime
+    last_seen_at: datetime
+    completed_at: datetime | None
+    minutes: float = Field(description="From start to end, or to the last sign of life.")
+    trials: int
+    answered: int
+    not_good: int = Field(description="Plays that were flagged or failed.")
+    refused: int = Field(description="Answers and views that could not be stored; the timeline has why.")
+    excluded: bool
+    exclusion_reason: str | None
+    erased_at: datetime | None
+    version: int
+    link: str
+
+
+class RunPage(BaseModel):
+    """Runs, the latest first."""
+
+    runs: list[RunSummary]
+    total: int = Field(description="How many runs fit, on all pages.")
+    next: str | None = Field(description="Ask again with `before` = this; null at the end.")
+
+
+class TimelineTrial(BaseModel):
+    """One play of one trial with its answer and what was shown."""
+
+    trial_index: int
+    kind: str
+    block: int
+    cell: str | None
+    exemplar: int | None
+    clip_sha256: str | None
+    play: int
+    answer: dict[str, Any] = Field(description="As its kind of trial stores it.")
+    response: float | None = Field(description="The answer on the scale, of kinds that have one.")
+    expected_response: int | None
+    rt: float | None
+    comment: str | None
+    method: str
+    verdict: str
+    verdict_rule: str
+    key_to_first_frame_ms: float | None
+    frames_drawn: int | None
+    frames_late: int | None
+    frames_missing: int | None
+    longest_gap_ms: float | None
+    focus_lost: bool | None
+    drawn: list[list[float]] | None
+    saved_at: datetime
+
+
+class TimelineEvent(BaseModel):
+    """Something that happened around the trials."""
+
+    type: str
+    at_client: datetime | None
+    received_at: datetime
+    data: VisibleObject
+
+
+class TimelineForm(BaseModel):
+    """The answers of one form."""
+
+    form: str
+    answers: VisibleObject
+    saved_at: datetime
+
+
+class TimelineCalibration(BaseModel):
+    """One size calibration."""
+
+    model_config = ConfigDict(from_attributes=True)
+    px_per_mm: float
+    method: str
+    viewing_distance_mm: float | None
+    zoom: float
+    saved_at: datetime
+    occasion: str
+    repeats: int | None
+    spread_percent: float | None
+    ruler_check: str | None
+    distance_method: str | None
+    distance_spread_mm: float | None
+    distance_typed_mm: float | None
+    recheck_percent: float | None
+
+
+class Timeline(BaseModel):
+    """One run, complete."""
+
+    summary: RunSummary
+    device: VisibleObject
+    consented_at: datetime | None
+    trials: list[TimelineTrial]
+    events: list[TimelineEvent]
+    forms: list[TimelineForm]
+    calibrations: list[TimelineCalibration]
+
+
+# A run's trials as they were shown, for the page that plays them back.
+
+
+class ReplayedClip(BaseModel):
+    """A clip of a trial, with what gives its size on the participant's screen."""
+
+    clip_sha256: str
+    clip_url: str
+    cell: str
+    exemplar: int
+    frames: int
+    fps: float
+    width_px: int
+    height_px: int
+    width_mm: float | None
+    inter_ocular_px: float | None
+
+
+class FrameLog(BaseModel):
+    """What was drawn of one clip of a view."""
+
+    role: Role
+    clip_sha256: str
+    drawn: list[tuple[int, float]] = Field(
+        description="Index and time in ms since the view's start key of every drawn frame."
+    )
+
+
+class ReplayedView(BaseModel):
+    """One view: what each clip's log says was drawn when, in ms since the view's start key."""
+
+    number: int
+    from_answer: bool = Field(
+        description="True where the run is older than the ledger of views: rebuilt from the answer's log."
+    )
+    started_at_client: datetime | None
+    ended_at_client: datetime | None
+    outcome: Outcome | None = Field(description="Null where the view was left open, or is rebuilt.")
+    screen: VisibleObject = Field(description="Window and screen at the view's start.")
+    showings: list[ViewShowing] | None
+    clips: list[FrameLog]
+    disturbances: dict[str, int] = Field(description="How often each disturbed this view.")
+
+
+class ReplayedPlay(BaseModel):
+    """One play of a trial: its views, its answer and the verdict; no answer where the page never sent one."""
+
+    play: int
+    px_per_mm: float | None = Field(description="CSS pixels per mm by the calibration that was in force.")
+    views: list[ReplayedView]
+    answer: dict[str, Any] | None = Field(description="As its kind of trial stores it.")
+    rt: float | None = Field(description="From the clip's last frame to the answer, ms.")
+    rt_from_first_frame: float | None
+    answered_at_client: datetime | None
+    comment: str | None
+    method: str | None
+    verdict: str | None
+    verdict_rule: str
+    refresh_rate_hz: float | None
+    device_pixel_ratio: float | None
+
+
+class ReplayedEvent(BaseModel):
+    """Something that happened around a trial, by the participant's clock."""
+
+    type: str
+    at_client: datetime
+    data: VisibleObject
+
+
+class ReplayedTrial(BaseModel):
+    """One trial with all its plays."""
+
+    trial_index: int
+    clips: list[ReplayedClip] = Field(description="Every clip that a view names or the trial was assigned.")
+    expected_response: int | None
+    plays: list[ReplayedPlay]
+    events: list[ReplayedEvent]
+
+
+class ClipInRole(BaseModel):
+    """Which clip a trial was assigned in which role."""
+
+    role: Role
+    cell: str
+    exemplar: int
+
+
+class ReplayableTrial(BaseModel):
+    """One line of the list of trials."""
+
+    trial_index: int
+    kind: str
+    block: int
+    block_label: str
+    clips: list[ClipInRole]
+    plays: int
+    views: int
+    verdict: str | None = Field(description="Of the last play; null without an answer.")
+
+
+class Replay(BaseModel):
+    """A run that can be played back, and what its trials looked like."""
+
+    run: str
+    participant: str
+    origin: str
+    language: str
+    erased: bool
+    trial: AnyPage
+    display: Display
+    trials: list[ReplayableTrial]

@@ -10,8 +10,10 @@ from typing import TypedDict
 from sqlalchemy.orm import Session
 
 from experiments.trials.scales import RatedScale, scale_called, scales_of
-from server.clock import now
+from server.core.values import now
 from server.models import Study, StudyVersion
+from server.participation.tallies import RT_MS
+from server.participation.tally_pools import PooledTally, pooled
 from server.results import summary
 from server.results.repository import Pool, clips_of
 from server.results.schemas import (
@@ -25,8 +27,6 @@ from server.results.schemas import (
     TimeBin,
 )
 from server.studies.lookup import definition_of
-from server.tallies.pools import PooledTally, pooled
-from server.tallies.tally import RT_MS
 
 MAX_BINS = 20
 ROUNDING = 1e-9

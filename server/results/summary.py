@@ -1,12 +1,16 @@
-"""Pure functions behind the results page: marginal means with within-participant error bars."""
+"""Pure functions behind the results page: marginal means and mean traces with their intervals."""
 
 import math
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from statistics import NormalDist, fmean, stdev
 from typing import NamedTuple
 
 from experiments.error_bars import within_participant_errors
+
+# Pure functions behind the results page: marginal means with within-participant error bars.
 
 
 @dataclass(frozen=True)
@@ -105,3 +109,109 @@ def _collapse(those: Alike, places: Sequence[int]) -> dict[tuple[str, ...], Sequ
         else [sum(values) / len(of) for values in zip(*(columns[one] for one in of), strict=True)]
         for key, of in members.items()
     }
+
+
+# Pure functions behind the results of continuous ratings: mean traces over people, with their intervals.
+
+MAX_POINTS = 300
+"""Points of a trace that a figure on a page can show."""
+COVERAGE = 0.95
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One person's play of one clip: values `step_s` apart from the clip's first frame."""
+
+    run: int
+    cell: str
+    step_s: float
+    values: Sequence[float]
+
+
+@dataclass(frozen=True)
+class CellTrace:
+    """Mean of a cell over people, each person's plays averaged before; intervals are None of one person.
+
+    Attributes
+    ----------
+    times_s, mean, low, high : list of float
+        A value a point; at most `MAX_POINTS`, evenly spaced.
+    level : float
+        Mean over the whole trace.
+    left_out : int
+        Traces of another sampling rate than the cell's first.
+    """
+
+    cell: str
+    people: int
+    traces: int
+    left_out: int
+    times_s: list[float]
+    mean: list[float]
+    low: list[float] | None
+    high: list[float] | None
+    level: float
+
+
+def cell_trace(traces: Sequence[Trace]) -> CellTrace:
+    """The mean trace of one cell, as long as the shortest of its traces; at least one is needed."""
+    first = traces[0]
+    alike = [one for one in traces if math.isclose(one.step_s, first.step_s, rel_tol=1e-6)]
+    samples = min(len(one.values) for one in alike)
+    every = range(0, samples, -(-samples // MAX_POINTS))
+    of_run: dict[int, list[Trace]] = {}
+    for one in alike:
+        of_run.setdefault(one.run, []).append(one)
+    people = [[fmean(one.values[step] for one in mine) for step in every] for mine in of_run.values()]
+    columns = list(zip(*people, strict=True))
+    mean = [fmean(column) for column in columns]
+    half = [half_width(column) for column in columns] if len(people) > 1 else None
+    return CellTrace(
+        cell=first.cell,
+        people=len(people),
+        traces=len(alike),
+        left_out=len(traces) - len(alike),
+        times_s=[round(step * first.step_s, 4) for step in every],
+        mean=_rounded(mean),
+        low=None if half is None else _rounded(m - h for m, h in zip(mean, half, strict=True)),
+        high=None if half is None else _rounded(m + h for m, h in zip(mean, half, strict=True)),
+        level=fmean(mean),
+    )
+
+
+def half_width(values: Sequence[float]) -> float:
+    """Half the 95% t interval of a mean."""
+    return student_t(len(values) - 1) * stdev(values) / math.sqrt(len(values))
+
+
+def _rounded(values: Iterable[float]) -> list[float]:
+    return [round(value, 4) for value in values]
+
+
+@lru_cache(maxsize=1024)
+def student_t(df: int) -> float:
+    """The number t with P(-t < T < t) = 0.95 for Student's t with `df` degrees of freedom, to 1e-4.
+
+    With theta = atan(t / sqrt(df)), P is a finite sum for whole `df` (Abramowitz & Stegun 1964, 26.7.3 and
+    26.7.4), solved by bisection; beyond 200 by z + (z^3 + z) / (4 df) (26.7.5).
+    """
+    if df > 200:
+        z = NormalDist().inv_cdf((1.0 + COVERAGE) / 2.0)
+        return z + (z**3 + z) / (4.0 * df)
+    low, high = 0.0, 20.0
+    for _ in range(60):
+        middle = (low + high) / 2.0
+        low, high = (middle, high) if _within(middle, df) < COVERAGE else (low, middle)
+    return high
+
+
+def _within(t: float, df: int) -> float:
+    theta = math.atan(t / math.sqrt(df))
+    sine, cosine = math.sin(theta), math.cos(theta)
+    odd = df % 2
+    term, total = (cosine if odd else 1.0), 0.0
+    # Terms of the sum: cos^k, k from 1 (odd df) or 0, each with its product of k / (k + 1).
+    for power in range(odd, df - 1, 2):
+        total += term
+        term *= cosine**2 * (power + 1.0) / (power + 2.0)
+    return 2.0 / math.pi * (theta + sine * total) if odd else sine * total

@@ -16,16 +16,17 @@ from experiments.schema.canonical import definition_sha256
 from server.accounts.audit import record
 from server.accounts.identity import OPERATOR
 from server.cli_common import migrated_services, out, stored_services
-from server.clock import now
 from server.context import Services
+from server.core.values import now
 from server.models import Link, Study, StudyVersion
 from server.studies import repository
-from server.studies.importing import (
+from server.studies.creation import (
     add_version,
     check_against_design,
     check_name,
     create_study,
     notes_of,
+    planned_experiment,
     store_clips,
 )
 from server.studies.launch_checks import refuse_if_live, refuse_unready
@@ -37,11 +38,10 @@ from server.studies.links import (
     make_links,
     numbered_labels,
     prepared_links,
+    signing,
 )
-from server.studies.links_repository import links_of
 from server.studies.lookup import active_version, find_study, must_not_be_archived
-from server.studies.planned import planned_experiment
-from server.studies.signing import signing
+from server.studies.repository import links_of
 
 study_app = command_group("Studies on this server.")
 link_app = command_group("Links for participants.")

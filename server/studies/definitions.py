@@ -11,7 +11,9 @@ from experiments.load import DefinitionError, toml_data
 from experiments.trials import KINDS
 from experiments.trials.counts import block_sizes, expected_minutes, trials_per_participant
 from server.accounts.identity import Identity
-from server.studies.definition_schemas import (
+from server.studies.creation import planned_experiment
+from server.studies.lookup import find_study
+from server.studies.schemas import (
     BlockOut,
     Checked,
     DesignOut,
@@ -22,8 +24,6 @@ from server.studies.definition_schemas import (
     LevelOut,
     ProblemOut,
 )
-from server.studies.lookup import find_study
-from server.studies.planned import planned_experiment
 from server.studies.series import judged
 from server.studies.toml_edit import with_data
 

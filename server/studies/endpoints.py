@@ -1,33 +1,60 @@
-"""Studies on the dashboard."""
+"""Studies on the dashboard: their life cycle and their links."""
 
-from fastapi import APIRouter
+from datetime import timedelta
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query, Response
 from fastapi.responses import PlainTextResponse
 
-from server.accounts.permission import Viewer, Writer
-from server.context import ServicesDep
-from server.errors import ERROR_RESPONSES
-from server.numbers import Number
-from server.studies import creation, definitions, service
-from server.studies.clip_schemas import ClipOut
-from server.studies.definition_schemas import (
+from experiments.spreadsheet import guarded_table
+from server.accounts.audit import record
+from server.accounts.identity import Myself, Viewer, Writer
+from server.accounts.workspaces import Uploader
+from server.context import Services, ServicesDep
+from server.core.errors import ERROR_RESPONSES
+from server.core.values import Number, now
+from server.models import Link
+from server.studies import creation, definitions, series, service
+from server.studies.launch_checks import launch_checks, refuse_recruiter
+from server.studies.links import (
+    LinkOptions,
+    link_in_use,
+    link_url,
+    links_with_runs,
+    make_links,
+    numbered_labels,
+    page_of_links,
+    prepared_links,
+    signing,
+    withdraw,
+)
+from server.studies.lookup import find_study
+from server.studies.schemas import (
+    ArchiveStudy,
+    ChangeSettings,
+    ChangeStatus,
     Checked,
+    ClipOut,
+    CloneStudy,
+    Comparison,
     DefinitionText,
     EditDefinition,
     EditedDefinition,
     JudgedEdit,
-)
-from server.studies.launch_checks import launch_checks
-from server.studies.schemas import (
-    ChangeSettings,
-    ChangeStatus,
+    Label,
     LaunchCheck,
+    LinkOut,
+    LinkPage,
+    NewLinks,
     NewStudy,
     NewVersion,
     ShippedExperiment,
+    Signing,
     StudyDetail,
     StudySummary,
 )
-from server.workspaces.access import Uploader
+
+# Studies on the dashboard.
 
 router = APIRouter(prefix="/api/admin", tags=["studies"], responses=ERROR_RESPONSES)
 
@@ -127,3 +154,140 @@ def list_clips(services: ServicesDep, identity: Viewer, study: str) -> list[Clip
     """Every clip of the active version with the closure curve it shows."""
     with services.database.read() as session:
         return service.clips(session, study, identity)
+
+
+# A study's life cycle on the dashboard: copies, the archive, comparisons of versions.
+
+life_router = APIRouter(prefix="/api/admin/studies/{study}", tags=["studies"], responses=ERROR_RESPONSES)
+
+
+@life_router.post("/copies", status_code=201)
+def clone_study(services: ServicesDep, identity: Writer, study: str, body: CloneStudy) -> StudyDetail:
+    """Copy a version's declaration and clips into a new draft; links, quota and recruiter are not copied."""
+    with services.database.write() as session:
+        service.clone_study(session, study, body, identity)
+    with services.database.read() as session:
+        return service.detail(session, body.name, identity)
+
+
+@life_router.put("/archive")
+def archive_study(services: ServicesDep, identity: Writer, study: str, body: ArchiveStudy) -> StudyDetail:
+    """Put a draft or closed study into the archive, where it can be read but not changed, or take it out."""
+    with services.database.write() as session:
+        service.archive_study(session, study, body, identity)
+    with services.database.read() as session:
+        return service.detail(session, study, identity)
+
+
+@life_router.get("/comparison")
+def compare_versions(
+    services: ServicesDep,
+    identity: Viewer,
+    study: str,
+    old: Number,
+    new: Number,
+    other: Annotated[str | None, Query(description="The study that `old` is a version of.")] = None,
+) -> Comparison:
+    """What differs between two versions: keys of the declaration, word by word, and clips."""
+    with services.database.read() as session:
+        return series.compare_versions(session, (other or study, old), (study, new), identity)
+
+
+# Links on the dashboard.
+
+link_router = APIRouter(prefix="/api/admin/studies/{study}/links", tags=["links"], responses=ERROR_RESPONSES)
+
+
+Limit = Annotated[int, Query(ge=1, le=1000)]
+LINKS_READ_AT_ONCE = 1000
+_SHOWN = ("kind", "label", "group_name", "quota", "expires_at", "created_at", "recruiter")
+
+
+def _link_out(services: Services, row: Link | dict[str, Any], runs: int = 0, complete: int = 0) -> LinkOut:
+    values = row if isinstance(row, dict) else vars(row)
+    own = {name: values[name] for name in _SHOWN}
+    url = link_url(services.settings.public_url, services.settings.key, values["public_id"])
+    return LinkOut(id=values["public_id"], url=url, runs=runs, complete=complete, **own)
+
+
+@link_router.get("")
+def list_links(
+    services: ServicesDep, identity: Writer, study: str, after: str | None = None, limit: Limit = 100
+) -> LinkPage:
+    """The links of a study in the order they were made, a page at a time: go on with `after` = `next`."""
+    with services.database.read() as session:
+        known = find_study(session, study, identity, "run")
+        page = page_of_links(session, known, after, limit)
+        return LinkPage(
+            links=[_link_out(services, link, *runs) for link, runs in page.links],
+            total=page.total,
+            next=page.next,
+        )
+
+
+@link_router.post("", status_code=201)
+def create_links(services: ServicesDep, identity: Writer, study: str, body: NewLinks) -> list[LinkOut]:
+    """Make a general or preview link, or many personal ones: by their labels, or `count` numbered ones."""
+    labels = [body.label]
+    if body.kind == "personal":
+        labels = body.labels or numbered_labels(body.label, body.count)
+    options = LinkOptions(
+        body.kind,
+        group_name=body.group,
+        quota=body.quota,
+        expires_at=now() + timedelta(days=body.days) if body.days else None,
+        recruiter=body.recruiter.model_dump() if body.recruiter else None,
+        created_by=identity.account_id,
+    )
+    rows = prepared_links(services.settings.key, options, labels)
+    with services.database.write() as session:
+        known = find_study(session, study, identity, "run")
+        refuse_recruiter(known, body.recruiter, "Links")
+        make_links(session, known, body.kind, body.group, rows)
+        record(session, identity, "links made", "study", study, links=body.kind, number=len(rows))
+    return [_link_out(services, row) for row in rows]
+
+
+@link_router.get("/signing")
+def get_signing(
+    services: ServicesDep,
+    identity: Myself,
+    study: str,
+    secret_name: Label | None = None,
+    link: Label | None = None,
+) -> Signing:
+    """The secret for signed addresses, with examples; for owners alone, each look is in the audit log.
+
+    Where a link has a recruiter of its own, give its id as `link`; the study's recruiter counts without.
+    """
+    with services.database.write() as session:
+        known = find_study(session, study, identity, "own")
+        of_link = None if link is None else link_in_use(session, known, link)
+        return signing(session, services.settings.key, known, secret_name, identity, of_link)
+
+
+@link_router.get("/personal.csv", response_class=Response)
+def download_personal_links(services: ServicesDep, identity: Writer, study: str) -> Response:
+    """The personal links as CSV: label, link, runs, complete, group."""
+    rows: list[tuple[Any, ...]] = [("label", "url", "runs", "complete", "group")]
+    with services.database.read() as session:
+        known = find_study(session, study, identity, "run")
+        for link, runs, complete in links_with_runs(session, known, LINKS_READ_AT_ONCE, "personal"):
+            url = link_url(services.settings.public_url, services.settings.key, link.public_id)
+            rows.append((link.label, url, runs, complete, link.group_name))
+    with services.database.write() as session:
+        record(session, identity, "personal links downloaded", "study", study)
+    headers = {"content-disposition": f'attachment; filename="{study}-links.csv"'}
+    return Response(guarded_table(rows), media_type="text/csv; charset=utf-8", headers=headers)
+
+
+@link_router.delete("/{link}", status_code=204)
+def revoke_link(services: ServicesDep, identity: Writer, study: str, link: str) -> None:
+    """Withdraw a link; runs that began with it go on."""
+    with services.database.write() as session:
+        known = find_study(session, study, identity, "run")
+        withdrawn = withdraw(session, known, link)
+        # A personal link's label is a person's name, which an erasure could not take out of the log's chain.
+        record(
+            session, identity, "link withdrawn", "study", study, link=withdrawn.public_id, kind=withdrawn.kind
+        )

@@ -14,12 +14,12 @@ from experiments.definition.placeholders import unfilled, untranslated
 from experiments.level_leaks import reported_leaks
 from experiments.manifest import Manifest
 from server.accounts.identity import Identity
-from server.errors import Conflict
-from server.evidence.service import guessed_throughout
-from server.evidence.verdict import ENOUGH_BY_CHANCE
+from server.core.errors import Conflict
 from server.models import Study, StudyVersion
-from server.participants.recruiter import Recruiter, stored_recruiter
-from server.studies import links_repository
+from server.participation.evidence import ENOUGH_BY_CHANCE
+from server.participation.judgement import guessed_throughout
+from server.participation.recruiter import Recruiter, stored_recruiter
+from server.studies import repository
 from server.studies.lookup import active_version, definition_of, find_study, version_numbered
 from server.studies.schemas import LaunchCheck
 
@@ -88,8 +88,8 @@ def _to_launch(session: Session, study: Study, version: StudyVersion) -> ToLaunc
         version,
         definition_of(version),
         stored_recruiter(study.recruiter) if study.recruiter else None,
-        [stored_recruiter(declared) for declared in links_repository.recruiters_of_links(session, study)],
-        links_repository.has_personal_links(session, study),
+        [stored_recruiter(declared) for declared in repository.recruiters_of_links(session, study)],
+        repository.has_personal_links(session, study),
     )
 
 

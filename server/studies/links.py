@@ -1,21 +1,27 @@
-"""Links into a study. A link's token is derived from the server's key, so that it can be shown again."""
+"""Links into a study, and how the recruiter's side signs its addresses."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, Literal, NamedTuple
+from urllib.parse import urlencode
 
 from sqlalchemy.orm import Session
 
 from experiments.assignment.groups import names
 from experiments.definition import Experiment
 from experiments.errors import did_you_mean
-from server.clock import now
-from server.errors import Invalid, NotFound
+from server.accounts.audit import record
+from server.accounts.identity import Identity
+from server.core.errors import Invalid, NotFound
+from server.core.values import derived_token, hash_token, new_public_id, now
 from server.models import Link, Study
-from server.studies import links_repository as repository
+from server.participation.recruiter import signature_of, signing_secret, stored_recruiter
+from server.studies import repository
 from server.studies.lookup import active_definition, must_not_be_archived
-from server.tokens import derived_token, hash_token, new_public_id
+from server.studies.schemas import Signing
+
+# Links into a study. A link's token is derived from the server's key, so that it can be shown again.
 
 LinkKind = Literal["general", "personal", "preview"]
 PURPOSE = "link"
@@ -161,4 +167,53 @@ def general_links(session: Session, key: bytes, study: Study) -> list[Link]:
 def _general_link(session: Session, key: bytes, study: Study, group: str) -> Link:
     return repository.first_general_link(session, study, group) or create_link(
         session, key, study, "general", label=group or "general", group_name=group
+    )
+
+
+# How the recruiter's side signs addresses of a study, for its owners.
+
+EXAMPLE_ID = "P-0001"
+USUAL_PARAMETER = "signature"
+PYTHON = (
+    "import hashlib, hmac\n\n"
+    'secret = bytes.fromhex("{secret}")\n'
+    'print(hmac.new(secret, "{identifier}".encode(), hashlib.sha256).hexdigest())'
+)
+SHELL = "printf %s '{identifier}' | openssl dgst -sha256 -mac HMAC -macopt hexkey:{secret}"
+
+
+def signing(
+    session: Session,
+    key: bytes,
+    study: Study,
+    name: str | None,
+    identity: Identity | None,
+    link: Link | None = None,
+) -> Signing:
+    """The secret of a study with examples of its use; that somebody looked is written down.
+
+    Parameters
+    ----------
+    name : str or None
+        Of the secret; that of the recruiter where None.
+    link : Link, optional
+        Whose recruiter it is, where it has its own; the study's where None.
+    """
+    recruiter = stored_recruiter((link.recruiter if link else None) or study.recruiter)
+    used = recruiter.secret_name if name is None else name
+    record(session, identity, "signing secret read", "study", study.name, secret_name=used)
+    secret = signing_secret(key, study.pseudonym_key, used)
+    filled = {"secret": secret.hex(), "identifier": EXAMPLE_ID}
+    signature = signature_of(secret, EXAMPLE_ID)
+    parameter = recruiter.signature_parameter or USUAL_PARAMETER
+    return Signing(
+        declared=bool(recruiter.signature_parameter),
+        parameter=parameter,
+        secret_name=used,
+        secret=secret.hex(),
+        identifier=EXAMPLE_ID,
+        signature=signature,
+        query=urlencode({recruiter.id_name: EXAMPLE_ID, parameter: signature}),
+        python=PYTHON.format(**filled),
+        shell=SHELL.format(**filled),
     )

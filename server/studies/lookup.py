@@ -5,13 +5,12 @@ from sqlalchemy.orm import Session
 from experiments.definition import Experiment
 from experiments.errors import did_you_mean
 from experiments.schema.stored import load_stored
-from server.accounts.identity import Identity, NotAllowed, Operator
-from server.accounts.permission import SecondFactorNeeded
-from server.errors import Conflict, NotFound
+from server.accounts import workspace_repository as workspaces
+from server.accounts.identity import Identity, NotAllowed, Operator, SecondFactorNeeded
+from server.accounts.workspace_repository import ordered
+from server.core.errors import Conflict, NotFound
 from server.models import RIGHTS, Right, Study, StudyVersion
 from server.studies import repository
-from server.workspaces import repository as workspaces
-from server.workspaces.rights import ordered
 
 
 class UnknownStudy(NotFound):

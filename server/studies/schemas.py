@@ -1,17 +1,231 @@
-"""What the endpoints of studies take and give: new ones, versions, status and settings, the list."""
+"""What the endpoints of studies, definitions, clips and links take and give."""
 
 from datetime import datetime
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
 
 from experiments.definition import Experiment
+from experiments.source_video import FrameRate, SourceVideo
+from server.core.values import Number, RequestBody
 from server.models import Right
-from server.participants.recruiter import Recruiter
-from server.request_body import RequestBody
-from server.studies.clip_schemas import LevelsPattern, LevelsTable, OwnClips
-from server.studies.definition_schemas import DesignOut
-from server.studies.fields import Label, Revision, StudyName, TomlText
+from server.participation.recruiter import Recruiter, without_refused
+
+# Fields that several bodies of the study endpoints have.
+
+StudyName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,59}$")]
+TomlText = Annotated[str, StringConstraints(max_length=500_000)]
+Label = Annotated[str, StringConstraints(strip_whitespace=True, max_length=200)]
+Revision = Annotated[int, Field(ge=1, le=2**31 - 1, description="The revision this edit started from.")]
+
+
+# What the endpoints of definitions take and give: texts, their problems, what they expand to, edits.
+
+
+class DefinitionText(RequestBody):
+    """A definition to check."""
+
+    toml: TomlText
+
+
+class ProblemOut(BaseModel):
+    """One thing wrong in a definition."""
+
+    line: int | None
+    path: str
+    message: str
+
+
+class BlockOut(BaseModel):
+    """A block of the design."""
+
+    label: str
+    trials: int
+
+
+class LevelOut(BaseModel):
+    """A level of a factor."""
+
+    name: str
+    label: str
+
+
+class FactorOut(BaseModel):
+    """A factor and its levels."""
+
+    name: str
+    label: str
+    levels: list[LevelOut]
+
+
+class DesignOut(BaseModel):
+    """What a definition expands to."""
+
+    experiment: str
+    title: str
+    factors: list[FactorOut]
+    cells: int
+    exemplars: int
+    unique_clips: int
+    trials_per_participant: int
+    blocks: list[BlockOut]
+    expected_minutes: float
+    notes: list[str] = Field(description="Groups, and how often each clip or pair is expected to be shown.")
+    groups: list[str] = Field(description="Groups that links decide; empty where they decide none.")
+    turned_away: str = Field(description="Devices that can take no part, in a sentence; empty where all can.")
+
+
+class Checked(BaseModel):
+    """Whether a definition can be used, and what it expands to."""
+
+    problems: list[ProblemOut]
+    design: DesignOut | None
+
+
+class ChangeOut(BaseModel):
+    """One key of a definition that an edit changes."""
+
+    path: str
+    effect: Literal["wording", "measured"]
+    text: str = Field(description="The change in words.")
+
+
+class JudgedEdit(BaseModel):
+    """What saving an edited definition would do to the answers that are stored."""
+
+    changes: list[ChangeOut]
+    series: int = Field(description="Data series that answers to the edited definition would be of.")
+    present_series: int
+    runs: int = Field(description="Runs of the present series, previews aside.")
+    begins_series: bool = Field(
+        description="A new data series begins, and there are runs it is kept apart from."
+    )
+
+
+class EditDefinition(RequestBody):
+    """A definition's text, and what it shall say instead; without `data` the text is read only."""
+
+    toml: TomlText
+    data: dict[str, Any] | None = Field(default=None, description="The declaration as the TOML's tables.")
+
+
+class EditedDefinition(BaseModel):
+    """A definition as text and as data, with its problems, or what it expands to."""
+
+    toml: str
+    data: dict[str, Any] | None = Field(description="Null where the text is not TOML.")
+    problems: list[ProblemOut]
+    design: DesignOut | None
+
+
+# What the endpoints of clips take and give: uploads, levels of own clips, the clips of a study.
+
+
+class LevelsTable(RequestBody):
+    """A CSV with one row a clip: column `file`, then one column a factor; `exemplar` is optional."""
+
+    csv: Annotated[str, StringConstraints(max_length=2_000_000)]
+
+
+class LevelsPattern(RequestBody):
+    """A pattern that file names follow, such as `{character}_{speed}_{exemplar}.mp4`."""
+
+    pattern: Annotated[str, StringConstraints(min_length=3, max_length=300)]
+
+
+Template = Literal["rating", "slider", "sliders", "acr", "dcr", "pairs", "just_noticeable"]
+
+
+class OwnClips(RequestBody):
+    """What to ask about one's own clips, where no definition is given.
+
+    The template says what participants do; `low` and `high` are for rating and sliders alone.
+    """
+
+    template: Template = "rating"
+    title: Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=300)]
+    question: Label = "How natural was this clip?"
+    low: Label = "very unnatural"
+    high: Label = "very natural"
+
+
+class ClipOut(BaseModel):
+    """A clip of a study, with the curve it shows."""
+
+    clip_sha256: str
+    url: str
+    file: str
+    cell: str
+    levels: dict[str, str]
+    exemplar: int
+    profile: str
+    fps: float
+    frames: int
+    width_px: int
+    height_px: int
+    bytes: int
+    closure: list[float]
+    source: SourceVideo | None = Field(
+        description="What it was converted from, without its frame map; null where it is shown as it came."
+    )
+
+
+class UploadedFile(BaseModel):
+    """One file of an upload: what it is, or why it cannot be used."""
+
+    name: str
+    bytes: int
+    state: Literal["waiting", "ready", "refused"] = Field(
+        description="Waiting: it is still looked into, or converted."
+    )
+    sha256: str | None = Field(default=None, description="Of the clip.")
+    fps: float | None = None
+    frames: int | None = None
+    width_px: int | None = None
+    height_px: int | None = None
+    problem: str | None = Field(default=None, description="Why it cannot be used, and what to do.")
+    same_as: str | None = Field(default=None, description="An earlier file with the same bytes.")
+    source: SourceVideo | None = Field(
+        default=None, description="What the clip was converted from; null where the file is shown as it came."
+    )
+
+
+class UploadProgress(BaseModel):
+    """How far an upload has been looked into and converted."""
+
+    files: int
+    waiting: int
+    refused: int
+    left_out: int = Field(description="Files that are set aside; they are none of `files`.")
+
+
+class LeaveOut(RequestBody):
+    """Whether one file of an upload is left out of what is made of it."""
+
+    file: str = Field(max_length=300)
+    left_out: bool
+
+
+class AskFrameRate(RequestBody):
+    """The frame rate that clips are to have: one for all, or each its own."""
+
+    fps: FrameRate | None
+
+
+class UploadOut(BaseModel):
+    """An upload waiting to become a study; it is deleted after a day."""
+
+    id: str
+    files: list[UploadedFile]
+    waiting: int = Field(description="Files that are still looked into, or converted.")
+    fps: float | None = Field(description="Frames per second asked for; null: each clip its own.")
+    has_manifest: bool
+    left_out: list[str] = Field(description="Names of the files that are set aside; they can be put back.")
+    tables: list[str] = Field(description="Names of CSV files in the upload.")
+    suggested_pattern: str | None
+
+
+# What the endpoints of studies take and give: new ones, versions, status and settings, the list.
 
 
 class ShippedExperiment(BaseModel):
@@ -124,3 +338,131 @@ class StudyDetail(BaseModel):
     versions: list[VersionOut]
     series: list[SeriesOut]
     recruiter: dict[str, Any] | None
+
+
+# What the endpoints of a study's life cycle take and give: copies, the archive, comparisons.
+
+
+class CloneStudy(RequestBody):
+    """A copy of a study under a name of its own."""
+
+    name: StudyName
+    version: Number | None = Field(
+        default=None, description="The version to copy; the active one where none is given."
+    )
+    workspace: Annotated[str, StringConstraints(max_length=60)] | None = Field(
+        default=None,
+        description="Where the copy goes; needed where one may make no studies beside its source.",
+    )
+
+
+class ArchiveStudy(RequestBody):
+    """Put a study into the archive, or take it out."""
+
+    revision: Revision
+    archived: bool
+
+
+class Piece(BaseModel):
+    """Words of a text that stayed, went or came."""
+
+    kind: Literal["same", "gone", "new"]
+    text: str
+
+
+class KeyDifference(BaseModel):
+    """One key of the declaration that differs."""
+
+    path: str
+    effect: Literal["wording", "measured"]
+    pieces: list[Piece] = Field(description="The old value with what went from it and came to it.")
+
+
+class ClipDifference(BaseModel):
+    """A clip that one of the versions lacks, or that has other bytes in each."""
+
+    kind: Literal["gone", "new", "replaced"]
+    cell: str
+    exemplar: int
+    old_file: str | None
+    new_file: str | None
+
+
+class ComparedVersion(BaseModel):
+    """One side of a comparison."""
+
+    study: str
+    version: int
+    series: int
+    created_at: datetime
+    note: str
+
+
+class Comparison(BaseModel):
+    """What differs between two versions, of one study or of two."""
+
+    old: ComparedVersion
+    new: ComparedVersion
+    pooled: bool = Field(description="Whether both measure the same, by the same clips.")
+    keys: list[KeyDifference] = Field(description="Of the declaration, what is measured first.")
+    clips: list[ClipDifference] = Field(description="At most 200 of them.")
+    clips_differing: int
+    clips_same: int
+
+
+# What the endpoints of links take and give, and how addresses are signed.
+
+
+class Signing(BaseModel):
+    """The study's secret for signed addresses, and how the recruiter's side signs with it."""
+
+    declared: bool = Field(description="The recruiter declares that addresses are signed.")
+    parameter: str = Field(description="Address parameter of the signature.")
+    secret_name: str = Field(description="Another name makes another secret.")
+    secret: str = Field(description="64 hexadecimal digits; who has it can sign for anybody.")
+    identifier: str = Field(description="A participant's id, as an example.")
+    signature: str = Field(description="HMAC-SHA-256 of that id, with the secret as key.")
+    query: str = Field(
+        description="What is added to the link after `?` for that participant, percent-encoded."
+    )
+    python: str = Field(description="The same signature in Python.")
+    shell: str = Field(description="The same signature by OpenSSL.")
+
+
+class NewLinks(RequestBody):
+    """One general or preview link, or many personal ones: by their labels, or `count` numbered ones."""
+
+    kind: Literal["general", "personal", "preview"]
+    label: Label = ""
+    group: Annotated[str, StringConstraints(max_length=600)] = Field(
+        default="", description="Group of who comes by it, where links decide."
+    )
+    labels: list[Label] = Field(default=[], max_length=5000)
+    count: Annotated[int, Field(ge=1, le=5000)] = 1
+    quota: Annotated[int, Field(ge=1, le=1_000_000)] | None = None
+    days: Annotated[int, Field(ge=1, le=3650)] | None = None
+    recruiter: Annotated[Recruiter, AfterValidator(without_refused)] | None = None
+
+
+class LinkOut(BaseModel):
+    """A link into a study."""
+
+    id: str
+    kind: str
+    label: str
+    group_name: str = Field(description="Group of who comes by it; empty where links decide none.")
+    url: str
+    quota: int | None
+    expires_at: datetime | None
+    created_at: datetime
+    runs: int
+    complete: int
+    recruiter: dict[str, Any] | None
+
+
+class LinkPage(BaseModel):
+    """Links in the order they were made."""
+
+    links: list[LinkOut]
+    total: int
+    next: str | None = Field(description="Ask again with `after` = this; null at the end.")

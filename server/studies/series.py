@@ -1,16 +1,35 @@
-"""The data series of a study: versions that measure the same, and whose answers may be pooled."""
+"""The data series of a study: versions that measure the same; and two versions compared."""
+
+import json
+import re
+from collections.abc import Iterator
+from difflib import SequenceMatcher
+from itertools import groupby
+from operator import itemgetter
+from typing import Any, Literal
 
 from sqlalchemy.orm import Session
 
 from experiments.definition import Experiment
 from experiments.manifest import Manifest
-from experiments.schema.difference import changes_what_is_measured, difference
-from server.errors import NotFound
+from experiments.schema.difference import Change, changes_what_is_measured, difference
+from server.accounts.identity import Identity
+from server.core.errors import NotFound
 from server.models import Study, StudyVersion
 from server.studies import repository
-from server.studies.definition_schemas import ChangeOut, JudgedEdit
-from server.studies.lookup import active_version, definition_of
-from server.studies.schemas import SeriesOut
+from server.studies.lookup import active_version, definition_of, find_study, version_numbered
+from server.studies.schemas import (
+    ChangeOut,
+    ClipDifference,
+    ComparedVersion,
+    Comparison,
+    JudgedEdit,
+    KeyDifference,
+    Piece,
+    SeriesOut,
+)
+
+# The data series of a study: versions that measure the same, and whose answers may be pooled.
 
 
 def series_of(session: Session, study: Study) -> list[SeriesOut]:
@@ -84,3 +103,113 @@ def judged(session: Session, study: Study, experiment: Experiment) -> JudgedEdit
         runs=runs,
         begins_series=bool(runs) and series not in known,
     )
+
+
+# Two texts as one: words that stayed, went and came.
+
+Kind = Literal["same", "gone", "new"]
+MAX_WORDS = 4000
+"""Of both texts; longer ones are compared line by line, which takes time by their lines."""
+_WORD = re.compile(r"\s+|\w+|[^\w\s]")
+_LINE = re.compile(r"[^\n]*\n|[^\n]+")
+
+
+def word_difference(old: str, new: str) -> list[tuple[Kind, str]]:
+    """Pieces of `old` and `new` in reading order; what went stands before what came in its place.
+
+    Examples
+    --------
+    >>> word_difference("a fast clip", "a slow clip")
+    [('same', 'a '), ('gone', 'fast'), ('new', 'slow'), ('same', ' clip')]
+    """
+    before, after = _WORD.findall(old), _WORD.findall(new)
+    if len(before) + len(after) > MAX_WORDS:
+        before, after = _LINE.findall(old), _LINE.findall(new)
+    pieces = groupby(_pieces(before, after), key=itemgetter(0))
+    return [(kind, "".join(text for _, text in group)) for kind, group in pieces]
+
+
+def _pieces(before: list[str], after: list[str]) -> Iterator[tuple[Kind, str]]:
+    matcher = SequenceMatcher(None, before, after, autojunk=False)
+    for operation, start, end, new_start, new_end in matcher.get_opcodes():
+        if operation == "equal":
+            yield "same", "".join(before[start:end])
+            continue
+        if start < end:
+            yield "gone", "".join(before[start:end])
+        if new_start < new_end:
+            yield "new", "".join(after[new_start:new_end])
+
+
+# Two versions compared: keys of the declaration with their words, and clips.
+
+MAX_CLIPS_LISTED = 200
+
+Clips = dict[tuple[str, int], tuple[str, str]]
+"""(cell, exemplar) -> (SHA-256, file name)."""
+
+
+def compare_versions(
+    session: Session, old: tuple[str, int], new: tuple[str, int], identity: Identity
+) -> Comparison:
+    """What differs between two versions, each given by its study's name and its number."""
+    studies = {name: find_study(session, name, identity, "view") for name in dict.fromkeys((old[0], new[0]))}
+    before, after = (version_numbered(session, studies[name], number) for name, number in (old, new))
+    changes = difference(definition_of(before), definition_of(after))
+    old_clips, new_clips = (repository.clips_by_exemplar(session, version) for version in (before, after))
+    clips = list(_clips(old_clips, new_clips))
+    return Comparison(
+        old=_side(before),
+        new=_side(after),
+        pooled=not clips and not changes_what_is_measured(changes),
+        keys=[_key(change) for change in changes],
+        clips=clips[:MAX_CLIPS_LISTED],
+        clips_differing=len(clips),
+        clips_same=len(old_clips.keys() | new_clips.keys()) - len(clips),
+    )
+
+
+def _side(version: StudyVersion) -> ComparedVersion:
+    return ComparedVersion(
+        study=version.study.name,
+        version=version.number,
+        series=version.series,
+        created_at=version.created_at,
+        note=version.note,
+    )
+
+
+def _key(change: Change) -> KeyDifference:
+    pieces = word_difference(_said(change.before), _said(change.after))
+    return KeyDifference(
+        path=change.path, effect=change.effect, pieces=[Piece(kind=kind, text=text) for kind, text in pieces]
+    )
+
+
+def _said(value: Any) -> str:
+    """A value as it is read: texts as they are, nothing for what is not there."""
+    if value is None:
+        return ""
+    return value if isinstance(value, str) else json.dumps(_given(value), ensure_ascii=False, indent=1)
+
+
+def _given(value: Any) -> Any:
+    """A value without the keys of its tables that were left out."""
+    if isinstance(value, dict):
+        given = {key: _given(item) for key, item in value.items()}
+        return {key: item for key, item in given.items() if item not in (None, {}, [])}
+    return [_given(item) for item in value] if isinstance(value, list) else value
+
+
+def _clips(old: Clips, new: Clips) -> Iterator[ClipDifference]:
+    for position in dict.fromkeys((*old, *new)):
+        before, after = old.get(position), new.get(position)
+        if before is not None and after is not None and before[0] == after[0]:
+            continue
+        yield ClipDifference(
+            kind="new" if before is None else "gone" if after is None else "replaced",
+            cell=position[0],
+            exemplar=position[1],
+            old_file=before[1] if before else None,
+            new_file=after[1] if after else None,
+        )

@@ -8,16 +8,16 @@ from experiments import design
 from experiments.manifest import Manifest
 from server.accounts.audit import record
 from server.accounts.identity import Identity
-from server.clips.address import clip_address
-from server.clock import now
-from server.errors import Conflict, Invalid
+from server.accounts.workspace_repository import studies_opened_to
+from server.accounts.workspaces import Standing, place_of_copy, standing_of, standing_on
+from server.core.errors import Conflict, Invalid
+from server.core.storage import clip_address
+from server.core.values import now
 from server.models import Study, StudyVersion, VersionClip
-from server.participants.recruiter import Recruiter, without_refused
+from server.participation.recruiter import Recruiter, without_refused
 from server.studies import repository
-from server.studies.clip_schemas import ClipOut
+from server.studies.creation import add_version, create_study, for_edit, size_notes
 from server.studies.definitions import design_out
-from server.studies.edits import for_edit
-from server.studies.importing import size_notes
 from server.studies.launch_checks import refuse_recruiter, refuse_unready
 from server.studies.lookup import (
     active_version,
@@ -27,10 +27,16 @@ from server.studies.lookup import (
     study_with_rights,
     version_numbered,
 )
-from server.studies.schemas import ChangeSettings, StudyDetail, StudySummary, VersionOut
+from server.studies.schemas import (
+    ArchiveStudy,
+    ChangeSettings,
+    ClipOut,
+    CloneStudy,
+    StudyDetail,
+    StudySummary,
+    VersionOut,
+)
 from server.studies.series import series_of
-from server.workspaces.repository import studies_opened_to
-from server.workspaces.service import Standing, standing_of, standing_on
 
 ALLOWED = {
     "draft": ("pilot", "live"),
@@ -182,4 +188,40 @@ def _clip_out(row: VersionClip, told: dict[str, Any]) -> ClipOut:
         bytes=clip.bytes,
         closure=told.get("closure", []),
         source=(source := told.get("source")) and source | {"frame_map": ()},
+    )
+
+
+# A study copied, put into the archive and taken out.
+
+
+def clone_study(session: Session, name: str, order: CloneStudy, identity: Identity) -> None:
+    """A new draft with declaration and clips of one version; nothing of its people comes along.
+
+    Links, quota and recruiter stay behind too: completion codes belong to one study.
+    """
+    source = find_study(session, name, identity, "edit")
+    version = version_numbered(session, source, order.version or source.active_version)
+    home = place_of_copy(session, source, identity, order.workspace)
+    copy = create_study(session, order.name, definition_of(version), identity, home)
+    note = f"copied from {source.name}, version {version.number}"
+    manifest = Manifest.model_validate(version.manifest)
+    add_version(session, copy, version.definition_toml, definition_of(version), manifest, identity, note)
+    copy.revision = 1
+
+
+def archive_study(session: Session, name: str, order: ArchiveStudy, identity: Identity) -> None:
+    """Into the archive or out of it; Conflict while people can take part."""
+    study = for_edit(session, name, order.revision, identity, "run", archived=True)
+    if order.archived == (study.archived_at is not None):
+        return
+    if order.archived and study.status in ("pilot", "live"):
+        raise Conflict(f"A study that is {study.status} cannot go into the archive; close it first.")
+    study.archived_at = now() if order.archived else None
+    study.revision += 1
+    record(
+        session,
+        identity,
+        "study archived" if order.archived else "study taken out of the archive",
+        "study",
+        name,
     )

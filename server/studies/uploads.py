@@ -1,20 +1,33 @@
 """Uploads of own clips: streamed to a folder of their own, unpacked with limits, and what became of them."""
 
+import lzma
+import os
+import re
 import secrets
 import shutil
 import time
+import zipfile
+import zlib
+from collections import Counter
+from collections.abc import Iterator
 from contextlib import suppress
-from pathlib import Path
-from typing import IO
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from tempfile import TemporaryDirectory
+from typing import IO, Protocol
+from urllib.parse import quote
 
-from experiments.manifest import MANIFEST_NAME
+from sqlalchemy.orm import Session
+
+from experiments.bounded_zip import BoundedZip, ZipListError
+from experiments.files import whole_file
+from experiments.manifest import MANIFEST_NAME, Manifest
 from experiments.own_clips import check_names, one_form, suggest_pattern
-from server.errors import Invalid, NotFound
-from server.studies.clip_schemas import UploadedFile, UploadOut, UploadProgress
-from server.studies.left_out import files_aside
-from server.studies.packed import MAX_FILES, unpack
-from server.studies.upload_quota import Quota
-from server.studies.uploaded_file import UploadTooLarge, copy, safe_name
+from experiments.source_video import SourceVideo
+from server.accounts.identity import Identity
+from server.core.errors import ApiError, Invalid, NotFound
+from server.studies.lookup import find_study
+from server.studies.schemas import UploadedFile, UploadOut, UploadProgress
 from server.transcoding.records import (
     ask_rate,
     asked_rate,
@@ -24,7 +37,299 @@ from server.transcoding.records import (
     videos_of,
     write_record,
 )
-from video_conversion.prepared import Prepared, clip_name
+from video_conversion.prepared import VIDEO_ENDINGS, Prepared, clip_name
+
+# One file that is uploaded: a name that leads nowhere else, and bytes up to a limit.
+
+TABLES = (".csv", ".json")
+CHUNK_BYTES = 1 << 20
+NAME = re.compile(r"\w[^\x00-\x1f\x7f]*")
+
+
+class UploadTooLarge(ApiError):
+    """The upload is larger than this server takes."""
+
+    status = 413
+    code = "too_large"
+
+
+def safe_name(path: str) -> str:
+    """The file's own name; Invalid where the path climbs out or is not a clip or table."""
+    pure = PurePosixPath(path.replace("\\", "/"))
+    if pure.is_absolute() or ".." in pure.parts or not pure.name or pure.name.startswith("."):
+        raise Invalid(f"The file '{path[:100]}' has a path that is not allowed; expected plain file names.")
+    if pure.suffix.lower() not in VIDEO_ENDINGS + TABLES:
+        raise Invalid(
+            f"The file '{pure.name[:100]}' is neither a video ({', '.join(VIDEO_ENDINGS)}) nor a CSV table."
+        )
+    if len(pure.name) > 150:
+        raise Invalid(f"The file name '{pure.name[:100]}...' is too long; 150 characters are the most.")
+    name = one_form(pure.name)
+    if not NAME.fullmatch(name):
+        raise Invalid(f"The file name '{name[:100]}' should begin with a letter or digit; rename the file.")
+    return name
+
+
+class Room(Protocol):
+    """Bytes that there is room for."""
+
+    def room(self) -> int:
+        """Those that may come still."""
+        ...
+
+    def check(self) -> None:
+        """Look again, once they have come."""
+        ...
+
+    def full(self) -> UploadTooLarge:
+        """What is said where more come."""
+        ...
+
+
+def copy(source: IO[bytes], target: Path, limit: int, called: str = "", within: Room | None = None) -> None:
+    """Store what comes, as a whole or not at all.
+
+    Raises
+    ------
+    UploadTooLarge
+        It is larger than `limit`, said by the name `called`, or than the room.
+    """
+    written, room = 0, None if within is None else within.room()
+    with whole_file(target) as temporary, temporary.open("wb") as stream:
+        while piece := source.read(CHUNK_BYTES):
+            written += len(piece)
+            if written > limit:
+                raise UploadTooLarge(
+                    f"'{called or target.name}' is larger than the {limit >> 20} MiB accepted."
+                )
+            if within is not None and room is not None and written > room:
+                raise within.full()
+            stream.write(piece)
+        if within is not None:
+            stream.flush()
+            within.check()
+
+
+# What the uploads of one account may hold together; each is removed after a day.
+
+MAX_UPLOADS = 200
+"""Of an account within a day."""
+
+
+@dataclass(frozen=True)
+class Quota:
+    """The room of one account.
+
+    It is looked at before bytes come and again once they are on the disk, before they get their name: of
+    several that come at once, by whatever worker, the last to look sees the others.
+
+    Attributes
+    ----------
+    folder : Path
+        Of every account's uploads.
+    account : int
+        Its number.
+    bytes : int
+        That its uploads may hold together.
+    """
+
+    folder: Path
+    account: int
+    bytes: int
+
+    def check(self, further: int = 0) -> None:
+        """UploadTooLarge where the account holds more than it may, or `further` uploads were too many."""
+        self._room(further)
+
+    def room(self) -> int:
+        """Bytes that may come still; UploadTooLarge where there are none."""
+        left = self._room(0)
+        if not left:
+            raise self._full(self._held())
+        return left
+
+    def full(self) -> UploadTooLarge:
+        """What is said where more comes than there is room for."""
+        return self._full(self._held())
+
+    def _room(self, further: int) -> int:
+        held = self._held()
+        if held > self.bytes or (further and len(self._own()) + further > MAX_UPLOADS):
+            raise self._full(held)
+        return self.bytes - held
+
+    def _own(self) -> list[Path]:
+        folders = self.folder.iterdir() if self.folder.is_dir() else ()
+        return [one for one in folders if sender(one) == str(self.account)]
+
+    def _held(self) -> int:
+        # What is made beside the files, and what is set aside, takes room too.
+        return sum(size for one in self._own() for size in _sizes(one))
+
+    def _full(self, held: int) -> UploadTooLarge:
+        return UploadTooLarge(
+            f"Your uploads of the last day hold {held / 1e9:.1f} GB in {len(self._own())} folders; at most "
+            f"{self.bytes / 1e9:.1f} GB in {MAX_UPLOADS} are kept. "
+            "Each is removed after a day; studies that were made of them stay."
+        )
+
+
+def _sizes(upload: Path) -> Iterator[int]:
+    # Files and folders may go at any moment: the worker's own, and those that become a study.
+    try:
+        with os.scandir(upload) as entries:
+            for entry in entries:
+                yield from (
+                    _sizes(Path(entry.path)) if entry.is_dir(follow_symlinks=False) else _folder_size(entry)
+                )
+    except (FileNotFoundError, NotADirectoryError):
+        return
+
+
+def _folder_size(entry: os.DirEntry[str]) -> Iterator[int]:
+    with suppress(FileNotFoundError):
+        yield entry.stat(follow_symlinks=False).st_size
+
+
+# Zips of own clips: unpacked flat, bounded in number, in size and in what their directory takes.
+
+_DAMAGED = (
+    zipfile.BadZipFile,
+    zlib.error,
+    lzma.LZMAError,
+    NotImplementedError,
+    RuntimeError,
+    EOFError,
+)
+"""What unpacking raises by itself; RuntimeError where a file is encrypted."""
+MAX_FILES = 5000
+MAX_UNPACKED_BYTES = 4 * 1024**3
+MAX_RATIO = 200
+
+
+def unpack(packed: Path, folder: Path, within: Room | None = None) -> None:
+    """Unpack a zip: flat, bounded in number and size, no name twice; all of its files come or none."""
+    try:
+        with BoundedZip(packed) as stream, zipfile.ZipFile(stream) as archive:
+            members = [m for m in archive.infolist() if not m.is_dir() and not _is_litter(m.filename)]
+            _check_members(members)
+            if within is not None and sum(member.file_size for member in members) > within.room():
+                raise within.full()
+            _take_out(archive, members, folder, within)
+    except ZipListError as error:
+        raise UploadTooLarge(f"Nothing was unpacked: {error}; {MAX_FILES} files need less.") from error
+    except _DAMAGED as error:
+        raise Invalid("The zip file is damaged or encrypted; please pack it again.") from error
+
+
+def _take_out(
+    archive: zipfile.ZipFile, members: list[zipfile.ZipInfo], folder: Path, within: Room | None
+) -> None:
+    with TemporaryDirectory(dir=folder, prefix=".unpacked-") as name:
+        for member in members:
+            with archive.open(member) as source:
+                copy(source, Path(name) / safe_name(member.filename), member.file_size)
+        if within is not None:
+            within.check()
+        for path in Path(name).iterdir():
+            path.replace(folder / path.name)
+
+
+def _is_litter(path: str) -> bool:
+    return path.startswith("__MACOSX/") or PurePosixPath(path).name in (".DS_Store", "Thumbs.db")
+
+
+def _check_members(members: list[zipfile.ZipInfo]) -> None:
+    if len(members) > MAX_FILES:
+        raise UploadTooLarge(f"The zip holds {len(members)} files; {MAX_FILES} is the most.")
+    unpacked = sum(member.file_size for member in members)
+    if unpacked > MAX_UNPACKED_BYTES:
+        raise UploadTooLarge(
+            f"The zip unpacks to {unpacked >> 20} MiB; {MAX_UNPACKED_BYTES >> 20} is the most."
+        )
+    for member in members:
+        if member.file_size > MAX_RATIO * max(member.compress_size, 1024):
+            raise Invalid(f"The zip's file '{member.filename[:100]}' unpacks to far more than a clip would.")
+    names = [safe_name(member.filename) for member in members]
+    if repeated := sorted(name for name, number in Counter(names).items() if number > 1):
+        raise Invalid(f"The zip holds '{repeated[0]}' more than once; file names must differ.")
+    check_names(names)
+
+
+# Files of an upload that are left out of the study to be made: set aside, and put back when asked for.
+
+ASIDE = ".left_out"
+"""Folder in an upload's folder; what is in it is no file of the upload, and goes with it."""
+
+
+def files_aside(folder: Path) -> list[Path]:
+    """The files that an upload leaves out, by name."""
+    aside = folder / ASIDE
+    return videos_of(aside) if aside.is_dir() else []
+
+
+def leave_out(folder: Path, name: str) -> None:
+    """Set one file aside; one that is left out already stays so.
+
+    What is known of it goes along: another file of its name is looked into as any other.
+
+    Raises
+    ------
+    NotFound
+        The upload has no such file.
+    Invalid
+        It is still being looked into, or belongs to a built set, which is taken as a whole.
+    """
+    file, aside = _named(videos_of(folder), name), folder / ASIDE
+    if file is None:
+        if _named(files_aside(folder), name) is None:
+            raise NotFound(f"This upload has no file '{name[:100]}'.")
+        return
+    if (folder / MANIFEST_NAME).exists():
+        raise Invalid(
+            "The clips of a built set are taken as a whole; leave out what its definition leaves out."
+        )
+    record = records_of(folder).get(file.name)
+    if record is None:
+        raise Invalid(f"'{file.name}' is still being looked into; leave it out once it has been.")
+    aside.mkdir(mode=0o700, exist_ok=True)
+    write_record(aside, record)
+    write_record(folder, Prepared(name=file.name, asked_fps=None, replaced=True))
+    file.replace(aside / file.name)
+
+
+def put_back(folder: Path, name: str) -> None:
+    """Take a file in again that was left out; one that is there already stays.
+
+    It is looked into again only where another frame rate was asked for, before or since.
+
+    Raises
+    ------
+    NotFound
+        The upload has no such file.
+    Invalid
+        Another file of its name, or one that would be the same clip, has come since.
+    """
+    file, there = _named(files_aside(folder), name), videos_of(folder)
+    if file is None:
+        if _named(there, name) is None:
+            raise NotFound(f"This upload has no file '{name[:100]}'.")
+        return
+    target = folder / file.name
+    if target.exists():
+        raise Invalid(f"Another '{file.name}' has come since; leave that one out first.")
+    check_names(clip_name(path.name) for path in (*there, file))
+    record = records_of(file.parent).get(file.name)
+    file.replace(target)
+    if record is not None:
+        write_record(folder, record)
+
+
+def _named(files: list[Path], name: str) -> Path | None:
+    # Looked up among the names that there are: nothing that is sent becomes a path.
+    asked = one_form(name)
+    return next((path for path in files if path.name == asked), None)
+
 
 KEEP_S = 24 * 3600
 MAX_KEPT_BYTES = 16 * 1024**3
@@ -219,3 +524,22 @@ def progress(folder: Path) -> UploadProgress:
         refused=sum(record.problem is not None for record in known),
         left_out=len(files_aside(folder)),
     )
+
+
+# Originals of converted clips: kept with the study as they were sent.
+
+
+def find_source(session: Session, study: str, sha256: str, identity: Identity) -> SourceVideo:
+    """What is known of an original, by its hash; NotFound where no version of the study has it."""
+    for version in reversed(find_study(session, study, identity, "view").versions):
+        for clip in Manifest.model_validate(version.manifest).clips:
+            if clip.source is not None and clip.source.sha256 == sha256:
+                return clip.source
+    raise NotFound(
+        "No clip of this study was made from such a file; reload the page to get the current list."
+    )
+
+
+def content_disposition(name: str) -> str:
+    """The header by which a browser saves a file under its own name, in any script."""
+    return f"attachment; filename*=UTF-8''{quote(name, safe='')}"

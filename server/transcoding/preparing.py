@@ -9,8 +9,7 @@ from pathlib import Path
 
 from sqlalchemy.exc import SQLAlchemyError
 
-from server.locks import Locks
-from server.locks_repository import LockTaken
+from server.core.locks import Locks, LockTaken
 from server.transcoding.records import uploads_in, waiting_in
 
 LOG = logging.getLogger(__name__)

@@ -1,32 +1,164 @@
-"""The process that looks into uploaded videos and converts them: `python -m server.transcoding FOLDER`.
-
-A decoder reads what strangers may have made. Each file gets a process, and accounts take turns: a file that
-takes longer than one turn is stopped while a file of another account has its turn, and goes on afterwards. A
-file that ends its process is tried once more and then refused.
-"""
+"""The process that looks into uploaded videos and converts them: `python -m server.transcoding FOLDER`."""
 
 import os
 import select
 import signal
 import sys
 import time
+from collections import deque
+from collections.abc import Iterable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
-from server.transcoding.process_limits import (
-    address_limit,
-    bound_memory,
-    end_with_parent,
-    memory_of_machine,
-    stand_back,
-    started_at_most,
-)
-from server.transcoding.records import BEGUN, CLIPS, asked_rate, uploads_in, write_record
-from server.transcoding.turns import Turns, Video
+from server.transcoding.records import BEGUN, CLIPS, asked_rate, sender, uploads_in, waiting_in, write_record
 from video_conversion.prepare import prepare
 from video_conversion.prepared import Prepared
 from video_conversion.video_file import READ_AGAIN, NotAClip
+
+# Whose video is next: accounts take turns, one file of each at a time, whatever folders they use.
+
+LOOK_S = 1.0
+LOOK_SHARE = 20
+"""The folders are read again after at least 20 times as long as reading them took."""
+
+Video = tuple[Path, Path]
+"""The folder of an upload, and one of its files."""
+
+
+@dataclass
+class Turns:
+    """The videos that wait, in one queue per account; the account served longest ago is next.
+
+    Attributes
+    ----------
+    root : Path
+        Folder of uploads.
+    """
+
+    root: Path
+    _queues: dict[str, deque[Video]] = field(default_factory=dict)
+    _served: dict[str, int] = field(default_factory=dict)
+    _put_back: dict[Video, int] = field(default_factory=dict)
+    _count: int = 0
+    _look_at: float = 0.0
+
+    def refresh(self, started: Iterable[Video] = (), *, now: bool = False) -> None:
+        """Read which videos wait, except those that are started, at most every second."""
+        begun = time.monotonic()
+        if begun < self._look_at and not now:
+            return
+        queues: dict[str, deque[Video]] = {}
+        taken = set(started)
+        for folder in uploads_in(self.root):
+            try:
+                waiting = waiting_in(folder)
+            except FileNotFoundError:  # discarded meanwhile
+                continue
+            if videos := [(folder, path) for path in waiting if (folder, path) not in taken]:
+                queues.setdefault(sender(folder) or "", deque()).extend(videos)
+        self._queues = {
+            account: deque(sorted(queue, key=lambda video: self._put_back.get(video, 0)))
+            for account, queue in queues.items()
+        }
+        ended = time.monotonic()
+        self._look_at = ended + max(LOOK_S, LOOK_SHARE * (ended - begun))
+
+    def accounts(self) -> list[str]:
+        """The accounts that have a video waiting, those served longest ago first."""
+        return self.in_order([account for account, queue in self._queues.items() if queue])
+
+    def take(self, account: str) -> Video:
+        """The next video of an account."""
+        return self._queues[account].popleft()
+
+    def put_last(self, account: str, video: Video) -> None:
+        """Let a video wait behind the others of its account."""
+        self._put_back[video] = self._put_back.get(video, 0) + 1
+        self._queues.setdefault(account, deque()).append(video)
+
+    def serve(self, account: str) -> None:
+        """Note that the account has had its turn."""
+        self._count += 1
+        self._served[account] = self._count
+
+    def in_order(self, accounts: list[str]) -> list[str]:
+        """These accounts, those served longest ago first."""
+        return sorted(accounts, key=lambda account: self._served.get(account, 0))
+
+
+# What a process that decodes strangers' files may take of the machine.
+
+MAX_ADDRESS_BYTES = 12 << 30
+SHARE = 2
+"""All of them together get the machine's memory divided by this."""
+ROOM_FOR_ONE_BYTES = 2 << 30
+"""A clip of 4096 x 4096 pixels takes 1.3 GB of addresses (measured)."""
+MAX_STARTED = 4
+NICENESS = 10
+CGROUP_LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
+_SIGNAL_AT_PARENTS_END = 1  # PR_SET_PDEATHSIG of Linux
+
+
+def memory_of_machine() -> int | None:
+    """Bytes of memory of the machine, or of its container where that has less; None if unknown."""
+    known = []
+    with suppress(ValueError, OSError, AttributeError):  # absent on Windows
+        known.append(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    for limit in CGROUP_LIMITS:
+        with suppress(OSError, ValueError):  # "max" where there is no limit
+            known.append(int(Path(limit).read_text(encoding="ascii")))
+    return min((size for size in known if size > 0), default=None)
+
+
+def address_limit(machine_bytes: int | None) -> int:
+    """Bytes of addresses of all processes together: half of the machine's memory, at most 12 GiB."""
+    return MAX_ADDRESS_BYTES if machine_bytes is None else min(MAX_ADDRESS_BYTES, machine_bytes // SHARE)
+
+
+def started_at_most(limit_bytes: int) -> int:
+    """How many files may be begun at a time, at least one, so that each has room for large pictures."""
+    return max(1, min(MAX_STARTED, limit_bytes // ROOM_FOR_ONE_BYTES))
+
+
+def stand_back() -> None:
+    """Let ratings go first, and let the system end this process first where memory runs out."""
+    with suppress(OSError):  # Linux
+        Path("/proc/self/oom_score_adj").write_text("1000", encoding="ascii")
+    if hasattr(os, "nice"):
+        os.nice(NICENESS)
+
+
+def bound_memory(limit_bytes: int) -> None:
+    """Take no more addresses than this, nor more than this process may take already."""
+    try:
+        import resource  # absent on Windows
+    except ImportError:
+        return
+    _, most = resource.getrlimit(resource.RLIMIT_AS)
+    if most != resource.RLIM_INFINITY:
+        limit_bytes = min(limit_bytes, most)
+    resource.setrlimit(resource.RLIMIT_AS, (limit_bytes, limit_bytes))
+
+
+def end_with_parent(parent: int) -> None:
+    """End this process, stopped or not, as soon as the one that started it has ended."""
+    # A group whose parent ends is sent SIGHUP and SIGCONT where a member is stopped (POSIX).
+    os.setpgid(0, 0)
+    if sys.platform == "linux":
+        import ctypes
+
+        with suppress(OSError, AttributeError):
+            ctypes.CDLL(None).prctl(_SIGNAL_AT_PARENTS_END, signal.SIGKILL)
+        if os.getppid() != parent:
+            os._exit(1)
+
+
+# The process that looks into uploaded videos and converts them: `python -m server.transcoding FOLDER`.
+#
+# A decoder reads what strangers may have made. Each file gets a process, and accounts take turns: a file
+# that takes longer than one turn is stopped while a file of another account has its turn, and goes on
+# afterwards. A file that ends its process is tried once more and then refused.
 
 MAX_S_A_FILE = 900
 MAX_TRIES = 2
@@ -35,7 +167,7 @@ FIRST_BUDGET_S = 10.0
 LONGEST_BUDGET_S = 30.0
 """No file keeps other accounts waiting for longer; one that needs more ends once nobody else waits."""
 """Where memory allows no further file, a file that took longer begins again later, with twice the budget."""
-LOOK_S = 0.25
+LOOK_AGAIN_S = 0.25
 FORKS = hasattr(os, "fork") and hasattr(signal, "SIGSTOP")
 
 
@@ -155,7 +287,7 @@ class Worker:
             if now >= turn_ends:
                 self._refresh()
                 if not {*self._turns.accounts(), *self._started} - {started.account}:
-                    turn_ends = now + LOOK_S
+                    turn_ends = now + LOOK_AGAIN_S
         os.kill(started.process, signal.SIGSTOP)
         started.used_s += now - begun
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from experiments.definition import Experiment
 from experiments.schema.canonical import definition_sha256
-from server import migrate
-from server.db import Database
+from server.core import migrate
+from server.core.db import Database
 
 NOW = "2026-11-21 10:00:00.000000"
 

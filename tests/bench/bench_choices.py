@@ -15,7 +15,7 @@ from experiments.assignment.active import Stored, batch
 from experiments.load import load_experiment
 from experiments.trials.paired_comparison.plan import assign
 from experiments.trials.threshold.grid import Model, model
-from server.trials.series import quest
+from server.participation import quest
 
 ITEMS, ANSWERS, PAIRS = 20, 2_000, 24
 TRIALS = 30

@@ -18,10 +18,10 @@ from typing import Any
 import psutil
 
 from server.cli_common import migrated_services
-from server.clock import now
-from server.evidence.clip_bytes import clip_digest, clip_hash
-from server.simulation.http import JsonClient
-from server.simulation.person import Person, Rater
+from server.core.values import now
+from server.participation.clip_bytes import clip_digest, clip_hash
+from server.rehearsals.http import JsonClient
+from server.rehearsals.person import Person, Rater
 from tests.browser.server_process import ServerProcess
 from tests.helpers.studies import SHORT, add_study
 

@@ -21,9 +21,9 @@ from experiments.source_video import SourceVideo
 from server.accounts import invitations
 from server.app import create_app
 from server.cli_common import migrated_services
-from server.settings import Settings
+from server.core.settings import Settings
 from server.studies import uploads
-from server.studies.upload_quota import Quota
+from server.studies.uploads import Quota
 from server.transcoding.records import RECORDS
 from tests.helpers.admins import PASSWORD
 from video_conversion.prepared import Prepared

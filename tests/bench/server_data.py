@@ -7,8 +7,8 @@ from typing import Any
 from sqlalchemy import Insert, func, insert, literal_column, select
 from sqlalchemy.orm import DeclarativeBase
 
-from server.clock import now
 from server.context import Services
+from server.core.values import now
 from server.models import (
     AssignedTrial,
     Link,
@@ -20,7 +20,7 @@ from server.models import (
     TrialClip,
     VersionClip,
 )
-from server.tallies.recount import Recount
+from server.participation.tally_pools import Recount
 from tests.helpers.studies import StudyInDatabase
 
 

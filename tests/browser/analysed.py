@@ -16,7 +16,13 @@ def analysed(server: ServerProcess, study: str, folder: Path) -> str:
     )
     declaration = folder / f"{study}.toml"
     declaration.write_text(server.rows(statement)[0]["text"], encoding="utf-8")
-    options = ["--database", server.settings.resolved_database_url, "--origin", "participant", "--no-report"]
+    options = [
+        "--database",
+        server.core.settings.resolved_database_url,
+        "--origin",
+        "participant",
+        "--no-report",
+    ]
     done = CliRunner().invoke(app, ["run", str(declaration), *options])
     assert done.exit_code == 0, f"{done.output}{done.exception!r}"
     return done.output

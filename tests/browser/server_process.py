@@ -20,8 +20,8 @@ from experiments.load import parse_experiment
 from experiments.manifest import read_manifest
 from server.cli_common import migrated_services
 from server.context import Services, open_services
-from server.settings import Settings
-from server.studies.importing import add_version, create_study, store_clips
+from server.core.settings import Settings
+from server.studies.creation import add_version, create_study, store_clips
 from server.studies.links import LinkKind, create_link
 from tests.helpers.databases import migrated_sqlite
 from tests.helpers.ports import free_port

@@ -140,7 +140,7 @@ def test_variables_are_those_of_the_example_and_no_secret_has_a_default(compose:
 
 
 def test_the_environment_of_the_server_is_one_of_settings(compose: Compose) -> None:
-    from server.settings import Settings
+    from server.core.settings import Settings
 
     known = {f"PALPEBRA_{name.upper()}" for name in Settings.model_fields} | {
         "DATABASE_URL",

@@ -7,10 +7,9 @@ import pytest
 
 from experiments.load import locate
 from server.cli_common import migrated_services
-from server.clock import now
+from server.core.values import now
 from server.studies import repository
-from server.studies.importing import create_study
-from server.studies.planned import planned_experiment
+from server.studies.creation import create_study, planned_experiment
 from tools import first_run
 
 

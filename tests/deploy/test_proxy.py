@@ -12,8 +12,8 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
 
-from server.door import ANONYMOUS_BYTES, SIGNED_IN_BYTES
-from server.settings import Settings
+from server.core.settings import Settings
+from server.request_limits import ANONYMOUS_BYTES, SIGNED_IN_BYTES
 from tests.conftest import REPOSITORY
 from tests.helpers.ports import free_port
 from tools.raw_attacks import LENGTHS, SMUGGLED

@@ -15,10 +15,10 @@ from sqlalchemy import create_engine, text
 from sqlalchemy.engine import URL
 
 from server.context import open_services
-from server.db import Database
-from server.migrate import upgrade
+from server.core.db import Database
+from server.core.migrate import upgrade
+from server.core.settings import Settings
 from server.operations.backup import back_up
-from server.settings import Settings
 from tests.conftest import REPOSITORY
 from tests.helpers.databases import postgres_server  # noqa: F401 - fixture
 

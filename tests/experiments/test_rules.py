@@ -60,14 +60,14 @@ def checked_before(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ),
         (
             "WarningRule = Annotated[",
-            "server/trials/warnings.py",
+            "server/participation/warnings.py",
             "experiments.rules.warning",
             "Warns",
             'has no attribute "lapses"',
         ),
         (
             "ScreeningRule = Annotated[",
-            "server/participants/screening.py",
+            "server/participation/current_run.py",
             BASE,
             "Declaration",
             'Argument 1 to "assert_never"',

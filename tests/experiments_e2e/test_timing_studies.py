@@ -10,8 +10,8 @@ from analysis.cli import app
 from experiments.load import load_experiment, locate
 from server.app import create_app
 from server.context import Services
-from server.settings import Settings
-from server.simulation.person import Person, Rater
+from server.core.settings import Settings
+from server.rehearsals.person import Person, Rater
 from tests.helpers.simulated import Api
 from tests.helpers.studies import add_study
 

@@ -15,12 +15,12 @@ from experiments.load import FOLDER
 from experiments.trials.clip_rating.columns import RATINGS
 from server.app import create_app
 from server.context import Services
-from server.export.extract import Extract
-from server.export.formats import ratings_csv
+from server.core.settings import Settings
+from server.exports.extract import Extract
+from server.exports.formats import ratings_csv
 from server.models import Rating, Study, StudyRun
-from server.settings import Settings
-from server.simulation.http import JsonClient, running_server
-from server.simulation.person import Person, Rater
+from server.rehearsals.http import JsonClient, running_server
+from server.rehearsals.person import Person, Rater
 from tests.helpers.studies import StudyInDatabase, add_study
 
 PEOPLE = 3

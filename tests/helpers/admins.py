@@ -11,8 +11,8 @@ from starlette.testclient import TestClient as StarletteClient
 
 from server.accounts import invitations
 from server.context import Services
+from server.core.settings import Settings
 from server.models import Role
-from server.settings import Settings
 
 PASSWORD = "correct horse battery"
 

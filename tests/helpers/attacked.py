@@ -9,12 +9,12 @@ from pathlib import Path
 import psutil
 import pytest
 
-from server.accounts.permission import Scope
+from server.accounts.identity import Scope
 from server.accounts.service import create_account
 from server.context import Services
+from server.core.settings import Settings
+from server.core.values import hash_token, new_token
 from server.models import ApiToken
-from server.settings import Settings
-from server.tokens import hash_token, new_token
 from tests.helpers.admins import PASSWORD
 from tests.helpers.ports import free_port
 from tests.helpers.studies import StudyInDatabase

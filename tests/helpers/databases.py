@@ -24,10 +24,10 @@ from sqlalchemy.engine import URL, make_url
 
 import server.cli
 from server.context import Services, open_services
-from server.db import Database
-from server.migrate import upgrade
+from server.core.db import Database
+from server.core.migrate import upgrade
+from server.core.settings import Settings
 from server.models import Base
-from server.settings import Settings
 
 MEMORY = Path("/dev/shm")
 BACKENDS = ("sqlite", pytest.param("postgres", marks=pytest.mark.postgres))

@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from server.clock import now
 from server.context import SIMULATED_TIME, Services, open_services
-from server.evidence.clip_bytes import clip_digest, clip_hash
-from server.settings import Settings
+from server.core.settings import Settings
+from server.core.values import now
+from server.participation.clip_bytes import clip_digest, clip_hash
 from tests.helpers.studies import Participant, clip_url
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import httpx2 as httpx
 
-from server.settings import Settings
+from server.core.settings import Settings
 from tests.helpers.ports import free_port
 
 SECRET = "the same on every host"

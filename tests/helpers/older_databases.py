@@ -8,7 +8,7 @@ from typing import Any
 import psycopg
 from sqlalchemy.engine import make_url
 
-from server.db import SIGNING_KEY, Database
+from server.core.db import SIGNING_KEY, Database
 from tests.conftest import REPOSITORY
 
 FOLDER = REPOSITORY / "tests" / "golden" / "databases"

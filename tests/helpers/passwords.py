@@ -4,7 +4,7 @@ import pytest
 from pwdlib import PasswordHash
 from pwdlib.hashers.argon2 import Argon2Hasher
 
-from server.accounts import passwords
+from server.accounts import credentials
 
 QUICK = PasswordHash((Argon2Hasher(time_cost=1, memory_cost=8, parallelism=1),))
 NOBODY = QUICK.hash("the password of an account that does not exist")
@@ -13,5 +13,5 @@ NOBODY = QUICK.hash("the password of an account that does not exist")
 @pytest.fixture(autouse=True)
 def quick_hashes(monkeypatch: pytest.MonkeyPatch) -> None:
     """Real argon2 hashes in this process, of the least cost; folders that measure the cost have their own."""
-    monkeypatch.setattr(passwords, "_hasher", lambda: QUICK)
-    monkeypatch.setattr(passwords, "_nobody", lambda: NOBODY)
+    monkeypatch.setattr(credentials, "_hasher", lambda: QUICK)
+    monkeypatch.setattr(credentials, "_nobody", lambda: NOBODY)

@@ -7,7 +7,7 @@ from unittest import mock
 
 import pytest
 
-from server.participants import links
+from server.participation import links
 
 OTHER_SEEDS = "TEST_SEEDS"
 """Set to a number, this environment variable gives every test other seeds: does it hang on chance?"""

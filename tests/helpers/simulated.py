@@ -6,8 +6,7 @@ from typing import Any
 from fastapi.testclient import TestClient
 
 from server.context import Services
-from server.simulation.observer import observer_of
-from server.simulation.person import Person, Rater
+from server.rehearsals.person import Person, Rater, observer_of
 from tests.helpers.studies import StudyInDatabase
 
 

@@ -15,11 +15,11 @@ from experiments.definition import Experiment
 from experiments.load import parse_experiment
 from server.app import create_app
 from server.context import Services
+from server.core.values import derived_token
 from server.models import Link, Study
-from server.simulation.http import ACCEPTED
-from server.studies.importing import add_version, create_study, store_clips
+from server.rehearsals.http import ACCEPTED
+from server.studies.creation import add_version, create_study, store_clips
 from server.studies.links import PURPOSE, LinkKind, create_link
-from server.tokens import derived_token
 from tests.helpers.tiny_clips import make_clip_folder
 
 SHORT = """

@@ -13,12 +13,12 @@ from experiments.load import parse_experiment
 from experiments.manifest import MADE_ELSEWHERE, UPLOADED
 from experiments.trials.clip_rating.columns import RATINGS
 from experiments.trials.clip_rating.declaration import SCALE_NAME
-from server.clock import now
 from server.context import Services
+from server.core.settings import Settings
+from server.core.values import now
 from server.models import Clip, Link, Study, StudyRun, StudyVersion
+from server.participation.tally_pools import pooled
 from server.results.repository import Pool
-from server.settings import Settings
-from server.tallies.pools import pooled
 from tests.helpers.databases import BACKENDS, run_server_command
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase
 from tests.helpers.tiny_clips import make_clip_folder

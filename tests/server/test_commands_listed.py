@@ -8,7 +8,16 @@ import pytest
 from experiments.lazy_commands import commands_of
 from server.cli import COMMANDS
 
-HEAVY = ("sqlalchemy", "fastapi", "pydantic", "authlib", "httpx", "uvicorn", "alembic", "server.settings")
+HEAVY = (
+    "sqlalchemy",
+    "fastapi",
+    "pydantic",
+    "authlib",
+    "httpx",
+    "uvicorn",
+    "alembic",
+    "server.core.settings",
+)
 LIST = f"""
 import sys
 from server.cli import main

@@ -12,12 +12,13 @@ from sqlalchemy import text
 from sqlalchemy.exc import DBAPIError
 from sqlalchemy.exc import TimeoutError as PoolTimeout
 
-from server import context, db
+from server import context
 from server.app import create_app
-from server.cli_refusals import refusal
+from server.cli_common import refusal
 from server.context import Services
-from server.db import Database, is_away
-from server.settings import Settings
+from server.core import db
+from server.core.db import Database, is_away
+from server.core.settings import Settings
 from tests.helpers.databases import run_server_command
 from tests.helpers.studies import Participant, StudyInDatabase
 

@@ -12,15 +12,13 @@ import psycopg
 import pytest
 from sqlalchemy import make_url, text
 
-from server.changes import Changes
-from server.changes_repository import heard_changes
 from server.context import Services
-from server.db import Database, kept_alive
-from server.errors import TooManyRequests
-from server.locks_repository import DatabaseLocks, LockTaken
-from server.rate_limit import RateLimit
-from server.settings import Settings
-from server.shared_counts_repository import SharedCounts
+from server.core.changes import Changes, heard_changes
+from server.core.db import Database, kept_alive
+from server.core.errors import TooManyRequests
+from server.core.limits import RateLimit, SharedCounts
+from server.core.locks import DatabaseLocks, LockTaken
+from server.core.settings import Settings
 from tests.helpers.databases import server_environment
 from tests.helpers.waiting import until
 
@@ -28,9 +26,9 @@ PATIENCE_S = 20.0
 soon = partial(until, limit_s=PATIENCE_S)
 HOLDS = """
 import sys
-from server.locks_repository import DatabaseLocks
-from server.db import open_database
-from server.settings import Settings
+from server.core.locks import DatabaseLocks
+from server.core.db import open_database
+from server.core.settings import Settings
 with DatabaseLocks(open_database(Settings())).held("one"):
     print(flush=True)
     sys.stdin.read()
@@ -105,7 +103,7 @@ def test_locks_are_regained_without_being_asked(
     monkeypatch: pytest.MonkeyPatch,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    monkeypatch.setattr("server.locks_repository.HEARTBEAT_S", 0.2)
+    monkeypatch.setattr("server.core.locks.HEARTBEAT_S", 0.2)
     other = DatabaseLocks(services.database)
     with locks.held("one"), locks.held("two"):
         for _ in range(2):
@@ -121,8 +119,8 @@ def test_a_lock_that_another_took_meanwhile_is_told_of(
     monkeypatch: pytest.MonkeyPatch,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    monkeypatch.setattr("server.locks_repository.HEARTBEAT_S", 1.0)
-    monkeypatch.setattr("server.locks_repository.OWN_LINE_S", 1.5)
+    monkeypatch.setattr("server.core.locks.HEARTBEAT_S", 1.0)
+    monkeypatch.setattr("server.core.locks.OWN_LINE_S", 1.5)
     other = DatabaseLocks(services.database)
     with locks.held("one"):
         cut_lines_of_locks(services)
@@ -137,7 +135,7 @@ def test_a_lock_that_the_line_of_before_still_held_is_regained_when_that_ends(
     monkeypatch: pytest.MonkeyPatch,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    monkeypatch.setattr("server.locks_repository.HEARTBEAT_S", 1.0)
+    monkeypatch.setattr("server.core.locks.HEARTBEAT_S", 1.0)
     before, other = DatabaseLocks(services.database), DatabaseLocks(services.database)
     with locks.held("one"):
         cut_lines_of_locks(services)
@@ -243,7 +241,7 @@ def test_counts_that_nobody_needs_go(services: Services) -> None:
 def test_invented_keys_are_bounded_and_the_oldest_go(
     services: Services, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.shared_counts_repository.KEYS_MAX", 50)
+    monkeypatch.setattr("server.core.limits.KEYS_MAX", 50)
     counts = SharedCounts(services.database, lambda: b"key")
     counts.failed("first")
     for number in range(100):

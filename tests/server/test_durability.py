@@ -12,9 +12,9 @@ import uuid
 from sqlalchemy import text
 
 from server.context import Services
-from server.settings import Settings
-from server.simulation.http import JsonClient
-from server.simulation.person import Person, Rater
+from server.core.settings import Settings
+from server.rehearsals.http import JsonClient
+from server.rehearsals.person import Person, Rater
 from tests.helpers.databases import server_environment
 from tests.helpers.ports import free_port
 from tests.helpers.studies import StudyInDatabase

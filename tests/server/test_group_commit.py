@@ -9,8 +9,8 @@ import pytest
 from sqlalchemy import Connection, text
 from sqlalchemy.exc import IntegrityError
 
-from server.errors import Conflict
-from server.group_commit import MAX_HEAVY, MAX_LIGHT, GroupCommit
+from server.core.commit import MAX_HEAVY, MAX_LIGHT, GroupCommit
+from server.core.errors import Conflict
 
 INSERT = text("INSERT INTO clips VALUES (:name, 1, 30, 1, 1, 1, '2026-11-21 00:00:00')")
 

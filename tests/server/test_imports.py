@@ -28,7 +28,7 @@ def test_no_module_imports_itself_by_a_detour(graph: grimp.ImportGraph) -> None:
     [
         ("server.participants", "server.trials"),
         ("server.context", "server.clips"),
-        ("server.errors", "server.operations"),
+        ("server.core.errors", "server.operations"),
         ("server.views", "server.participants"),
     ],
 )

@@ -8,10 +8,9 @@ import sys
 import pytest
 from sqlalchemy import text
 
-from server.db import Database
-from server.migrate import current_revision, newest_revision, upgrade
-from server.operations.rows import Content
-from server.operations.rows_repository import content_of, snapshot, tables_of
+from server.core.db import Database
+from server.core.migrate import current_revision, newest_revision, upgrade
+from server.privacy.rows import Content, content_of, snapshot, tables_of
 from tests.conftest import REPOSITORY
 from tests.helpers.databases import BACKENDS
 from tests.helpers.older_databases import load_older_database, opened

@@ -8,8 +8,8 @@ from fastapi.testclient import TestClient
 from sqlalchemy import text
 
 from server.context import Services
-from server.migrate import current_revision, downgrade, newest_revision
-from server.simulation.person import Person, Rater
+from server.core.migrate import current_revision, downgrade, newest_revision
+from server.rehearsals.person import Person, Rater
 from tests.helpers.simulated import Api
 from tests.helpers.studies import SHORT, add_study
 from tests.helpers.thresholds import YES_NO, text_with

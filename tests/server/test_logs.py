@@ -11,9 +11,9 @@ from fastapi.testclient import TestClient
 from sqlalchemy.exc import IntegrityError
 
 from server.context import Services
-from server.logs import JsonLines, Needless, PlainLines, described, logging_configuration
-from server.operations.observer import Observer
-from server.settings import Settings
+from server.core.logs import JsonLines, Needless, PlainLines, described, logging_configuration
+from server.core.settings import Settings
+from server.operations.metrics import Observer
 
 SECRET = "born in Liege"
 

@@ -7,8 +7,8 @@ from sqlalchemy import Connection, inspect, select, text
 
 from experiments.columns import Dialect
 from experiments.trials import views
-from server.db import Database
-from server.migrate import current_revision, downgrade, newest_revision, upgrade
+from server.core.db import Database
+from server.core.migrate import current_revision, downgrade, newest_revision, upgrade
 from server.models import Base, StudyVersion
 from tests.helpers.databases import BACKENDS
 from tests.helpers.older_databases import load_older_database

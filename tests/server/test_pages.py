@@ -6,7 +6,7 @@ from fastapi.testclient import TestClient
 
 from server.app import create_app
 from server.context import Services
-from server.settings import Settings
+from server.core.settings import Settings
 from tests.helpers.studies import StudyInDatabase
 
 

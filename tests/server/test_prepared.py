@@ -8,9 +8,9 @@ from sqlalchemy import bindparam, insert, select, text, update
 from sqlalchemy.exc import DBAPIError, IntegrityError
 
 from server.context import Services
-from server.db import is_away, is_cut
+from server.core.commit import Prepared, Query
+from server.core.db import is_away, is_cut
 from server.models import RunEvent
-from server.prepared import Prepared, Query
 
 EVENTS = RunEvent.__table__
 COLUMNS = ("event_id", "type", "at_client", "received_at", "data")

@@ -1,7 +1,7 @@
 import pytest
 
-from server.errors import TooManyRequests
-from server.rate_limit import RateLimit
+from server.core.errors import TooManyRequests
+from server.core.limits import RateLimit
 
 
 def test_a_share_is_used_up_and_comes_back_with_time() -> None:

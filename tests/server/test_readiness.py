@@ -12,11 +12,11 @@ from pathlib import Path
 import pytest
 from fastapi.testclient import TestClient
 
-from server import health
+from server import web
 from server.app import create_app
-from server.db import Database
-from server.migrate import upgrade
-from server.settings import Settings
+from server.core.db import Database
+from server.core.migrate import upgrade
+from server.core.settings import Settings
 
 
 def told(client: TestClient) -> str:
@@ -74,7 +74,7 @@ def assert_told_to_monitors(client: TestClient, statuses: dict[str, int]) -> Non
 def test_a_locked_database_is_told_apart(
     client: TestClient, settings: Settings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(health, "LOCKED_AFTER_S", 0.2)
+    monkeypatch.setattr(web, "LOCKED_AFTER_S", 0.2)
     path = settings.database_url.removeprefix("sqlite:///")
     with closing(sqlite3.connect(path, isolation_level=None)) as other:
         other.execute("BEGIN IMMEDIATE")

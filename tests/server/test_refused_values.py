@@ -9,7 +9,7 @@ from fastapi.testclient import TestClient
 from pydantic import BaseModel, ValidationError
 
 from server.app import create_app
-from server.refused_values import refused_value
+from server.core.errors import refused_value
 
 SECRET = "a secret"
 WRONG: tuple[Any, ...] = (

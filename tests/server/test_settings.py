@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from server.cli import main
-from server.settings import Settings
+from server.core.settings import Settings
 
 
 def test_the_secret_key_is_made_once_with_mode_600(tmp_path: Path) -> None:

@@ -15,10 +15,10 @@ from sqlalchemy import URL, text
 
 from server.accounts import invitations
 from server.context import Services, open_services
-from server.migrate import upgrade
-from server.simulation.http import JsonClient
-from server.simulation.person import Person, Rater
-from server.storage.s3 import open_s3
+from server.core.migrate import upgrade
+from server.core.storage import open_s3
+from server.rehearsals.http import JsonClient
+from server.rehearsals.person import Person, Rater
 from tests.helpers.admins import PASSWORD
 from tests.helpers.databases import database_of_its_own
 from tests.helpers.hosts import Host, running, settings_of

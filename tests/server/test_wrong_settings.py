@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from server.settings import Settings
+from server.core.settings import Settings
 from tests.helpers.databases import run_server_command
 
 WRONG = [

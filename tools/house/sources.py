@@ -45,7 +45,7 @@ PROTOCOL = (
     "server/views",
     "server/evidence",
     "server/participation",
-    "server/group_commit.py",
+    "server/core/commit.py",
     "frontend/src/participant/outbox",
     "frontend/src/participant/playback",
     "frontend/src/participant/preload",

@@ -10,7 +10,11 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
-MEASURED = ("frontend/src/participant/playback", "server/trials/verdict.py", "experiments/rules/playback.py")
+MEASURED = (
+    "frontend/src/participant/playback",
+    "server/participation/verdict.py",
+    "experiments/rules/playback.py",
+)
 """What draws clips and judges plays: with another one, plays of before are of something else."""
 
 

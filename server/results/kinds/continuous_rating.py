@@ -7,12 +7,12 @@ from sqlalchemy.orm import Session
 from experiments import design
 from experiments.trials.continuous_rating.declaration import continuous_rating_of
 from server.models import Study, StudyVersion
-from server.results.mean_traces import Trace, cell_trace
+from server.participation.tally_pools import pooled
 from server.results.repository import Pool, blinks_of_cells, traces_of
 from server.results.schemas import TraceCell, TraceResults
 from server.results.service import common
+from server.results.summary import Trace, cell_trace
 from server.studies.lookup import definition_of
-from server.tallies.pools import pooled
 
 
 def summarise(session: Session, study: Study, version: StudyVersion, of: Pool) -> TraceResults:

@@ -11,11 +11,11 @@ from experiments import design
 from experiments.definition import Experiment
 from experiments.trials.paired_comparison.answer import CODES
 from server.models import Study, StudyVersion
+from server.participation.tally_pools import PooledTally, pooled
 from server.results.repository import Pool, cells_of
 from server.results.schemas import LevelChoices, PairChoices, PairResults
 from server.results.service import common
 from server.studies.lookup import definition_of
-from server.tallies.pools import PooledTally, pooled
 
 Outcomes = Counter[tuple[str, str, int]]
 """(cell on the left or first, cell on the right or second, number of the answer) -> how often."""

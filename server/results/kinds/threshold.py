@@ -12,7 +12,7 @@ from experiments.definition import Experiment
 from experiments.trials.threshold.declaration import Series, TwoInterval, threshold_of
 from experiments.trials.threshold.grid import Point, model, seconds, series_of
 from server.models import Study, StudyVersion
-from server.results.mean_traces import half_width
+from server.participation.tally_pools import pooled
 from server.results.repository import (
     LatestEstimate,
     PersonCount,
@@ -24,11 +24,11 @@ from server.results.repository import (
 )
 from server.results.schemas import MeanTilt, SeriesResult, StimulusAnswers, ThresholdResults
 from server.results.service import common
+from server.results.summary import half_width
 from server.studies.lookup import definition_of
-from server.tallies.pools import pooled
 
 if TYPE_CHECKING:
-    from server.trials.series.quest import Tilt
+    from server.participation.quest import Tilt
 
 
 def summarise(session: Session, study: Study, version: StudyVersion, of: Pool) -> ThresholdResults:
@@ -98,7 +98,7 @@ def series_result(
 def mean_tilts(definition: Experiment, counts: Sequence[PersonCount]) -> dict[str, MeanTilt]:
     """The mean tilt of each series that has answers."""
     # brings the numerics of QUEST+ with it, which studies along one factor need not have loaded here
-    from server.trials.series import quest
+    from server.participation import quest
 
     assumed, seconds_of = model(definition), second_by_cell(definition)
     people: dict[tuple[str, int], dict[Point, tuple[int, int]]] = {}

@@ -3,11 +3,11 @@
 from sqlalchemy.orm import Session
 
 from server.models import Study, StudyVersion
+from server.participation.tally_pools import pooled
 from server.results.repository import Pool
 from server.results.schemas import OtherResults
 from server.results.service import common
 from server.studies.lookup import definition_of
-from server.tallies.pools import pooled
 
 
 def summarise(session: Session, study: Study, version: StudyVersion, of: Pool) -> OtherResults:

@@ -12,7 +12,7 @@ from analysis.cli import app
 from experiments.counted import counted
 from experiments.load import load_experiment, locate
 from server.app import create_app
-from server.simulation.person import Person, Rater
+from server.rehearsals.person import Person, Rater
 from tests.browser.admin.conftest import Dashboard
 from tests.browser.admin.test_walk import shoot
 from tests.browser.forked_server import ForkedServer

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page
 
+from server.accounts import workspaces
 from server.accounts.identity import OPERATOR
 from server.cli_common import migrated_services
-from server.workspaces import service as workspaces
 from tests.browser.forked_server import ForkedServer
 from tests.browser.server_process import ServerProcess
 from tests.helpers.providers import SECRET, provider_for

@@ -11,9 +11,9 @@ from playwright.sync_api import Browser, Page
 from sqlalchemy import select
 
 from server.cli_common import migrated_services
-from server.evidence.service import judge_run
-from server.evidence.verdict import Judgement
 from server.models import StudyRun
+from server.participation.evidence import Judgement
+from server.participation.judgement import judge_run
 from tests.browser.conftest import CHROMIUM_FLAGS, system_chromium
 from tests.browser.server_process import ServerProcess
 from tests.browser.studies import PLAIN

@@ -9,7 +9,7 @@ from playwright.sync_api import Page
 
 from server.cli_common import migrated_services
 from server.models import ViewClip
-from server.views.frame_log import unpacked
+from server.participation.views import unpacked
 from tests.browser.served import Served, go_back, serve
 from tests.browser.studies import PLAIN
 from tests.browser.visit import axe_violations

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, Response
 
-from server.storage.s3 import open_s3
+from server.core.storage import open_s3
 from tests.browser.server_process import ServerProcess
 from tests.browser.studies import PLAIN
 from tests.browser.visit import Visit

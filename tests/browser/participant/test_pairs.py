@@ -10,7 +10,7 @@ from playwright.sync_api import Page
 
 from server.cli_common import migrated_services
 from server.models import View, ViewClip
-from server.views.frame_log import unpacked
+from server.participation.views import unpacked
 from tests.browser.analysed import analysed
 from tests.browser.served import Served, go_back, reload_in_next_clip, serve, show_to_answers, start_clip
 from tests.browser.studies import PLAIN

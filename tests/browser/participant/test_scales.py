@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Page
 
-from server.simulation.http import JsonClient
-from server.simulation.person import Person, Rater
+from server.rehearsals.http import JsonClient
+from server.rehearsals.person import Person, Rater
 from tests.browser.analysed import analysed
 from tests.browser.server_process import ServerProcess
 from tests.browser.studies import PLAIN, without

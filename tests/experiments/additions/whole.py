@@ -15,11 +15,11 @@ from analysis.report.write import write_report
 from server.accounts.identity import OPERATOR
 from server.app import create_app
 from server.context import open_services
-from server.export.extract import Extract
-from server.export.formats import FORMATS
-from server.migrate import upgrade
-from server.settings import Settings
-from server.simulation.person import Person, Rater
+from server.core.migrate import upgrade
+from server.core.settings import Settings
+from server.exports.extract import Extract
+from server.exports.formats import FORMATS
+from server.rehearsals.person import Person, Rater
 from server.studies.lookup import find_study
 from tests.helpers.simulated import Api
 from tests.helpers.studies import SHORT, add_study

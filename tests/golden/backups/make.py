@@ -7,9 +7,9 @@ from fastapi.testclient import TestClient
 
 from server.app import create_app
 from server.context import open_services
-from server.migrate import newest_revision, upgrade
+from server.core.migrate import newest_revision, upgrade
+from server.core.settings import Settings
 from server.operations.backup import back_up
-from server.settings import Settings
 from tests.helpers.golden_backups import GOLDEN, keep_backup
 from tests.helpers.studies import Participant, add_study
 

@@ -19,9 +19,9 @@ from playwright.sync_api import Page, Response, sync_playwright
 from server.app import create_app
 from server.cli_common import migrated_services
 from server.context import open_services
-from server.migrate import current_revision
+from server.core.migrate import current_revision
+from server.core.settings import Settings
 from server.operations.copying import copy_database
-from server.settings import Settings
 from tests.browser.conftest import CHROMIUM_FLAGS, REPOSITORY, system_chromium
 from tests.browser.server_process import ServerProcess
 from tests.browser.studies import PLAIN

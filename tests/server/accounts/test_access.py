@@ -3,8 +3,8 @@ from fastapi.testclient import TestClient
 
 from server.accounts.identity import OPERATOR
 from server.context import Services
+from server.core.settings import Settings
 from server.models import Job
-from server.settings import Settings
 from server.studies.lookup import find_study
 from tests.helpers.admins import Admin, fresh_browser, signed_in
 from tests.helpers.studies import SHORT, StudyInDatabase

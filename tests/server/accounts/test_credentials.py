@@ -7,13 +7,13 @@ from fastapi.testclient import TestClient
 from pwdlib import PasswordHash
 from pwdlib.hashers.argon2 import Argon2Hasher
 
-from server.accounts import second_factor
+from server.accounts import credentials
 from server.accounts.schemas import TOKEN_DAYS_MAX
-from server.clock import now
 from server.context import Services
+from server.core.settings import Settings
+from server.core.values import now
 from server.models import Account, ApiToken
-from server.operations.checks import tokens
-from server.settings import Settings
+from server.operations.doctor import tokens
 from tests.helpers.admins import PASSWORD, Admin, fresh_browser, wrong_code
 
 OLDER = PasswordHash((Argon2Hasher(time_cost=1, memory_cost=16, parallelism=1),))
@@ -43,11 +43,11 @@ def test_a_hash_of_older_parameters_is_renewed_at_the_next_sign_in(
 
 
 def test_a_recovery_code_has_at_least_112_bits() -> None:
-    codes = second_factor.new_recovery_codes()
-    assert len(set(codes)) == second_factor.RECOVERY_CODES
+    codes = credentials.new_recovery_codes()
+    assert len(set(codes)) == credentials.RECOVERY_CODES
     for code in codes:
         assert 5 * len(code.replace("-", "")) >= 112
-        assert second_factor.is_recovery_code(code)
+        assert credentials.is_recovery_code(code)
         assert len(code) <= 40  # what the form takes
 
 
@@ -100,7 +100,7 @@ def test_owners_may_be_asked_for_a_second_factor(services: Services, owner: Admi
     assert [row["name"] for row in owner.get("/workspaces").json()] == ["default"]
     secret = owner.send("POST", "/second-factor").json()["secret"]
     assert owner.send("PUT", "/second-factor", {"code": wrong_code(secret)}).status_code == 401
-    code = second_factor.pyotp.TOTP(secret).now()
+    code = credentials.pyotp.TOTP(secret).now()
     assert owner.send("PUT", "/second-factor", {"code": code}).status_code == 200
     assert owner.get("/accounts").status_code == 200
 

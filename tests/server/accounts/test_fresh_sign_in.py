@@ -6,9 +6,9 @@ from typing import Any
 import pytest
 from sqlalchemy import update
 
-from server.accounts.permission import FRESH_FOR
-from server.clock import now
+from server.accounts.identity import FRESH_FOR
 from server.context import Services
+from server.core.values import now
 from server.models import Account, AccountLogin, AdminSession, Workspace
 from tests.helpers.admins import PASSWORD, Admin, fresh_browser, signed_in
 from tests.helpers.studies import Participant

@@ -5,8 +5,8 @@ from fastapi.testclient import TestClient
 from server.accounts import invitations
 from server.accounts.identity import COOKIE
 from server.context import Services
+from server.core.settings import Settings
 from server.models import Account, AdminSession, ApiToken, Invitation
-from server.settings import Settings
 from tests.helpers.admins import PASSWORD, Admin, fresh_browser
 
 

@@ -7,8 +7,8 @@ from fastapi.testclient import TestClient
 from sqlalchemy import select
 
 from server.context import Services
+from server.core.limits import OpenStreams
 from server.models import Clip
-from server.open_streams import OpenStreams
 from tests.helpers.admins import Admin, signed_in
 from tests.helpers.studies import StudyInDatabase
 

@@ -7,8 +7,7 @@ from typing import Any
 import pytest
 
 from server.context import Services
-from server.studies.upload_quota import Quota
-from server.studies.uploads import new_upload
+from server.studies.uploads import Quota, new_upload
 from tests.helpers.admins import Admin
 from tests.helpers.studies import SHORT, StudyInDatabase
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from server.lane import ExperimentersLane
+from server.request_limits import ExperimentersLane
 
 PAGE = "/api/admin/studies"
 

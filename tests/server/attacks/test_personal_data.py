@@ -6,7 +6,7 @@ from fastapi.testclient import TestClient
 from sqlalchemy import text
 
 from server.context import Services
-from server.settings import Settings
+from server.core.settings import Settings
 from tests.helpers.admins import Admin, fresh_browser
 from tests.helpers.studies import Participant, StudyInDatabase
 

@@ -11,12 +11,11 @@ from pathlib import Path
 import pytest
 
 from server.context import Services
+from server.core import storage
+from server.core.settings import Settings, open_to_others
+from server.core.storage import ClipsAway
 from server.models import StudyRun
-from server.operations.modes import open_to_others
-from server.participants import bounds
-from server.settings import Settings
-from server.storage import s3
-from server.storage.clips import ClipsAway
+from server.participation import current_run
 from tests.helpers.databases import run_server_command
 from tests.helpers.studies import Participant
 
@@ -36,14 +35,14 @@ def test_device_reports_do_not_grow_without_end(participant: Participant, servic
         deep = [deep]
     assert participant.request("PUT", "/device", {"deep": deep}).status_code == 413
     with services.database.read() as session:
-        assert len(str(session.query(StudyRun).one().device)) < bounds.DEVICE_BYTES
+        assert len(str(session.query(StudyRun).one().device)) < current_run.DEVICE_BYTES
 
 
 def test_events_and_calibrations_are_bounded(
     participant: Participant, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(bounds, "EVENTS_A_RUN", 5)
-    monkeypatch.setattr(bounds, "CALIBRATIONS_A_RUN", 2)
+    monkeypatch.setattr(current_run, "EVENTS_A_RUN", 5)
+    monkeypatch.setattr(current_run, "CALIBRATIONS_A_RUN", 2)
     participant.agree()
 
     def event(**data: str) -> dict[str, object]:
@@ -81,10 +80,10 @@ def test_a_store_that_hangs_holds_neither_threads_nor_requests(monkeypatch: pyte
     pytest.importorskip("boto3")
     monkeypatch.setenv("AWS_ACCESS_KEY_ID", "x")
     monkeypatch.setenv("AWS_SECRET_ACCESS_KEY", "x")
-    monkeypatch.setattr(s3, "READ_S", 1)
-    monkeypatch.setattr(s3, "AWAY_S", 600)
+    monkeypatch.setattr(storage, "READ_S", 1)
+    monkeypatch.setattr(storage, "AWAY_S", 600)
     with silent_store() as (endpoint, asked):
-        store = s3.open_s3(Settings(s3_bucket="clips", s3_endpoint=endpoint))
+        store = storage.open_s3(Settings(s3_bucket="clips", s3_endpoint=endpoint))
 
         def ask() -> None:
             with pytest.raises(ClipsAway):
@@ -93,7 +92,7 @@ def test_a_store_that_hangs_holds_neither_threads_nor_requests(monkeypatch: pyte
         with ThreadPoolExecutor(40) as threads:
             for future in [threads.submit(ask) for _ in range(40)]:
                 future.result()
-        assert 1 <= len(asked) <= s3.AT_ONCE
+        assert 1 <= len(asked) <= storage.AT_ONCE
         before = len(asked)
         assert store.problem(None)
         ask()

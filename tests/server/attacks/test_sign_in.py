@@ -11,8 +11,8 @@ import pyotp
 import pytest
 from fastapi.testclient import TestClient
 
-from server.accounts import invitations, passwords, signing_in
-from server.accounts.passwords import (
+from server.accounts import credentials, invitations, signing_in
+from server.accounts.credentials import (
     Checked,
     PasswordsBusy,
     PasswordWork,
@@ -22,8 +22,8 @@ from server.accounts.passwords import (
 )
 from server.accounts.throttle import BackOff, TooManyFailures, address_range, known_device, new_device
 from server.context import Services
+from server.core.settings import Settings
 from server.models import Account, AdminSession
-from server.settings import Settings
 from tests.helpers.admins import PASSWORD, Admin, fresh_browser
 from tests.helpers.databases import run_server_command
 from tests.helpers.studies import FROM_OWN_PAGE
@@ -210,7 +210,7 @@ def test_a_hash_costs_what_is_recommended() -> None:
 
 def test_one_hash_at_a_time_and_of_those_who_wait_only_so_many(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each takes 64 MB and four cores; a thread more for each stranger is how the memory was filled."""
-    monkeypatch.setattr(passwords, "_step_back", lambda: None)  # threads begin without their first hash
+    monkeypatch.setattr(credentials, "_step_back", lambda: None)  # threads begin without their first hash
     at_once, highest, gate = 0, 0, threading.Event()
 
     def work() -> None:

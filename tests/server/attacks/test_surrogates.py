@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 from sqlalchemy import text
 
 from server.context import Services
-from server.export import repository, runs
-from server.settings import Settings
-from server.simulation.http import JsonClient
-from server.simulation.person import Person, Rater
-from server.text import body_problem, is_storable, visible
+from server.core.settings import Settings
+from server.core.values import body_problem, is_storable, visible
+from server.exports import repository, tables
+from server.rehearsals.http import JsonClient
+from server.rehearsals.person import Person, Rater
 from tests.helpers.admins import Admin
 from tests.helpers.attacked import Attacked, api_token
 from tests.helpers.databases import run_server_command
@@ -127,7 +127,7 @@ def test_backup_copy_and_command_line_export_survive_it(
 def test_an_export_that_breaks_off_exits_with_an_error_and_leaves_no_file(
     stored: Participant, settings: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(runs, "raw_lines", lambda *_: iter(["{}\n"]))
+    monkeypatch.setattr(tables, "raw_lines", lambda *_: iter(["{}\n"]))
     monkeypatch.setattr(repository, "run_count", lambda *_: 2)
     called = run_server_command(settings, "export", "short", "--format", "raw", "--out", str(tmp_path / "x"))
     assert called.returncode != 0

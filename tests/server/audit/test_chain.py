@@ -20,16 +20,14 @@ from cryptography.x509.oid import NameOID
 from pydantic import ValidationError
 from sqlalchemy import text
 
-from server.accounts.audit import record
-from server.audit import repository
-from server.audit.cli import _lines
-from server.audit.forwarding import _send
-from server.audit.syslog_address import syslog_address
-from server.audit.verify import Verdict, verify
-from server.clock import now
+from server.accounts import repository
+from server.accounts.audit import _send, record
+from server.accounts.audit_cli import _lines
+from server.accounts.audit_verification import Verdict, verify
 from server.context import Services, open_services
-from server.db import open_database
-from server.settings import Settings
+from server.core.db import open_database
+from server.core.settings import Settings, syslog_address
+from server.core.values import now
 from tests.helpers.admins import Admin
 from tests.helpers.studies import Participant, StudyInDatabase
 
@@ -147,7 +145,7 @@ def test_an_erased_person_leaves_the_chain_whole(
     found = verdict(services)
     assert (found.erased, found.broken) == (1, None)
     with services.database.read() as session:
-        assert not [entry for entry in repository.chained(session) if "Miller" in str(entry.details)]
+        assert not [entry for entry in repository.chained_entries(session) if "Miller" in str(entry.details)]
 
 
 def test_looks_at_persons_and_downloads_are_in_the_log(

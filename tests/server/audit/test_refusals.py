@@ -8,8 +8,8 @@ from sqlalchemy import text
 
 from server.accounts.identity import COOKIE
 from server.context import REFUSALS_PER_MINUTE, Services
-from server.rate_limit import BoundedRecords
-from server.settings import Settings
+from server.core.limits import BoundedRecords
+from server.core.settings import Settings
 from tests.helpers.admins import Admin, fresh_browser
 from tests.helpers.studies import StudyInDatabase
 

@@ -23,13 +23,13 @@ from experiments.manifest import Manifest
 from experiments.seal import deviations, read_clips_sha256, read_seal
 from server.accounts.identity import OPERATOR
 from server.app import create_app
-from server.capsules.build import CapsuleContents, _without_answers, build_capsule
 from server.context import Services, open_services
-from server.errors import NotFound
+from server.core.errors import NotFound
+from server.core.settings import Settings
+from server.exports.capsules import CapsuleContents, _without_answers, build_capsule
+from server.exports.seals import seal_plan
 from server.models import Job
-from server.seals.service import seal_plan
-from server.settings import Settings
-from server.studies.importing import add_version
+from server.studies.creation import add_version
 from server.studies.lookup import find_study
 from tests.helpers.admins import Admin, signed_in
 from tests.helpers.studies import Participant, add_study

@@ -3,9 +3,9 @@
 from datetime import timedelta
 from pathlib import Path
 
-from server.capsules.service import remove_old
-from server.clock import now
 from server.context import Services
+from server.core.values import now
+from server.exports.capsules import remove_old
 from server.models import Job
 from tests.helpers.admins import Admin
 from tests.helpers.studies import StudyInDatabase

@@ -8,7 +8,7 @@ from fastapi.testclient import TestClient
 
 from experiments.errors import InputError
 from server.context import Services
-from server.storage.clips import FolderStore
+from server.core.storage import FolderStore
 
 CONTENT = bytes(range(256)) * 40
 SHA256 = hashlib.sha256(CONTENT).hexdigest()

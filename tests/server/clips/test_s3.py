@@ -11,8 +11,8 @@ from fastapi.testclient import TestClient
 from experiments.errors import InputError
 from server.app import create_app
 from server.context import open_services
-from server.settings import Settings
-from server.storage.s3 import S3Store, open_s3
+from server.core.settings import Settings
+from server.core.storage import S3Store, open_s3
 from tests.helpers.studies import add_study
 
 moto_server = pytest.importorskip("moto.server", reason="moto is not installed")

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from server.evidence.clip_bytes import ClipBytes, clip_hash
+from server.participation.clip_bytes import ClipBytes, clip_hash
 
 CLIPS = {f"{number:064x}": bytes([number]) * 1000 for number in range(30)}
 
@@ -80,7 +80,7 @@ def test_a_clip_that_is_not_prepared_is_on_its_way_after_the_first_question(clip
 def test_a_large_clip_is_hashed_in_pieces_and_not_kept(
     far: FarStore, clips: ClipBytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.evidence.clip_bytes.MAX_CLIP_BYTES", 999)
+    monkeypatch.setattr("server.participation.clip_bytes.MAX_CLIP_BYTES", 999)
     sha256, limit = next(iter(CLIPS)), time.monotonic() + 30
     clips.prepare(1, [(sha256, 1000)])
     while clips.hash_at_once(sha256, 1000) is None and time.monotonic() < limit:
@@ -93,7 +93,7 @@ def test_a_large_clip_is_hashed_in_pieces_and_not_kept(
 def test_a_clip_cut_off_by_its_store_has_no_hash(
     far: FarStore, clips: ClipBytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.evidence.clip_bytes.MAX_CLIP_BYTES", 999)
+    monkeypatch.setattr("server.participation.clip_bytes.MAX_CLIP_BYTES", 999)
     sha256 = next(iter(CLIPS))
     clips.prepare(1, [(sha256, 1001)])
     clips.close()

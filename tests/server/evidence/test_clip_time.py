@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from sqlalchemy import delete, select, update
 
 from server.context import Services
-from server.evidence import repository
-from server.evidence.clip_time import ClipTime
-from server.migrate import downgrade, upgrade
+from server.core.migrate import downgrade, upgrade
 from server.models import AnswerEvidence, RunTally, StudyRun
-from server.operations import checks
-from server.tallies.recount import Recount
+from server.operations import doctor
+from server.participation import evidence_repository
+from server.participation.clip_bytes import ClipTime
+from server.participation.tally_pools import Recount
 from tests.helpers.evidence import Watcher
 from tests.server.evidence.conftest import CLIP_S
 
@@ -79,7 +79,11 @@ def test_what_is_kept_is_what_a_full_count_gives(watcher: Watcher, services: Ser
     with services.database.read() as session:
         assert list(Recount(services.versions).differing(session)) == []
         run = session.scalars(select(StudyRun.id)).one()
-        sums = [repository.clip_ms_since(session.connection(), run, moment) for moment in made[2:4] if moment]
+        sums = [
+            evidence_repository.clip_ms_since(session.connection(), run, moment)
+            for moment in made[2:4]
+            if moment
+        ]
     assert sums == [made.clip_ms, made.newest_clip_ms]
 
 
@@ -94,10 +98,10 @@ def test_the_migration_fills_the_sums_from_the_evidence(watcher: Watcher, servic
 
 def test_doctor_tells_of_wrong_sums(watcher: Watcher, services: Services) -> None:
     answered(watcher)
-    assert next(checks.counts(services)).verdict == "ok"
+    assert next(doctor.counts(services)).verdict == "ok"
     with services.database.write() as session:
         session.execute(update(RunTally).values(newest_clip_ms=RunTally.newest_clip_ms + 1))
-    assert next(checks.counts(services)).verdict == "failed"
+    assert next(doctor.counts(services)).verdict == "failed"
 
 
 def test_tickets_between_the_first_and_the_newest_are_summed_up(watcher: Watcher) -> None:

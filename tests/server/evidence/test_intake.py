@@ -8,13 +8,13 @@ import pytest
 from fastapi.testclient import TestClient
 from sqlalchemy import select, text
 
-from server.clock import now
 from server.context import Services
-from server.evidence.clip_bytes import older_digest
-from server.evidence.intake import FALSE_ANSWERS_PER_MINUTE
-from server.evidence.repository import has_refusals
-from server.evidence.service import judge_run
+from server.core.values import now
 from server.models import AnswerEvidence, RunEvent, StudyRun
+from server.participation.clip_bytes import older_digest
+from server.participation.evidence_repository import has_refusals
+from server.participation.intake import FALSE_ANSWERS_PER_MINUTE
+from server.participation.judgement import judge_run
 from tests.helpers.evidence import Watcher
 from tests.helpers.studies import Participant, StudyInDatabase, clip_url
 from tests.server.evidence.conftest import CLIP_S

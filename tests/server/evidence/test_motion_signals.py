@@ -8,8 +8,7 @@ from typing import Any
 
 import pytest
 
-from server.evidence.signals import JudgedAnswer, guessed, signals_of
-from server.evidence.verdict import judge
+from server.participation.evidence import JudgedAnswer, guessed, judge, signals_of
 from tests.server.evidence.test_verdicts import gamma_person
 
 CHECKS, CHOICES, RUNS = 10, 4, 1000

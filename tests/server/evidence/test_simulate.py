@@ -7,9 +7,9 @@ import pytest
 from sqlalchemy import select
 
 from server.context import Services
-from server.evidence.signals import GUESSED_BY_CHANCE
 from server.models import StudyRun
-from server.simulation.manners import MANNERS
+from server.participation.evidence import GUESSED_BY_CHANCE
+from server.rehearsals.manners import MANNERS
 from tests.helpers.databases import run_server_command
 from tests.helpers.studies import SHORT, StudyInDatabase, add_study
 from tests.server.evidence.conftest import CLIP_FRAMES

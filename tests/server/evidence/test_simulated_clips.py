@@ -8,8 +8,8 @@ import pytest
 
 from server.context import Services
 from server.models import View
-from server.simulation.adversaries import act, manner_called
-from server.simulation.person import Rater
+from server.rehearsals.manners import act, manner_called
+from server.rehearsals.person import Rater
 from tests.conftest import REPOSITORY
 from tests.helpers.studies import SHORT, add_study
 from tests.helpers.thresholds import TWO_INTERVAL, text_with

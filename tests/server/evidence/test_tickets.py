@@ -6,9 +6,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.errors import ApiError
-from server.evidence.refusals import TicketExpired, TicketInvalid, TicketOfAnotherRun, TicketOfAnotherTrial
-from server.evidence.tickets import LIFETIME, check_ticket, evidence_key, issue, ticket, tickets
+from server.core.errors import ApiError
+from server.participation.intake import LIFETIME, check_ticket, evidence_key, issue, ticket, tickets
+from server.participation.refusals import (
+    TicketExpired,
+    TicketInvalid,
+    TicketOfAnotherRun,
+    TicketOfAnotherTrial,
+)
 
 KEY = evidence_key(b"secret")
 MOMENT = datetime(2026, 11, 21, 12, tzinfo=UTC)

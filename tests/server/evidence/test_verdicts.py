@@ -11,8 +11,18 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from experiments.columns.runs import EVIDENCE_COLUMNS
-from server.evidence.signals import GUESSED_BY_CHANCE, SIGNAL_NAMES, JudgedAnswer, Signals, signals_of
-from server.evidence.verdict import BANDS, ENOUGH_BY_CHANCE, WITHOUT, judge, verdict_on
+from server.participation.evidence import (
+    BANDS,
+    ENOUGH_BY_CHANCE,
+    GUESSED_BY_CHANCE,
+    SIGNAL_NAMES,
+    WITHOUT,
+    JudgedAnswer,
+    Signals,
+    judge,
+    signals_of,
+    verdict_on,
+)
 
 START = datetime(2026, 11, 21, tzinfo=UTC)
 HONEST_RUNS, FALSE_ALARMS = 1_000, 0.01

@@ -9,13 +9,13 @@ import pytest
 from fastapi.testclient import TestClient
 from sqlalchemy import select
 
-from server.clock import now
 from server.context import Services
-from server.evidence import repository
-from server.evidence.intake import FALSE_ANSWERS_PER_MINUTE
-from server.evidence.repository import ANSWER, VIEW, has_refusals
-from server.evidence.service import judge_run
+from server.core.values import now
 from server.models import Clip, RunEvent, StudyRun, View
+from server.participation import evidence_repository
+from server.participation.evidence_repository import ANSWER, VIEW, has_refusals
+from server.participation.intake import FALSE_ANSWERS_PER_MINUTE
+from server.participation.judgement import judge_run
 from tests.helpers.evidence import Watcher
 from tests.helpers.studies import StudyInDatabase
 from tests.server.evidence.conftest import CLIP_S
@@ -210,13 +210,13 @@ def test_what_was_spent_is_read_once_for_the_views_of_a_call(
     trials = with_clips(watcher.state())
     watcher.wait(len(trials) * SHOWN_S)
     whole = [ended(watcher, view_of(watcher, trial)) for trial in trials]
-    asked, ask = [], repository.spent_by_views
+    asked, ask = [], evidence_repository.spent_by_views
 
-    def noted(*question: Any) -> repository.Spent:
+    def noted(*question: Any) -> evidence_repository.Spent:
         asked.append(question)
         return ask(*question)
 
-    monkeypatch.setattr(repository, "spent_by_views", noted)
+    monkeypatch.setattr(evidence_repository, "spent_by_views", noted)
     assert send(watcher, *whole).json()["completed"] == len(trials)
     assert len(asked) == 1
 

@@ -9,11 +9,10 @@ import pytest
 from sqlalchemy import select
 
 from server.context import Services
-from server.evidence.clip_bytes import ClipBytes, older_digest
-from server.evidence.later import digests_judged_later
-from server.evidence.waiting import judge_later
+from server.core.storage import ClipsAway, ClipStore
 from server.models import AnswerEvidence, RunEvent, StudyRun
-from server.storage.clips import ClipsAway, ClipStore
+from server.participation.clip_bytes import ClipBytes, older_digest
+from server.participation.judgement import digests_judged_later, judge_later
 from tests.helpers.evidence import Watcher
 from tests.helpers.studies import clip_url
 from tests.server.evidence.conftest import CLIP_S

@@ -4,7 +4,7 @@ import pyreadstat
 import pytest
 from fastparquet import ParquetFile
 
-from server.export.endpoints import _converting
+from server.exports.endpoints import _converting
 from tests.helpers.admins import Admin
 from tests.helpers.studies import Participant
 
@@ -43,8 +43,8 @@ def test_what_cannot_be_converted_is_refused_before_the_file_begins(
     participant.agree()
     participant.rate_all()
     # The real program, which finds no place for the file.
-    monkeypatch.setattr("server.export.endpoints.tempfile.mkdtemp", lambda prefix: str(tmp_path / "gone"))
-    monkeypatch.setattr("server.export.endpoints.write_table", lambda table, folder: None)
+    monkeypatch.setattr("server.exports.endpoints.tempfile.mkdtemp", lambda prefix: str(tmp_path / "gone"))
+    monkeypatch.setattr("server.exports.endpoints.write_table", lambda table, folder: None)
     answer = viewer.get("/studies/short/data/ratings.sav")
     assert answer.status_code == 422
     assert answer.json()["error"]["message"]

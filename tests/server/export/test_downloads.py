@@ -13,7 +13,7 @@ from experiments.manifest import read_manifest
 from experiments.trials.clip_rating.columns import RATINGS
 from server.accounts.identity import OPERATOR
 from server.context import Services
-from server.studies.importing import add_version
+from server.studies.creation import add_version
 from server.studies.lookup import find_study
 from tests.helpers.admins import Admin
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study

@@ -6,8 +6,8 @@ import io
 import pytest
 
 from server.context import Services
-from server.export.extract import Extract
-from server.export.formats import ratings_csv
+from server.exports.extract import Extract
+from server.exports.formats import ratings_csv
 from server.models import Study
 from tests.helpers.studies import Participant
 

@@ -21,7 +21,7 @@ from fastapi.testclient import TestClient
 from experiments.load import parse_experiment
 from server.accounts.identity import OPERATOR
 from server.context import Services
-from server.studies.importing import add_version, store_clips
+from server.studies.creation import add_version, store_clips
 from server.studies.lookup import find_study
 from tests.helpers.admins import Admin
 from tests.helpers.studies import SHORT, Participant, add_study

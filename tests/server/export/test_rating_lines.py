@@ -12,12 +12,12 @@ from experiments.columns.tables import rows_of
 from experiments.trials import views
 from experiments.trials.continuous_rating import CONTINUOUS_RATING
 from server.context import Services
-from server.export import rating_lines
-from server.export.extract import EVERYTHING, Extract
-from server.export.formats import ratings_csv
-from server.export.pieces import ExportBrokenOff, csv_pieces, rating_table
+from server.exports import csv_lines
+from server.exports.csv_lines import ExportBrokenOff, csv_pieces, rating_table
+from server.exports.extract import EVERYTHING, Extract
+from server.exports.formats import ratings_csv
 from server.models import Rating, Study, StudyRun, VersionClip
-from server.simulation.person import Person, Rater
+from server.rehearsals.person import Person, Rater
 from tests.conftest import REPOSITORY
 from tests.helpers.motion_checks import checked
 from tests.helpers.simulated import Api, levels_by_clip
@@ -77,7 +77,7 @@ def test_clips_that_no_longer_fit_in_memory_are_read_again(
     participant: Participant, services: Services, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     participant.agree().rate_all()
-    monkeypatch.setattr(rating_lines, "CLIPS_KEPT", 2)
+    monkeypatch.setattr(csv_lines, "CLIPS_KEPT", 2)
     with services.database.read() as session:
         study = session.query(Study).one()
         expected = b"".join(csv_pieces(rating_table(session, study, EVERYTHING)))
@@ -88,7 +88,7 @@ def test_lines_that_are_missing_break_the_export_off(
     participant: Participant, services: Services, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     participant.agree().rate_all()
-    monkeypatch.setattr("server.export.pieces.rating_count", lambda *_: 13)
+    monkeypatch.setattr("server.exports.csv_lines.rating_count", lambda *_: 13)
     with (
         services.database.read() as session,
         pytest.raises(ExportBrokenOff, match="expected 13 rows, got 12"),

@@ -5,9 +5,9 @@ from typing import Any
 
 from experiments.trials.clip_rating.columns import RATINGS
 from server.context import Services
-from server.export.extract import EVERYTHING
-from server.export.formats import ratings_csv
-from server.export.ratings_csv import rating_rows
+from server.exports.csv_lines import rating_rows
+from server.exports.extract import EVERYTHING
+from server.exports.formats import ratings_csv
 from server.models import Study
 from tests.helpers.studies import Participant
 

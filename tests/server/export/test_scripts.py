@@ -11,7 +11,7 @@ import pytest
 from experiments.definition import Experiment
 from experiments.load import load_experiment
 from experiments.rules import DropFailedPlays, DropSlowTrials, ExcludeIncomplete
-from server.export.scripts import LANGUAGES, script
+from server.exports.psych_ds import LANGUAGES, script
 from tests.analysis.ratings_file import rows_of, simulate, write_export
 from tests.analysis.report.r_process import needed
 

@@ -14,7 +14,7 @@ from analysis.plans.plan import plan_of, study_contents
 from analysis.read.study_answers import load_csv
 from experiments.definition import Experiment
 from experiments.load import load_experiment
-from server.export.scripts import APPLIED, script
+from server.exports.psych_ds import APPLIED, script
 from tests.analysis.ratings_file import Row, rows_of, simulate, write_export
 from tests.analysis.report.r_process import needed, run_together
 from tests.conftest import REPOSITORY

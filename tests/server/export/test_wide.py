@@ -9,11 +9,11 @@ from fastapi.testclient import TestClient
 from experiments.columns.form_columns import form_columns
 from experiments.load import parse_experiment
 from server.context import Services
-from server.export import wide
-from server.export.extract import EVERYTHING
-from server.export.ratings_csv import rating_rows
-from server.export.scripts import LANGUAGES, script
-from server.export.wide import cells_of
+from server.exports import tables
+from server.exports.csv_lines import rating_rows
+from server.exports.extract import EVERYTHING
+from server.exports.psych_ds import LANGUAGES, script
+from server.exports.tables import cells_of
 from server.models import Study
 from tests.conftest import REPOSITORY
 from tests.helpers.admins import Admin
@@ -74,10 +74,10 @@ def test_each_visit_has_its_own_means_and_one_is_in_memory_at_a_time(
             taken.append(row)
             yield row
 
-    monkeypatch.setattr(wide, "rating_rows", noted)
+    monkeypatch.setattr(tables, "rating_rows", noted)
     with services.database.read() as session:
         [known] = session.query(Study).all()
-        rows = wide.wide_rows(session, known, EVERYTHING, study.experiment, [])
+        rows = tables.wide_rows(session, known, EVERYTHING, study.experiment, [])
         at_once = [len(taken) for _ in rows]
     ratings = rows_of(viewer, "ratings.csv")
     assert len(taken) == len(ratings)

@@ -10,15 +10,15 @@ from sqlalchemy import select, text
 
 from experiments.errors import InputError
 from server.context import Services, open_services
-from server.identities.repository import known_as, readable
+from server.core.settings import Settings
 from server.models import IdentityKey, RecruiterIdentity, Study, StudyRun
-from server.operations import erasures
 from server.operations.backup import back_up
-from server.operations.checks import identities
+from server.operations.doctor import identities
 from server.operations.drill import drill
-from server.operations.keys_apart import NAME
+from server.operations.key_escrow import NAME
 from server.operations.restore import restore
-from server.settings import Settings
+from server.participation.identity_repository import known_as, readable
+from server.privacy import erasures
 from tests.helpers.admins import Admin
 from tests.helpers.databases import BACKENDS, run_server_command
 from tests.helpers.studies import Participant, StudyInDatabase

@@ -7,11 +7,11 @@ from alembic.util import CommandError
 from sqlalchemy import select, text
 
 from server.context import Services, open_services
-from server.identities.repository import known_as
-from server.migrate import current_revision, downgrade, newest_revision, upgrade
+from server.core.migrate import current_revision, downgrade, newest_revision, upgrade
+from server.core.settings import Settings
 from server.models import StudyRun
 from server.operations.restore import restore
-from server.settings import Settings
+from server.participation.identity_repository import known_as
 from tests.helpers.golden_backups import golden_backup, golden_keys
 
 BEFORE, SEALED = "0024", "0025"

@@ -9,7 +9,7 @@ from cryptography.hazmat.primitives.ciphers.aead import AESGCM
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.identities.sealing import (
+from server.participation.identity_keys import (
     KnownAs,
     UnreadableError,
     identifier_hash,

@@ -3,7 +3,7 @@ import io
 import pytest
 from PIL import Image
 
-from server.settings import Settings
+from server.core.settings import Settings
 from stimuli_builder.clips.strips import write_strips
 from tests.helpers.admins import Admin
 

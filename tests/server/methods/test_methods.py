@@ -14,10 +14,10 @@ from sqlalchemy import text
 
 from server.accounts.identity import OPERATOR
 from server.context import Services
-from server.methods.paragraph import Methods
-from server.methods.repository import Number
-from server.methods.service import methods_of
-from server.runs.erasure import erase
+from server.privacy.erasures import erase
+from server.results.methods import methods_of
+from server.results.methods_clauses import Methods
+from server.results.methods_repository import Number
 from server.studies.lookup import find_study
 from tests.helpers.admins import Admin
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study

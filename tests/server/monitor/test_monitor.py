@@ -4,8 +4,8 @@ from sqlalchemy import delete
 
 from server.context import Services
 from server.models import StudyRun
-from server.monitor import endpoints
-from server.monitor.schemas import MonitorSnapshot
+from server.results import endpoints
+from server.results.schemas import MonitorSnapshot
 from tests.helpers.admins import Admin
 from tests.helpers.studies import Participant, StudyInDatabase
 
@@ -72,7 +72,7 @@ def test_who_takes_the_place_of_a_deleted_preview_gets_a_row_of_her_own(
 def test_every_run_is_counted_and_the_latest_are_listed(
     viewer: Admin, client: TestClient, study: StudyInDatabase, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.monitor.service.MAX_LISTED", 2)
+    monkeypatch.setattr("server.results.monitor.MAX_LISTED", 2)
     people = [Participant(client, study.link_token).agree() for _ in range(3)]
     people[0].answer_all()
     assert people[0].request("POST", "/complete").status_code == 200

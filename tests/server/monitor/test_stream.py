@@ -11,11 +11,11 @@ from fastapi.testclient import TestClient
 from sqlalchemy import update
 
 from server.cli_run import GRACE_S
-from server.clock import now
 from server.context import Services
+from server.core.changes import Stopping
+from server.core.settings import Settings
+from server.core.values import now
 from server.models import AdminSession
-from server.settings import Settings
-from server.stopping import Stopping
 from tests.helpers.admins import Admin, signed_in
 from tests.helpers.ports import free_port
 from tests.helpers.studies import StudyInDatabase

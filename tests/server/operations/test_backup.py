@@ -11,13 +11,12 @@ from sqlalchemy import text
 
 from experiments.errors import InputError
 from server.context import Services, open_services
-from server.db import Database
+from server.core.db import Database
+from server.core.settings import Settings
 from server.operations.backup import back_up
 from server.operations.copying import copy_database
 from server.operations.restore import restore
-from server.operations.rows import Content
-from server.operations.rows_repository import content_of, snapshot, tables_of
-from server.settings import Settings
+from server.privacy.rows import Content, content_of, snapshot, tables_of
 from tests.helpers.databases import BACKENDS
 from tests.helpers.studies import Participant
 

@@ -4,13 +4,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from server.context import Services, open_services
-from server.operations import erasures
-from server.operations.checks import CHECKS
-from server.operations.doctor import examine
-from server.operations.findings import Finding
-from server.operations.modes import close_to_others
-from server.operations.shared_checks import ledger
-from server.settings import Settings
+from server.core.settings import Settings, close_to_others
+from server.operations.doctor import CHECKS, Finding, examine, ledger
+from server.privacy import erasures
 from tests.helpers.databases import run_server_command
 from tests.helpers.studies import StudyInDatabase
 

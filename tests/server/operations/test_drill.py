@@ -16,14 +16,14 @@ from fastapi.testclient import TestClient
 from sqlalchemy.exc import OperationalError
 
 from server.context import Services
-from server.operations import drill_schedule
+from server.core.settings import Settings
+from server.operations import drill as drill_module
 from server.operations.backup import back_up
-from server.operations.backup_checks import backups
 from server.operations.backup_stores import backup_store
+from server.operations.doctor import backups
 from server.operations.drill import DrillUnderWayError, drill, drill_when_due, is_due, sweep
 from server.operations.metrics import exposition
 from server.operations.watched_backups import DrillResult, last_drill, newest_backup
-from server.settings import Settings
 from tests.helpers.databases import run_server_command
 from tests.helpers.studies import Participant
 from tests.helpers.waiting import until
@@ -219,7 +219,7 @@ def test_the_server_makes_the_drill_by_itself(
     monkeypatch.setenv("DATABASE_URL", watched.database_url)
 
     async def serve_until_drilled() -> None:
-        async with drill_schedule.weekly_drill(watched, first_look_s=0):
+        async with drill_module.weekly_drill(watched, first_look_s=0):
             for _ in range(1800):
                 if last_drill(watched):
                     return

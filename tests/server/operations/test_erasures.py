@@ -9,13 +9,13 @@ from sqlalchemy import select
 
 from experiments.errors import InputError
 from server.context import Services, open_services
-from server.identities.repository import keep
-from server.identities.sealing import KnownAs
+from server.core.settings import Settings
 from server.models import AuditEntry, StudyRun
-from server.operations import erasures
 from server.operations.backup import back_up
 from server.operations.restore import restore
-from server.settings import Settings
+from server.participation.identity_keys import KnownAs
+from server.participation.identity_repository import keep
+from server.privacy import erasures
 from tests.helpers.admins import Admin
 from tests.helpers.databases import BACKENDS, run_server_command
 from tests.helpers.studies import Participant, StudyInDatabase

@@ -13,18 +13,16 @@ from sqlalchemy import select
 
 from experiments.errors import InputError
 from server.context import Services, open_services
-from server.identities.repository import known_as
+from server.core.settings import Settings
+from server.core.storage import ClipStore
 from server.models import IdentityKey, Study, StudyRun
-from server.operations import keys_apart
-from server.operations.backup import back_up
-from server.operations.backup_stores import FolderOfBackups, backups_in
+from server.operations import key_escrow
+from server.operations.backup import back_up, decrypt, identity_in, make_identity, recipient_of
+from server.operations.backup_stores import FolderOfBackups, KeptBackup, back_up_to, backups_in
 from server.operations.drill import drill, drill_when_due
-from server.operations.encryption import decrypt, identity_in, make_identity, recipient_of
-from server.operations.keys_apart import NAME, key_file
-from server.operations.off_host import KeptBackup, back_up_to
+from server.operations.key_escrow import NAME, key_file
 from server.operations.restore import restore
-from server.settings import Settings
-from server.storage.clips import ClipStore
+from server.participation.identity_repository import known_as
 from tests.helpers.admins import Admin
 from tests.helpers.databases import run_server_command
 from tests.helpers.studies import Participant, StudyInDatabase
@@ -138,7 +136,7 @@ def test_the_keys_stand_there_before_the_backup(
     if kind == "here":
         (tmp_path / "b").mkdir()
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(keys_apart, "write_keys", _killed)
+            patch.setattr(key_escrow, "write_keys", _killed)
             with pytest.raises(KeyboardInterrupt):
                 back_up(services, tmp_path / "b" / TAR)
         assert list((tmp_path / "b").glob("*.tar")) == []

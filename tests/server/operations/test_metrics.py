@@ -2,7 +2,7 @@ from fastapi.testclient import TestClient
 from prometheus_client.parser import text_string_to_metric_families
 
 from server.context import Services
-from server.settings import Settings
+from server.core.settings import Settings
 from tests.helpers.studies import Participant
 
 TOKEN = "for prometheus"

@@ -9,14 +9,13 @@ import pytest
 from sqlalchemy import select, text
 
 from server.accounts import service, signing_in
+from server.accounts.audit_verification import Verdict, verify
+from server.accounts.credentials import Checked, secret_of
 from server.accounts.identity import Identity
-from server.accounts.passwords import Checked
-from server.accounts.second_factor import secret_of
-from server.audit.verify import Verdict, verify
 from server.context import Services, open_services
-from server.errors import ApiError
+from server.core.errors import ApiError
+from server.core.settings import Settings
 from server.models import Account
-from server.settings import Settings
 from tests.helpers.admins import wrong_code
 from tests.helpers.databases import Called, run_server_command
 from tests.helpers.studies import Participant

@@ -14,18 +14,23 @@ import pytest
 from fastapi.testclient import TestClient
 
 from experiments.errors import InputError
-from server.clock import now
 from server.context import Services, open_services
+from server.core.settings import Settings
+from server.core.values import now
 from server.operations import watched_backups as watching
-from server.operations.backup import back_up
-from server.operations.backup_checks import backups
-from server.operations.backup_stores import BackupStore, backup_store, backups_in
+from server.operations.backup import back_up, decrypt, encrypted, identity_in, make_identity, recipient_of
+from server.operations.backup_stores import (
+    BackupStore,
+    KeptBackup,
+    back_up_to,
+    backup_store,
+    backups_in,
+    ending_of,
+)
+from server.operations.doctor import backups
 from server.operations.drill import drill, drill_when_due
-from server.operations.encryption import decrypt, encrypted, identity_in, make_identity, recipient_of
 from server.operations.metrics import exposition
-from server.operations.off_host import KeptBackup, back_up_to, ending_of
 from server.operations.watched_backups import OLD_AFTER_S, WatchedBackups, last_drill, watched_backups
-from server.settings import Settings
 from tests.helpers.admins import Admin
 from tests.helpers.databases import Called, run_server_command
 from tests.helpers.studies import Participant, StudyInDatabase

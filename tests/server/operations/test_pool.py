@@ -13,8 +13,8 @@ from sqlalchemy.engine import make_url
 from sqlalchemy.exc import OperationalError
 
 from server.context import open_services
-from server.operations.shared_checks import connection_pool
-from server.settings import Settings
+from server.core.settings import Settings
+from server.operations.doctor import connection_pool
 from tests.helpers.ports import free_port
 
 on_postgres = pytest.mark.parametrize(

@@ -5,13 +5,12 @@ from pathlib import Path
 import pytest
 
 from server.context import open_services
-from server.identities.repository import readable
-from server.migrate import current_revision, downgrade, newest_revision, upgrade
+from server.core.migrate import current_revision, downgrade, newest_revision, upgrade
+from server.core.settings import Settings
 from server.operations.restore import restore
-from server.operations.rows import Content
-from server.operations.rows_repository import content_of, snapshot, tables_of
-from server.settings import Settings
-from server.tallies.recount import Recount
+from server.participation.identity_repository import readable
+from server.participation.tally_pools import Recount
+from server.privacy.rows import Content, content_of, snapshot, tables_of
 from tests.helpers.databases import BACKENDS
 from tests.helpers.golden_backups import REVISIONS, golden_backup, golden_keys
 

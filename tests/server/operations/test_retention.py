@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.operations.retention import day_of, superfluous
-from server.settings import Settings
+from server.core.settings import Settings
+from server.operations.watched_backups import day_of, superfluous
 from tests.helpers.databases import run_server_command
 
 DAYS = st.dates(date(2026, 1, 1), date(2026, 3, 1))

@@ -9,7 +9,7 @@ from sqlalchemy import text
 
 from server.app import create_app
 from server.context import Services
-from server.settings import Settings
+from server.core.settings import Settings
 from tests.helpers.admins import Admin
 from tests.helpers.studies import Participant, StudyInDatabase
 

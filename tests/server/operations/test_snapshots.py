@@ -17,14 +17,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sqlalchemy import func, select
 
-from server.clock import now
 from server.context import Services, open_services
-from server.file_locks import locked
-from server.identities.repository import keep
-from server.identities.sealing import KnownAs
+from server.core.locks import locked
+from server.core.settings import Settings
+from server.core.values import now
 from server.models import AuditEntry, IdentityKey, Rating, StudyRun
-from server.operations import backup_checks, erasures
-from server.operations.snapshot_schedule import look, snapshots_taken
+from server.operations import doctor
 from server.operations.snapshots import (
     ALL_OF,
     DAILY_OF,
@@ -33,12 +31,16 @@ from server.operations.snapshots import (
     SnapshotUnderWayError,
     database_file,
     is_due,
+    look,
     set_aside,
     snapshots_of,
+    snapshots_taken,
     superfluous,
     take_snapshot,
 )
-from server.settings import Settings
+from server.participation.identity_keys import KnownAs
+from server.participation.identity_repository import keep
+from server.privacy import erasures
 from tests.helpers.admins import Admin
 from tests.helpers.databases import run_server_command
 from tests.helpers.studies import Participant, StudyInDatabase
@@ -224,7 +226,7 @@ class TestGoingBack:
             last = session.scalars(select(AuditEntry).order_by(AuditEntry.id.desc()).limit(1)).one()
         assert (last.action, last.target[:16]) == ("database taken back", f"{taken.taken_at:%Y-%m-%dT%H:%M}")
         assert run_server_command(services.settings, "audit", "verify").returncode == 0
-        finding = list(backup_checks.snapshots(services))[-1]
+        finding = list(doctor.snapshots(services))[-1]
         assert finding.verdict == "warning"
         assert str(aside) in finding.advice
 

@@ -17,12 +17,12 @@ from sqlalchemy.exc import DBAPIError
 from server.accounts.identity import OPERATOR
 from server.app import create_app
 from server.context import Services, open_services
-from server.export.extract import Extract
-from server.export.formats import FORMATS
-from server.migrate import current_revision, downgrade, newest_revision, upgrade
+from server.core.migrate import current_revision, downgrade, newest_revision, upgrade
+from server.core.settings import Settings
+from server.exports.extract import Extract
+from server.exports.formats import FORMATS
 from server.models.runs import StudyRun
-from server.participants import returning
-from server.settings import Settings
+from server.participation import returning
 from server.studies.lookup import find_study
 from tests.helpers.databases import BACKENDS
 from tests.helpers.older_databases import (

@@ -9,7 +9,7 @@ from fastapi.testclient import TestClient
 
 from server.context import Services
 from server.models import Study, StudyRun
-from server.participants.comparisons_repository import compared
+from server.participation.run_repository import compared
 from tests.helpers.studies import Participant, StudyInDatabase, add_study
 from tests.server.trials.test_comparisons import PAIRS, compare, mains
 

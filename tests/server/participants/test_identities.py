@@ -9,10 +9,10 @@ from fastapi.testclient import TestClient
 from sqlalchemy import inspect, text
 
 from server.context import Services
-from server.identities.repository import known_as
-from server.identities.sealing import KnownAs, identifier_hash
 from server.models import IdentityKey, RecruiterIdentity, StudyRun
-from server.participants.identities import pseudonym
+from server.participation.identity_keys import KnownAs, identifier_hash
+from server.participation.identity_repository import known_as
+from server.participation.returning import pseudonym
 from tests.helpers.admins import Admin
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study
 

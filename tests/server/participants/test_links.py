@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from server.clock import now
 from server.context import Services
+from server.core.values import now
 from server.models import AssignedTrial, RunEvent, StudyRun, TrialClip
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study
 

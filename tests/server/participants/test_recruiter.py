@@ -1,7 +1,7 @@
 import pytest
 from pydantic import ValidationError
 
-from server.participants.recruiter import Recruiter
+from server.participation.recruiter import Recruiter
 
 
 @pytest.mark.parametrize(

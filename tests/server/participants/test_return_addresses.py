@@ -7,8 +7,8 @@ from sqlalchemy import update
 
 from server.context import Services
 from server.models import Study
-from server.operations.shared_checks import return_addresses
-from server.participants.recruiter import stored_recruiter
+from server.operations.doctor import return_addresses
+from server.participation.recruiter import stored_recruiter
 from tests.helpers.admins import Admin
 from tests.helpers.studies import Participant, StudyInDatabase
 

@@ -10,7 +10,7 @@ from sqlalchemy import text
 
 from server.context import Services
 from server.models import AssignedTrial, Study, StudyRun
-from server.participants.repository import lock_study
+from server.participation.run_repository import lock_study
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study
 from tests.helpers.waiting import until
 

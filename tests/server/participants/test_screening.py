@@ -164,7 +164,7 @@ def test_a_device_is_screened_out_only_where_declared(
 
 def test_the_monitor_counts_who_was_screened_out(screened: Screened, services: Services) -> None:
     from server.models import Study
-    from server.monitor.service import snapshot
+    from server.results.monitor import snapshot
     from server.studies.lookup import active_definition
 
     screened().request("PUT", "/forms/about", {"answers": {"age": 90}})

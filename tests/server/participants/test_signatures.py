@@ -15,12 +15,11 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from server.context import Services
-from server.identities.repository import known_as
+from server.core.values import hash_token
 from server.models import Link, Study, StudyRun
-from server.participants.recruiter import Recruiter
-from server.participants.refusals import SignatureWrong
-from server.participants.signatures import is_signed, signature_of, signing_secret
-from server.tokens import hash_token
+from server.participation.identity_repository import known_as
+from server.participation.recruiter import Recruiter, is_signed, signature_of, signing_secret
+from server.participation.refusals import SignatureWrong
 from tests.helpers.admins import Admin
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study
 

@@ -10,12 +10,12 @@ from sqlalchemy.orm import Session
 
 from experiments.load import parse_experiment
 from server.context import Services
-from server.identities.repository import keep
-from server.identities.sealing import KnownAs
 from server.models import Base, RunEvent, StudyRun, View, ViewClip
-from server.operations import erasures
-from server.persons.service import visits_of
-from server.retention.schedule import every_study
+from server.participation.identity_keys import KnownAs
+from server.participation.identity_repository import keep
+from server.privacy import erasures
+from server.privacy.persons import visits_of
+from server.privacy.retention import every_study
 from tests.helpers.admins import Admin
 from tests.helpers.databases import run_server_command
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study

@@ -11,11 +11,10 @@ from typing import Any
 
 import pytest
 
-from server.errors import ApiError
-from server.providers import answers
-from server.providers.declaration import Provider
-from server.providers.protocol import ProviderClient, Secrets
-from server.providers.refusals import NotRecognised, ProviderAway
+from server.accounts import provider_protocol
+from server.accounts.provider_protocol import NotRecognised, ProviderAway, ProviderClient, Secrets
+from server.core.errors import ApiError
+from server.core.settings import Provider
 
 SECRETS = Secrets("a-state", "a-nonce", "a-verifier-" * 5)
 Answer = Callable[[BaseHTTPRequestHandler], None]
@@ -108,7 +107,7 @@ def hostile() -> Iterator[Hostile]:
 
 @pytest.fixture
 def client(hostile: Hostile, monkeypatch: pytest.MonkeyPatch) -> ProviderClient:
-    monkeypatch.setattr(answers, "WHOLE_S", 1.0)
+    monkeypatch.setattr(provider_protocol, "WHOLE_S", 1.0)
     provider = Provider(label="Hostile", issuer=hostile.address, client_id="palpebra")
     return ProviderClient(provider, "http://localhost:8000/callback")
 

@@ -7,10 +7,9 @@ from fastapi.testclient import TestClient
 
 from server.accounts import invitations
 from server.context import Services
+from server.core.limits import RateLimit
+from server.core.settings import Provider, RoleRule, Settings
 from server.models import DEFAULT_WORKSPACE, Account, AuditEntry
-from server.providers.declaration import Provider, RoleRule
-from server.rate_limit import RateLimit
-from server.settings import Settings
 from tests.helpers.admins import PASSWORD, fresh_browser, signed_in
 from tests.helpers.providers import RunningProvider, Visitor, provider_for
 

@@ -8,13 +8,12 @@ import pytest
 from fastapi.testclient import TestClient
 
 from server.accounts import service as accounts
-from server.accounts.notices import LOGIN_ADDED
-from server.accounts.passwords import hash_password
+from server.accounts.credentials import hash_password
+from server.accounts.letters import LOGIN_ADDED
 from server.accounts.throttle import BackOff
 from server.context import Services
+from server.core.settings import Provider, Settings
 from server.models import Account, AccountLogin, AuditEntry, LoginAttempt
-from server.providers.declaration import Provider
-from server.settings import Settings
 from tests.helpers.admins import PASSWORD, Admin, signed_in, wrong_code
 from tests.helpers.mail import ADDRESS, smtp_server
 from tests.helpers.providers import SECRET, RunningProvider, Visitor, provider_for

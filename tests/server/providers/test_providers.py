@@ -10,14 +10,13 @@ import pyotp
 import pytest
 from fastapi.testclient import TestClient
 
+from server.accounts import workspaces
 from server.accounts.identity import OPERATOR
 from server.app import create_app
 from server.context import Services
+from server.core.limits import RateLimit
+from server.core.settings import Provider, RoleRule, Settings
 from server.models import Account, AccountLogin, AuditEntry, LoginAttempt
-from server.providers.declaration import Provider, RoleRule
-from server.rate_limit import RateLimit
-from server.settings import Settings
-from server.workspaces import service as workspaces
 from tests.helpers.admins import PASSWORD, Admin, fresh_browser, signed_in, wrong_code
 from tests.helpers.providers import SECRET, RunningProvider, Visitor, provider_for, state_of
 from tests.helpers.studies import FROM_OWN_PAGE

@@ -8,20 +8,16 @@ import pyotp
 import pytest
 from sqlalchemy import text
 
+from server.accounts import provider_sign_in, signing_in, workspaces
 from server.accounts import repository as accounts
 from server.accounts import service as account_service
-from server.accounts import signing_in
 from server.accounts.identity import OPERATOR, Identity
-from server.clock import now
+from server.accounts.provider_protocol import NotRecognised, Recognised
 from server.context import Services
-from server.errors import ApiError
+from server.core.errors import ApiError
+from server.core.settings import Provider, RoleRule, Settings
+from server.core.values import now
 from server.models import LoginAttempt
-from server.providers import attempts, service
-from server.providers.declaration import Provider, RoleRule
-from server.providers.protocol import Recognised
-from server.providers.refusals import NotRecognised
-from server.settings import Settings
-from server.workspaces import service as workspaces
 
 on_postgres = pytest.mark.parametrize("database_url", ["postgres"], indirect=True)
 VISION = RoleRule(workspace="vision", role="owner", claim="groups", value="vision-lab")
@@ -51,9 +47,11 @@ def recognised(subject: str, *groups: str) -> Recognised:
     return Recognised("https://uni.example", subject, {"name": subject, "groups": list(groups)}, False)
 
 
-def sign_in(services: Services, subject: str, *groups: str) -> service.Finished:
+def sign_in(services: Services, subject: str, *groups: str) -> provider_sign_in.Finished:
     attempt = LoginAttempt(provider="uni", purpose="sign in", next_page="/", expires_at=now())
-    return service.finish(services, "uni", attempt, recognised(subject, *groups), "a browser")
+    return provider_sign_in.finish_sign_in(
+        services, "uni", attempt, recognised(subject, *groups), "a browser"
+    )
 
 
 def identity(services: Services, name: str) -> Identity:
@@ -138,7 +136,7 @@ def test_a_waiting_sign_in_ends_with_the_second_factor(
     cookie = asked_for_code(services, "ada")
     taken_off(services)
     with pytest.raises(NotRecognised):
-        service.finish_with_code(services, cookie, "000000", "a browser")
+        provider_sign_in.finish_with_code(services, cookie, "000000", "a browser")
     with services.database.read() as session:
         assert session.query(LoginAttempt).count() == 0
 
@@ -153,7 +151,7 @@ def test_without_a_second_factor_no_code_signs_in(services: Services) -> None:
         assert account is not None
         account.totp_secret = account.totp_confirmed_at = None
     with pytest.raises(NotRecognised):
-        service.finish_with_code(services, cookie, "000000", "a browser")
+        provider_sign_in.finish_with_code(services, cookie, "000000", "a browser")
 
 
 def test_what_nobody_began_takes_no_turn_to_write(
@@ -161,7 +159,7 @@ def test_what_nobody_began_takes_no_turn_to_write(
 ) -> None:
     monkeypatch.setattr(services.database, "write", None)
     with pytest.raises(NotRecognised):
-        attempts.take(services, "uni", "a state", "a cookie")
+        provider_sign_in.take_attempt(services, "uni", "a state", "a cookie")
 
 
 @pytest.mark.postgres
@@ -175,7 +173,7 @@ def test_one_code_lets_one_of_two_in(services: Services, kind: str) -> None:
     with services.database.write() as session:
         accounts.account_named(session, "ada", lock=True)
         threads, ends = at_once(
-            *(lambda one=one: service.finish_with_code(services, one, code, "x") for one in cookies)
+            *(lambda one=one: provider_sign_in.finish_with_code(services, one, code, "x") for one in cookies)
         )
         wait_for_locks(services, 2, threads)
     joined(threads)

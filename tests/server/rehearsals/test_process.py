@@ -13,11 +13,11 @@ import pytest
 
 from server.accounts.identity import OPERATOR, Identity
 from server.context import Services
-from server.errors import Conflict
+from server.core.errors import Conflict
 from server.models import Account, Job
 from server.rehearsals import service
 from server.rehearsals.schemas import NewRehearsal
-from server.reports.jobs import begun
+from server.results.jobs import begun
 from server.studies.lookup import find_study
 from tests.helpers.admins import Admin
 from tests.helpers.studies import SHORT, StudyInDatabase, add_study

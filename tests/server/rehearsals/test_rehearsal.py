@@ -9,7 +9,7 @@ from experiments.errors import InputError
 from experiments.load import load_experiment, locate, parse_experiment
 from server.context import Services
 from server.models import Link, Rating, StudyRun
-from server.rehearsals.power import plan_command
+from server.rehearsals.sandbox import plan_command
 from tests.helpers.admins import Admin
 from tests.helpers.studies import SHORT, Participant
 

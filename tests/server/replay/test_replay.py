@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.replay.answer_log import rebuilt_views
+from server.results.replay import rebuilt_views
 from tests.helpers.admins import Admin
 from tests.helpers.studies import Participant
 

@@ -13,10 +13,10 @@ from sqlalchemy import update
 from sqlalchemy.exc import OperationalError
 
 from server.accounts.identity import OPERATOR
-from server.clock import now
 from server.context import Services
+from server.core.values import now
 from server.models import Job
-from server.reports import jobs
+from server.results import jobs
 from server.studies.lookup import find_study
 from tests.helpers.admins import Admin
 from tests.helpers.databases import server_environment
@@ -24,9 +24,9 @@ from tests.helpers.studies import StudyInDatabase
 
 HOLDS = """
 import sys
-from server.db import open_database
-from server.locks import open_locks
-from server.settings import Settings
+from server.core.db import open_database
+from server.core.locks import open_locks
+from server.core.settings import Settings
 settings = Settings()
 with open_locks(settings, open_database(settings)).of_job(sys.argv[1]):
     print(flush=True)

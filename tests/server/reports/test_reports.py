@@ -8,9 +8,9 @@ import pytest
 from fastapi.testclient import TestClient
 
 from server.context import Services
+from server.exports import reports
+from server.exports.schemas import NewReport
 from server.models import StudyRun
-from server.reports import service
-from server.reports.schemas import NewReport
 from tests.helpers.admins import Admin
 from tests.helpers.studies import Participant, StudyInDatabase
 
@@ -68,15 +68,15 @@ def test_answers_and_runs_of_a_report_are_of_one_moment(
     client: TestClient, participant: Participant, services: Services, study: StudyInDatabase, tmp_path: Path
 ) -> None:
     participant.agree().rate_all()
-    written = service.runs_csv
+    written = reports.runs_csv
 
     def after_another_began(*of: Any) -> Iterator[bytes]:
         Participant(client, study.link_token).start()
         return written(*of)
 
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(service, "runs_csv", after_another_began)
-        service._export(services, study.name, tmp_path / "inputs", NewReport())
+        patched.setattr(reports, "runs_csv", after_another_began)
+        reports._export(services, study.name, tmp_path / "inputs", NewReport())
     lines = (tmp_path / "inputs" / "runs.csv").read_text(encoding="utf-8").splitlines()
     assert len(lines) == 2
     with services.database.read() as session:

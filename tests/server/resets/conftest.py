@@ -6,7 +6,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from server.context import Services
-from server.settings import Settings
+from server.core.settings import Settings
 from tests.helpers.admins import PASSWORD, Admin, fresh_browser, signed_in
 from tests.helpers.mail import ADDRESS, Letterbox, smtp_server
 

@@ -8,13 +8,13 @@ import pytest
 from fastapi.testclient import TestClient
 from typer.testing import CliRunner
 
-from server.accounts import notices
-from server.accounts.notices import Notice
+from server.accounts import letters
+from server.accounts.letters import Notice
 from server.cli import app
-from server.clock import now
 from server.context import Services
+from server.core.settings import Settings
+from server.core.values import now
 from server.models import Account, AccountLogin, AdminSession
-from server.settings import Settings
 from tests.helpers.admins import PASSWORD, Admin, fresh_browser
 from tests.helpers.mail import ADDRESS, Letterbox
 
@@ -66,12 +66,12 @@ def _sign_in_by_recovery_code(ada: Admin, services: Services) -> None:
 @pytest.mark.parametrize(
     ("changes", "notice"),
     [
-        (_change, notices.PASSWORD_CHANGED),
-        (_add_factor, notices.SECOND_FACTOR_ADDED),
-        (_remove_factor, notices.SECOND_FACTOR_REMOVED),
-        (_remove_login, notices.LOGIN_REMOVED),
-        (_sign_in_elsewhere, notices.NEW_BROWSER),
-        (_sign_in_by_recovery_code, notices.RECOVERY_CODE_USED),
+        (_change, letters.PASSWORD_CHANGED),
+        (_add_factor, letters.SECOND_FACTOR_ADDED),
+        (_remove_factor, letters.SECOND_FACTOR_REMOVED),
+        (_remove_login, letters.LOGIN_REMOVED),
+        (_sign_in_elsewhere, letters.NEW_BROWSER),
+        (_sign_in_by_recovery_code, letters.RECOVERY_CODE_USED),
     ],
     ids=lambda value: value.subject if isinstance(value, Notice) else value.__name__,
 )
@@ -110,7 +110,7 @@ def test_the_command_line_tells_too(
     for words in (["reset-password", "ada", "--password", FRESH], ["reset-second-factor", "ada"]):
         called = CliRunner().invoke(app, ["account", *words])
         assert called.exit_code == 0, called.output
-    expected = [notices.PASSWORD_RESET.subject, notices.SECOND_FACTOR_REMOVED.subject]
+    expected = [letters.PASSWORD_RESET.subject, letters.SECOND_FACTOR_REMOVED.subject]
     assert [letter["Subject"] for letter in box.letters] == expected
 
 

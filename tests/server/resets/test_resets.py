@@ -18,27 +18,25 @@ from fastapi.testclient import TestClient
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
-from server import mail
-from server.accounts import repository
+from server.accounts import letters, repository, resets
 from server.accounts import service as accounts
+from server.accounts.credentials import hash_password
 from server.accounts.identity import Identity, NotSignedIn
-from server.accounts.passwords import hash_password
-from server.accounts.throttle import DEVICE_COOKIE, LETTERS_FROM_A_RANGE
-from server.accounts.tokens import end_everything
-from server.app import create_app
-from server.clock import now
-from server.context import Services
-from server.models import Account, AdminSession, AuditEntry, MailedLink
-from server.resets import service as resets
-from server.resets.schemas import Address
-from server.resets.service import (
+from server.accounts.resets import (
     LINK_MINUTES,
     MAX_OPEN_LINKS,
     MAX_RESET_LETTERS_A_DAY,
     RESERVED_LETTERS,
     Asking,
 )
-from server.settings import Settings
+from server.accounts.schemas import Address
+from server.accounts.service import end_everything
+from server.accounts.throttle import DEVICE_COOKIE, LETTERS_FROM_A_RANGE
+from server.app import create_app
+from server.context import Services
+from server.core.settings import Settings
+from server.core.values import now
+from server.models import Account, AdminSession, AuditEntry, MailedLink
 from tests.helpers.admins import PASSWORD, Admin, signed_in
 from tests.helpers.mail import ADDRESS, Letterbox, smtp_server
 
@@ -232,7 +230,7 @@ def test_a_letter_goes_to_the_address_and_nowhere_else(
     except ValidationError:
         return
     box.letters.clear()
-    assert mail.send(settings, taken, "subject", "text")
+    assert letters.send_mail(settings, taken, "subject", "text")
     [letter] = box.letters
     assert (letter["To"].addresses[0].addr_spec, len(letter["To"].addresses)) == (taken, 1)
 
@@ -271,7 +269,7 @@ def test_no_letter_goes_to_a_server_that_nobody_vouches_for(
     options = {"tls_context": _own_certificate(tmp_path)} if offers_tls else {}
     with smtp_server(**options) as (letters, port):
         strict = settings.model_copy(update={"smtp_port": port, "smtp_security": "starttls"})
-        assert not mail.send(strict, ADDRESS, "subject", "text")
+        assert not letters.send_mail(strict, ADDRESS, "subject", "text")
     assert letters.letters == []
     assert "a letter was not sent" in caplog.text
     assert ADDRESS not in caplog.text

@@ -10,10 +10,10 @@ from scipy import stats
 from analysis.plans.continuous_rating import cell_traces, clips_of
 from analysis.plans.plan import plan_of, prepare
 from analysis.read.study_answers import load_csv
-from server.clock import now
 from server.context import Services
+from server.core.values import now
 from server.models import StudyRun
-from server.results.mean_traces import MAX_POINTS, Trace, cell_trace, student_t
+from server.results.summary import MAX_POINTS, Trace, cell_trace, student_t
 from tests.helpers.admins import Admin
 from tests.helpers.studies import Participant, StudyInDatabase
 from tests.server.trials.test_continuous import BLINKS_S, exported, send, study

@@ -11,17 +11,16 @@ from sqlalchemy import select
 
 from experiments.definition.retention import Retention
 from experiments.load import parse_experiment
-from server.clock import now
 from server.context import Services, open_services
-from server.identities.repository import known_as
+from server.core.settings import Settings
+from server.core.values import now
 from server.models import AuditEntry, Link, Rating, Study, StudyRun
-from server.operations import erasures
 from server.operations.backup import back_up
 from server.operations.restore import restore
-from server.retention.schedule import hourly_retention
-from server.retention.service import AT_ONCE, carry_out, preview
-from server.settings import Settings
-from server.studies.importing import add_version
+from server.participation.identity_repository import known_as
+from server.privacy import erasures
+from server.privacy.retention import AT_ONCE, carry_out, hourly_retention, preview
+from server.studies.creation import add_version
 from tests.helpers.admins import Admin
 from tests.helpers.databases import run_server_command
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study

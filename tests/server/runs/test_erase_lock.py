@@ -9,10 +9,10 @@ from sqlalchemy import text
 
 from server.accounts.identity import OPERATOR
 from server.context import Services
-from server.errors import Conflict
+from server.core.errors import Conflict
 from server.models import AuditEntry
-from server.operations import erasures
-from server.runs.erasure import erase
+from server.privacy import erasures
+from server.privacy.erasures import erase
 from server.studies.lookup import find_study
 from tests.helpers.studies import Participant, StudyInDatabase
 

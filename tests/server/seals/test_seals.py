@@ -14,9 +14,8 @@ from experiments.load import load_experiment, parse_experiment
 from experiments.seal import deviations, read_seal
 from server.accounts.identity import OPERATOR
 from server.context import Services
-from server.errors import Conflict
-from server.seals.page import page
-from server.seals.service import seal_of, seal_plan
+from server.core.errors import Conflict
+from server.exports.seals import page, seal_of, seal_plan
 from server.studies.lookup import find_study
 from tests.analysis.ratings_file import rows_of, simulate, write_export
 from tests.helpers.admins import Admin

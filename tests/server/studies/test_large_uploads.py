@@ -10,7 +10,7 @@ import pytest
 
 from experiments.capsule.opening import CapsuleError, open_capsule
 from server.context import Services
-from server.studies import packed
+from server.studies import uploads
 from tests.helpers.admins import Admin
 
 pytestmark = pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
@@ -34,7 +34,7 @@ def test_a_request_that_says_it_is_too_large_is_not_read(services: Services, exp
 def test_a_zip_that_unpacks_to_more_than_the_limit_is_refused_unopened(
     services: Services, experimenter: Admin, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(packed, "MAX_UNPACKED_BYTES", 2 << 20)
+    monkeypatch.setattr(uploads, "MAX_UNPACKED_BYTES", 2 << 20)
     zipped = io.BytesIO()
     with zipfile.ZipFile(zipped, "w", zipfile.ZIP_STORED) as archive:
         for number in range(3):
@@ -62,8 +62,8 @@ def test_a_zip_that_names_very_many_files_takes_no_memory(tmp_path: Path, databa
     zipped = with_very_many_names(tmp_path / "many.zip")
     tracemalloc.start()
     try:
-        with pytest.raises(packed.UploadTooLarge, match="list of files has 8 MiB"):
-            packed.unpack(zipped, tmp_path)
+        with pytest.raises(uploads.UploadTooLarge, match="list of files has 8 MiB"):
+            uploads.unpack(zipped, tmp_path)
         with pytest.raises(CapsuleError, match="list of files has 8 MiB"):
             open_capsule(zipped, tmp_path)
         assert tracemalloc.get_traced_memory()[1] < 2 << 20

@@ -9,8 +9,8 @@ from fastapi.testclient import TestClient
 from experiments.level_leaks import reported_leaks
 from experiments.manifest import Manifest
 from server.context import Services
+from server.core.settings import Settings
 from server.models import Study, StudyVersion
-from server.settings import Settings
 from tests.helpers.admins import Admin
 from tests.helpers.databases import run_server_command
 from tests.helpers.motion_checks import checked

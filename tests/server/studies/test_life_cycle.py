@@ -7,10 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from server.accounts.identity import OPERATOR
-from server.clock import now
 from server.context import Services
+from server.core.values import now
 from server.studies.lookup import find_study
-from server.studies.word_difference import word_difference
+from server.studies.series import word_difference
 from tests.helpers.admins import Admin
 from tests.helpers.studies import Participant, StudyInDatabase
 

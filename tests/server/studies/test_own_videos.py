@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from server.context import Services
-from server.locks import FileLocks
+from server.core.locks import FileLocks
 from server.transcoding.preparing import Preparing
 from server.transcoding.records import BEGUN, records_of
 from tests.helpers.admins import Admin

@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from server.studies.clip_schemas import OwnClips
-from server.studies.templates import trial_of
+from server.studies.own_clips import trial_of
+from server.studies.schemas import OwnClips
 from tests.helpers.admins import Admin
 from tests.helpers.studies import Participant
 from tests.helpers.tiny_clips import encoded_video

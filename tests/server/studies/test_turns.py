@@ -12,9 +12,9 @@ from typing import Any
 import av
 import pytest
 
-from server.transcoding import process_limits, worker
-from server.transcoding.process_limits import address_limit, started_at_most
+from server.transcoding import worker
 from server.transcoding.records import RECORDS, mark, records_of, waiting_in
+from server.transcoding.worker import address_limit, started_at_most
 from tests.helpers.videos import write_video
 from video_conversion.prepare import prepare
 from video_conversion.video_file import NotAClip
@@ -229,11 +229,11 @@ def test_memory_of_all_files_together_stays_below_the_machine_s(machine_gib: flo
 def test_a_container_s_limit_counts_where_it_is_lower_than_the_machine_s(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    whole = process_limits.memory_of_machine()
+    whole = worker.memory_of_machine()
     limit = tmp_path / "memory.max"
-    monkeypatch.setattr(process_limits, "CGROUP_LIMITS", (str(limit),))
+    monkeypatch.setattr(worker, "CGROUP_LIMITS", (str(limit),))
     limit.write_text("max\n")
     assert whole is not None
-    assert (process_limits.memory_of_machine() or 0) >= whole
+    assert (worker.memory_of_machine() or 0) >= whole
     limit.write_text(f"{256 << 20}\n")
-    assert process_limits.memory_of_machine() == 256 << 20
+    assert worker.memory_of_machine() == 256 << 20

@@ -10,9 +10,8 @@ from threading import Barrier
 import pytest
 
 from server.context import Services
-from server.studies import upload_quota, uploads
-from server.studies.upload_quota import Quota
-from server.studies.uploaded_file import UploadTooLarge
+from server.studies import uploads
+from server.studies.uploads import Quota, UploadTooLarge
 from tests.helpers.admins import Admin
 
 FILE = {"files": ("clips.csv", b"file\n" * 300, "text/csv")}
@@ -89,19 +88,19 @@ def test_files_that_go_while_they_are_counted_are_no_error(
     """The worker's own files, and uploads that become studies, go at any moment."""
     _, folder = uploads.new_upload(Quota(tmp_path, 1, LARGE))
     uploads.receive(folder, "clips.csv", io.BytesIO(b"file\n"), LARGE, Quota(tmp_path, 1, LARGE))
-    walk = upload_quota.os.walk
+    walk = uploads.os.walk
 
     def walk_and_lose(path: Path) -> Iterator[tuple[str, list[str], list[str]]]:
         for found in walk(path):
             (folder / "clips.csv").unlink(missing_ok=True)
             yield found
 
-    monkeypatch.setattr(upload_quota.os, "walk", walk_and_lose)
+    monkeypatch.setattr(uploads.os, "walk", walk_and_lose)
     assert Quota(tmp_path, 1, LARGE).room() > LARGE - 100
 
 
 def test_an_account_has_no_more_than_so_many_uploads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(upload_quota, "MAX_UPLOADS", 3)
+    monkeypatch.setattr(uploads, "MAX_UPLOADS", 3)
     quota = Quota(tmp_path, 1, LARGE)
     made = [uploads.new_upload(quota)[1] for _ in range(3)]
     with pytest.raises(UploadTooLarge):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from server.settings import Settings
+from server.core.settings import Settings
 from stimuli_builder.cli import main
 from tests.helpers.databases import run_server_command
 from tests.helpers.tiny_clips import encoded_video

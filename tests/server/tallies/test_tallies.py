@@ -8,15 +8,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sqlalchemy import Connection, delete, select, update
 
-from server.clock import now
 from server.context import Services
+from server.core.settings import Settings
+from server.core.values import now
 from server.models import Rating, RunTally, StudyRun
-from server.operations import checks
-from server.settings import Settings
-from server.tallies.recount import Recount
-from server.tallies.tally import Counted, Play, Tally, tally_of, unpacked
-from server.trials import service
-from server.trials.schemas import RatingIn
+from server.operations import doctor
+from server.participation import ratings
+from server.participation.answer_schemas import RatingIn
+from server.participation.tallies import Counted, Play, Tally, tally_of, unpacked
+from server.participation.tally_pools import Recount
 from tests.helpers.admins import Admin
 from tests.helpers.databases import run_server_command
 from tests.helpers.studies import Participant, good_playback
@@ -63,8 +63,8 @@ def test_a_stored_tally_is_the_tally_in_whatever_order_its_plays_came(given_play
     assert tallied(given_plays).same(made)
 
 
-def finding(services: Services) -> checks.Finding:
-    return next(checks.counts(services))
+def finding(services: Services) -> doctor.Finding:
+    return next(doctor.counts(services))
 
 
 def differing(services: Services) -> list[int]:
@@ -140,6 +140,6 @@ def test_ratings_of_one_run_at_once_are_all_counted(participant: Participant, se
 
 
 def _save(services: Services, connection: Connection, token: str, rating: RatingIn) -> None:
-    service.save_rating(
+    ratings.save_rating(
         services.versions, services.intake, connection, token, str(uuid.uuid4()), rating, now()
     )

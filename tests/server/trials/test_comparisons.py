@@ -9,12 +9,12 @@ import pytest
 from fastapi.testclient import TestClient
 
 from server.context import Services
-from server.export.extract import Extract
-from server.export.formats import FORMATS
+from server.exports.extract import Extract
+from server.exports.formats import FORMATS
 from server.models import RunTally, Study
-from server.simulation.person import Person, Rater
-from server.tallies.recount import Recount
-from server.tallies.tally import tally_of, unpacked
+from server.participation.tallies import tally_of, unpacked
+from server.participation.tally_pools import Recount
+from server.rehearsals.person import Person, Rater
 from tests.helpers.admins import Admin
 from tests.helpers.comparisons import comparisons
 from tests.helpers.simulated import Api

@@ -15,11 +15,11 @@ from analysis.plans.plan import plan_of, study_contents
 from analysis.read.study_answers import load_csv
 from experiments.trials.continuous_rating import CONTINUOUS_RATING
 from server.context import Services
-from server.export.extract import ExportOrigin, Extract
-from server.export.formats import FORMATS
+from server.exports.extract import ExportOrigin, Extract
+from server.exports.formats import FORMATS
 from server.models import Study
-from server.simulation.person import Person, Rater
-from server.trials.kinds.continuous_rating import LAG_S
+from server.participation.kinds.continuous_rating import LAG_S
+from server.rehearsals.person import Person, Rater
 from tests.helpers.simulated import Api
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study, good_playback
 

@@ -14,17 +14,16 @@ from experiments.errors import InputError
 from experiments.manifest import Manifest
 from server.app import create_app
 from server.context import Services
-from server.export.extract import Extract
-from server.export.formats import FORMATS
-from server.migrate import current_revision, downgrade, newest_revision
+from server.core.migrate import current_revision, downgrade, newest_revision
+from server.exports.extract import Extract
+from server.exports.formats import FORMATS
 from server.models import Study, View
-from server.simulation.acting import Actor
-from server.simulation.adversaries import act, manner_called
-from server.simulation.http import JsonClient, running_server
-from server.simulation.person import Person, Rater
-from server.studies.importing import add_version
+from server.participation.tally_pools import Recount
+from server.rehearsals.http import JsonClient, running_server
+from server.rehearsals.manners import Actor, act, manner_called
+from server.rehearsals.person import Person, Rater
+from server.studies.creation import add_version
 from server.studies.lookup import active_version
-from server.tallies.recount import Recount
 from tests.helpers.databases import run_server_command
 from tests.helpers.motion_checks import CHECKS, checked
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study, good_playback

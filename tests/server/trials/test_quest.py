@@ -8,7 +8,7 @@ from statistics import NormalDist
 import pytest
 
 from experiments.trials.threshold.grid import Model, Point
-from server.trials.series import quest
+from server.participation import quest
 
 STIMULI = tuple(float(value) for value in range(50, 401, 25))
 

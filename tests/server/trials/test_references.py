@@ -12,11 +12,11 @@ from typer.testing import CliRunner
 
 from analysis.cli import app
 from server.context import Services
-from server.export.extract import Extract
-from server.export.formats import FORMATS
+from server.exports.extract import Extract
+from server.exports.formats import FORMATS
 from server.models import Study, StudyRun
-from server.simulation.person import Person, Rater
-from server.trials import repository
+from server.participation import rating_repository
+from server.rehearsals.person import Person, Rater
 from tests.conftest import REPOSITORY
 from tests.helpers.simulated import Api, levels_by_clip
 from tests.helpers.studies import Participant, StudyInDatabase, add_study, good_playback
@@ -98,7 +98,7 @@ def test_the_digest_is_over_the_clips_in_the_order_the_page_has_them(
     told = mains(judge)[0]
     with services.database.read() as session:
         run = session.query(StudyRun).one().id
-        stored = repository.trial(session.connection(), run, told["trial_index"])
+        stored = rating_repository.trial(session.connection(), run, told["trial_index"])
     assert stored is not None
     assert list(stored.clips) == [clip["role"] for clip in told["clips"]] == ["shown", "reference"]
 

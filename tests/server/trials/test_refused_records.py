@@ -11,11 +11,10 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from server.context import Services, open_services
+from server.core.settings import Settings
 from server.models import Rating, RunEvent, StudyRun
-from server.settings import Settings
-from server.trials.attention import failed_checks
-from server.trials.schemas import RatingIn
-from server.views.schemas import ViewsIn
+from server.participation.answer_schemas import RatingIn, ViewsIn
+from server.participation.warnings import failed_checks
 from tests.helpers.admins import Admin
 from tests.helpers.evidence import Watcher
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study, good_playback
@@ -290,7 +289,7 @@ def test_many_refused_records_of_a_run_are_not_kept_whole(
     participant: Participant, services: Services, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """All of a run are read with each answer: their size is bounded together, not only one by one."""
-    monkeypatch.setattr("server.trials.refused_records.MAX_WHOLE", 1)
+    monkeypatch.setattr("server.participation.refused_records.MAX_WHOLE", 1)
     participant.agree()
     for number in range(3):
         told = refused("/api/run/views", {"number": number, "x": "a" * 9000})

@@ -12,10 +12,10 @@ from fastapi.testclient import TestClient
 from sqlalchemy import text
 
 from server.context import Services
-from server.export.extract import Extract
-from server.export.formats import FORMATS, row_count
+from server.exports.extract import Extract
+from server.exports.formats import FORMATS, row_count
 from server.models import Rating, Study
-from server.simulation.person import Person, Rater
+from server.rehearsals.person import Person, Rater
 from tests.helpers.admins import Admin
 from tests.helpers.simulated import Api
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study, good_playback

@@ -1,9 +1,9 @@
 import pytest
 
 from experiments.rules import PlaybackRules
-from server.trials.schemas import RatingIn
-from server.trials.several_clips import judge_several
-from server.versions import PlacedClip
+from server.participation.answer_schemas import RatingIn
+from server.participation.verdict import judge_several
+from server.studies.versions import PlacedClip
 
 SLOW, FAST = "a" * 64, "b" * 64
 

@@ -12,10 +12,10 @@ from analysis.cli import app
 from experiments.errors import InputError
 from experiments.load import load_experiment
 from server.context import Services
-from server.export.extract import Extract
-from server.export.formats import FORMATS
+from server.exports.extract import Extract
+from server.exports.formats import FORMATS
 from server.models import Study
-from server.simulation.observer import Truth, truth_of
+from server.rehearsals.person import Truth, truth_of
 from tests.conftest import REPOSITORY
 from tests.helpers.simulated import take_part
 from tests.helpers.studies import add_study

@@ -9,12 +9,11 @@ import pytest
 from fastapi.testclient import TestClient
 
 from server.context import Services
-from server.export.extract import Extract
-from server.export.formats import FORMATS
+from server.exports.extract import Extract
+from server.exports.formats import FORMATS
 from server.models import SeriesAnswer, SeriesOffer, Study, StudyRun, View
-from server.trials.series import quest
-from server.trials.series import service as series
-from server.versions import Versions
+from server.participation import quest, series
+from server.studies.versions import Versions
 from tests.helpers.admins import Admin
 from tests.helpers.simulated import take_part
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study, good_playback

@@ -14,10 +14,10 @@ import pytest
 from sqlalchemy import text
 
 from server.context import Services
-from server.settings import Settings
-from server.simulation.http import JsonClient
-from server.simulation.person import Person, Rater
-from server.trials.series import service as series
+from server.core.settings import Settings
+from server.participation import series
+from server.rehearsals.http import JsonClient
+from server.rehearsals.person import Person, Rater
 from tests.helpers.comparisons import comparisons
 from tests.helpers.ports import free_port
 from tests.helpers.studies import SHORT, add_study

@@ -4,7 +4,7 @@ import pytest
 
 from experiments.rules import PlaybackRules
 from experiments.rules.disturbances import Disturbances
-from server.trials.verdict import Playback, frames_in_log, is_settled, judge
+from server.participation.verdict import Playback, frames_in_log, is_settled, judge
 
 CLIP = "a" * 64
 GOOD = Playback(

@@ -10,7 +10,7 @@ from sqlalchemy import text
 
 from server.context import Services
 from server.models import View, ViewClip
-from server.views.frame_log import packed, unpacked
+from server.participation.views import packed, unpacked
 from tests.helpers.studies import Participant, StudyInDatabase
 
 BEGUN = "2026-11-21T10:00:00+00:00"

@@ -14,15 +14,15 @@ from fastapi import FastAPI
 from fastapi.routing import APIRoute
 from fastapi.testclient import TestClient
 
+from server.accounts import workspaces
 from server.accounts.identity import OPERATOR
 from server.app import _routers
 from server.context import Services
-from server.errors import NotFound
+from server.core.errors import NotFound
 from server.models import RIGHTS, AccountLogin, Job, Right
 from server.studies.links import create_link
 from server.studies.lookup import find_study
 from server.studies.uploads import upload_folder
-from server.workspaces import service
 from tests.helpers.admins import Admin, signed_in
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study
 
@@ -176,14 +176,14 @@ def outsiders(client: TestClient, services: Services, foreign: Laboratory, tmp_p
     own = SHORT.replace("A short study", "A study of our own")
     add_study(services, tmp_path / "own clips", own, name="own")
     with services.database.write() as session:
-        elsewhere = service.create(session, "elsewhere", "Another laboratory", OPERATOR)
-        service.move(session, find_study(session, "own", OPERATOR, "own"), elsewhere, OPERATOR)
-        home = service.find_workspace(session, "default")
+        elsewhere = workspaces.create(session, "elsewhere", "Another laboratory", OPERATOR)
+        workspaces.move(session, find_study(session, "own", OPERATOR, "own"), elsewhere, OPERATOR)
+        home = workspaces.find_workspace(session, "default")
         for name in OUTSIDERS:
-            service.set_member(session, home, name, None, OPERATOR)
+            workspaces.set_member(session, home, name, None, OPERATOR)
         for role in ("owner", "experimenter", "viewer"):
-            service.set_member(session, elsewhere, f"{role} elsewhere", role, OPERATOR)
-        service.account_named(session, "administrator").role = "owner"
+            workspaces.set_member(session, elsewhere, f"{role} elsewhere", role, OPERATOR)
+        workspaces.account_named(session, "administrator").role = "owner"
     return found
 
 
@@ -299,7 +299,7 @@ def test_a_right_opens_what_it_is_for_and_nothing_else(
     known = application.openapi()["components"]["schemas"]
     with services.database.write() as session:
         found = find_study(session, foreign.study.name, OPERATOR, "own")
-        service.grant(session, found, "experimenter elsewhere", [granted], OPERATOR)
+        workspaces.grant(session, found, "experimenter elsewhere", [granted], OPERATOR)
     listed = {one for right in NEEDED.values() for one in right}
     for endpoint, about in endpoints(application):
         method, path = endpoint

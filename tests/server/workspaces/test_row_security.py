@@ -8,13 +8,13 @@ from sqlalchemy import Connection, select, text, true
 from sqlalchemy.orm import Session
 
 from experiments.errors import InputError
-from server import row_policies_repository as row_policies
-from server import row_security_repository as row_security
+from server.accounts import workspace_repository
 from server.context import Services
-from server.db import Database
-from server.migrate import downgrade, newest_revision, revision_of, upgrade
+from server.core import row_security
+from server.core import row_security as row_policies
+from server.core.db import Database
+from server.core.migrate import downgrade, newest_revision, revision_of, upgrade
 from server.models import RIGHTS, Base, Study
-from server.workspaces import repository
 from tests.helpers.admins import Admin
 from tests.helpers.older_databases import load_older_database
 from tests.server.workspaces.test_isolation import (  # noqa: F401 - fixtures
@@ -46,8 +46,8 @@ def without_checks(monkeypatch: pytest.MonkeyPatch) -> None:
     def everything(_session: Session, studies: list[Study], _identity: object) -> dict[int, frozenset[str]]:
         return {study.id: frozenset(RIGHTS) for study in studies}
 
-    monkeypatch.setattr(repository, "seen_by", lambda _identity: true())
-    monkeypatch.setattr(repository, "rights_on", everything)
+    monkeypatch.setattr(workspace_repository, "seen_by", lambda _identity: true())
+    monkeypatch.setattr(workspace_repository, "rights_on", everything)
 
 
 @on_postgres

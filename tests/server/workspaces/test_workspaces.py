@@ -5,14 +5,14 @@ import pytest
 from fastapi.testclient import TestClient
 from sqlalchemy import text
 
+from server.accounts import workspace_repository, workspaces
 from server.accounts.identity import OPERATOR
 from server.accounts.service import add_account
 from server.context import Services, open_services
-from server.db import Database
-from server.migrate import current_revision, downgrade, newest_revision, upgrade
-from server.settings import Settings
+from server.core.db import Database
+from server.core.migrate import current_revision, downgrade, newest_revision, upgrade
+from server.core.settings import Settings
 from server.studies.lookup import find_study
-from server.workspaces import repository, service
 from tests.helpers.admins import PASSWORD, Admin, signed_in
 from tests.helpers.databases import BACKENDS
 from tests.helpers.studies import StudyInDatabase, add_study
@@ -52,7 +52,7 @@ def test_whoever_had_an_account_moves_in_with_the_rights_she_had(filled: Service
     ]
     with filled.database.read() as session:
         study = find_study(session, "short", OPERATOR, "view")
-        home = repository.workspace_of(session, study)
+        home = workspace_repository.workspace_of(session, study)
         assert home is not None
         assert (home.name, home.second_factor_required) == ("default", False)
     filled.database.close()
@@ -61,7 +61,7 @@ def test_whoever_had_an_account_moves_in_with_the_rights_she_had(filled: Service
 @both
 def test_no_way_back_where_it_would_open_a_laboratory_to_others(filled: Services) -> None:
     with filled.database.write() as session:
-        service.create(session, "elsewhere", "Elsewhere", OPERATOR)
+        workspaces.create(session, "elsewhere", "Elsewhere", OPERATOR)
     with pytest.raises(RuntimeError, match="and 1 others and 0 accounts") as raised:
         downgrade(filled.database, BEFORE)
     assert "\n" not in str(raised.value)
@@ -92,7 +92,7 @@ def test_who_manages_the_server_needs_the_second_factor_of_a_workspace_too(
     services: Services, owner: Admin
 ) -> None:
     with services.database.write() as session:
-        service.create(session, "locked", "Locked", OPERATOR).second_factor_required = True
+        workspaces.create(session, "locked", "Locked", OPERATOR).second_factor_required = True
     wanted = {"title": "Opened", "second_factor_required": False}
     for method, path, body in (
         ("PUT", "/workspaces/locked", wanted),
@@ -113,12 +113,12 @@ def test_a_copy_lands_beside_its_source_or_where_the_copier_says(
     owner.send("POST", "/workspaces", {"name": "new-lab", "title": "New"})
     other = signed_in(client, services, "experimenter", "other")
     with services.database.write() as session:
-        home = service.find_workspace(session, "default")
+        home = workspaces.find_workspace(session, "default")
         found = find_study(session, "short", OPERATOR, "own")
-        service.set_member(session, home, "other", None, OPERATOR)
-        new = service.find_workspace(session, "new-lab")
-        service.set_member(session, new, "other", "experimenter", OPERATOR)
-        service.grant(session, found, "other", ["edit"], OPERATOR)
+        workspaces.set_member(session, home, "other", None, OPERATOR)
+        new = workspaces.find_workspace(session, "new-lab")
+        workspaces.set_member(session, new, "other", "experimenter", OPERATOR)
+        workspaces.grant(session, found, "other", ["edit"], OPERATOR)
     refused = other.send("POST", "/studies/short/copies", {"name": "copy"})
     assert (refused.status_code, "new-lab" in refused.text, "default" in refused.text) == (422, True, False)
     foreign = other.send("POST", "/studies/short/copies", {"name": "copy", "workspace": "default"})
@@ -131,7 +131,7 @@ def test_a_copy_lands_beside_its_source_or_where_the_copier_says(
     elsewhere = owner.send("POST", "/studies/short/copies", {"name": "further", "workspace": "new-lab"})
     assert elsewhere.json()["summary"]["workspace"] == "new-lab"
     with services.database.write() as session:
-        service.set_member(session, service.find_workspace(session, "new-lab"), "other", None, OPERATOR)
+        workspaces.set_member(session, workspaces.find_workspace(session, "new-lab"), "other", None, OPERATOR)
     nowhere = other.send("POST", "/studies/short/copies", {"name": "nowhere"})
     assert (nowhere.status_code, "you have it in none" in nowhere.text) == (403, True)
 

@@ -8,8 +8,8 @@ import pytest
 from experiments.errors import InputError
 from experiments.load import load_experiment
 from experiments.manifest import check_files, check_originals, file_sha256, read_manifest
-from server.storage.clips import FolderStore
-from server.studies.importing import store_clips
+from server.core.storage import FolderStore
+from server.studies.creation import store_clips
 from stimuli_builder.cli import main
 from tests.helpers.tiny_clips import encoded_video
 from tests.helpers.videos import HEIGHT, WIDTH, write_sound, write_video

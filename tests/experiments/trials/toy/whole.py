@@ -15,10 +15,10 @@ from tests.experiments.trials.toy import TOY
 trials.KINDS[TOY.name] = TOY
 
 import analysis.plans  # noqa: E402
-import server.trials.kinds  # noqa: E402
+import server.participation.kinds  # noqa: E402
 
 HERE = Path(__file__).parent
-server.trials.kinds.__path__.append(str(HERE / "served"))
+server.participation.kinds.__path__.append(str(HERE / "served"))
 analysis.plans.__path__.append(str(HERE / "plans"))
 
 from fastapi.testclient import TestClient  # noqa: E402
@@ -32,13 +32,13 @@ from experiments.schema.upgrades import FORMAT  # noqa: E402
 from server.accounts.identity import OPERATOR  # noqa: E402
 from server.app import create_app  # noqa: E402
 from server.context import open_services  # noqa: E402
-from server.export.extract import Extract  # noqa: E402
-from server.export.formats import FORMATS  # noqa: E402
-from server.migrate import upgrade  # noqa: E402
+from server.core.migrate import upgrade  # noqa: E402
+from server.core.settings import Settings  # noqa: E402
+from server.exports.extract import Extract  # noqa: E402
+from server.exports.formats import FORMATS  # noqa: E402
+from server.rehearsals.person import Person, Rater  # noqa: E402
 from server.results.kinds import summary_of  # noqa: E402
 from server.results.repository import Pool  # noqa: E402
-from server.settings import Settings  # noqa: E402
-from server.simulation.person import Person, Rater  # noqa: E402
 from server.studies.lookup import active_definition, active_version, find_study  # noqa: E402
 from tests.helpers.simulated import Api  # noqa: E402
 from tests.helpers.studies import SHORT, add_study  # noqa: E402

@@ -5,14 +5,14 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from experiments.definition import Experiment
-from server.tallies.tally import Counted, NumberedClip
-from server.trials.kinds import Part, Preference, Served, answer_of
-from server.trials.schemas import RatingIn
-from server.trials.verdict import Ruling
+from server.participation.answer_schemas import RatingIn
+from server.participation.kinds import Part, Preference, Served, answer_of
+from server.participation.tallies import Counted, NumberedClip
+from server.participation.verdict import Ruling
 from tests.experiments.trials.toy import SameAnswer
 
 if TYPE_CHECKING:
-    from server.versions import LoadedVersion
+    from server.studies.versions import LoadedVersion
 
 
 def validate(_experiment: Experiment, _part: Part, rating: RatingIn) -> None:

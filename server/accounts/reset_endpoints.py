@@ -1,0 +1,104 @@
+"""Endpoints of reset by mail: forgotten passwords, and the address of the own account."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, BackgroundTasks, Cookie, Request
+from fastapi.concurrency import run_in_threadpool
+
+from server.accounts import letters, resets
+from server.accounts.credentials import hash_password
+from server.accounts.endpoints import address_of
+from server.accounts.identity import Myself, account_of, check_origin
+from server.accounts.invitations import must_fit, must_prove
+from server.accounts.resets import Asking
+from server.accounts.schemas import (
+    ConfirmAddress,
+    ConfirmPassword,
+    ForgottenPassword,
+    NewAddress,
+    NewPassword,
+    OwnAddress,
+)
+from server.accounts.throttle import DEVICE_COOKIE
+from server.context import Services, ServicesDep
+from server.core.errors import ERROR_RESPONSES, NotFound
+
+router = APIRouter(prefix="/api/admin", tags=["account"], responses=ERROR_RESPONSES)
+
+
+async def _enter(services: Services, request: Request, what: str) -> None:
+    address = address_of(request)
+    key = services.sign_ins.key(what, address, None)
+    await run_in_threadpool(services.sign_ins.enter, key, address, None)
+
+
+def _must_send(services: Services) -> None:
+    if not letters.can_send(services.settings):
+        raise NotFound("This server sends no mail; ask an owner of it for a new password.")
+
+
+@router.post("/session/forgotten", status_code=202)
+async def forgot_password(
+    request: Request,
+    services: ServicesDep,
+    body: ForgottenPassword,
+    after: BackgroundTasks,
+    device_cookie: Annotated[str | None, Cookie(alias=DEVICE_COOKIE, include_in_schema=False)] = None,
+) -> None:
+    """Ask for a link by mail for a new password; the answer is the same whether there is such an account."""
+    check_origin(request, services)
+    _must_send(services)
+    await _enter(services, request, "forgotten password")
+    after.add_task(
+        resets.write_to_who_forgot, services, body.name, Asking(address_of(request), device_cookie)
+    )
+
+
+@router.post("/session/new-password", status_code=204)
+async def set_password(
+    request: Request, services: ServicesDep, body: NewPassword, after: BackgroundTasks
+) -> None:
+    """Choose a new password by a link; every session and every API token of the account ends."""
+    check_origin(request, services)
+    await _enter(services, request, "new password")
+    name = await run_in_threadpool(resets.name_of, services, body.token)
+    fresh = await services.passwords.run(lambda: hash_password(body.password, name))
+    letter = await run_in_threadpool(resets.set_password, services, body.token, fresh)
+    after.add_task(resets.post, services.settings, letter)
+
+
+@router.get("/mail")
+def own_address(services: ServicesDep, me: Myself) -> OwnAddress:
+    """Where a link for a new password goes."""
+    with services.database.read() as session:
+        return OwnAddress(address=account_of(session, me).email)
+
+
+@router.put("/mail", status_code=202)
+async def change_address(services: ServicesDep, me: Myself, body: NewAddress, after: BackgroundTasks) -> None:
+    """Enter an address of mail; it is the account's once the link that goes there was opened."""
+    _must_send(services)
+    await must_fit(services, me, body.password)
+    letter = await run_in_threadpool(resets.ask_to_confirm, services, me, body.address)
+    after.add_task(resets.post, services.settings, letter)
+
+
+@router.delete("/mail", status_code=204)
+async def remove_address(
+    services: ServicesDep, me: Myself, body: ConfirmPassword, after: BackgroundTasks
+) -> None:
+    """Take the address of mail off one's own account; passwords are then reset by the command line alone."""
+    await must_prove(services, me, body.password)
+    letter = await run_in_threadpool(resets.remove_address, services, me)
+    after.add_task(resets.post, services.settings, letter)
+
+
+@router.post("/session/mail", status_code=204)
+async def confirm_address(
+    request: Request, services: ServicesDep, body: ConfirmAddress, after: BackgroundTasks
+) -> None:
+    """Confirm an address of mail by the link that went there; the address before it is told."""
+    check_origin(request, services)
+    await _enter(services, request, "confirm an address")
+    letter = await run_in_threadpool(resets.confirm_address, services, body.token)
+    after.add_task(resets.post, services.settings, letter)

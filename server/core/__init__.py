@@ -1,0 +1,1 @@
+"""What every part of the server rests on: settings, database, locks, limits, errors."""

@@ -1,0 +1,1 @@
+"""Downloads: exports, capsules, reports and sealed plans."""

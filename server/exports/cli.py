@@ -1,0 +1,321 @@
+"""`server export`, `server capsule`, `server seal` and `server methods`."""
+
+import json
+import sys
+from collections.abc import Iterable
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.text import Text
+from sqlalchemy.exc import SQLAlchemyError
+
+from experiments.definition import Experiment
+from experiments.errors import InputError
+from experiments.files import check_targets, whole_file, whole_text
+from server.accounts.audit import record
+from server.accounts.identity import OPERATOR
+from server.cli_common import out, stored_services
+from server.core.values import encoded
+from server.exports.capsules import CapsuleContents, CapsuleOrigin, build_capsule
+from server.exports.extract import ExportOrigin, Extract
+from server.exports.formats import CSV_FORMATS, FORMATS, Format, row_count, spreadsheet_pieces
+from server.exports.psych_ds import LANGUAGES, script
+from server.exports.repository import runs_by_origin
+from server.exports.seals import page, seal_of, seal_plan
+from server.results import methods as methods_service
+from server.studies.lookup import find_study
+
+# `server export`: take the data of a study out, in the same forms as the dashboard's data page.
+
+
+def register(parent: typer.Typer) -> None:
+    """Add `server export`, `server capsule`, `server seal` and `server methods` to the command line."""
+    _register_export(parent)
+    _register_capsule(parent)
+    _register_seal(parent)
+    _register_methods(parent)
+
+
+def _register_export(parent: typer.Typer) -> None:
+    """Add `server export` to the command line."""
+    parent.command("export")(export)
+
+
+def export(
+    study: Annotated[str, typer.Argument(help="Name of the study.")],
+    out_file: Annotated[Path, typer.Option("--out", help="File to write, or - for the standard output.")],
+    form: Annotated[
+        Format,
+        typer.Option(
+            "--format",
+            help="csv: one row a play; wide: one row a visit and a column a cell; runs: one row a visit with "
+            "its answers to forms; spss, parquet: the table of csv; spss-wide, parquet-wide: that of wide; "
+            "raw: JSON lines with every drawn frame; codebook: Markdown; columns: those of csv as JSON; "
+            "psych-ds: a zip of the de-identified dataset folder; identities: recruiters' ids beside the "
+            "pseudonyms, noted in the audit log.",
+        ),
+    ] = "csv",
+    origin: Annotated[
+        ExportOrigin, typer.Option(help="Whose data: of one origin, or all together.")
+    ] = "participant",
+    series: Annotated[
+        int | None,
+        typer.Option(min=1, help="Data of one data series; without it of all, told apart by a column."),
+    ] = None,
+    bom: Annotated[
+        bool, typer.Option("--bom", help="Begin a CSV with a byte order mark, by which Excel knows UTF-8.")
+    ] = False,
+    guard: Annotated[
+        bool,
+        typer.Option(
+            "--guard/--no-guard",
+            help="Put ' before each cell of a CSV that a spreadsheet would run as a formula (= + - @, not "
+            "numbers). --no-guard writes every text exactly as it was given: for programs alone.",
+        ),
+    ] = True,
+    scripts: Annotated[
+        bool, typer.Option(help="Beside the long CSV, write scripts that analyse it with R and Python.")
+    ] = True,
+) -> None:
+    """Write a study's data: as csv, the columns of experiments/columns and one column a factor.
+
+    Participants have the study's pseudonyms. The file appears under its name only when complete. Beside a CSV
+    with one row a play stand a script for R (afex, emmeans, lme4) and one for Python (pandas, statsmodels).
+
+    Examples:
+
+      server export exp3 --out exp3.csv
+
+      server export exp3 --format wide --bom --out exp3-wide.csv
+
+      server export exp3 --format spss-wide --out exp3.sav
+
+      server export exp3 --format psych-ds --out exp3.zip
+
+      server export exp3 --origin simulated --out rehearsal.csv
+
+      server export exp3 --series 2 --out exp3-series-2.csv
+    """
+    beside = ""
+    if (bom or not guard) and form not in CSV_FORMATS:
+        raise InputError(f"--bom and --no-guard are for CSV ({', '.join(CSV_FORMATS)}), not {form}")
+    if str(out_file) != "-":
+        check_targets([out_file])
+    with stored_services() as services, services.database.snapshot() as session:
+        known = find_study(session, study, OPERATOR, "view")
+        extract = Extract(origin, series)
+        extract.definition(session, known)
+        if form != "codebook":
+            action = "identities downloaded" if form == "identities" else "data downloaded"
+            with services.database.write() as noted:
+                record(noted, None, action, "study", study, what=form, origin=origin)
+        try:
+            size = _write(
+                out_file, spreadsheet_pieces(FORMATS[form](session, known, extract), form, bom, guard)
+            )
+            if form == "csv" and scripts and str(out_file) != "-":
+                beside = _write_scripts(out_file, extract.definition(session, known))
+        except (ValueError, SQLAlchemyError) as error:
+            raise InputError(
+                f"the export broke off ({str(error).splitlines()[0]}) and was not kept; run: server doctor"
+            ) from error
+        there = runs_by_origin(session, known)
+        rows = None if form == "codebook" else row_count(form, session, known, extract)
+    if str(out_file) != "-":
+        counted = "" if rows is None else f"{rows:,} row{'' if rows == 1 else 's'}, "
+        out.print(f"{out_file}: {counted}{size:,} bytes" + (f"; analyse it with {beside}" if beside else ""))
+        if form == "psych-ds":
+            out.print(
+                f"the dataset is the folder {study}/ in the zip: unpack it and give that to a validator"
+            )
+    others = {name: number for name, number in sorted(there.items()) if name != origin}
+    if rows == 0 and form != "identities" and origin != "all" and others:
+        named = ", ".join(f"{number} of origin {name}" for name, number in others.items())
+        typer.echo(f"nothing of origin {origin} to export; there are runs: {named} (--origin)", err=True)
+
+
+def _write_scripts(out_file: Path, experiment: Experiment) -> str:
+    """Write the scripts beside the CSV; their names in words."""
+    targets = {language: out_file.with_suffix(f".{language}") for language in LANGUAGES}
+    for language, target in targets.items():
+        _write(target, [encoded(script(experiment, language, out_file.name))])
+    return " or ".join(target.name for target in targets.values())
+
+
+def _write(out_file: Path, pieces: Iterable[bytes]) -> int:
+    """Write the pieces, to a file that gets its name at the end; return their bytes."""
+    if str(out_file) == "-":
+        return sum(sys.stdout.buffer.write(piece) for piece in pieces)
+    with whole_file(out_file) as unfinished, unfinished.open("wb") as stream:
+        return sum(stream.write(piece) for piece in pieces)
+
+
+# `server capsule`: everything of a study that can be handed on, in one zip that can be verified.
+
+
+def _register_capsule(parent: typer.Typer) -> None:
+    """Add `server capsule` to the command line."""
+    parent.command("capsule")(capsule)
+
+
+def capsule(
+    study: Annotated[str, typer.Argument(help="Name of the study.")],
+    out_file: Annotated[Path, typer.Option("--out", help="Zip to write.")],
+    origin: Annotated[CapsuleOrigin, typer.Option(help="Whose data.")] = "participant",
+    series: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            help="One data series alone: its data, definition, clips and report. Without it the data of "
+            "every series, and all else of the active version.",
+        ),
+    ] = None,
+    clips: Annotated[
+        bool, typer.Option(help="Put the clips in; without them the manifest has their hashes.")
+    ] = True,
+    sensitivity: Annotated[
+        bool, typer.Option(help="Put in what takes long: mixed and ordinal models, Bayes factors.")
+    ] = True,
+) -> None:
+    """Write the capsule of a study: a Psych-DS dataset and an RO-Crate with data, materials and report.
+
+    The data are de-identified. Anybody can verify the capsule with `analysis verify`.
+
+    Examples:
+
+      server capsule exp3 --out exp3-capsule.zip
+
+      server capsule exp3 --origin simulated --no-clips --out rehearsal.zip
+
+      server capsule exp3 --series 2 --out exp3-series-2.zip
+
+      analysis verify exp3-capsule.zip
+    """
+    check_targets([out_file])
+    with stored_services() as services, Console(stderr=True, markup=False).status("capsule") as status:
+        with services.database.write() as session:
+            known = find_study(session, study, OPERATOR, "view")
+            about = Extract(origin, series).definition(session, known).dataset
+            record(session, None, "data downloaded", "study", study, what="capsule", origin=origin)
+        made = build_capsule(
+            services,
+            study,
+            CapsuleContents(origin, clips, sensitivity, series),
+            out_file,
+            lambda _, step: status.update(Text(f"capsule: {step}")),
+        )
+    out.print(f"{out_file}: {out_file.stat().st_size:,} bytes, {len(made.files)} files, sha256 {made.sha256}")
+    missing = [
+        name for name, value in (("creators", about.creators), ("licence", about.licence)) if not value
+    ]
+    if missing:
+        typer.echo(f"no {' and no '.join(missing)} declared: say them in the table [dataset]", err=True)
+
+
+# `server seal`: fix the plan of a study before its first participant.
+
+
+def _register_seal(parent: typer.Typer) -> None:
+    """Add `server seal` to the command line."""
+    parent.command("seal")(seal)
+
+
+def seal(
+    study: Annotated[str, typer.Argument(help="Name of the study.")],
+    out_file: Annotated[
+        Path, typer.Option("--out", help="JSON file to write; a page to print stands beside.")
+    ],
+    power: Annotated[
+        Path | None, typer.Option(help="JSON of `analysis power --json`, to be sealed with the plan.")
+    ] = None,
+) -> None:
+    """Seal design, exclusions, analysis plan and power before the first participant; or write the seal again.
+
+    Examples:
+
+      server seal exp3 --out exp3-seal.json
+
+      analysis run exp3.toml --csv exp3.csv --seal exp3-seal.json
+    """
+    planned = _power(power)
+    with stored_services() as services, services.database.write() as session:
+        known = find_study(session, study, OPERATOR, "view")
+        sealed = seal_of(session, known) or seal_plan(session, known, None, planned)
+    if planned is not None and sealed.power != planned:
+        raise InputError(
+            f"the plan was sealed {sealed.sealed_at} with another power; a seal is never replaced"
+        )
+    for path, text in ((out_file, sealed.text()), (out_file.with_suffix(".html"), page(sealed))):
+        with whole_text(path) as stream:
+            stream.write(text)
+    out.print(f"{out_file}: sealed {sealed.sealed_at}, sha256 {sealed.sha256}")
+
+
+def _power(path: Path | None) -> dict[str, Any] | None:
+    if path is None:
+        return None
+    try:
+        power = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: expected the JSON of `analysis power` ({error})") from error
+    if not isinstance(power, dict):
+        raise InputError(f"{path}: expected the JSON of `analysis power`, got a list or a number")
+    return power
+
+
+# `server methods`: the Methods paragraph of a study.
+
+
+class Form(StrEnum):
+    """Forms of the paragraph."""
+
+    TEXT = "text"
+    LATEX = "latex"
+    JSON = "json"
+
+
+class Origin(StrEnum):
+    """Whose runs are counted."""
+
+    PARTICIPANT = "participant"
+    PILOT = "pilot"
+    SIMULATED = "simulated"
+
+
+def _register_methods(parent: typer.Typer) -> None:
+    """Add `server methods` to the command line."""
+    parent.command("methods")(methods)
+
+
+def methods(
+    study: Annotated[str, typer.Argument(help="Name of the study.")],
+    form: Annotated[Form, typer.Option("--format", help="text, latex, or json for programs.")] = Form.TEXT,
+    origin: Annotated[Origin, typer.Option(help="Whose runs are counted.")] = Origin.PARTICIPANT,
+    series: Annotated[int | None, typer.Option(help="Data series; that of the version in use.")] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option(help="Folder of `analysis run --out`, for what each declared rule left out."),
+    ] = None,
+) -> None:
+    """Write a study's Methods paragraph; each number is followed by the query that gives it.
+
+    Examples:
+
+      server methods exp3
+
+      server methods exp3 --format latex --report exp3-report > methods.tex
+    """
+    results = methods_service.read_results(report) if report else None
+    if report and results is None:
+        raise InputError(
+            f"expected {methods_service.RESULTS} in {report}, found none; run `analysis run --out` first"
+        )
+    with stored_services() as services, services.database.read() as session:
+        methods = methods_service.methods_of(
+            session, find_study(session, study, OPERATOR, "view"), origin.value, series, results
+        )
+    written = {Form.TEXT: methods.text, Form.LATEX: methods.latex, Form.JSON: methods.json}[form]()
+    typer.echo(written, nl=False)

@@ -1,0 +1,428 @@
+"""The tables that exports are made of: answers, runs and wide, and what every column means."""
+
+import json
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from datetime import datetime
+from itertools import chain, groupby, islice, product
+from operator import itemgetter
+from typing import Any, Literal
+
+from sqlalchemy.orm import Session
+
+from experiments.columns import RUN_COLUMNS, Column
+from experiments.columns.form_columns import FormColumn, form_columns, run_columns
+from experiments.columns.names import plain_name, unlike
+from experiments.definition import Experiment
+from experiments.design import rated_levels
+from experiments.errors import InputError
+from experiments.trials import KINDS
+from experiments.trials.scales import RatedScale, scales_of
+from server.core.values import iso
+from server.exports import repository
+from server.exports.csv_lines import (
+    ExportBrokenOff,
+    factor_names,
+    rating_count,
+    rating_rows,
+    rating_table,
+    view_of,
+    whole,
+)
+from server.exports.extract import Extract
+from server.exports.repository import run_count
+from server.models import NO_SLOT, Study, StudyRun
+from server.participation.judgement import judge_run
+from server.participation.visit_repository import calibrations
+from server.results import runs
+from server.studies.lookup import all_definitions
+
+# Runs as CSV rows, and everything stored as JSON lines; one run is in memory at a time.
+
+
+def run_rows(
+    session: Session, study: Study, extract: Extract, forms: Sequence[FormColumn]
+) -> Iterator[list[Any]]:
+    """Rows of the runs CSV in the order the runs began: the columns of `run_columns(forms)`."""
+    names = [column.name for column in run_columns(forms)]
+    name = study.name
+    for run in repository.each_run(session, study, extract):
+        values = _values(session, run, forms) | {"study": name}
+        yield [values[column] for column in names]
+
+
+def _values(session: Session, run: StudyRun, forms: Sequence[FormColumn]) -> dict[str, Any]:
+    answers = repository.answers_by_form(session, run)
+    return {
+        "run": run.public_id,
+        "participant": run.participant,
+        "phase": run.phase,
+        "synthetic": int(run.origin == "simulated"),
+        "status": run.status,
+        "stage": run.stage,
+        "language": run.language,
+        "version": run.version.number,
+        "definition_sha256": run.version.definition_sha256,
+        "seed": run.seed,
+        "slot": run.slot if run.slot != NO_SLOT else "",
+        "group_name": run.group_name,
+        "started_at": _time(run.started_at),
+        "consented_at": _time(run.consented_at),
+        "completed_at": _time(run.completed_at),
+        "trials": run.trials_total,
+        "excluded": int(run.excluded),
+        "exclusion_reason": run.exclusion_reason or "",
+        "erased": int(run.erased_at is not None),
+        **{one.column.name: one.value(answers) for one in forms},
+        "device": _json(run.device),
+        "run_origin": run.origin,
+        "data_series": run.version.series,
+        **_calibration(session, run),
+    } | _evidence(session, run)
+
+
+def _calibration(session: Session, run: StudyRun) -> dict[str, Any]:
+    """How the latest size and distance were measured; nothing where none were, or by a page of before."""
+    every = calibrations(session, run)
+    rechecks = [one.recheck_percent for one in every if one.recheck_percent is not None]
+    latest = every[-1] if every else None
+    values = {
+        "calibration_method": latest and latest.method,
+        "calibration_repeats": latest and latest.repeats,
+        "calibration_spread": latest and latest.spread_percent,
+        "calibration_ruler": latest and latest.ruler_check,
+        "calibration_recheck": max(rechecks, default=None),
+        "distance_method": latest and latest.distance_method,
+        "distance_spread_mm": latest and latest.distance_spread_mm,
+        "distance_typed_mm": latest and latest.distance_typed_mm,
+    }
+    return {name: "" if value is None else value for name, value in values.items()}
+
+
+def _evidence(session: Session, run: StudyRun) -> dict[str, Any]:
+    judged = judge_run(session, run)
+    values = {f"evidence_{name}": _rounded(value) for name, value in asdict(judged.signals).items()}
+    points = "" if judged.verdict == "not_judged" else judged.points
+    return values | {"evidence_verdict": judged.verdict, "evidence_points": points}
+
+
+def _rounded(value: float | None) -> float | str:
+    return "" if value is None else round(value, 4)
+
+
+def _time(moment: datetime | None) -> str:
+    return iso(moment) if moment else ""
+
+
+def _json(value: Any) -> str:
+    return json.dumps(value, sort_keys=True, ensure_ascii=False)
+
+
+def raw_lines(session: Session, study: Study, extract: Extract) -> Iterator[str]:
+    """One JSON object a run with every play, drawn frame, event, form and calibration."""
+    for public_id in repository.public_ids(session, study, extract):
+        yield runs.timeline(session, study, public_id).model_dump_json() + "\n"
+
+
+# The wide table: one row a run, and a column a cell of the design with the run's mean rating in it.
+
+OF_THE_RUN = (
+    "study", "run", "participant", "synthetic", "status", "language", "version", "started_at",
+    "completed_at", "excluded", "exclusion_reason", "run_origin", "data_series", "group_name",
+    "evidence_verdict",
+)  # fmt: skip
+"""Columns of the runs that the wide table has too, and the answers to forms with them."""
+# The official Psych-DS validator stumbles at the members of its table of columns and at the number of a row.
+_STUMBLES_AT = "clear constructor delete entries forEach get has keys row_id set size values"
+_TAKEN = frozenset((*(column.name for column in RUN_COLUMNS), *_STUMBLES_AT.split()))
+Levels = tuple[str, ...]
+Means = dict[tuple[str, Levels], float]
+
+
+def beside_runs(factor: str) -> str:
+    """What a factor is called where columns of the runs are too: a variable has one meaning in a dataset."""
+    return f"factor_{factor}" if factor in _TAKEN else factor
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A column of means: of one scale and one combination of the levels within participants."""
+
+    scale: str
+    levels: Levels
+    column: Column
+
+
+def cells_of(experiment: Experiment) -> list[Cell]:
+    """The columns of means, scale by scale, cells in declared order."""
+    scales = scales_of(experiment)
+    if not scales:
+        raise InputError(
+            f"the wide table holds mean ratings; '{experiment.name}' has trials of the kind "
+            f"{experiment.trial.kind}: take the long table (answers)"
+        )
+    within = [factor for factor in experiment.factors if not factor.between]
+    rated = [
+        [level for level in factor.levels if level.name in rated_levels(experiment, factor.name)]
+        for factor in within
+    ]
+    cells: list[Cell] = []
+    taken = {name.casefold() for name in _TAKEN}
+    for scale in scales:
+        for levels in product(*rated):
+            name = unlike("_".join((scale.name, *(plain_name(one.name) for one in levels))), taken)
+            said = ", ".join(f"{f.label}: {one.label}" for f, one in zip(within, levels, strict=True))
+            column = Column(
+                name, "number", _mean_of(scale, said), minimum=scale.minimum, maximum=scale.maximum
+            )
+            cells.append(Cell(scale.name, tuple(one.name for one in levels), column))
+    return cells
+
+
+def _mean_of(scale: RatedScale, cell: str) -> str:
+    of = f" of {cell}" if cell else ""
+    return f"Mean answer on the scale {scale.name}{of}: main trials, the last play with an answer of each."
+
+
+def wide_columns(experiment: Experiment, forms: Sequence[FormColumn]) -> list[Column]:
+    """The run, its groups, its answers to forms, how many answers are averaged, and a column a cell."""
+    of_forms = {one.column.name for one in forms}
+    kept = [one for one in run_columns(forms) if one.name in OF_THE_RUN or one.name in of_forms]
+    between = [
+        Column(
+            beside_runs(factor.name),
+            "text",
+            f"Level of the factor {factor.label}, between participants.",
+            values=tuple(level.name for level in factor.levels),
+            labels=tuple((level.name, level.label) for level in factor.levels),
+        )
+        for factor in experiment.factors
+        if factor.between
+    ]
+    number = Column("answers", "integer", "Answers of main trials that the means are of.", minimum=0)
+    return [*kept, *between, number, *(cell.column for cell in cells_of(experiment))]
+
+
+def wide_rows(
+    session: Session,
+    study: Study,
+    extract: Extract,
+    experiment: Experiment,
+    forms: Sequence[FormColumn],
+) -> Iterator[list[Any]]:
+    """Rows in the order the runs began; a cell is empty where the run has no answer in it."""
+    cells, names = cells_of(experiment), [column.name for column in run_columns(forms)]
+    kept = [
+        names.index(column.name)
+        for column in wide_columns(experiment, forms)
+        if column.name in names and column.name != "answers"
+    ]
+    between = [factor.name for factor in experiment.factors if factor.between]
+    at = names.index("run")
+    # Both are in the order the runs began, so that the answers of one run are in memory at a time.
+    answered = _by_run(session, study, extract, experiment)
+    coming = next(answered, None)
+    for row in run_rows(session, study, extract, forms):
+        mine = _NOTHING
+        if coming is not None and coming.run == row[at]:
+            mine, coming = coming, next(answered, None)
+        yield [
+            *(row[index] for index in kept),
+            *(mine.groups.get(name, "") for name in between),
+            mine.count,
+            *(mine.means.get((cell.scale, cell.levels), "") for cell in cells),
+        ]
+    if coming is not None:
+        raise ExportBrokenOff(f"the export broke off: answers of the run {coming.run} are left; try it again")
+
+
+@dataclass(frozen=True)
+class _RunMeans:
+    """Of a run with answers: its levels between participants, how many answers, and its cells' means."""
+
+    run: str
+    groups: dict[str, str]
+    count: int
+    means: Means
+
+
+_NOTHING = _RunMeans("", {}, 0, {})
+
+
+def _by_run(session: Session, study: Study, extract: Extract, experiment: Experiment) -> Iterator[_RunMeans]:
+    """The runs with rows of main trials, in the order they began."""
+    factors, view = factor_names(session, study), view_of(session, study)
+    header = view.csv_header(factors)
+    within = [header.index(factor.name) for factor in experiment.factors if not factor.between]
+    between = {factor.name: header.index(factor.name) for factor in experiment.factors if factor.between}
+    run, kind, trial, scale, response = (
+        header.index(name) for name in ("run", "kind", "trial_index", "scale", "response")
+    )
+    rows = (view.csv_row(stored, factors) for stored in rating_rows(session, study, extract))
+    for name, mine in groupby((row for row in rows if row[kind] == "main"), key=itemgetter(run)):
+        last: dict[tuple[Any, str], tuple[Levels, float]] = {}
+        for row in mine:
+            # Plays come in order: as in the scripts, a later one with an answer takes the place of an earlier
+            # one of its trial; a later one without an answer leaves the earlier standing.
+            if row[response] is not None:
+                levels = tuple(str(row[index]) for index in within)
+                last[row[trial], row[scale]] = (levels, float(row[response]))
+        groups = {factor: str(row[index]) for factor, index in between.items()}
+        yield _RunMeans(name, groups, len(last), _means(last))
+
+
+def _means(answers: dict[tuple[Any, str], tuple[Levels, float]]) -> Means:
+    values: dict[tuple[str, Levels], list[float]] = defaultdict(list)
+    for (_, scale), (levels, response) in answers.items():
+        values[scale, levels].append(response)
+    return {cell: round(sum(each) / len(each), 6) for cell, each in values.items()}
+
+
+# What every exported column means, from its declaration: as Markdown, and as schema.org variables.
+
+
+def factor_columns(definitions: Iterable[Experiment]) -> list[Column]:
+    """The CSV's factor columns, which stand in the place of the view's `levels`: those of all versions."""
+    columns: dict[str, Column] = {}
+    for factor in (factor for definition in definitions for factor in definition.factors):
+        before = dict(columns[factor.name].labels) if factor.name in columns else {}
+        labels = {**before, **{level.name: level.label for level in factor.levels}}
+        meaning = f"Level of the factor {factor.label}."
+        columns[factor.name] = Column(
+            factor.name, "text", meaning, values=tuple(labels), labels=tuple(labels.items())
+        )
+    return list(columns.values())
+
+
+def rating_columns(definitions: Iterable[Experiment]) -> list[Column]:
+    """Every column of the tidy CSV of a study with these versions, in order; the last one's kind counts."""
+    versions = list(definitions)
+    columns: list[Column] = []
+    for column in KINDS[versions[-1].trial.kind].view.columns:
+        columns.extend(factor_columns(versions) if column.name == "levels" else [column])
+    return columns
+
+
+def codebook_text(definition: Experiment, tables: Iterable[tuple[str, Iterable[Column]]]) -> str:
+    """The codebook as Markdown: of each table its title and its columns."""
+    lines = [
+        f"# Codebook: {definition.title}",
+        "",
+        definition.trial.asked(definition.languages[0]),
+        "",
+    ]
+    for title, table in tables:
+        lines += [f"## {title}", "", "| column | type | unit | meaning | values |", "|---|---|---|---|---|"]
+        lines += [_line(column) for column in table]
+        lines.append("")
+    return "\n".join(lines)
+
+
+def explained_tables(definitions: list[Experiment]) -> list[tuple[str, list[Column]]]:
+    """The tables of a study with these versions by title: answers, runs, and wide where it has one."""
+    active, forms = definitions[-1], form_columns(definitions)
+    tables = [
+        (KINDS[active.trial.kind].view.title, rating_columns(definitions)),
+        ("Runs: one row a visit", run_columns(forms)),
+    ]
+    if scales_of(active):
+        cells = [column for column in wide_columns(active, forms) if column not in tables[1][1]]
+        title = "Wide: one row a visit; beside columns of the runs, a column a cell of the design"
+        tables.append((title, cells))
+    return tables
+
+
+def _line(column: Column) -> str:
+    cells = (column.name, column.type, column.unit or "", column.description, column.allowed)
+    return f"| {' | '.join(cell.replace('|', '&#124;').replace(chr(10), ' ') for cell in cells)} |"
+
+
+def variables_measured(columns: list[Column]) -> list[dict[str, Any]]:
+    """The columns as schema.org PropertyValue objects."""
+    return [_variable(column) for column in columns]
+
+
+def _variable(column: Column) -> dict[str, Any]:
+    variable: dict[str, Any] = {
+        "@type": "PropertyValue",
+        "name": column.name,
+        "description": column.description,
+        "additionalType": column.type,
+    }
+    if column.unit:
+        variable["unitText"] = column.unit
+    if column.minimum is not None:
+        variable["minValue"] = column.minimum
+    if column.maximum is not None:
+        variable["maxValue"] = column.maximum
+    if column.values:
+        variable["valueReference"] = [_term(value, dict(column.labels)) for value in column.values]
+    return variable
+
+
+def _term(value: str, labels: dict[str, str]) -> dict[str, str]:
+    term = {"@type": "DefinedTerm", "name": value}
+    return term | {"description": labels[value]} if labels.get(value, value) != value else term
+
+
+# The tables that exports are made of: answers (a row a play), runs (a row a visit), wide (a row a run).
+
+TableName = Literal["answers", "runs", "wide"]
+Row = Sequence[Any]
+
+
+@dataclass(frozen=True)
+class ExportTable:
+    """A table on its way out.
+
+    Attributes
+    ----------
+    name : str
+        As files are called by it.
+    columns : list of Column
+        In order.
+    rows : iterator of Row
+        Without a header; taken once.
+    count : int
+        Of the rows, which `rows` is held to.
+    """
+
+    name: str
+    columns: list[Column]
+    rows: Iterator[Row]
+    count: int
+
+    def with_header(self) -> Iterator[Row]:
+        """The names of the columns, then the rows."""
+        return chain([[column.name for column in self.columns]], self.rows)
+
+
+def answers_table(session: Session, study: Study, extract: Extract) -> ExportTable:
+    """One row a play (or a scale and play), a column a factor."""
+    columns = rating_columns(all_definitions(session, study))
+    rows = islice(rating_table(session, study, extract), 1, None)
+    name = view_of(session, study).name
+    return ExportTable(name, columns, rows, rating_count(session, study, extract))
+
+
+def runs_table(session: Session, study: Study, extract: Extract) -> ExportTable:
+    """One row a visit, a column a question of the forms."""
+    forms, number = form_columns(all_definitions(session, study)), run_count(session, study, extract)
+    rows = whole(run_rows(session, study, extract, forms), number)
+    return ExportTable("runs", run_columns(forms), rows, number)
+
+
+def wide_table(session: Session, study: Study, extract: Extract) -> ExportTable:
+    """One row a visit, a column a cell with the mean rating in it; InputError for trials without a scale."""
+    definitions, number = all_definitions(session, study), run_count(session, study, extract)
+    newest, forms = extract.definition(session, study), form_columns(definitions)
+    rows = whole(wide_rows(session, study, extract, newest, forms), number)
+    return ExportTable("wide", wide_columns(newest, forms), rows, number)
+
+
+TABLES: dict[TableName, Callable[[Session, Study, Extract], ExportTable]] = {
+    "answers": answers_table,
+    "runs": runs_table,
+    "wide": wide_table,
+}

@@ -1,0 +1,1 @@
+"""The participant's side: runs, trials, views, ratings, evidence and series."""

@@ -1,0 +1,269 @@
+"""What a link leads to, and how a run begins or is taken up again."""
+
+import secrets
+from datetime import timedelta
+from typing import Literal
+from uuid import UUID
+
+from sqlalchemy.orm import Session
+
+from experiments.assignment.grouping import deciding
+from experiments.definition import Display, Experiment
+from experiments.errors import did_you_mean
+from experiments.trials.counts import expected_minutes
+from server.context import Services
+from server.core.values import derived_token, hash_token, new_public_id, new_token, now
+from server.models import NO_SLOT, Link, Study, StudyRun
+from server.participation import identity_repository as identities
+from server.participation import places, returning, run_repository
+from server.participation.current_run import checked_device, screens_devices
+from server.participation.evidence_repository import awaits_views_without_tickets, has_older_runs
+from server.participation.identity_keys import KnownAs
+from server.participation.intake import ENFORCED_ORIGINS
+from server.participation.places import assign_slot
+from server.participation.recruiter import (
+    Recruiter,
+    refuse_other_recruiter,
+    stored_recruiter,
+    without_signature,
+)
+from server.participation.refusals import (
+    LanguageUnknown,
+    LinkExpired,
+    LinkUnknown,
+    StudyClosed,
+    StudyFull,
+    StudyPaused,
+)
+from server.participation.run_schemas import Gates, LinkedStudy, LinkState, Origin, RunStart, RunStarted
+from server.studies.versions import LoadedVersion
+
+RUN_PURPOSE = "run"
+OLD_PAGES_ACCEPTED = timedelta(hours=48)
+"""How long after the last run of before there was evidence a page of that time may begin another.
+
+Also: how long after the first run whose views bring tickets a page without them may.
+"""
+SEED_BITS = 53  # so that a seed survives JSON in every program
+_REFUSALS = {
+    "expired": (LinkExpired, "This link has expired; please ask the person who invited you for a new one."),
+    "closed": (StudyClosed, "This study takes no more participants."),
+    "paused": (StudyPaused, "This study is paused; please come back later."),
+    "full": (StudyFull, "Every place of this study is taken; please come back later."),
+}
+
+
+def new_seed() -> int:
+    """A random seed of a run: what is shown to it, in what order, with which checks, follows from it."""
+    return secrets.randbits(SEED_BITS)
+
+
+def find_link(session: Session, token: str) -> Link:
+    """The link with this token, or LinkUnknown."""
+    link = run_repository.link_by_token(session, token)
+    if link is None:
+        raise LinkUnknown("This link is not known; please check that the address is complete.")
+    return link
+
+
+def recruiter_of(link: Link) -> Recruiter:
+    """The recruiter of a link, or of its study."""
+    return stored_recruiter(link.recruiter or link.study.recruiter)
+
+
+def link_state(services: Services, session: Session, token: str) -> LinkState:
+    """What a visitor sees before a run begins."""
+    link = find_link(session, token)
+    version_id = run_repository.active_version_id(session, link.study)
+    experiment = services.versions.get(session, version_id).experiment
+    run = run_repository.latest_run(session, link) if link.kind == "personal" else None
+    resumable = (
+        run is not None and run.status == "active" and returning.refusal_to_resume(experiment, run) is None
+    )
+    over = run is not None and not resumable and not returning.restarts(experiment, run)
+    status = _status(session, link, link.study, version_id, experiment)
+    return LinkState(
+        study=LinkedStudy(
+            name=link.study.name,
+            title=experiment.title_for(experiment.languages[0]),
+            titles={language: experiment.title_for(language) for language in experiment.languages},
+            languages=list(experiment.languages),
+            background=experiment.display.background,
+            expected_minutes=expected_minutes(experiment),
+        ),
+        status="open" if resumable else "used" if over else status,
+        kind=link.kind,
+        resumable=resumable,
+        screens_devices=screens_devices(experiment),
+        way_back=recruiter_of(link).way_back(),
+        gates=_gates(experiment.display),
+    )
+
+
+def _gates(display: Display) -> Gates:
+    return Gates(
+        minimum_width_px=display.minimum_width_px,
+        minimum_height_px=display.minimum_height_px,
+        allow_touch=display.allow_touch,
+        full_screen=display.full_screen,
+        calibrate=display.calibrate,
+        viewing_distance=display.viewing_distance,
+        inter_ocular_mm=display.inter_ocular_mm,
+    )
+
+
+def start_run(services: Services, session: Session, token: str, start: RunStart) -> RunStarted:
+    """Begin a run, or give back the one this browser, person or personal link already has."""
+    link = find_link(session, token)
+    study = run_repository.lock_study(session, link.study_id)
+    known = returning.known_run(services, session, link, recruiter_of(link), start)
+    if known is not None:
+        experiment = services.versions.get(session, known.version_id).experiment
+        if not returning.restarts(experiment, known):
+            return _resumed(services, experiment, known, start.client_id)
+        with session.begin_nested():  # should a new visit be refused, the old one stays as it is
+            known.status = "withdrawn"
+            known.client_id = f"{known.client_id}:{known.public_id}"
+            session.flush()
+            return _begun(services, session, link, study, start)
+    return _begun(services, session, link, study, start)
+
+
+def _begun(services: Services, session: Session, link: Link, study: Study, start: RunStart) -> RunStarted:
+    """A new visit, or the reason why there is none."""
+    version_id = run_repository.active_version_id(session, study)
+    loaded = services.versions.get(session, version_id)
+    places.check_parameter(loaded.experiment, link, start.query)
+    status = _status(session, link, study, version_id, loaded.experiment)
+    if status != "open":
+        refusal, message = _REFUSALS[status]
+        raise refusal(message)
+    if link.kind == "general" and not link.synthetic:
+        refuse_other_recruiter(recruiter_of(link), start.query)
+    if start.language not in loaded.experiment.languages:
+        near = did_you_mean(start.language, loaded.experiment.languages)
+        raise LanguageUnknown(f"The study has no texts in '{start.language}'{near}.")
+    run, run_token = _new_run(services, session, link, study, version_id, loaded, start)
+    return RunStarted(run_token=run_token, run_id=run.public_id, resumed=False)
+
+
+Status = Literal["open", "closed", "expired", "full", "paused"]
+
+
+def _status(session: Session, link: Link, study: Study, version_id: int, experiment: Experiment) -> Status:
+    """Whether a new run may begin: open, or the reason why not."""
+    if link.expires_at is not None and link.expires_at <= now():
+        return "expired"
+    if link.kind == "preview" or link.synthetic:
+        return "open"
+    if study.status not in ("pilot", "live") or places.leads_nowhere(experiment, link):
+        return "closed"
+    if study.paused:
+        return "paused"
+    lease = timedelta(minutes=experiment.session.lease_minutes)
+    for quota, column, ident in (
+        (link.quota, StudyRun.link_id, link.id),
+        (study.quota, StudyRun.study_id, study.id),
+    ):
+        if quota is not None:
+            taken = run_repository.places_taken(session, column, ident, _origin(link, study), lease)
+            if taken >= quota:
+                return "full"
+    turns = places.open_turns(session, experiment, version_id, _origin(link, study), _group(experiment, link))
+    return "open" if turns else "full"
+
+
+def _group(experiment: Experiment, link: Link) -> str:
+    """The group that a link is for; empty where it decides none."""
+    return link.group_name if experiment.groups.by == "link" else ""
+
+
+def _origin(link: Link, study: Study) -> Origin:
+    """Where the answers of a run come from that begins through this link at this moment."""
+    if link.kind == "preview":
+        return "preview"
+    if link.synthetic:
+        return "simulated"
+    return "participant" if study.status == "live" else "pilot"
+
+
+def _resumed(services: Services, experiment: Experiment, run: StudyRun, client_id: UUID) -> RunStarted:
+    refusal = returning.refusal_to_resume(experiment, run)
+    if refusal is not None:
+        raise refusal
+    run.last_seen_at = now()
+    token = derived_token(services.settings.key, RUN_PURPOSE, run.public_id)
+    run.token_hash = hash_token(token)
+    again = run.client_id != str(client_id) or run.consented_at is not None
+    return RunStarted(run_token=token, run_id=run.public_id, resumed=again)
+
+
+def _new_run(
+    services: Services,
+    session: Session,
+    link: Link,
+    study: Study,
+    version_id: int,
+    loaded: LoadedVersion,
+    start: RunStart,
+) -> tuple[StudyRun, str]:
+    """Draw a seed, store the run, and give it its place, unless an answer is to decide its group."""
+    origin, phase = _origin(link, study), "live" if study.status == "live" else "pilot"
+    if origin == "preview":
+        keep = timedelta(hours=services.settings.preview_keep_hours)
+        run_repository.delete_previews(session, study, now() - keep)
+    public_id = new_public_id()
+    token = derived_token(services.settings.key, RUN_PURPOSE, public_id)
+    recruiter = recruiter_of(link)
+    identifier = returning.settled_id(session, link, recruiter, start.query)
+    evidence = _evidence(services, session, origin, start)
+    run = StudyRun(
+        public_id=public_id,
+        study_id=study.id,
+        version_id=version_id,
+        link_id=link.id,
+        client_id=str(start.client_id),
+        token_hash=hash_token(token),
+        participant=returning.name_of(link, study, identifier) or public_id,
+        phase=phase,
+        origin=origin,
+        language=start.language,
+        seed=new_seed(),
+        slot=NO_SLOT,
+        trials_total=0,
+        completion_code=new_token()[:10],
+        device=checked_device(start.device),
+        evidence=evidence,
+        # The study's recruiter may be another one later.
+        recruiter=recruiter.kind if identifier and not link.synthetic else "",
+        view_tickets=_view_tickets(session, evidence, start),
+    )
+    run_repository.add_all(session, [run])
+    if start.query:
+        written = recruiter.participant(start.query) or ""
+        known_as = KnownAs(written, without_signature(recruiter, start.query))
+        identities.keep(session, run, study.pseudonym_key, known_as, identifier)
+    if deciding(loaded.experiment) is None:
+        group = _group(loaded.experiment, link)
+        assign_slot(
+            session, run, loaded, places.open_turns(session, loaded.experiment, version_id, origin, group)
+        )
+    return run, token
+
+
+def _evidence(
+    services: Services, session: Session, origin: Origin, start: RunStart
+) -> Literal["none", "older", "asked"]:
+    """Whether evidence is asked for: not from a page that was open when this server learned to ask."""
+    if start.evidence:
+        return "asked"
+    if origin not in ENFORCED_ORIGINS and not services.intake.rehearses:
+        return "none"
+    return "older" if has_older_runs(session, now() - OLD_PAGES_ACCEPTED) else "asked"
+
+
+def _view_tickets(session: Session, evidence: str, start: RunStart) -> bool:
+    """Whether views are to bring tickets: all do but those of a page that was open before views had any."""
+    if start.view_tickets or evidence != "asked":
+        return start.view_tickets
+    return not awaits_views_without_tickets(session, now() - OLD_PAGES_ACCEPTED)

@@ -1,0 +1,231 @@
+"""A run's trials as the page gets them, and what an answer changes of those to come."""
+
+import logging
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from fastapi import Request
+from fastapi.responses import JSONResponse
+from sqlalchemy.orm import Session
+
+from experiments.assignment.checks import motion_checks_by_block
+from experiments.checks import CHECK_KINDS, CheckName
+from experiments.definition import Experiment
+from experiments.trials import KINDS
+from server.context import Services
+from server.core.errors import Answer, finished
+from server.core.storage import clip_address
+from server.models import StudyRun
+from server.participation import run_repository, series
+from server.participation.answer_schemas import NextTrials, Receipt, SeriesPosition, TrialClip, TrialInfo
+from server.participation.current_run import find_run
+from server.participation.rating_repository import refused_trials
+from server.participation.run_schemas import ShownCheck, ShownChecks, ShownOtherWay
+from server.participation.series import Outlook
+from server.participation.verdict import is_settled
+from server.participation.view_repository import numbers
+from server.participation.views import unanswered_views
+from server.participation.warnings import in_language
+from server.studies.versions import LoadedVersion, PlacedClip
+
+# A run's trials as the page gets them: in stored order, with what is still to be shown of each.
+
+_TOLD = ("clip_sha256", "frames", "fps")
+_SIZE = ("width_px", "height_px", "width_mm", "inter_ocular_px")
+
+
+def trial_list(session: Session, run: StudyRun, loaded: LoadedVersion) -> list[TrialInfo]:
+    """Every trial of a run; nothing in it tells the participant which cell a clip is of."""
+    done, begun = run_repository.plays(session, run), numbers(session, run)
+    unanswered = unanswered_views(session, run) if begun else {}
+    max_repeats = loaded.experiment.playback.max_repeats
+    positions = _positions(session, run, loaded)
+    refused = refused_trials(session.connection(), run.id)
+    shown, clips = loaded.once(_FirstClips), loaded.once(_Clips)
+    trials = []
+    for row in run_repository.trials(session, run):
+        index, kind, first = row.trial_index, row.kind, next(iter(row.clips.values()), None)
+        plays = done.get(index, ())
+        settled = any(is_settled(kind, play, verdict, max_repeats) for play, verdict in plays)
+        position, closed = positions.get(index, (None, False))
+        settled = settled or closed or index in refused
+        trials.append(
+            TrialInfo(
+                trial_index=index,
+                kind=kind,
+                block=row.block,
+                **shown[first],
+                clips=[clips[role, clip] for role, clip in row.clips.items()],
+                prompt=_prompt(loaded, run.language, row) if kind == "attention" else None,
+                check=_check(loaded, first) if kind == "check" else None,
+                plays_done=len(plays),
+                plays_wanted=len(plays) if settled else len(plays) + 1,
+                answered=settled,
+                series=position,
+                views_begun=begun.get(index, 0),
+                views=[] if settled else unanswered.get(index, []),
+            )
+        )
+    return trials
+
+
+def _positions(
+    session: Session, run: StudyRun, loaded: LoadedVersion
+) -> dict[int, tuple[SeriesPosition, bool]]:
+    """Position in its series of each trial that has one, and whether that series ended before it."""
+    if not KINDS[loaded.experiment.trial.kind].adapts:
+        return {}
+    return {
+        index: (SeriesPosition(number=number, position=position, known=known), closed)
+        for index, number, position, known, closed in series.places(session.connection(), run.id, loaded)
+    }
+
+
+class _FirstClips(dict[int | None, dict[str, Any]]):
+    """What a trial tells of its first clip, by the clip's id; under None the nulls of a trial without clips.
+
+    As with `_Clips`: made when a clip is first shown, and kept with its version, which never changes.
+    """
+
+    def __init__(self, loaded: LoadedVersion) -> None:
+        super().__init__({None: dict.fromkeys((*_TOLD, *_SIZE))})
+        self.loaded = loaded
+
+    def __missing__(self, ident: int) -> dict[str, Any]:
+        clip = self.loaded.clips[ident]
+        told = {name: getattr(clip, name) for name in _SIZE if name != "inter_ocular_px"}
+        self[ident] = _told(clip) | told | {"inter_ocular_px": self.loaded.inter_ocular_px}
+        return self[ident]
+
+
+class _Clips(dict[tuple[str, int], TrialClip]):
+    """Every clip of a version as the page gets it, by role and id."""
+
+    def __init__(self, loaded: LoadedVersion) -> None:
+        super().__init__()
+        self.loaded = loaded
+
+    def __missing__(self, shown: tuple[str, int]) -> TrialClip:
+        role, ident = shown
+        self[shown] = TrialClip.model_validate({"role": role, **_told(self.loaded.clips[ident])})
+        return self[shown]
+
+
+def _told(clip: PlacedClip) -> dict[str, Any]:
+    return {"clip_sha256": clip.sha256, "frames": clip.frames, "fps": clip.fps}
+
+
+def _check(loaded: LoadedVersion, clip: int | None) -> CheckName | None:
+    return None if clip is None else loaded.check_of(clip).check
+
+
+def _prompt(loaded: LoadedVersion, language: str, row: run_repository.StoredTrial) -> str:
+    """What an attention check asks for; the right answer of a motion check is never told."""
+    texts = loaded.experiment.attention.text
+    text = texts.get(language) or texts.get("en") or next(iter(texts.values()))
+    return text.replace("{response}", str(row.expected_response))
+
+
+# What an answer changes of the trials to come, told with its receipt.
+
+log = logging.getLogger("palpebra")
+
+
+def next_trials(services: Services, token: str, receipt: Receipt) -> tuple[Receipt, NextTrials | None]:
+    """The receipt with what remains once ended series are closed, and the trials chosen anew."""
+    outlook = follow(services, token)
+    if outlook is None:
+        return receipt, None
+    offered = {offer.trial_index for offer in outlook.offers}
+    with services.database.read() as session:
+        run = find_run(session, token)
+        every = trial_list(session, run, services.versions.get(session, run.version_id))
+    trials = [trial for trial in every if trial.trial_index in offered]
+    receipt = receipt.model_copy(update={"remaining": outlook.remaining})
+    return receipt, NextTrials(trials=trials, closed=list(outlook.closed))
+
+
+def follow(services: Services, token: str) -> Outlook | None:
+    """Bring a run's series up to its answers. What fails here is logged and done again with the next answer.
+
+    The answer itself is stored by then, and its receipt must not be lost to a choice that could not be made.
+    """
+    try:
+        return series.follow(services.database, services.versions, token)
+    except Exception:
+        log.exception("the series of a run could not be followed; its page goes on with what it has")
+        return None
+
+
+# Answers with trials, as the page that asked reads them.
+#
+# A page says that it knows where a clip is from its hash (`clips=hash` in Accept). One that was open before
+# the server learned this says nothing, and is told of each clip's address and size.
+
+KNOWS_ADDRESSES = "clips=hash"
+_OLD_PAGE_SIZE = ("width_px", "height_px", "width_mm")
+
+
+def finished_for_page(
+    services: Services, request: Request, token: str, answer: Answer, status: int = 200, exclude: Any = None
+) -> Answer:
+    """The answer as a response, with addresses and sizes of clips where the page does not know them."""
+    if KNOWS_ADDRESSES in request.headers.get("accept", ""):
+        return finished(answer, status, exclude)
+    content = answer.model_dump(mode="json", exclude=exclude)
+    if trials := list(_trials(content)):
+        with services.database.read() as session:
+            loaded = services.versions.get(session, find_run(session, token).version_id)
+        clips = {clip.sha256: clip for clip in loaded.clips.values()}
+        for trial in trials:
+            _tell_all(trial, clips, loaded)
+    return JSONResponse(content, status)  # type: ignore[return-value]
+
+
+def _trials(content: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    """The trials of a run, of the run within an answer to a form, or of those that follow a rating."""
+    for told in (content, content.get("run"), content.get("next")):
+        if told:
+            yield from told.get("trials", ())
+
+
+def _tell_all(trial: dict[str, Any], clips: Mapping[str, PlacedClip], loaded: LoadedVersion) -> None:
+    first = clips.get(trial["clip_sha256"])
+    trial["clip_url"], trial["bytes"] = (clip_address(first.sha256), first.bytes) if first else (None, None)
+    for told in trial["clips"]:
+        clip = clips[told["clip_sha256"]]
+        told["clip_url"] = clip_address(clip.sha256)
+        told.update((name, getattr(clip, name)) for name in _OLD_PAGE_SIZE)
+        told["inter_ocular_px"] = loaded.inter_ocular_px
+
+
+# What the page is told of a study's motion checks: questions and choices, never an answer.
+
+
+def shown_checks(experiment: Experiment, language: str) -> ShownChecks | None:
+    """The words of the declared checks in the run's language; None where there are no checks."""
+    declared = experiment.evidence.motion_checks
+    if not any(motion_checks_by_block(experiment)):
+        return None
+    other = declared.other_way
+    said = (
+        {
+            name: in_language(text, language, experiment.languages)
+            for name, text in (("label", other.label), ("text", other.text))
+        }
+        if other
+        else None
+    )
+    return ShownChecks(
+        by_kind={kind: _shown(experiment, kind, language) for kind in declared.kinds},
+        other_way=ShownOtherWay.model_validate(said) if said else None,
+    )
+
+
+def _shown(experiment: Experiment, kind: CheckName, language: str) -> ShownCheck:
+    wording = experiment.evidence.motion_checks.wording
+    words = next((words for words in wording if words.check == kind), None) or CHECK_KINDS[kind]
+    return ShownCheck(
+        question=in_language(words.question, language, experiment.languages),
+        choices=[in_language(choice, language, experiment.languages) for choice in words.choices],
+    )

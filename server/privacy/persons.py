@@ -1,0 +1,78 @@
+"""Subject access: everything that is stored of one person, in all visits known to be theirs."""
+
+import json
+from dataclasses import asdict
+from typing import Any
+
+from sqlalchemy.orm import Session
+
+from server.accounts.audit import record
+from server.accounts.identity import Identity, Operator
+from server.accounts.repository import entries_on_run
+from server.core.errors import Conflict, NotFound
+from server.core.values import iso, now, visible
+from server.models import Study, StudyRun
+from server.participation.identity_keys import UnreadableError
+from server.participation.identity_repository import known_as
+from server.participation.visit_repository import every_visit, find_run
+from server.privacy import repository
+
+ABOUT = (
+    "Everything that this server stores of one person in this study, table by table and column by column "
+    "(docs/data-dictionary.md tells what each column is). Left out are the secrets that open a visit, "
+    "and the codes that pay for one until it is complete. "
+    "Downloads and reports that were made before are not part of it."
+)
+
+
+def visits_of(session: Session, study: Study, run: str, identifier: str) -> list[StudyRun]:
+    """The visits of a person, told by one of the runs or by the recruiter's id.
+
+    Raises
+    ------
+    NotFound
+        Nobody is known so.
+    Conflict
+        The run is erased.
+    """
+    if not run:
+        visits = repository.runs_known_as(session, study, identifier) if identifier else []
+        if not visits:
+            raise NotFound(f"The study '{study.name}' has no visit under this recruiter's id.")
+        return every_visit(session, visits)
+    first = find_run(session, study, run)
+    if first.erased_at is not None:
+        raise Conflict("This run's data were erased; nothing of its person is left.")
+    return every_visit(session, [first])
+
+
+def subject_access(
+    session: Session, study: Study, visits: list[StudyRun], reader: Identity | Operator
+) -> str:
+    """The JSON of everything stored; that somebody took it is written down."""
+    told = {
+        "about": ABOUT,
+        "study": study.name,
+        "made_at": iso(now()),
+        "visits": [_visit(session, visit) for visit in visits],
+    }
+    for visit in visits:
+        record(session, reader, "subject access", "run", visit.public_id, study=study.name)
+    return json.dumps(told, indent=1, ensure_ascii=False) + "\n"
+
+
+def _visit(session: Session, run: StudyRun) -> dict[str, Any]:
+    try:
+        known = known_as(session, run)
+    except UnreadableError as error:
+        raise Conflict(f"{error}.") from error
+    entries = [
+        {"at": iso(entry.at), "action": entry.action, "details": visible(entry.details)}
+        for entry in entries_on_run(session, run.public_id)
+    ]
+    return {
+        "run": run.public_id,
+        "recruiter": visible(asdict(known)) if known else None,
+        "stored": repository.stored_rows(session, run),
+        "audit": entries,
+    }

@@ -1,0 +1,153 @@
+"""`server simulate`: simulated participants through the real API; their runs have the origin `simulated`."""
+
+import sys
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from experiments.counted import counted
+from experiments.errors import InputError
+from server.app import create_app
+from server.cli_common import out, stored_services
+from server.core.settings import Settings
+from server.rehearsals.http import JsonClient, Refused, running_server
+from server.rehearsals.manners import MANNERS, act, manner_called, summary, write
+from server.rehearsals.person import Person, Rater, link_and_raters
+
+
+def register(parent: typer.Typer) -> None:
+    """Add `server simulate` to the command line."""
+    parent.command("simulate")(simulate)
+
+
+def simulate(
+    study: Annotated[str, typer.Argument(help="Name of a study, a draft or a closed one too.")],
+    participants: Annotated[int, typer.Option(min=1, max=100_000, help="How many.")] = 3,
+    seed: Annotated[int, typer.Option(help="Seed of the people and of the effects in their answers.")] = 1,
+    at_once: Annotated[int, typer.Option(min=1, max=200, help="How many take part at the same time.")] = 2,
+    url: Annotated[
+        str, typer.Option(help="Address of a running server; one is started where not given.")
+    ] = "",
+    manner: Annotated[
+        str,
+        typer.Option("--as", help=f"Manner of taking part, to try the evidence by: {', '.join(MANNERS)}."),
+    ] = "",
+    observer: Annotated[
+        str,
+        typer.Option(
+            help="In a study of thresholds, the true function: threshold=200,spread=30,sd=10,guess=0.02,"
+            "lapse=0.02 (sd is that of people's thresholds), with a second factor tilt=50 too. What is left "
+            "out is usual for the stimuli."
+        ),
+    ] = "",
+    json_file: Annotated[
+        Path | None, typer.Option("--json", help="With --as: file for the verdict and signals of each run.")
+    ] = None,
+) -> None:
+    """Let simulated participants take part through the HTTP API; their runs have the origin `simulated`.
+
+    No count, quota, result or report of people's answers holds them: a study is rehearsed as a draft.
+
+    Each goes through consent, forms, calibration and every trial. Answers follow a rater model with effects
+    drawn by the seed, so that an analysis has something to find; they say nothing about people.
+    With --as they are held to what people are held to, and the verdict on each run is told.
+
+    Examples:
+
+      server simulate exp3 --participants 20
+
+      server simulate exp3 --as http --participants 5 --json http.json
+
+      server simulate threshold_demo --participants 10 --observer threshold=180,spread=30,sd=15
+    """
+    settings = Settings()
+    if manner:
+        if url:
+            raise InputError("--as starts a server of its own, whose time it can tell; leave --url out")
+        _as(
+            settings,
+            study,
+            manner,
+            range(seed * 1_000_000, seed * 1_000_000 + participants),
+            at_once,
+            json_file,
+        )
+        return
+    if json_file is not None:
+        raise InputError("--json goes with --as, which gives the verdicts to write")
+    with stored_services(settings) as services:
+        token, raters = link_and_raters(services, study, observer)
+    people = range(seed * 1_000_000, seed * 1_000_000 + participants)
+    with (
+        _server(settings, url) as address,
+        ThreadPoolExecutor(at_once) as pool,
+        _bar(participants) as advance,
+    ):
+        work = [pool.submit(_one, address, token, raters(number, seed)) for number in people]
+        ratings = 0
+        for done in as_completed(work):
+            try:
+                ratings += done.result()
+            except Refused as error:
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise InputError(f"the server refused a simulated participant: {error}") from error
+            advance()
+    out.print(
+        f"study {study}: {counted(participants, 'simulated participant')}, {counted(ratings, 'rating')}"
+    )
+
+
+def _as(
+    settings: Settings, study: str, name: str, people: range, at_once: int, json_file: Path | None
+) -> None:
+    """Simulated people in a manner, with the verdict on each."""
+    manner = manner_called(name)
+    with stored_services(settings) as services:
+        token, raters = link_and_raters(services, study)
+    everyone = [raters(number, people.start) for number in people]
+    runs = act(settings, token, everyone, manner, at_once)
+    if json_file is not None:
+        write(json_file, study, name, runs)
+    out.print(f"study {study}, {len(runs)} as {name}: {summary(runs)}")
+
+
+def _one(address: str, token: str, rater: Rater) -> int:
+    client = JsonClient(address)
+    try:
+        person = Person(client, rater)
+        person.take_part(token)
+        return person.ratings
+    finally:
+        client.close()
+
+
+@contextmanager
+def _server(settings: Settings, url: str) -> Iterator[str]:
+    if url:
+        yield url
+        return
+    with running_server(create_app(settings)) as address:
+        yield address
+
+
+@contextmanager
+def _bar(total: int) -> Iterator[Callable[[], None]]:
+    """A progress bar with remaining time on a terminal, nothing elsewhere."""
+    if not sys.stderr.isatty():
+        yield lambda: None
+        return
+    columns = (
+        TextColumn("participants", markup=False),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True, markup=False)) as progress:
+        task = progress.add_task("participants", total=total)
+        yield lambda: progress.advance(task)

@@ -1,1 +1,0 @@
-"""Where the bytes of clips lie: a folder, or an S3-compatible store."""

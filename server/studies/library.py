@@ -1,0 +1,122 @@
+"""The shipped blinks and the characters at closures, for the blinks page."""
+
+import csv
+import json
+from collections import defaultdict
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from fastapi import APIRouter, Response
+from pydantic import BaseModel, Field, ValidationError
+
+from server.accounts.identity import Viewer
+from server.context import ServicesDep
+from server.core.errors import ERROR_RESPONSES, NotFound
+
+# The shipped blinks, recorded and modelled, read from the files that come with `stimuli`.
+
+blink_router = APIRouter(prefix="/api/admin/blinks", tags=["blinks"], responses=ERROR_RESPONSES)
+
+
+class RecordedProfile(BaseModel):
+    """One recorded blink at 300 fps: of one eye, or of both on common samples."""
+
+    profile_id: str
+    recording: str
+    person: str
+    eye: str = Field(description="left, right, both (`closure` is the left eye's), or empty where unknown.")
+    down_frames: int
+    up_frames: int
+    amplitude: float
+    minimum_index: int
+    source: str
+    licence: str
+    closure: list[float] = Field(description="Closure per frame at `fps`: 0 open, 1 closed.")
+    closure_other: list[float] = Field(description="The right eye's where `eye` is both; else empty.")
+
+
+class BlinkLibrary(BaseModel):
+    """The recorded profiles, and the PCA model as `stimuli model fit` wrote it."""
+
+    fps: float
+    profiles: list[RecordedProfile]
+    model: dict[str, Any]
+
+
+@blink_router.get("/library")
+def get_library(services: ServicesDep, _identity: Viewer) -> BlinkLibrary:
+    """Recorded profiles and the PCA model."""
+    folder = services.settings.library_folder
+    if not (folder / "profiles.csv").is_file():
+        raise NotFound("The blink library is not on this server.")
+    return _library(folder, (folder / "profiles.csv").stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=2)
+def _library(folder: Path, _changed_ns: int) -> BlinkLibrary:
+    curves: dict[str, list[float]] = defaultdict(list)
+    others: dict[str, list[float]] = defaultdict(list)
+    for row in _rows(folder / "closures.csv"):
+        curves[row["profile_id"]].append(float(row["closure"]))
+        if row.get("closure_other"):
+            others[row["profile_id"]].append(float(row["closure_other"]))
+    profiles = [
+        RecordedProfile.model_validate(
+            {name: row[name] for name in RecordedProfile.model_fields if name in row}
+            | {"closure": curves[row["profile_id"]], "closure_other": others[row["profile_id"]]}
+        )
+        for row in _rows(folder / "profiles.csv")
+    ]
+    model = json.loads((folder / "model.json").read_text(encoding="utf-8"))
+    return BlinkLibrary(fps=float(model.get("fps", 300)), profiles=profiles, model=model)
+
+
+def _rows(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+# The characters at closures from open to shut, for the blinks page: files that `stimuli strips` wrote.
+
+strip_router = APIRouter(prefix="/api/admin/blinks/strips", tags=["blinks"], responses=ERROR_RESPONSES)
+STRIPS_FILE = "strips.json"
+
+
+class Strips(BaseModel):
+    """Picture strips, one a character: frames of one size, one below the other."""
+
+    width_px: int = Field(gt=0)
+    height_px: int = Field(gt=0)
+    closures: list[float] = Field(description="Closure of each frame, ascending: 0 open, 1 shut.")
+    characters: list[str] = Field(description="Their pictures are at …/strips/NAME.webp.")
+
+
+@strip_router.get("")
+def get_strips(services: ServicesDep, _identity: Viewer) -> Strips:
+    """What strips there are; none where they have not been made on this server."""
+    strips = _declared(services.settings.strips_folder)
+    return strips or Strips(width_px=1, height_px=1, closures=[], characters=[])
+
+
+@strip_router.get("/{name}.webp", response_class=Response)
+def get_strip(services: ServicesDep, _identity: Viewer, name: str) -> Response:
+    """The strip of one character."""
+    folder = services.settings.strips_folder
+    strips = _declared(folder)
+    if strips is None or name not in strips.characters:
+        raise NotFound(
+            f"There is no picture strip of '{name}'; run `stimuli strips --out DATA_FOLDER/stimuli/strips`."
+        )
+    content = (folder / f"{name}.webp").read_bytes()
+    return Response(content, media_type="image/webp", headers={"cache-control": "private, no-cache"})
+
+
+def _declared(folder: Path) -> Strips | None:
+    """The declaration; None where there is none, it is not readable or a picture is missing."""
+    try:
+        declared = Strips.model_validate_json((folder / STRIPS_FILE).read_bytes())
+    except (OSError, ValidationError):
+        return None
+    whole = all((folder / f"{Path(name).name}.webp").is_file() for name in declared.characters)
+    return declared if whole else None
