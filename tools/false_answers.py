@@ -262,7 +262,7 @@ def session(folder: Path, seconds: float, raters: int) -> Counts:
     try:
         victim = Visit(server.address, link, 1)
         victim.http.close()
-        target = Target(server.address, link, server.core.settings.key, victim.state["tickets"])
+        target = Target(server.address, link, server.settings.key, victim.state["tickets"])
         lines = len(server.log.read_text().splitlines())
         end = time.monotonic() + seconds
         with ProcessPoolExecutor(1) as attackers, ThreadPoolExecutor(raters) as pool:

@@ -225,9 +225,9 @@ def export(rows: int, target: float) -> list[Row]:
 
         run(go())
         multiply(server, rows)
-        out = server.core.settings.data_folder / "out.csv"
-        environment = {**os.environ, "DATABASE_URL": server.core.settings.database_url}
-        environment["PALPEBRA_DATA_FOLDER"] = str(server.core.settings.data_folder)
+        out = server.settings.data_folder / "out.csv"
+        environment = {**os.environ, "DATABASE_URL": server.settings.database_url}
+        environment["PALPEBRA_DATA_FOLDER"] = str(server.settings.data_folder)
         command = [sys.executable, "-m", "server", "export", "short", "--out", str(out)]
         began = time.monotonic()
         peak_mb = _peak_mb(subprocess.Popen(command, env=environment, cwd=ROOT, stdout=subprocess.DEVNULL))

@@ -23,7 +23,7 @@ def snapshots(count: int, seconds: float, stored_rows: int, p95: float) -> list[
     """`count` raters on a database with so many ratings, of which the server takes snapshots meanwhile."""
     tally, windows = Tally(), list[Window]()
     with load_server("sqlite", 1, PALPEBRA_SNAPSHOT_MINUTES=str(EVERY_MINUTES)) as server:
-        folder = server.core.settings.data_folder / FOLDER
+        folder = server.settings.data_folder / FOLDER
 
         async def go() -> None:
             fillers = await begin(server, FILLERS, Tally(), FILLERS)
@@ -37,7 +37,7 @@ def snapshots(count: int, seconds: float, stored_rows: int, p95: float) -> list[
             watching.cancel()
 
         run(go())
-        size_mb = database_file(server.core.settings).stat().st_size / 1e6
+        size_mb = database_file(server.settings).stat().st_size / 1e6
         all_there = saved(server, tally)
     during, others = divided(tally, windows)
     took = ", ".join(f"{ended - begun:.1f}" for begun, ended in windows)

@@ -18,7 +18,7 @@ def analysed(server: ServerProcess, study: str, folder: Path) -> str:
     declaration.write_text(server.rows(statement)[0]["text"], encoding="utf-8")
     options = [
         "--database",
-        server.core.settings.resolved_database_url,
+        server.settings.resolved_database_url,
         "--origin",
         "participant",
         "--no-report",

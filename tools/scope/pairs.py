@@ -165,7 +165,7 @@ def _records(server: ServerProcess, plays: int) -> list[tuple[object, ...]]:
     """The stored frame logs of each pair of the latest run, a log a clip."""
     latest = "(SELECT max(id) FROM study_runs)"
     server.rows_soon(f"SELECT id FROM views WHERE study_run_id = {latest} AND outcome = 'shown'", plays)
-    with migrated_services(server.core.settings) as services, services.database.read() as session:
+    with migrated_services(server.settings) as services, services.database.read() as session:
         run = session.query(View.study_run_id).order_by(View.study_run_id.desc()).limit(1).scalar()
         views = session.query(View).where(View.study_run_id == run).all()
         return [

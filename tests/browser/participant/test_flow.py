@@ -48,7 +48,7 @@ def test_every_screen_is_accessible_and_the_ratings_arrive(
     assert {row["frames_drawn"] + row["frames_missing"] for row in shown} == {8}
     assert {row["viewing_distance_mm"] for row in rows} == {600}
     out = tmp_path / "ratings.csv"
-    assert run_server_command(server.core.settings, "export", "browser", "--out", str(out)).returncode == 0
+    assert run_server_command(server.settings, "export", "browser", "--out", str(out)).returncode == 0
     exported = list(csv.DictReader(io.StringIO(out.read_text())))
     assert [line["response"] for line in exported] == [str(row["response"]) for row in rows]
 

@@ -141,7 +141,7 @@ def test_two_long_clips_side_by_side_are_drawn_by_one_clock(
     # The two pictures of one refresh are of one frame, and the record names that frame for each.
     left, right = held["seen"][0::2], held["seen"][1::2]
     assert left == right
-    with migrated_services(server.core.settings) as services, services.database.read() as session:
+    with migrated_services(server.settings) as services, services.database.read() as session:
         clips = session.query(ViewClip).order_by(ViewClip.role).all()
         logs = {clip.role: [index for index, _ in unpacked(clip.frame_log)] for clip in clips}
     assert logs == {"left": left, "right": left}

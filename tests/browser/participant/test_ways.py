@@ -136,7 +136,7 @@ def test_practice_comes_once_more_where_a_key_was_pressed_during_the_clip(served
 def test_a_locked_database_is_not_called_a_lost_connection(served: Served, page: Page) -> None:
     server, studies = served
     Visit(page, server.address).open(studies["plain"].link_token)
-    file = server.core.settings.resolved_database_url.removeprefix("sqlite:///")
+    file = server.settings.resolved_database_url.removeprefix("sqlite:///")
     with closing(sqlite3.connect(file, isolation_level=None)) as other:
         other.execute("BEGIN IMMEDIATE")
         page.click(".primary")
