@@ -21,7 +21,8 @@ from server.core.values import body_problem
 
 # The HTTP connection: heads must come soon and be small, answers must be taken, or the connection ends.
 #
-# The server behind (uvicorn with httptools) bounds none of these. Bodies are bounded in `server.door`.
+# The server behind (uvicorn with httptools) bounds none of these. Bodies are bounded in
+# `server.request_limits`.
 
 HEAD_S = 15.0
 """From the connection, or from a later request's first byte, to the end of the head."""

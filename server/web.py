@@ -89,7 +89,7 @@ class SecurityHeaders:
 
 
 class RowSecurity:
-    """Each request acts for nobody until an account is recognised (`server.row_security_repository`)."""
+    """Each request acts for nobody until an account is recognised (`server.core.row_security`)."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app

@@ -18,7 +18,7 @@ from server.models import Base
 # The second wall between laboratories: on PostgreSQL a member's transactions see her own studies' rows.
 #
 # Every transaction of a request that an account was recognised for runs in a role that owns no table, and the
-# tables' policies (`server.row_policies_repository`) let that role at rows of her workspaces' and grants'
+# tables' policies (`server.core.row_security`) let that role at rows of her workspaces' and grants'
 # studies. Who calls whom does not matter: an endpoint that forgets to ask whose a study is finds nothing.
 # Participants, the command line and the server's own work are nobody's requests and run as the owner of the
 # tables.
@@ -103,7 +103,7 @@ def kind_of_session(narrows: bool) -> type[Session]:
     return NarrowedSession if narrows else Session
 
 
-# Policies of rows (`server.row_security_repository`): made where PostgreSQL and its user allow it.
+# Policies of rows (`server.core.row_security`): made where PostgreSQL and its user allow it.
 #
 # They are no migration of their own: whether the database's user may have the role changes from place to
 # place, and every migration that touches a table would meet them. Each upgrade takes them down and makes

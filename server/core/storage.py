@@ -30,7 +30,7 @@ class ClipsAway(ApiError):
 
 
 class ClipStore(Protocol):
-    """What a clip store does: the folder here, an object store in `server.storage.s3`."""
+    """What a clip store does: the folder here, an object store in `server.core.storage`."""
 
     def add(self, source: BinaryIO, sha256: str) -> bool:
         """Store a clip; True where it was not there yet. InputError where the bytes have another hash."""

@@ -135,7 +135,7 @@ def _declared(experiment: Experiment) -> _Declared:
             case ScreenFormAnswer():
                 declared.answers.append(rule)
             case ScreenAttention():
-                pass  # looked at with each check that is answered, by server.trials.attention
+                pass  # looked at with each check that is answered, by server.participation.warnings
             case ScreenDevice():
                 declared.devices.append(rule)
             case _:

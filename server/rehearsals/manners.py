@@ -28,8 +28,8 @@ from server.rehearsals.person import SEES_MOTION, Person, Rater, still_due, view
 
 # Manners of taking part: how people and programs act between two answers, seeded.
 #
-# Each is a model of who answers; the points of server/evidence/verdict.py were set by them. A second set,
-# written apart, tests them (tests/server/evidence).
+# Each is a model of who answers; the points of server/participation/evidence.py were set by them. A second
+# set, written apart, tests them (tests/server/evidence).
 
 Interaction = dict[str, Any]
 

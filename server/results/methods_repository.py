@@ -35,7 +35,7 @@ ASKED = f"{EXTRA} AND a.kind = 'check' AND t.verdict <> 'failed'"
 OTHER_WAY = "coalesce(CAST(t.payload ->> 'other_way' AS text), '0') IN ('1', 'true')"
 """As SQLite and PostgreSQL write a true of JSON."""
 RESTARTED = "r.status = 'withdrawn' AND r.client_id LIKE '%:' || r.public_id"
-"""A visit that a new one of the same person took the place of (`server.participants.links`)."""
+"""A visit that a new one of the same person took the place of (`server.participation.links`)."""
 GONE = f"r.status = 'withdrawn' AND r.erased_at IS NULL AND NOT ({RESTARTED})"
 
 

@@ -162,7 +162,7 @@ def _frame_map_csv(shown: Iterable[int]) -> str:
 clip_router = APIRouter(tags=["clips"], responses=ERROR_RESPONSES)
 IMMUTABLE = "public, max-age=31536000, immutable"
 REDIRECT_KEPT_S = 1800
-"""Half of what a signed address of `server.storage.s3` is good for."""
+"""Half of what a signed address of `server.core.storage` is good for."""
 _RANGE = re.compile(r"^bytes=([0-9]{0,15})-([0-9]{0,15})$")
 _CLIP_ANSWERS: dict[int | str, dict[str, Any]] = {
     200: {"content": {"video/mp4": {"schema": {"type": "string", "format": "binary"}}}},

@@ -91,5 +91,5 @@ _SERVED: dict[str, Served] = {}
 def served(kind: str) -> Served:
     """What the server does for trials of this kind."""
     if kind not in _SERVED:
-        _SERVED[kind] = import_module(f"server.trials.kinds.{kind}").SERVED
+        _SERVED[kind] = import_module(f"server.participation.kinds.{kind}").SERVED
     return _SERVED[kind]
