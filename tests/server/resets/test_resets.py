@@ -267,10 +267,10 @@ def test_no_letter_goes_to_a_server_that_nobody_vouches_for(
     tmp_path: Path, settings: Settings, offers_tls: bool, caplog: pytest.LogCaptureFixture
 ) -> None:
     options = {"tls_context": _own_certificate(tmp_path)} if offers_tls else {}
-    with smtp_server(**options) as (letters, port):
+    with smtp_server(**options) as (letterbox, port):
         strict = settings.model_copy(update={"smtp_port": port, "smtp_security": "starttls"})
         assert not letters.send_mail(strict, ADDRESS, "subject", "text")
-    assert letters.letters == []
+    assert letterbox.letters == []
     assert "a letter was not sent" in caplog.text
     assert ADDRESS not in caplog.text
 
