@@ -13,7 +13,7 @@ import uvicorn
 from fastapi import FastAPI
 
 from experiments.errors import InputError
-from server.request_limits import BoundedHttp
+from server.protocol import BoundedHttp
 
 TIMEOUT_S = 60.0
 START_TIMEOUT_S = 30.0

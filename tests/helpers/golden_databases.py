@@ -9,8 +9,8 @@ from typing import Any
 import psycopg
 from sqlalchemy.engine import make_url
 
-from server.db import Database
-from server.operations.rows_repository import read_rows, snapshot, tables_of
+from server.core.db import Database
+from server.privacy.rows import read_rows, snapshot, tables_of
 from tests.conftest import REPOSITORY
 
 FOLDER = REPOSITORY / "tests" / "golden" / "databases"

@@ -18,14 +18,13 @@ from experiments.load import locate
 from server.accounts.identity import OPERATOR
 from server.app import create_app
 from server.context import Services, open_services
-from server.export.extract import Extract
-from server.export.formats import FORMATS
-from server.migrate import newest_revision, upgrade
+from server.core.migrate import newest_revision, upgrade
+from server.core.settings import Settings
+from server.exports.extract import Extract
+from server.exports.formats import FORMATS
 from server.operations.backup import back_up
 from server.operations.copying import copy_database
-from server.settings import Settings
-from server.simulation.people import link_and_raters
-from server.simulation.person import Person
+from server.rehearsals.person import Person, link_and_raters
 from server.studies.lookup import find_study
 from tests.helpers.admins import Admin, signed_in
 from tests.helpers.golden_databases import FOLDER, SECRET_KEY, contents_of

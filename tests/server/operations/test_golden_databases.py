@@ -14,11 +14,11 @@ from fastapi.testclient import TestClient
 from server.accounts.identity import OPERATOR
 from server.app import create_app
 from server.context import Services, open_services
-from server.export.extract import Extract
-from server.export.formats import FORMATS
-from server.migrate import current_revision, newest_revision, upgrade
+from server.core.migrate import current_revision, newest_revision, upgrade
+from server.core.settings import Settings
+from server.exports.extract import Extract
+from server.exports.formats import FORMATS
 from server.operations.restore import restore
-from server.settings import Settings
 from server.studies.lookup import find_study
 from tests.helpers.admins import signed_in
 from tests.helpers.databases import BACKENDS
