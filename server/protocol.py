@@ -1,6 +1,7 @@
 """The HTTP connection: heads must come soon and be small, answers must be taken, or the connection ends.
 
-The server behind (uvicorn with httptools) bounds none of these. Bodies are bounded in `server.request_limits`.
+The server behind (uvicorn with httptools) bounds none of these. Bodies are bounded in
+`server.request_limits`.
 """
 
 import asyncio

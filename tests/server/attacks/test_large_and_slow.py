@@ -10,7 +10,7 @@ from contextlib import suppress
 
 import pytest
 
-from server import request_limits
+from server import protocol, request_limits
 from server.app import create_app
 from server.context import Services
 from server.rehearsals.http import running_server
@@ -112,7 +112,7 @@ HALF_SENT = [
 
 
 def test_half_sent_requests_are_cut(port: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(request_limits, "HEAD_S", 0.4)
+    monkeypatch.setattr(protocol, "HEAD_S", 0.4)
     monkeypatch.setattr(request_limits, "BODY_S", 0.4)
     for half in HALF_SENT:
         with socket.create_connection(("127.0.0.1", port)) as connection:
@@ -136,7 +136,7 @@ def test_a_head_without_end_is_cut(port: int) -> None:
 def test_an_answer_nobody_takes_ends_the_connection(port: int, monkeypatch: pytest.MonkeyPatch) -> None:
     with urllib.request.urlopen(f"http://127.0.0.1:{port}/api/openapi.json") as answer:
         size = len(answer.read())
-    monkeypatch.setattr(request_limits, "SEND_S", 0.3)
+    monkeypatch.setattr(protocol, "SEND_S", 0.3)
     with socket.socket() as connection:
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         connection.connect(("127.0.0.1", port))
