@@ -9,8 +9,7 @@ import av
 
 from experiments.errors import InputError
 from experiments.files import remove_quietly, temporary_beside
-from stimuli_builder.video import Picture
-from stimuli_builder.video_clock import reason
+from stimuli_builder.video import Picture, reason
 
 ENDINGS = (".mp4", ".m4v", ".mov", ".mkv")
 

@@ -15,11 +15,10 @@ sys.path.insert(0, str(ROOT))
 from experiments.rendering import RenderSettings  # noqa: E402
 from stimuli_builder.characters.colour import linear_to_srgb  # noqa: E402
 from stimuli_builder.clips.characters import find_character, shipped_names  # noqa: E402
-from stimuli_builder.clips.curves import ClipCurve  # noqa: E402
+from stimuli_builder.clips.curves import ClipCurve, frame_windows  # noqa: E402
+from stimuli_builder.clips.design_clips import performance_curve  # noqa: E402
 from stimuli_builder.clips.frames import FramePainter  # noqa: E402
 from stimuli_builder.clips.kernels import FULL_SCALE  # noqa: E402
-from stimuli_builder.clips.motion_blur import frame_windows  # noqa: E402
-from stimuli_builder.clips.performances import performance_curve  # noqa: E402
 from tools.screenshots_clips import SIZE, Rgb, save  # noqa: E402
 
 FPS, SEED, EXEMPLAR = 30, 2011, 5

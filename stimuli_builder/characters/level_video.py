@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import InputError
+from stimuli_builder.characters.colour import FORMAT, frame_planes, picture_of, planes_of
 from stimuli_builder.characters.declaration import REPAIR, Picture
-from stimuli_builder.characters.level_planes import FORMAT, frame_planes, picture_of, planes_of
 from stimuli_builder.characters.writing import write_bytes_declared
 
 QUANTISER = 21

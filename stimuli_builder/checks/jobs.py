@@ -9,13 +9,190 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.checks import CHECK_KINDS, CheckName
-from stimuli_builder.checks.dots import Motion, coherence_of, pictures, steps_for
-from stimuli_builder.checks.masks import LATTICE, digit, placed, shape
-from stimuli_builder.checks.own_look import first_blink, first_eye
-from stimuli_builder.clips.curves import ClipCurve
+from stimuli_builder.blinks.profile import PROFILE_FPS
+from stimuli_builder.clips.curves import DECIMALS, Array, ClipCurve, generator
 from stimuli_builder.clips.encode import encode_clip, encoder_signature
 from stimuli_builder.clips.jobs import Look
-from stimuli_builder.clips.seeds import generator
+
+# What a motion check may show, as masks on the lattice of its dots.
+
+Mask = NDArray[np.bool_]
+Generator = np.random.Generator
+
+LATTICE = 60
+"""Dots along each side of the picture."""
+JITTER = 4
+"""How many dots what is shown may stand away from the middle."""
+
+_DIGITS = (
+    "00100 01100 00100 00100 00100 00100 01110",
+    "01110 10001 00001 00110 01000 10000 11111",
+    "01110 10001 00001 00110 00001 10001 01110",
+    "00010 00110 01010 10010 11111 00010 00010",
+    "11111 10000 11110 00001 00001 10001 01110",
+    "01110 10000 10000 11110 10001 10001 01110",
+    "11111 00001 00010 00100 00100 01000 01000",
+    "01110 10001 10001 01110 10001 10001 01110",
+    "01110 10001 10001 01111 00001 00001 01110",
+)
+"""The digits from 1 to 9, row by row: no font is needed, and every machine draws the same."""
+_DOTS_A_PIXEL = 6
+
+
+def digit(answer: int) -> Mask:
+    """The digit `answer`, (42, 30) dots."""
+    rows = [[dot == "1" for dot in row] for row in _DIGITS[answer - 1].split()]
+    return np.kron(np.array(rows), np.ones((_DOTS_A_PIXEL, _DOTS_A_PIXEL))).astype(bool)
+
+
+def shape(answer: int) -> Mask:
+    """Circle, square, triangle or cross by the number of the answer, (36, 36) dots, of about one area."""
+    down, across = np.mgrid[0:36, 0:36] - 17.5
+    if answer == 1:
+        return np.asarray(np.hypot(down, across) < 15.5)
+    if answer == 2:
+        return np.asarray((abs(down) < 14) & (abs(across) < 14))
+    if answer == 3:
+        return np.asarray(abs(across) * 2 < down + 18)
+    return np.asarray((abs(down) < 6.5) | (abs(across) < 6.5))
+
+
+def placed(shown: Mask, rng: Generator) -> Mask:
+    """A mask of the whole lattice with `shown` near its middle."""
+    mask = np.zeros((LATTICE, LATTICE), bool)
+    top, left = ((LATTICE - side) // 2 + int(rng.integers(-JITTER, JITTER + 1)) for side in shown.shape)
+    mask[top : top + shown.shape[0], left : left + shown.shape[1]] = shown
+    return mask
+
+
+# Random dots of which no picture, and not their mean, says anything: only their motion does.
+#
+# Each picture is a lattice of independent dots, each dark or bright with probability 1/2. Within a segment
+# of `SEGMENT` steps the dots inside the mask move one way and those outside the other, one dot a step, over
+# two textures that are independent of each other; a share 1 - coherence of the dots is drawn anew in each
+# picture.
+#
+# - One picture. A shifted texture of independent dots is a texture of independent dots, so that inside,
+# outside and across the edge the dots of one picture have one distribution, whatever the mask. - The mean.
+# Every segment comes a second time with dark and bright exchanged, at another place of the order: each dot
+# is dark in half of the pictures, and the mean is the background everywhere. Without this the mean shows
+# streaks that break at the mask's edge.
+
+Dots = NDArray[np.bool_]
+
+SEGMENT = 6
+"""Steps for which a texture moves on; at 30 a second a fifth of a second."""
+STEPS_PER_SECOND = 30
+WAYS = ((0, -1), (0, 1), (-1, 0), (1, 0))
+"""Left, right, up, down: what a step adds to row and column."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """How the dots move.
+
+    Attributes
+    ----------
+    way : int
+        Of the dots inside the mask, from 1 in the order of `WAYS`.
+    """
+
+    mask: Mask
+    way: int
+    coherence: float
+    steps: int
+
+
+def coherence_of(difficulty: float) -> float:
+    """Share of dots that follow: all where nothing is difficult, half of them at a difficulty of 1."""
+    return 1 - difficulty / 2
+
+
+def steps_for(seconds: float) -> int:
+    """Steps of a clip that lasts about as long: whole pairs of segments."""
+    return 2 * SEGMENT * max(1, round(seconds * STEPS_PER_SECOND / (2 * SEGMENT)))
+
+
+def pictures(motion: Motion, rng: Generator) -> Dots:
+    """(steps, LATTICE, LATTICE) dots, True where bright."""
+    pairs = motion.steps // (2 * SEGMENT)
+    segments = [_segment(motion, rng) for _ in range(pairs)]
+    order = rng.permutation(2 * pairs)
+    both = [*segments, *(~segment for segment in segments)]
+    return np.concatenate([both[index] for index in order])
+
+
+def _segment(motion: Motion, rng: Generator) -> Dots:
+    size = (LATTICE, LATTICE)
+    inside, outside = rng.random(size) < 0.5, rng.random(size) < 0.5
+    down, across = WAYS[motion.way - 1]
+    made = np.empty((SEGMENT, *size), bool)
+    for step in range(SEGMENT):
+        there = np.roll(inside, (step * down, step * across), (0, 1))
+        back = np.roll(outside, (-step * down, -step * across), (0, 1))
+        moved = np.where(motion.mask, there, back)
+        drawn_anew = rng.random(size) >= motion.coherence
+        made[step] = np.where(drawn_anew, rng.random(size) < 0.5, moved)
+    return made
+
+
+# Checks in the study's own look: which blink came first, and which eye closed first.
+#
+# The two answers' clips hold the same pictures, one in the reverse order of the other: every blink closes
+# as it opens. A picture alone says nothing; two pictures in their order say all, as in a study's clips
+# themselves.
+
+BLINK_S = 0.36
+REST_S = 0.13
+"""Open eyes at least this long before, between and after blinks."""
+
+
+def first_blink(answer: int, difficulty: float, seconds: float, rng: Generator) -> ClipCurve:
+    """A full and a half blink; 1: the full one comes first. The half one closes by 0.4 to 0.75."""
+    length, blink = _samples(seconds), _samples(BLINK_S)
+    free = length - 2 * blink - 3 * _samples(REST_S)
+    before, between = np.sort(rng.integers(0, free + 1, 2))
+    heights = (1.0, 0.4 + 0.35 * difficulty)
+    closure = np.zeros(length)
+    first = _samples(REST_S) + int(before)
+    second = first + blink + _samples(REST_S) + int(between - before)
+    for start, height in zip((first, second), heights, strict=True):
+        closure[start : start + blink] = height * _bump(blink)
+    return _turned(ClipCurve(_rounded(closure), first), turned=answer == 2)
+
+
+def first_eye(answer: int, difficulty: float, seconds: float, rng: Generator) -> ClipCurve:
+    """One blink of both eyes; 1: that at the left of the picture is first, by 200 to 67 ms by difficulty."""
+    length, blink = _samples(seconds), _samples(BLINK_S)
+    lag = _samples((6 - 4 * difficulty) / 30)
+    start = _samples(REST_S) + int(rng.integers(0, length - blink - lag - 2 * _samples(REST_S) + 1))
+    at_left, at_right = np.zeros(length), np.zeros(length)
+    at_left[start : start + blink] = _bump(blink)
+    at_right[start + lag : start + lag + blink] = _bump(blink)
+    # `closure` is of the character's left eye, which is seen at the right.
+    curve = ClipCurve(_rounded(at_right), start, closure_other=_rounded(at_left))
+    return _turned(curve, turned=answer == 2)
+
+
+def _samples(seconds: float) -> int:
+    return round(seconds * PROFILE_FPS)
+
+
+def _bump(length: int) -> Array:
+    """A blink that closes as it opens: sin^2 over its length."""
+    return np.asarray(np.sin(np.pi * (np.arange(length) + 0.5) / length) ** 2)
+
+
+def _rounded(closure: Array) -> Array:
+    return np.round(closure, DECIMALS)
+
+
+def _turned(curve: ClipCurve, *, turned: bool) -> ClipCurve:
+    if not turned:
+        return curve
+    other = None if curve.closure_other is None else curve.closure_other[::-1].copy()
+    return ClipCurve(curve.closure[::-1].copy(), curve.onset_sample, closure_other=other)
+
 
 CHECK_VERSION = 1
 """Raise this when the same inputs come to give other pictures; every check's clip is then made again."""

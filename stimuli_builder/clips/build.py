@@ -11,12 +11,18 @@ from experiments.manifest import MANIFEST_NAME, Manifest
 from experiments.schema.canonical import definition_sha256
 from experiments.trials import KINDS
 from stimuli_builder.characters.writing import write_bytes
-from stimuli_builder.checks import build as checks
+from stimuli_builder.checks import plan as checks
 from stimuli_builder.checks.plan import planned_checks
 from stimuli_builder.clips.design_clips import Options, PlannedClip, planned_clips
-from stimuli_builder.clips.folder import former_manifest, readable_failures, stale
-from stimuli_builder.clips.manifest_file import assemble, manifest_text
-from stimuli_builder.clips.state import BuildState, Built
+from stimuli_builder.clips.folder import (
+    BuildState,
+    Built,
+    assemble,
+    former_manifest,
+    manifest_text,
+    readable_failures,
+    stale,
+)
 from stimuli_builder.clips.workers import available_cores, run_jobs
 
 Progress = Callable[[int, int], None]
@@ -77,7 +83,7 @@ def build(
     with readable_failures(folder, state), state.recording():
         if asked:
             checks.keep_seed(folder, seed)
-        made = chain(_rendered(missing, folder, machines), checks.rendered(missing_checks, folder))
+        made = chain(_rendered(missing, folder, machines), checks.rendered_checks(missing_checks, folder))
         for done, built in enumerate(made, start=1):
             state.add(built)
             progress(done, to_build)
@@ -88,7 +94,7 @@ def build(
             write_bytes(folder / MANIFEST_NAME, manifest_text(manifest).encode())
     for name in removed:
         (folder / name).unlink(missing_ok=True)
-    checks.finish(folder, state)
+    checks.finish_checks(folder, state)
     inputs = {clip.job.input_hash for clip in planned} | {one.job.input_hash for one in asked}
     return Report(manifest, to_build, len(inputs) - to_build, removed)
 

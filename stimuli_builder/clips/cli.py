@@ -1,8 +1,8 @@
-"""`stimuli plan`, `stimuli build` and `stimuli verify`; other commands have files of their own."""
+"""`stimuli plan`, `build`, `verify`, `checks`, `manifest` and `strips`."""
 
 import json
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -14,6 +14,9 @@ from experiments.errors import InputError
 if TYPE_CHECKING:
     from experiments.level_leaks import LevelLeak
     from stimuli_builder.clips.build import Progress, Report
+
+
+# `stimuli plan`, `stimuli build` and `stimuli verify`; other commands have files of their own.
 
 ExperimentName = Annotated[
     str, typer.Argument(help="exp1 to exp3, a demo, or a TOML file.", show_default=False)
@@ -65,10 +68,7 @@ Examples:
 
 def register(app: typer.Typer) -> None:
     """Add the commands of the clip builder to `app`."""
-    from stimuli_builder.clips.cli_checks import CHECKS_HELP, checks_command
     from stimuli_builder.clips.cli_clip import CLIP_HELP, clip_command
-    from stimuli_builder.clips.cli_manifest import MANIFEST_HELP, manifest_command
-    from stimuli_builder.clips.cli_strips import STRIPS_HELP, strips_command
 
     app.command("plan", help=PLAN_HELP)(plan_command)
     app.command("build", help=BUILD_HELP)(build_command)
@@ -85,8 +85,7 @@ def plan_command(
 ) -> None:
     """Print the design of an experiment."""
     from experiments.load import load_experiment
-    from stimuli_builder.clips.plan import summary
-    from stimuli_builder.clips.plan_table import print_plan
+    from stimuli_builder.clips.design_clips import print_plan, summary
 
     plan = summary(load_experiment(experiment))
     if as_json:
@@ -114,8 +113,7 @@ def build_command(
     """Build the clips of an experiment."""
     from experiments.load import load_experiment
     from stimuli_builder.clips.build import Machines, build
-    from stimuli_builder.clips.design_clips import Options
-    from stimuli_builder.clips.plan import experiment_folder
+    from stimuli_builder.clips.design_clips import Options, experiment_folder
 
     declared = load_experiment(experiment)
     options = Options(seed=seed, barcode=barcode, beside=experiment_folder(experiment))
@@ -200,3 +198,148 @@ def progress_bar(what: str) -> "Iterator[Progress]":
     ) as bar:
         task = bar.add_task(what, total=None)
         yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+# `stimuli checks`: the clips of a study's motion checks.
+
+CHECKS_HELP = """
+Make the clips of a study's motion checks, whose content shows in motion alone.
+
+`stimuli build` makes them too; this command adds them to clips of your own, or makes other ones. They come
+from a secret seed, kept in manifest.json with the right answers: keep that file from participants. The same
+seed gives the same bytes on one machine.
+
+Examples:
+
+  stimuli checks my_study.toml --out clips/mine
+
+  stimuli checks my_study.toml --out clips/mine --anew
+
+  stimuli checks my_study.toml --out clips/mine --seed 20261122
+"""
+
+
+def checks_command(
+    experiment: Annotated[
+        str, typer.Argument(help="exp1 to exp3, a demo, or a TOML file.", show_default=False)
+    ],
+    out: Annotated[Path, typer.Option(help="Folder that holds the study's clips and manifest.json.")],
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Seed; a secret one is drawn, and kept, where not given.")
+    ] = None,
+    anew: Annotated[
+        bool, typer.Option("--anew", help="Make other checks than those that are there.")
+    ] = False,
+) -> None:
+    """Make the clips of motion checks."""
+    from experiments.errors import InputError
+    from experiments.load import load_experiment
+    from stimuli_builder.checks.plan import build_checks
+    from stimuli_builder.clips.design_clips import Options, experiment_folder
+
+    if anew and seed is not None:
+        raise InputError("--anew draws a seed; leave out --seed")
+    declared = load_experiment(experiment)
+    options = Options(checks_seed=seed, beside=experiment_folder(experiment))
+    with progress_bar(f"checks of {declared.name}") as progress:
+        report = build_checks(declared, out, options, progress, anew=anew)
+    size_mb = sum({clip.file: clip.bytes for clip in report.manifest.checks}.values()) / 1e6
+    removed = f", {len(report.removed)} old ones removed" if report.removed else ""
+    print(
+        f"{declared.name}: {len(report.manifest.checks)} clips of checks in {out} ({size_mb:.1f} MB); "
+        f"{report.built} made{removed}"
+    )
+
+
+# `stimuli manifest`: the manifest of clips that were not made here.
+
+MANIFEST_HELP = """
+Write manifest.json for a folder of clips of your own, so that a server can take them.
+
+Levels are read from file names by a pattern, or from a CSV table (column `file`, then one a factor;
+`exemplar` numbers the clips of a cell). With the declaration the clips are compared with its design.
+Videos of any usual format are taken. Where each is H.264 that browsers play, the manifest is written
+beside them; else all are put into FOLDER/clips (or --out): converted as the server converts uploads, with
+frame map and lowest PSNR in the manifest and each original beside its clip.
+
+Examples:
+
+  stimuli manifest clips/ --pattern '{speed}_{style}_{exemplar}.mp4'
+
+  stimuli manifest clips/ --table levels.csv --experiment my_study.toml
+
+  stimuli manifest recordings/ --pattern '{actor}_{mood}.mp4' --out clips/ --fps 30
+"""
+
+
+def manifest_command(
+    folder: Annotated[Path, typer.Argument(help="Folder of videos.", show_default=False)],
+    pattern: Annotated[str | None, typer.Option(help="Names of factors in braces, as in file names.")] = None,
+    table: Annotated[Path | None, typer.Option(help="CSV with the levels of each file.")] = None,
+    experiment: Annotated[
+        str | None, typer.Option(help="TOML file (or exp1 ...) that declares the study.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for clips and manifest.")] = None,
+    fps: Annotated[
+        float | None, typer.Option(min=1, max=240, help="Frame rate of every clip; else each its own.")
+    ] = None,
+) -> None:
+    """Write the manifest of somebody's own clips."""
+    from experiments.load import load_experiment
+    from experiments.own_clips import levels_from_names, levels_from_table
+    from experiments.text_tables import whole_text_of
+    from stimuli_builder.clips.own_manifest import clip_names, understood, write_own_manifest
+
+    if (pattern is None) == (table is None):
+        raise InputError("expected either --pattern or --table, to know which levels each clip has")
+    names = clip_names(folder)
+    if pattern is not None:
+        placed = levels_from_names(pattern, names)
+    elif table is not None:
+        if not table.is_file():
+            raise InputError(f"no file {table}; expected a CSV with a column 'file' and one a factor")
+        placed = levels_from_table(whole_text_of(table), names)
+    print(*understood(placed, pattern), sep="\n", flush=True)
+    declared = load_experiment(experiment) if experiment else None
+    with _looking_into(len(placed)) as report:
+        manifest, target = write_own_manifest(folder, placed, declared, out, fps, report)
+    cells = len({clip.cell for clip in manifest.clips})
+    converted = f", {len(manifest.sources)} converted" if manifest.sources else ""
+    print(f"{len(manifest.clips)} clips in {cells} cells{converted}; wrote {target / 'manifest.json'}")
+
+
+@contextmanager
+def _looking_into(total: int) -> Iterator[Callable[[int], None]]:
+    """A function to report how many are done: a bar on stderr, nothing where that is no terminal."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("videos", markup=False), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(
+        *columns, console=Console(stderr=True, markup=False), disable=not sys.stderr.isatty()
+    ) as progress:
+        task = progress.add_task("videos", total=total)
+        yield lambda done: progress.update(task, completed=done)
+
+
+# `stimuli strips`: the pictures that the dashboard's blinks page plays.
+
+STRIPS_HELP = """
+Write the shipped characters at 33 closures as picture strips, for the dashboard's blinks page.
+
+`make run` does this; after a character was baked anew, `make run` or this command brings them up to date.
+
+Examples:
+
+  stimuli strips --out data/stimuli/strips
+"""
+
+
+def strips_command(
+    out: Annotated[Path, typer.Option(help="Folder for the pictures and strips.json; made if not there.")],
+) -> None:
+    """Write one WebP a character, and strips.json."""
+    from stimuli_builder.clips.preview import write_strips
+
+    for name, size in write_strips(out):
+        print(f"{out / name}.webp: {size / 1024:.0f} KiB")

@@ -75,7 +75,7 @@ def clip_command(
     barcode: Annotated[bool, typer.Option("--test-barcode", help="Draw each frame's number.")] = False,
 ) -> None:
     """Render one clip."""
-    from stimuli_builder.clips.profile_files import reading_note
+    from stimuli_builder.clips.exemplars import reading_note
     from stimuli_builder.clips.single import SingleClip, render_single
 
     if out.suffix.lower() != ".mp4":

@@ -1,21 +1,171 @@
 """Every clip of an experiment before anything is rendered: its cell, its blink, its job."""
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from blink_engine import Event, Law, Parameters, Performance, StateChange, default_parameters, perform
+from blink_engine.speech import Speech, seed_of_speaker, speech_events, speech_states
 from experiments import design
+from experiments.counted import counted
 from experiments.definition import Experiment
 from experiments.design import ClipSpec
 from experiments.errors import InputError
 from experiments.rendering import RenderSettings
+from experiments.trials import KINDS
+from experiments.trials.counts import block_sizes, expected_minutes, trials_per_participant
+from stimuli_builder.blinks.profile import PROFILE_FPS
 from stimuli_builder.clips.characters import DRAWN, Geometry, fingerprint, geometry
-from stimuli_builder.clips.curves import Timing, clip_curve, shown_by
-from stimuli_builder.clips.exemplars import exemplar
-from stimuli_builder.clips.face_movement.amounts import Movement
+from stimuli_builder.clips.curves import DECIMALS, Array, ClipCurve, Timing, clip_curve, generator, shown_by
+from stimuli_builder.clips.exemplars import exemplar, recorded_order
+from stimuli_builder.clips.face_movement import Movement
 from stimuli_builder.clips.jobs import ClipJob, Look
-from stimuli_builder.clips.performances import performance_curve
+from stimuli_builder.performance.run import LOWER_IN_MM, LOWER_UP_MM, speech_of
+
+# A clip of living eyes: the blink engine's lids over many seconds, as a curve at 300 fps.
+
+TIMER_SHARES = (0.5, 1.5)
+"""Shortest and longest interval of a uniform timer as shares of the mean: 2 to 6 s at 15 a minute."""
+NEVER_S = 1e9
+"""An interval longer than any clip."""
+
+
+def performance_curve(
+    settings: RenderSettings, family: str, number: int, seed: int, beside: Path | None = None
+) -> ClipCurve:
+    """Return performance `number` (from 1) of a family of exemplars, as `settings` time it.
+
+    Blink k of a performance has the same shape whatever the timing: shapes and times come from streams of
+    random numbers of their own. With `amplitude` full every blink closes the eyes fully; with natural as
+    many do as the engine was fitted to, and the others as far as it draws.
+
+    Parameters
+    ----------
+    beside : Path, optional
+        Folder that the file `speech` is relative to.
+
+    Raises
+    ------
+    InputError
+        The speech cannot be read, or lasts less than the clip.
+    """
+    rng = generator("performance", seed, family, number)
+    shown = _performed(settings, int(rng.integers(2**31)), rng, beside)
+    blinks = tuple(round(blink.onset_s, 4) for blink in shown.blinks)
+    closure, other = _rounded(shown.left), _rounded(shown.right)
+    vertical, horizontal = _lower_lid(shown, settings.lower_lid)
+    return ClipCurve(
+        closure=closure,
+        closure_other=other if settings.eyes == "separate" else None,
+        onset_sample=int(blinks[0] * PROFILE_FPS) if blinks else 0,
+        profile_id=f"performance-{settings.performance}-{number:03d}",
+        lower_vertical_mm=vertical,
+        lower_horizontal_mm=horizontal,
+        blinks_s=blinks,
+    )
+
+
+def _rounded(eye: Array) -> Array:
+    return np.asarray(np.round(np.clip(eye, 0.0, 1.0), DECIMALS), np.float64)
+
+
+def _performed(
+    settings: RenderSettings, seed: int, rng: np.random.Generator, beside: Path | None
+) -> Performance:
+    events: list[Event] = []
+    changes: list[StateChange] = []
+    parameters = _parameters(settings)
+    _, speaker = file_and_speaker(settings.speech)
+    if settings.performance == "events":
+        events = [Event(settings.event, time_s) for time_s in settings.events_s]
+        stretches = _speech(settings, beside)
+        events += speech_events(stretches)
+        changes = speech_states(stretches, settings.state) if stretches else []
+    elif settings.performance != "intervals":
+        mean_s = parameters.mean_interval_s(settings.state)
+        parameters = _without_spontaneous(parameters)
+        if settings.performance == "uniform":
+            events = [Event("blink", time_s) for time_s in _timer(settings.seconds, mean_s, rng)]
+    return perform(
+        settings.seconds,
+        PROFILE_FPS,
+        seed=seed_of_speaker(seed, speaker) if speaker else seed,
+        state=settings.state,
+        events=events,
+        changes=changes,
+        parameters=parameters,
+        ends_open=True,
+    )
+
+
+def _parameters(settings: RenderSettings) -> Parameters:
+    chosen = default_parameters()
+    if settings.amplitude == "full":
+        chosen = chosen.with_profile(complete_share=1.0, long_share=0.0)
+    if settings.blinks_per_minute is not None:
+        chosen = chosen.with_rate(settings.state, settings.blinks_per_minute)
+    return chosen
+
+
+def _without_spontaneous(parameters: Parameters) -> Parameters:
+    never = {state: Law("fixed", NEVER_S) for state in parameters.intervals}
+    return parameters.with_intervals(never)
+
+
+def _timer(length_s: float, mean_s: float, rng: np.random.Generator) -> list[float]:
+    """Blinks of a timer that runs already when the clip begins: in a long wait rather than a short one."""
+    shortest, longest = (share * mean_s for share in TIMER_SHARES)
+    times: list[float] = []
+    under_way = float(np.sqrt(rng.uniform(shortest**2, longest**2)))
+    time_s = float(rng.uniform(0.0, under_way))
+    while time_s < length_s:
+        times.append(time_s)
+        time_s += float(rng.uniform(shortest, longest))
+    return times
+
+
+def file_and_speaker(speech: str) -> tuple[str, str]:
+    """The file of a key `speech`, and the voice after its #; empty where none is named.
+
+    >>> file_and_speaker("dialogue.vtt#Anna"), file_and_speaker("speech.wav")
+    (('dialogue.vtt', 'Anna'), ('speech.wav', ''))
+    """
+    file, _, speaker = speech.partition("#")
+    return file, speaker
+
+
+def _speech(settings: RenderSettings, beside: Path | None) -> list[Speech]:
+    if not settings.speech:
+        return []
+    file, speaker = file_and_speaker(settings.speech)
+    stretches, length_s = speech_of((beside or Path()) / file, speaker or None)
+    if length_s < settings.seconds:
+        raise InputError(
+            f"{settings.speech} lasts {length_s:.1f} s, the clip {settings.seconds:g} s; shorten `seconds`"
+        )
+    return stretches
+
+
+def _lower_lid(shown: Performance, lower: str) -> tuple[Array | None, Array | None]:
+    """Lift and slide in mm, the mean of the eyes; None where the lower lid is left to the character."""
+    if lower == "none":
+        return None, None
+    vertical = np.round(LOWER_UP_MM * (shown.left_lower_up + shown.right_lower_up) / 2, DECIMALS)
+    horizontal = np.round(LOWER_IN_MM * (shown.left_lower_in + shown.right_lower_in) / 2, DECIMALS)
+    still = np.zeros(len(vertical))
+    return (
+        vertical if lower in ("both", "vertical") else still,
+        horizontal if lower in ("both", "horizontal") else still,
+    )
 
 
 @dataclass(frozen=True)
@@ -137,3 +287,111 @@ def _encoder() -> str:
     from stimuli_builder.clips.encode import encoder_signature
 
     return encoder_signature()
+
+
+# `stimuli plan`: what an experiment's declaration expands to, before anything is rendered.
+
+
+def summary(experiment: Experiment) -> dict[str, Any]:
+    """The design as plain values.
+
+    Returns
+    -------
+    dict of str to Any
+        By key:
+
+        - `name`, `title`, `participants` as declared;
+        - `factors`, a list of {name, label, levels: list of {name, label}};
+        - `cells`, a list of cell labels, last factor fastest;
+        - `exemplars_per_cell`, `unique_clips`, `trials_per_participant`, `practice_trials`, counts;
+        - `blocks`, a list of {label, trials} in declared order, and `order`, how the blocks' order is drawn;
+        - `expected_minutes`, the length of a visit in minutes;
+        - `notes`, what the kind of trial adds, such as counts of pairs;
+        - `repeated_profiles`, a list of {exemplar, profile, group}: recordings that stand for a second one.
+    """
+    return {
+        "name": experiment.name,
+        "title": experiment.title,
+        "participants": experiment.participants,
+        "factors": [
+            {
+                "name": factor.name,
+                "label": factor.label,
+                "levels": [{"name": level.name, "label": level.label} for level in factor.levels],
+            }
+            for factor in experiment.factors
+        ],
+        "cells": ["/".join(level for _, level in cell) for cell in design.cells(experiment)],
+        "exemplars_per_cell": experiment.exemplars.per_cell,
+        "unique_clips": len(design.clips(experiment)),
+        "trials_per_participant": trials_per_participant(experiment),
+        "practice_trials": experiment.practice.trials,
+        "blocks": [block._asdict() for block in block_sizes(experiment)],
+        "order": experiment.blocks.order,
+        "expected_minutes": expected_minutes(experiment),
+        "notes": list(KINDS[experiment.trial.kind].plan(experiment)),
+        "repeated_profiles": repeated_profiles(experiment),
+    }
+
+
+def repeated_profiles(experiment: Experiment, seed: int | None = None) -> list[dict[str, Any]]:
+    """Exemplars whose recorded profile already stands for an earlier exemplar of the same cells."""
+    clips: dict[str, list[dict[str, Any]]] = {}
+    for spec in design.clips(experiment):
+        settings = design.render_settings(experiment, spec)
+        group = design.exemplar_key(experiment, spec).rpartition("/")[0]
+        if settings.performance is None and settings.profile == "real" and group not in clips:
+            order = recorded_order(
+                experiment.exemplars.per_cell,
+                experiment.exemplars.seed if seed is None else seed,
+                group,
+                paired=settings.eyes == "separate",
+            )
+            clips[group] = [
+                {"exemplar": number, "profile": profile.profile_id, "group": group}
+                for number, (profile, repeated) in enumerate(order, start=1)
+                if repeated
+            ]
+    return [entry for entries in clips.values() for entry in entries]
+
+
+def experiment_folder(name_or_path: str) -> Path | None:
+    """Folder that the files named in a TOML are relative to; None for a shipped experiment."""
+    path = Path(name_or_path)
+    return path.resolve().parent if path.is_file() else None
+
+
+# A plan as a person reads it.
+
+
+def print_plan(plan: dict[str, Any]) -> None:
+    """Print what `summary` found."""
+    console = Console(highlight=False, markup=False)
+    console.print(
+        Text(plan["name"], "bold"),
+        f" {plan['title']}  ({counted(plan['participants'], 'participant')})",
+    )
+    factors = Table("factor", "levels", box=SIMPLE_HEAD)
+    for factor in plan["factors"]:
+        factors.add_row(factor["name"], ", ".join(level["name"] for level in factor["levels"]))
+    console.print(factors)
+    cells, each = len(plan["cells"]), plan["exemplars_per_cell"]
+    clips = counted(plan["unique_clips"], "unique clip")
+    console.print(f"{counted(cells, 'cell')} x {counted(each, 'exemplar')} = {clips}")
+    trials = counted(plan["trials_per_participant"], "trial")
+    console.print(f"{trials} per participant in {_blocks(plan['blocks'])}, order {plan['order']}")
+    minutes = counted(round(plan["expected_minutes"]), "minute")
+    console.print(f"{counted(plan['practice_trials'], 'practice trial')}; about {minutes}")
+    for note in plan["notes"]:
+        console.print(note)
+    for entry in plan["repeated_profiles"]:
+        console.print(
+            f"exemplar {entry['exemplar']} of '{entry['group'] or 'all cells'}' shows the recorded profile "
+            f"{entry['profile']} for the second time"
+        )
+
+
+def _blocks(blocks: list[dict[str, Any]]) -> str:
+    counts = Counter((block["label"], block["trials"]) for block in blocks)
+    parts = [f"{times} x {label} ({counted(trials, 'trial')})" for (label, trials), times in counts.items()]
+    return f"{counted(len(blocks), 'block')}: " + ", ".join(parts)

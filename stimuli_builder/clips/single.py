@@ -8,11 +8,17 @@ from experiments.files import whole_file
 from experiments.rendering import PROFILES, RenderSettings
 from stimuli_builder.blinks.library import load_library
 from stimuli_builder.clips.characters import geometry
-from stimuli_builder.clips.curves import ClipCurve, Timing, amplitude_of, clip_curve, shown_by
+from stimuli_builder.clips.curves import (
+    ClipCurve,
+    Timing,
+    amplitude_of,
+    clip_curve,
+    samples_per_frame,
+    shown_by,
+)
 from stimuli_builder.clips.design_clips import Options, check_look, look_of
 from stimuli_builder.clips.exemplars import Exemplar, exemplar, of_declared_length
 from stimuli_builder.clips.jobs import ClipJob, render
-from stimuli_builder.clips.motion_blur import samples_per_frame
 
 
 @dataclass(frozen=True)

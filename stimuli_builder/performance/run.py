@@ -1,20 +1,90 @@
 """The command `stimuli performance`: speech in, lid curves out."""
 
+import shlex
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import cast, get_args
 
+import av
 import numpy as np
+import webrtcvad
+import webvtt
 from rich.console import Console
+from webvtt.models import Caption
 
 from blink_engine import Performance, StateName, default_parameters, perform
-from blink_engine.speech import Speech, seed_of_speaker, speech_events, speech_states
+from blink_engine.speech import Speech, joined, seed_of_speaker, speech_events, speech_states
 from experiments.counted import counted
 from experiments.errors import InputError, did_you_mean
 from experiments.files import check_targets, whole_text
 from stimuli_builder.blinks.export.curve import AnimationCurve
 from stimuli_builder.blinks.export.formats import CurveTarget, check_format, write_curve
-from stimuli_builder.performance.subtitles import SUFFIXES, speech_in_subtitles
+
+# Where somebody speaks by the times of subtitles (WebVTT, SubRip).
+
+SUFFIXES = (".vtt", ".srt")
+
+
+def speech_in_subtitles(path: Path, speaker: str | None = None) -> tuple[list[Speech], float]:
+    """Return the stretches of speech, in order whatever the file's, and when the last one ends.
+
+    Parameters
+    ----------
+    path : Path
+        A .vtt or .srt file.
+    speaker : str, optional
+        Of a file with voices (<v Name>), the one whose eyes these are. One of several voices must be named.
+
+    Raises
+    ------
+    InputError
+        Where the file cannot be read, a time is impossible, nobody of that name speaks, or several people
+        speak and none is named.
+    """
+    captions = _captions(path)
+    voices = sorted({caption.voice for caption in captions if caption.voice})
+    if speaker is None and len(voices) > 1:
+        raise InputError(
+            f"{path}: expected one person, got {len(voices)} voices ({', '.join(voices)}); name the one "
+            f"whose eyes these are: --speaker {shlex.quote(voices[0])}, in an experiment speech = "
+            f'"{path.name}#{voices[0]}"'
+        )
+    if speaker is not None and speaker not in voices:
+        spoken = f"; voices: {', '.join(voices)}" if voices else "; the file names no voices"
+        raise InputError(f"{path}: nobody is called '{speaker}'{did_you_mean(speaker, voices)}{spoken}")
+    length_s = max((_seconds(caption.end) for caption in captions), default=0.0)
+    own = [caption for caption in captions if speaker is None or caption.voice == speaker]
+    return joined([_stretch(path, caption) for caption in own]), length_s
+
+
+def _captions(path: Path) -> list[Caption]:
+    read = webvtt.read if path.suffix.lower() == ".vtt" else webvtt.from_srt
+    try:
+        captions = list(read(str(path)).captions)
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"{path}: expected subtitles in UTF-8 ({error.reason}); save them as UTF-8"
+        ) from error
+    except (OSError, webvtt.errors.MalformedFileError) as error:
+        raise InputError(f"{path}: expected subtitles ({' or '.join(SUFFIXES)}): {error}") from error
+    if not captions:
+        raise InputError(f"{path}: expected subtitles with times, found none")
+    return captions
+
+
+def _stretch(path: Path, caption: Caption) -> Speech:
+    start_s, end_s = _seconds(caption.start), _seconds(caption.end)
+    if end_s <= start_s:
+        raise InputError(f"{path}: a subtitle ends at {caption.end}, not after its start at {caption.start}")
+    return Speech(start_s, end_s)
+
+
+def _seconds(stamp: str) -> float:
+    seconds = 0.0
+    for part in stamp.replace(",", ".").split(":"):
+        seconds = seconds * 60.0 + float(part)
+    return seconds
+
 
 MAX_FRAMES = 6_000_000
 """A day at 60 frames a second; more is a slip of the keyboard, and would fill the memory."""
@@ -116,6 +186,61 @@ def speech_of(source: Path, speaker: str | None = None) -> tuple[list[Speech], f
         return speech_in_subtitles(source, speaker)
     if speaker is not None:
         raise InputError("--speaker is for subtitles with voices; a recording has nobody's name")
-    from stimuli_builder.performance.audio import speech_in_audio
 
     return speech_in_audio(source)
+
+
+# Where somebody speaks in a recording, by the voice activity detector of WebRTC.
+
+RATE_HZ = 16_000
+FRAME_MS = 30
+AGGRESSIVENESS = 2
+HANGOVER_FRAMES = 4
+"""A gap this short within speech does not end it: the detector flickers on soft sounds."""
+
+SPEECH_MIN_S = 0.15
+"""Shorter sounds are clicks, or the detector still learning the room."""
+
+
+def read_audio(path: Path) -> tuple[bytes, float]:
+    """Return the first audio stream as 16 kHz mono 16-bit samples, and its length in s.
+
+    Raises
+    ------
+    InputError
+        Where the file cannot be read or holds no sound.
+    """
+    try:
+        with av.open(str(path)) as container:
+            if not container.streams.audio:
+                raise InputError(f"{path}: expected a file with sound, this one has none")
+            resampler = av.AudioResampler(format="s16", layout="mono", rate=RATE_HZ)
+            frames = [
+                part.to_ndarray() for frame in container.decode(audio=0) for part in resampler.resample(frame)
+            ]
+            frames += [part.to_ndarray() for part in resampler.resample(None)]
+    except (av.FFmpegError, OSError) as error:
+        reason = error.strerror or "it cannot be decoded"  # without the number, which says nothing to people
+        raise InputError(
+            f"{path}: expected sound that can be read (WAV, MP3, FLAC, ...) or subtitles (.vtt, .srt): "
+            f"{reason}"
+        ) from error
+    samples = np.concatenate([frame.ravel() for frame in frames]) if frames else np.zeros(0, dtype=np.int16)
+    if not samples.size:
+        raise InputError(f"{path}: expected sound, the file holds no samples")
+    return samples.astype("<i2").tobytes(), samples.size / RATE_HZ
+
+
+def speech_in_audio(path: Path) -> tuple[list[Speech], float]:
+    """Return the stretches of speech in a recording and its length in s; silence has none."""
+    samples, duration_s = read_audio(path)
+    detector = webrtcvad.Vad(AGGRESSIVENESS)
+    size = RATE_HZ * FRAME_MS // 1000 * 2
+    step_s = FRAME_MS / 1000
+    spoken = [
+        Speech(start / size * step_s, (start / size + 1) * step_s)
+        for start in range(0, len(samples) - size + 1, size)
+        if detector.is_speech(samples[start : start + size], RATE_HZ)
+    ]
+    stretches = joined(spoken, HANGOVER_FRAMES * step_s)
+    return joined([one for one in stretches if one.end_s - one.start_s > SPEECH_MIN_S]), duration_s

@@ -42,7 +42,7 @@ def scope(
     out: Annotated[Path | None, typer.Option(help="Write each onset to this CSV.")] = None,
 ) -> None:
     """Read a film of the sync patch."""
-    from stimuli_builder.sync_patch import report
+    from stimuli_builder.sync_patch import onsets
 
     if film.suffix.lower() == ".csv":
         lines, rows = _of_trace(film, fps)
@@ -50,7 +50,7 @@ def scope(
         lines, rows = _of_film(film, camera_fps, fps, frames)
     print("\n".join(lines))
     if out:
-        report.write_csv(out, rows)
+        onsets.write_csv(out, rows)
         print(f"wrote {out}")
 
 
@@ -58,23 +58,23 @@ Said = tuple[list[str], list[tuple[object, ...]]]
 
 
 def _of_film(path: Path, camera_fps: float | None, fps: float | None, frames: int | None) -> Said:
-    from stimuli_builder.sync_patch import report
+    from stimuli_builder.sync_patch import onsets
     from stimuli_builder.sync_patch.film import read_film
     from stimuli_builder.sync_patch.onsets import plays
 
     read = read_film(path, camera_fps, lambda line: typer.echo(line, err=True))
     shown = plays(read.times_ms, read.numbers, fps, frames)
-    return report.of_film(shown, read.pictures_per_s), report.rows_of_film(shown)
+    return onsets.of_film(shown, read.pictures_per_s), onsets.rows_of_film(shown)
 
 
 def _of_trace(path: Path, fps: float | None) -> Said:
     from experiments.errors import InputError
-    from stimuli_builder.sync_patch import photodiode, report
+    from stimuli_builder.sync_patch import onsets
 
     if fps is None:
         raise InputError("a photodiode's trace needs the clip's rate: --fps 30")
-    changes = photodiode.changes(photodiode.read_trace(path), fps)
-    return report.of_trace(changes), report.rows_of_trace(changes)
+    changes = onsets.changes(onsets.read_trace(path), fps)
+    return onsets.of_trace(changes), onsets.rows_of_trace(changes)
 
 
 def register(app: typer.Typer) -> None:

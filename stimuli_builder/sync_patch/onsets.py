@@ -7,15 +7,19 @@ Equations: t_k is the onset of frame k, r the clip's frame rate.
 (2)  late_k = (t_k - k / r) - median over k of (t_k - k / r).
 """
 
+import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import InputError
-from stimuli_builder.sync_patch.code import NO_FRAME, NUMBERS, UNREADABLE
+from experiments.files import whole_text
+from experiments.text_tables import separator_of, whole_text_of
+from stimuli_builder.sync_patch.film import NO_FRAME, NUMBERS, UNREADABLE
 
 RATES = (24.0, 25.0, 30.0, 50.0, 60.0)
 BACK_MAX = NUMBERS // 2
@@ -144,3 +148,168 @@ def _rate(cut: Sequence[Sequence[Onset]]) -> float:
         raise InputError("expected a clip of two frames or more, saw one: give its rate with --fps")
     seen = 1000 / float(np.median(steps))
     return min(RATES, key=lambda rate: abs(np.log(rate / seen)))
+
+
+# A photodiode over the middle field: each frame's change, without its number.
+#
+# The field is white without a clip, black for even frames and white for odd ones. A frame that never came
+# makes one long interval out of three (black, white, black is then black throughout); a late one makes a
+# long and a short one.
+
+UP, DOWN = 0.6, 0.4
+"""Share of the way from dark to light at which the field counts as light, or as dark again."""
+PAUSE_FRAMES = 6
+"""A field that stays light for longer than this is between clips."""
+CONTRAST_MIN = 1e-6
+DARKEST, LIGHTEST = 1, 99
+
+
+@dataclass(frozen=True)
+class Trace:
+    """Times in ms, ascending, and the diode's values."""
+
+    times_ms: NDArray[np.float64]
+    values: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Changes:
+    """Of each play the times at which the field changed, in ms: the onset of frames 0, 1, 2 and so on."""
+
+    plays: tuple[tuple[float, ...], ...]
+    period_ms: float
+
+    def intervals_ms(self) -> list[list[float]]:
+        """From each change to the next, by play."""
+        return [[float(step) for step in np.diff(times)] for times in self.plays]
+
+
+def read_trace(path: Path) -> Trace:
+    """Read a CSV of two columns with a line of names: time in ms, value."""
+    if not path.is_file():
+        raise InputError(f"{path}: expected a CSV of a photodiode, found none; check the path")
+    text = whole_text_of(path)
+    lines = list(csv.reader(text.splitlines(), delimiter=separator_of(text.partition("\n")[0])))[1:]
+    try:
+        rows = np.array([[float(cell) for cell in line[:2]] for line in lines if line], np.float64)
+    except ValueError as error:
+        raise InputError(f"{path}: expected two columns of numbers, time_ms and value ({error})") from error
+    if rows.ndim != 2 or rows.shape[1] != 2 or len(rows) < 2:
+        raise InputError(f"{path}: expected two columns of numbers, time_ms and value, and two lines or more")
+    if not (np.diff(rows[:, 0]) > 0).all():
+        raise InputError(f"{path}: expected times that grow from line to line, in ms")
+    return Trace(rows[:, 0], rows[:, 1])
+
+
+def changes(trace: Trace, fps: float) -> Changes:
+    """When the field changed, play by play.
+
+    Parameters
+    ----------
+    trace : Trace
+        At least some samples a frame.
+    fps : float
+        The clip's frame rate.
+
+    Raises
+    ------
+    InputError
+        The values hardly change, or no clip is in them.
+    """
+    dark, light = np.percentile(trace.values, [DARKEST, LIGHTEST])
+    if light - dark < CONTRAST_MIN:
+        raise InputError("expected a diode that sees light and dark, its values hardly change")
+    crossings = _crossings(trace.times_ms, (trace.values - dark) / (light - dark))
+    period_ms = 1000 / fps
+    plays: list[list[float]] = []
+    last_ms = -np.inf
+    for at_ms, to_light in crossings:
+        if not to_light and at_ms - last_ms > PAUSE_FRAMES * period_ms:
+            plays.append([])
+        if plays:
+            plays[-1].append(at_ms)
+        last_ms = at_ms
+    if not plays:
+        raise InputError("expected at least one play after a light field, found none")
+    return Changes(tuple(tuple(times) for times in plays), period_ms)
+
+
+def _crossings(times_ms: NDArray[np.float64], share: NDArray[np.float64]) -> list[tuple[float, bool]]:
+    """Each change with its direction, half way between samples; what stays between the levels is noise."""
+    changes: list[tuple[float, bool]] = []
+    light = bool(share[0] > (UP + DOWN) / 2)
+    for sample in range(1, len(share)):
+        if (light and share[sample] < DOWN) or (not light and share[sample] > UP):
+            light = not light
+            changes.append((float(times_ms[sample - 1] + times_ms[sample]) / 2, light))
+    return changes
+
+
+# What `stimuli scope` prints, and the CSV of onsets.
+
+COLUMNS = ("play", "frame", "onset_ms", "within_ms", "interval_ms", "late_ms")
+LONG_SHARE = 1.5
+"""An interval of more than this many frames' time is named as long."""
+NAMED_MAX = 12
+
+
+def of_film(plays: Sequence[PlayOnScreen], pictures_per_s: float) -> list[str]:
+    """A line a play, and one over all."""
+    lines = [
+        f"{len(plays)} play(s) of {plays[0].frames} frames at {plays[0].fps:g} fps; "
+        f"onsets to within {500 / pictures_per_s:.1f} ms ({pictures_per_s:.0f} pictures a second)"
+    ]
+    lines += [f"play {number}: {_play(play)}" for number, play in enumerate(plays, start=1)]
+    complete = sum(not play.missing for play in plays)
+    worst = max(max(abs(late) for late in play.late_ms) for play in plays)
+    return [*lines, f"{complete} of {len(plays)} play(s) without a missing frame; worst {worst:.1f} ms off"]
+
+
+def _play(play: PlayOnScreen) -> str:
+    missing = play.missing
+    named = ", ".join(str(frame) for frame in missing[:NAMED_MAX])
+    more = "" if len(missing) <= NAMED_MAX else f" and {len(missing) - NAMED_MAX} more"
+    gone = f"{len(missing)} missing ({named}{more})" if missing else "none missing"
+    intervals, late = play.intervals_ms, play.late_ms
+    return (
+        f"{gone}; intervals {min(intervals):.1f} to {max(intervals):.1f} ms; "
+        f"{min(late):+.1f} to {max(late):+.1f} ms off the clip's times"
+    )
+
+
+def of_trace(changes: Changes) -> list[str]:
+    """A line a play: a photodiode sees changes and no numbers."""
+    lines = []
+    for number, steps in enumerate(changes.intervals_ms(), start=1):
+        long = [step for step in steps if step > LONG_SHARE * changes.period_ms]
+        ends = f"intervals {min(steps):.1f} to {max(steps):.1f} ms" if steps else "no interval"
+        lines.append(
+            f"play {number}: {len(steps) + 1} changes; {ends}; {len(long)} longer than a frame and a half"
+        )
+    return [*lines, "A photodiode cannot tell a missing frame from a late one; a film of the patch can."]
+
+
+def rows_of_film(plays: Sequence[PlayOnScreen]) -> list[tuple[object, ...]]:
+    """One row a frame, as in COLUMNS."""
+    return [
+        (number, onset.frame, *(round(value, 3) for value in (onset.at_ms, onset.within_ms, interval, late)))
+        for number, play in enumerate(plays, start=1)
+        for onset, interval, late in zip(play.onsets, play.intervals_ms, play.late_ms, strict=True)
+    ]
+
+
+def rows_of_trace(changes: Changes) -> list[tuple[object, ...]]:
+    """One row a change; which frame it was is not known."""
+    return [
+        (number, "", round(at_ms, 3), "", round(step, 3) if step is not None else "", "")
+        for number, times in enumerate(changes.plays, start=1)
+        for at_ms, step in zip(times, [*(b - a for a, b in pairwise(times)), None], strict=True)
+    ]
+
+
+def write_csv(path: Path, rows: Sequence[tuple[object, ...]]) -> None:
+    """Write the table whole or not at all."""
+    with whole_text(path) as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        writer.writerows(rows)

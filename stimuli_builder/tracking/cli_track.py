@@ -26,9 +26,7 @@ from stimuli_builder.tracking.shapes import Points
 from stimuli_builder.tracking.survey import survey
 from stimuli_builder.tracking.track import track_video
 from stimuli_builder.tracking.training import TrainingOptions
-from stimuli_builder.video import VideoInfo
-from stimuli_builder.video_clock import DamagedFileError
-from stimuli_builder.video_scan import declared_frames
+from stimuli_builder.video import DamagedFileError, VideoInfo, declared_frames
 from stimuli_builder.video_writer import check_video_name
 
 Hints = Mapping[int, Points | str]

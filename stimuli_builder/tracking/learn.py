@@ -17,8 +17,7 @@ from stimuli_builder.tracking.certainty import with_errors
 from stimuli_builder.tracking.labels import Labels, load_labels
 from stimuli_builder.tracking.model import CoupledModel
 from stimuli_builder.tracking.training import TrainingOptions, train
-from stimuli_builder.video import VideoInfo, read_frames
-from stimuli_builder.video_scan import scan_before_damage, scan_video
+from stimuli_builder.video import VideoInfo, read_frames, scan_before_damage, scan_video
 
 WORTH_REFINING = 0.96
 FOLDS = 5

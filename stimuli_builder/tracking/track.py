@@ -16,8 +16,7 @@ from stimuli_builder.tracking.picture import reduced
 from stimuli_builder.tracking.shapes import Points
 from stimuli_builder.tracking.table import TrackWriter
 from stimuli_builder.tracking.tracker import Tracker
-from stimuli_builder.video import VideoInfo, frames
-from stimuli_builder.video_clock import DamagedFileError
+from stimuli_builder.video import DamagedFileError, VideoInfo, frames
 
 
 def track_video(

@@ -17,7 +17,7 @@ import cv2
 from stimuli_builder.characters.atlas import SHIPPED, load_atlas
 from stimuli_builder.characters.level_video import decode_level_video
 from stimuli_builder.clips.characters import find_character
-import stimuli_builder.clips.baked_character
+import stimuli_builder.clips.characters
 
 cv2.setNumThreads(1)
 name, most = sys.argv[1], lambda: resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024

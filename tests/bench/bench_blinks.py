@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.optimize import least_squares
 
-from stimuli_builder.actor.physiology import Blink, course, plan_blinks
+from stimuli_builder.actor.recording import Blink, course, plan_blinks
 from stimuli_builder.blinks.blink_model import BlinkModel
 from stimuli_builder.blinks.labelling import LabelledBlink, label_blinks
 from stimuli_builder.blinks.library import load_library

@@ -28,8 +28,7 @@ from stimuli_builder.tracking.survey import survey
 from stimuli_builder.tracking.table import track_rows
 from stimuli_builder.tracking.track import track_video
 from stimuli_builder.tracking.training import TrainingOptions
-from stimuli_builder.video import Picture, frames, rgb
-from stimuli_builder.video_scan import scan_video
+from stimuli_builder.video import Picture, frames, rgb, scan_video
 from stimuli_builder.video_writer import VideoWriter
 
 KINDS = ("hand", "paper", "dark", "cheek", "cloth", "half")

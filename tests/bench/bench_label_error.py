@@ -20,8 +20,7 @@ from stimuli_builder.tracking.certainty import lid_offsets
 from stimuli_builder.tracking.labels import Labels, load_labels
 from stimuli_builder.tracking.shapes import inter_eyelid_distances
 from stimuli_builder.tracking.training import TrainingOptions
-from stimuli_builder.video import read_frames
-from stimuli_builder.video_scan import scan_video
+from stimuli_builder.video import read_frames, scan_video
 
 FOLDER = Path("../shared/data/face_video")
 CLIPS = ("single_face", "short_human_3blink")

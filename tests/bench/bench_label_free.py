@@ -25,7 +25,7 @@ from stimuli_builder.tracking.survey import survey
 from stimuli_builder.tracking.table import numbers, point_columns, track_rows
 from stimuli_builder.tracking.track import track_video
 from stimuli_builder.tracking.training import TrainingOptions
-from stimuli_builder.video_scan import scan_video
+from stimuli_builder.video import scan_video
 
 FOLDER = Path("../shared/data/face_video")
 CLIPS = {"single_face": False, "short_human_3blink": True}

@@ -13,8 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from stimuli_builder.actor.physiology import Blink, plan_blinks
-from stimuli_builder.actor.recording import Actor, ActorOptions, label_points, write_video
+from stimuli_builder.actor.recording import Actor, ActorOptions, Blink, label_points, plan_blinks, write_video
 from stimuli_builder.blinks.label_options import PRESETS, LabelOptions
 from stimuli_builder.blinks.labelling import label_blinks
 from stimuli_builder.blinks.series import BlinkSeries, read_series
@@ -23,7 +22,7 @@ from stimuli_builder.tracking.learn import learn
 from stimuli_builder.tracking.shapes import default_markers
 from stimuli_builder.tracking.track import track_video
 from stimuli_builder.tracking.training import TrainingOptions
-from stimuli_builder.video_scan import scan_video
+from stimuli_builder.video import scan_video
 from tests.bench.bench_blinks import matches
 from tests.bench.bench_tracking import print_line
 

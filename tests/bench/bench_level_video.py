@@ -14,9 +14,8 @@ import pytest
 from numpy.typing import NDArray
 
 from stimuli_builder.characters import level_video
-from stimuli_builder.characters.atlas import SHIPPED, load_atlas
+from stimuli_builder.characters.atlas import SHIPPED, decode_picture, load_atlas
 from stimuli_builder.characters.facekit.development import psnr_db
-from stimuli_builder.characters.reading import decode_picture
 from stimuli_builder.characters.writing import write_picture
 
 

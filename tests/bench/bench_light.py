@@ -20,8 +20,7 @@ from stimuli_builder.tracking.model import CoupledModel
 from stimuli_builder.tracking.shapes import Points, default_markers, widths
 from stimuli_builder.tracking.tracker import Tracker
 from stimuli_builder.tracking.training import TrainingOptions
-from stimuli_builder.video import Picture, frames
-from stimuli_builder.video_scan import scan_video
+from stimuli_builder.video import Picture, frames, scan_video
 
 SEEDS = (11, 12)
 CHANGES: dict[str, Callable[[int], tuple[float, float]]] = {

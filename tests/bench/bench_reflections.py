@@ -24,8 +24,7 @@ from stimuli_builder.tracking.survey import survey
 from stimuli_builder.tracking.table import numbers, point_columns, track_rows
 from stimuli_builder.tracking.track import track_video
 from stimuli_builder.tracking.training import TrainingOptions
-from stimuli_builder.video import Picture, VideoInfo, frames, rgb
-from stimuli_builder.video_scan import scan_video
+from stimuli_builder.video import Picture, VideoInfo, frames, rgb, scan_video
 from stimuli_builder.video_writer import VideoWriter
 
 FOLDER = Path("../shared/data/face_video")

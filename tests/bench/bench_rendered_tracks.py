@@ -27,8 +27,7 @@ from stimuli_builder.tracking.shapes import Points, default_markers
 from stimuli_builder.tracking.survey import survey
 from stimuli_builder.tracking.table import numbers, point_columns
 from stimuli_builder.tracking.training import TrainingOptions
-from stimuli_builder.video import Picture
-from stimuli_builder.video_scan import scan_video
+from stimuli_builder.video import Picture, scan_video
 
 
 def every_third_run(number: int, picture: Picture, points: Points) -> Picture:

@@ -24,8 +24,7 @@ from stimuli_builder.tracking.picture import reduced
 from stimuli_builder.tracking.shapes import default_markers
 from stimuli_builder.tracking.track import track_video
 from stimuli_builder.tracking.training import TrainingOptions, warped
-from stimuli_builder.video import frames, read_frames
-from stimuli_builder.video_scan import scan_video
+from stimuli_builder.video import frames, read_frames, scan_video
 
 
 def print_line(name: str, value: str, must: str = "", aim: str = "") -> None:

@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from stimuli_builder.characters.atlas import SHIPPED, Atlas, load_atlas
-from stimuli_builder.characters.colour import linear_to_srgb, srgb_to_linear
+from stimuli_builder.characters.colour import level_weights, linear_to_srgb, srgb_to_linear
 from stimuli_builder.characters.facekit.assembly import STUDIO_EV
 from stimuli_builder.characters.facekit.bake import RECIPES
 from stimuli_builder.characters.facekit.development import (
@@ -36,7 +36,6 @@ from stimuli_builder.characters.facekit.kit import load_facekit
 from stimuli_builder.characters.facekit.lid_pose import HORIZONTAL_MM, VERTICAL_MM, LidPose
 from stimuli_builder.characters.facekit.renderer import Renderer, Setup, Shot
 from stimuli_builder.characters.facekit.scene import FaceScene
-from stimuli_builder.characters.interpolation import level_weights
 from tests.helpers.lower_lid_change import lower_lid_change
 
 # The last one is where the lids almost meet.

@@ -9,9 +9,8 @@ import subprocess
 import sys
 
 from experiments.rendering import RenderSettings
-from stimuli_builder.clips.design_clips import Options, look_of
+from stimuli_builder.clips.design_clips import Options, look_of, performance_curve
 from stimuli_builder.clips.jobs import ClipJob, render
-from stimuli_builder.clips.performances import performance_curve
 
 LENGTHS_S = (5.0, 60.0)
 CHARACTERS = ("cartoon", "alder@8")

@@ -1,6 +1,6 @@
 """Recordings of the rendered faces that ship, with exact lids: for benches that need a truth without labels.
 
-Blinks, head and light are those of the synthetic actor (`stimuli_builder.actor.physiology`), but for a blink
+Blinks, head and light are those of the synthetic actor (`stimuli_builder.actor.recording`), but for a blink
 every second. Each frame is the level of the face whose closure is nearest, so that the geometry it was
 rendered from tells where its lids are; it is moved, turned and scaled by that head, blurred, noisy and
 written as H.264.
@@ -16,7 +16,7 @@ import numpy as np
 from bench_close_up import MIRRORED, from_left
 from bench_iris import AtlasScene
 
-from stimuli_builder.actor.physiology import Blink, Course, course, plan_blinks
+from stimuli_builder.actor.recording import Blink, Course, course, plan_blinks
 from stimuli_builder.characters.atlas import SHIPPED, Atlas, load_atlas
 from stimuli_builder.characters.colour import linear_to_srgb
 from stimuli_builder.characters.facekit.training.draw import SamplePose

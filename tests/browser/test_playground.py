@@ -6,7 +6,7 @@ import pytest
 from playwright.sync_api import BrowserContext
 
 from blink_engine import BlinkEngine
-from stimuli_builder.clips.strips import write_strips
+from stimuli_builder.clips.preview import write_strips
 from tools.build_playground import build_scripts, playground_page, vrm_page
 
 FACES = ".playground-side:first-child canvas:not(.playground-trace)"

@@ -7,9 +7,7 @@ import numpy as np
 import pytest
 
 from experiments.errors import InputError
-from stimuli_builder.video import frames, read_frames, rgb
-from stimuli_builder.video_clock import clock_of
-from stimuli_builder.video_scan import scan_video
+from stimuli_builder.video import clock_of, frames, read_frames, rgb, scan_video
 from stimuli_builder.video_writer import VideoWriter
 
 

@@ -18,8 +18,7 @@ from stimuli_builder.tracking.certainty import lid_offsets
 from stimuli_builder.tracking.detector.detection import eye_points
 from stimuli_builder.tracking.labels import load_labels
 from stimuli_builder.tracking.survey import survey
-from stimuli_builder.video import frames, rgb
-from stimuli_builder.video_scan import scan_video
+from stimuli_builder.video import frames, rgb, scan_video
 from tools.lid_network.augment import EYE_PX, SIZE, normalised
 
 Values = NDArray[np.float64]

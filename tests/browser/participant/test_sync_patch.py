@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 from playwright.sync_api import Page
 
-from stimuli_builder.sync_patch import code
+from stimuli_builder.sync_patch import film as patch_code
 from tests.browser.served import Served, serve, start_clip
 from tests.browser.studies import PLAIN, without
 
@@ -35,12 +35,12 @@ def number_on(page: Page) -> int:
     part = box["height"] / PARTS
     rows = [int(box["y"] + box["height"] - part * (3.5 - row)) for row in range(3)]
     columns = [int(box["x"] + part * (1.5 + column)) for column in range(3)]
-    return int(code.read(picture[np.ix_(rows, columns)].reshape(1, -1))[0])
+    return int(patch_code.read_numbers(picture[np.ix_(rows, columns)].reshape(1, -1))[0])
 
 
 def test_every_picture_carries_its_number(studies: Served, page: Page) -> None:
     visit = studies.visit("sync_patch", page)
-    assert number_on(page) == code.NO_FRAME
+    assert number_on(page) == patch_code.NO_FRAME
     start_clip(page)
     seen = []
     while page.query_selector(".trial.playing"):
@@ -50,5 +50,5 @@ def test_every_picture_carries_its_number(studies: Served, page: Page) -> None:
     assert frames == sorted(frames)
     assert max(frames) < FRAMES
     page.wait_for_selector(".scale")
-    assert number_on(page) == code.NO_FRAME
+    assert number_on(page) == patch_code.NO_FRAME
     assert visit.problems == []

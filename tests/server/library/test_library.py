@@ -4,7 +4,7 @@ import pytest
 from PIL import Image
 
 from server.core.settings import Settings
-from stimuli_builder.clips.strips import write_strips
+from stimuli_builder.clips.preview import write_strips
 from tests.helpers.admins import Admin
 
 

@@ -8,13 +8,20 @@ import pytest
 
 from experiments.errors import InputError
 from stimuli_builder.actor.face import EYE_WIDTH_PX, eye_landmarks, landmarks, lid_distances
-from stimuli_builder.actor.physiology import blink_closure, course, plan_blinks
-from stimuli_builder.actor.recording import Actor, ActorOptions, choose_frames, label_points, truth_header
+from stimuli_builder.actor.recording import (
+    Actor,
+    ActorOptions,
+    blink_closure,
+    choose_frames,
+    course,
+    label_points,
+    plan_blinks,
+    truth_header,
+)
 from stimuli_builder.cli import main
 from stimuli_builder.tracking.labels import load_labels
 from stimuli_builder.tracking.shapes import default_markers, inter_eyelid_distances
-from stimuli_builder.video import frames
-from stimuli_builder.video_scan import scan_video
+from stimuli_builder.video import frames, scan_video
 
 
 @pytest.fixture(scope="module")

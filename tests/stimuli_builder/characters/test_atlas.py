@@ -9,10 +9,9 @@ from hypothesis import strategies as st
 
 from experiments.errors import InputError
 from stimuli_builder.characters.atlas import load_atlas
-from stimuli_builder.characters.colour import linear_to_srgb, srgb_to_linear
+from stimuli_builder.characters.colour import level_weights, linear_to_srgb, srgb_to_linear
 from stimuli_builder.characters.declaration import declaration_toml, read_declaration
-from stimuli_builder.characters.example import CROP, draw_crop, write_example_character
-from stimuli_builder.characters.interpolation import level_weights
+from stimuli_builder.characters.writing import CROP, draw_crop, write_example_character
 from tests.helpers.lower_lid_change import lower_lid_change
 
 

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, laplace, uniform_filter
 
-from stimuli_builder.checks.jobs import DOT_PX, CheckJob
-from stimuli_builder.checks.masks import JITTER, LATTICE, digit, shape
+from stimuli_builder.checks.jobs import DOT_PX, JITTER, LATTICE, CheckJob, digit, shape
 
 Picture = NDArray[np.float64]
 

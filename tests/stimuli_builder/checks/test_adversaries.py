@@ -9,8 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from experiments.checks import CheckName
-from stimuli_builder.checks.dots import pictures
-from stimuli_builder.checks.jobs import DOT_PX, CheckJob
+from stimuli_builder.checks.jobs import DOT_PX, CheckJob, pictures
 from stimuli_builder.clips.encode import encode_clip
 from tests.stimuli_builder.checks import solvers
 

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from experiments.errors import InputError
 from experiments.load import parse_experiment
 from experiments.manifest import MANIFEST_NAME, Manifest, check_files, read_manifest
-from stimuli_builder.checks import build as checks
+from stimuli_builder.checks import plan as checks
 from stimuli_builder.cli import app
 from stimuli_builder.clips.build import Machines, build, silent
 from stimuli_builder.clips.design_clips import Options

@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from experiments.rendering import RenderSettings
-from stimuli_builder.checks.jobs import OWN_LOOK_QP
-from stimuli_builder.checks.own_look import first_blink, first_eye
+from stimuli_builder.checks.jobs import OWN_LOOK_QP, first_blink, first_eye
 from stimuli_builder.clips.curves import ClipCurve
 from stimuli_builder.clips.design_clips import Options, look_of
 from stimuli_builder.clips.encode import encode_clip
 from stimuli_builder.clips.frames import FramePainter
-from stimuli_builder.clips.kept_levels import kept_levels
+from stimuli_builder.clips.jobs import kept_levels
 from tests.stimuli_builder.checks.solvers import decoded
 
 Maker = Callable[[int, float, float, np.random.Generator], ClipCurve]

@@ -17,7 +17,7 @@ from experiments.manifest import MANIFEST_NAME, check_files, file_sha256, read_m
 from stimuli_builder.clips import build as build_module
 from stimuli_builder.clips.build import Machines, build
 from stimuli_builder.clips.design_clips import Options, planned_clips
-from stimuli_builder.clips.state import STATE_NAME
+from stimuli_builder.clips.folder import STATE_NAME
 
 from .conftest import Small, make_small
 

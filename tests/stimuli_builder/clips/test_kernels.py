@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from stimuli_builder.clips.barcode import BITS, CELL_PX, draw_barcode, read_barcode
+from stimuli_builder.clips.frames import BITS, CELL_PX, draw_barcode, read_barcode
 from stimuli_builder.clips.kernels import GAMMA, add_products, blend, to_yuv
 
 RNG = np.random.default_rng(4)

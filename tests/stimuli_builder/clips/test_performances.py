@@ -14,10 +14,9 @@ from experiments.load import load_experiment, parse_experiment
 from experiments.manifest import read_manifest
 from experiments.rendering import EventKind, RenderOverrides, RenderSettings, State
 from stimuli_builder.clips.build import Machines, build
-from stimuli_builder.clips.design_clips import Options, planned_clips
+from stimuli_builder.clips.design_clips import TIMER_SHARES, Options, performance_curve, planned_clips
 from stimuli_builder.clips.frames import PAINTED_KEPT, FramePainter
-from stimuli_builder.clips.kept_levels import kept_levels
-from stimuli_builder.clips.performances import TIMER_SHARES, performance_curve
+from stimuli_builder.clips.jobs import kept_levels
 from stimuli_builder.clips.verify import verify
 
 from .conftest import SMALL, make_small

@@ -9,7 +9,7 @@ import pytest
 from experiments.errors import InputError
 from stimuli_builder.blinks.library import load_library
 from stimuli_builder.blinks.profile_table import write_profile_table
-from stimuli_builder.clips.profile_files import read_closure_file, reading_note
+from stimuli_builder.clips.exemplars import read_closure_file, reading_note
 
 
 def test_one_blink_with_named_columns(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from experiments.manifest import Clip, read_manifest
 from stimuli_builder.blinks.library import load_library
 from stimuli_builder.clips.build import Machines, build
 from stimuli_builder.clips.design_clips import Options, PlannedClip, planned_clips
-from stimuli_builder.clips.manifest_file import clip_onset_frame, clip_samples
+from stimuli_builder.clips.folder import clip_onset_frame, clip_samples
 from stimuli_builder.clips.verify import verify
 
 

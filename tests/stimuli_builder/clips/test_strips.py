@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from stimuli_builder.characters.example import write_example_character
-from stimuli_builder.clips.strips import SIZE_PX, STEPS, strip, strip_names, write_strips
+from stimuli_builder.characters.writing import write_example_character
+from stimuli_builder.clips.preview import SIZE_PX, STEPS, strip, strip_names, write_strips
 
 
 def test_the_eye_closes_from_the_first_frame_to_the_last() -> None:

@@ -12,10 +12,13 @@ from blink_engine.speech import Speech, joined, speech_events, speech_states
 from experiments.errors import InputError
 from experiments.rendering import RenderSettings
 from stimuli_builder.cli import app
-from stimuli_builder.clips.performances import performance_curve
-from stimuli_builder.performance.audio import speech_in_audio
-from stimuli_builder.performance.run import PerformanceJob, write_performance
-from stimuli_builder.performance.subtitles import speech_in_subtitles
+from stimuli_builder.clips.design_clips import performance_curve
+from stimuli_builder.performance.run import (
+    PerformanceJob,
+    speech_in_audio,
+    speech_in_subtitles,
+    write_performance,
+)
 
 RATE_HZ = 16_000
 SUBTITLES = """WEBVTT

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from stimuli_builder.sync_patch import code
+from stimuli_builder.sync_patch import film as patch_code
 
 SCREEN_WIDTH, SCREEN_HEIGHT, FIELD, RIM = 480, 360, 30, 30
 CORNERS = np.array([[0, 0], [SCREEN_WIDTH, 0], [SCREEN_WIDTH, SCREEN_HEIGHT], [0, SCREEN_HEIGHT]], np.float32)
@@ -42,7 +42,7 @@ def screen(number: int | None, shade: int) -> NDArray[np.uint8]:
     """The page: a grey surround, a clip whose brightness varies, and the patch in its lower left corner."""
     picture = np.full((SCREEN_HEIGHT, SCREEN_WIDTH), 128, np.uint8)
     picture[40:320, 20:460] = shade
-    white = np.ones(code.FIELDS, np.bool_) if number is None else code.fields(number)
+    white = np.ones(patch_code.FIELDS, np.bool_) if number is None else patch_code.fields_of_number(number)
     top, left = 320 - 2 * RIM - 3 * FIELD, 20
     picture[top:320, left : left + 2 * RIM + 3 * FIELD] = 0
     for field in np.flatnonzero(white):

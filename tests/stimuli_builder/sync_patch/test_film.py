@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from experiments.errors import InputError
-from stimuli_builder.sync_patch import code
+from stimuli_builder.sync_patch import film as patch_code
 from stimuli_builder.sync_patch.cli import scope
 from stimuli_builder.sync_patch.film import read_film
 from stimuli_builder.sync_patch.onsets import PlayOnScreen, plays
@@ -38,20 +38,22 @@ def assert_onsets(play: PlayOnScreen, shown: Shown, within_ms: float) -> None:
 
 @given(st.integers(0, 2**20))
 def test_a_number_reads_as_itself_and_its_neighbour_differs_in_two_fields(number: int) -> None:
-    white = code.fields(number)
-    assert code.read(white[None].astype(float)).tolist() == [number % code.NUMBERS]
-    assert (white != code.fields(number + 1)).sum() == 2
+    white = patch_code.fields_of_number(number)
+    assert patch_code.read_numbers(white[None].astype(float)).tolist() == [number % patch_code.NUMBERS]
+    assert (white != patch_code.fields_of_number(number + 1)).sum() == 2
 
 
 @given(st.integers(0, 255), st.floats(0.4, 0.6))
 def test_a_picture_half_way_between_two_frames_is_neither(number: int, share: float) -> None:
-    mixed = (1 - share) * code.fields(number) + share * code.fields(number + 1)
-    assert code.read(mixed[None]).tolist() == [code.UNREADABLE]
+    mixed = (1 - share) * patch_code.fields_of_number(number) + share * patch_code.fields_of_number(
+        number + 1
+    )
+    assert patch_code.read_numbers(mixed[None]).tolist() == [patch_code.UNREADABLE]
 
 
 def test_no_frame_is_told_from_every_frame() -> None:
-    assert code.read(np.ones((1, 9))).tolist() == [code.NO_FRAME]
-    assert not any(code.fields(number).all() for number in range(code.NUMBERS))
+    assert patch_code.read_numbers(np.ones((1, 9))).tolist() == [patch_code.NO_FRAME]
+    assert not any(patch_code.fields_of_number(number).all() for number in range(patch_code.NUMBERS))
 
 
 @pytest.mark.parametrize("turns", [0, 1, 2, 3])
@@ -114,7 +116,7 @@ def test_a_film_without_a_patch_is_one_line(tmp_path: Path) -> None:
 
 def test_half_a_play_is_one_line() -> None:
     with pytest.raises(InputError, match="film from before the start key until after the clip"):
-        plays(np.arange(4.0), np.array([0, 0, 1, code.NO_FRAME]))
+        plays(np.arange(4.0), np.array([0, 0, 1, patch_code.NO_FRAME]))
 
 
 def test_the_page_draws_what_is_read_here() -> None:

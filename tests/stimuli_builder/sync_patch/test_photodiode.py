@@ -7,7 +7,7 @@ import pytest
 
 from experiments.errors import InputError
 from stimuli_builder.sync_patch.cli import scope
-from stimuli_builder.sync_patch.photodiode import changes, read_trace
+from stimuli_builder.sync_patch.onsets import changes, read_trace
 from tests.stimuli_builder.sync_patch.films import Shown, steady
 
 FPS, FRAMES = 30.0, 11

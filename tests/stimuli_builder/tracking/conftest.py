@@ -13,8 +13,7 @@ from stimuli_builder.tracking.labels import Labels, save_labels
 from stimuli_builder.tracking.learn import Lesson, learn
 from stimuli_builder.tracking.shapes import default_markers
 from stimuli_builder.tracking.training import TrainingOptions
-from stimuli_builder.video import frames
-from stimuli_builder.video_scan import scan_video
+from stimuli_builder.video import frames, scan_video
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,7 @@ import pytest
 
 from stimuli_builder.tracking.labels import load_labels
 from stimuli_builder.tracking.model_file import save_model
-from stimuli_builder.video import opened
-from stimuli_builder.video_scan import scan_video
+from stimuli_builder.video import opened, scan_video
 from stimuli_builder.video_writer import VideoWriter
 
 

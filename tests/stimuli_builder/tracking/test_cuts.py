@@ -14,8 +14,7 @@ from stimuli_builder.tracking.shapes import widths
 from stimuli_builder.tracking.survey import survey
 from stimuli_builder.tracking.track import track_video
 from stimuli_builder.tracking.training import TrainingOptions
-from stimuli_builder.video import frames
-from stimuli_builder.video_scan import scan_video
+from stimuli_builder.video import frames, scan_video
 from tests.stimuli_builder.tracking.test_bad_input import write_frames
 from tests.stimuli_builder.tracking.test_files_as_they_come import written
 

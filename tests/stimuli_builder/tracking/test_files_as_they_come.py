@@ -13,7 +13,7 @@ from stimuli_builder.tracking.shapes import default_markers
 from stimuli_builder.tracking.table import numbers, point_columns, track_rows
 from stimuli_builder.tracking.track import track_video
 from stimuli_builder.tracking.training import TrainingOptions
-from stimuli_builder.video_scan import scan_video
+from stimuli_builder.video import scan_video
 
 FRAMES = 24
 

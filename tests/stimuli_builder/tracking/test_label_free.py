@@ -32,8 +32,7 @@ from stimuli_builder.tracking.survey import Survey, survey
 from stimuli_builder.tracking.track import track_video
 from stimuli_builder.tracking.tracker import FROZEN, UNSEEN, Tracker
 from stimuli_builder.tracking.training import TrainingOptions
-from stimuli_builder.video import frames, rgb
-from stimuli_builder.video_scan import scan_video
+from stimuli_builder.video import frames, rgb, scan_video
 from tests.stimuli_builder.tracking.test_bad_input import write_frames
 
 

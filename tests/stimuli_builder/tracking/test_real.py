@@ -8,7 +8,7 @@ from stimuli_builder.tracking.learn import learn
 from stimuli_builder.tracking.table import distance_columns, numbers, track_rows
 from stimuli_builder.tracking.track import track_video
 from stimuli_builder.tracking.training import TrainingOptions
-from stimuli_builder.video_scan import scan_video
+from stimuli_builder.video import scan_video
 
 CLIPS = {
     "single_face": {"one_eye": False, "blinks": [27], "rms_px": 1.0},

@@ -12,7 +12,7 @@ from stimuli_builder.tracking.proposals import as_proposed, by_hand, unmarked
 from stimuli_builder.tracking.relabel import write_relabel
 from stimuli_builder.tracking.shapes import default_markers
 from stimuli_builder.tracking.survey import Survey
-from stimuli_builder.video_scan import scan_video
+from stimuli_builder.video import scan_video
 
 
 @pytest.fixture

@@ -15,8 +15,7 @@ from stimuli_builder.environments import cache_folder
 from stimuli_builder.tracking.model_file import save_model
 from stimuli_builder.tracking.survey import survey
 from stimuli_builder.tracking.track import track_video
-from stimuli_builder.video import frames
-from stimuli_builder.video_scan import declared_frames, scan_before_damage, scan_video
+from stimuli_builder.video import declared_frames, frames, scan_before_damage, scan_video
 from tests.stimuli_builder.tracking.test_bad_input import write_frames
 from tests.stimuli_builder.tracking.test_files_as_they_come import written
 

@@ -12,7 +12,7 @@ from stimuli_builder.tracking.outcome import TrackedFrame
 from stimuli_builder.tracking.stillness import Stillness
 from stimuli_builder.tracking.track import track_video
 from stimuli_builder.tracking.tracker import FROZEN, STILL, Tracker
-from stimuli_builder.video_scan import scan_video
+from stimuli_builder.video import scan_video
 
 FPS = 60
 EYE = np.array([[0, 0], [20, -9], [40, -12], [60, -12], [80, -9], [100, 0], [75, 5], [50, 7], [25, 5.0]])

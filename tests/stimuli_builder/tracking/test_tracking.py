@@ -13,8 +13,7 @@ from stimuli_builder.tracking.model_file import load_model, save_model
 from stimuli_builder.tracking.table import COLUMN_MEANINGS, track_columns
 from stimuli_builder.tracking.track import track_video
 from stimuli_builder.tracking.tracker import Tracker
-from stimuli_builder.video import frames, rgb
-from stimuli_builder.video_scan import scan_video
+from stimuli_builder.video import frames, rgb, scan_video
 
 
 @pytest.fixture(scope="module")

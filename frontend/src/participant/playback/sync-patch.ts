@@ -1,6 +1,6 @@
 /**
  * A square in the clip's lower left corner that codes the frame's number, drawn with the frame itself, so that both
- * are on the screen in the same refresh. `stimuli scope` reads it (stimuli_builder/sync_patch/code.py).
+ * are on the screen in the same refresh. `stimuli scope` reads it (stimuli_builder/sync_patch/film.py).
  */
 interface Canvas {
   readonly canvas: { readonly width: number; readonly height: number };
