@@ -1,38 +1,13 @@
 """From a declared experiment to its cells, clips and blocks: pure functions, no randomness."""
 
-from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING
 
 from experiments.rendering import RenderSettings
+from experiments.trials.declared import BlockSpec, ClipSpec
 
 if TYPE_CHECKING:
     from experiments.definition import Experiment
-
-
-@dataclass(frozen=True)
-class ClipSpec:
-    """One clip of the factorial set: a level of every factor, and which exemplar of that cell (from 1)."""
-
-    levels: tuple[tuple[str, str], ...]
-    exemplar: int
-
-    @property
-    def cell(self) -> str:
-        """The level names joined by slashes, in factor order."""
-        return "/".join(level for _, level in self.levels)
-
-    def level(self, factor: str) -> str:
-        """Return the level this clip has of `factor`."""
-        return dict(self.levels)[factor]
-
-
-@dataclass(frozen=True)
-class BlockSpec:
-    """One block as declared: its label (a level of the split factor, or `all`) and its clips."""
-
-    label: str
-    clips: tuple[ClipSpec, ...]
 
 
 def cells(experiment: "Experiment") -> list[tuple[tuple[str, str], ...]]:

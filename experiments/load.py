@@ -9,8 +9,8 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
+from experiments.consistency import check_consistency
 from experiments.definition import Experiment
-from experiments.definition.experiment import STORED
 from experiments.errors import InputError, and_others, did_you_mean, nearest
 from experiments.schema.keys import Key, is_tag
 from experiments.schema.upgrades import upgraded
@@ -112,13 +112,27 @@ def parse_experiment(text: str, source: str = "definition", *, has_data: bool = 
         raise DefinitionError(source, [Problem(line_of(text, (path,)), path, message)]) from error
     try:
         # TOML tells texts, numbers and truth values apart: none is taken for another.
-        return Experiment.model_validate(_with_tuples(data), strict=not has_data, context={STORED: has_data})
+        experiment = Experiment.model_validate(_with_tuples(data), strict=not has_data)
     except ValidationError as error:
         # A misspelt key is also a missing one: name the misspelling first.
         causes = (detail for detail in error.errors() if not is_follower(detail))
         details = sorted(causes, key=lambda detail: detail["type"] == "missing")
         problems = [_problem(detail, text) for detail in details[:MAX_PROBLEMS]]
         raise DefinitionError(source, problems, len(details)) from error
+    try:
+        check_consistency(experiment, has_data=has_data)
+    except ValueError as error:
+        raise DefinitionError(source, [_unfit_part(str(error), text)]) from error
+    return experiment
+
+
+def _unfit_part(message: str, text: str) -> Problem:
+    """A fault of parts that do not fit; its path stands before the message, items of lists from 1."""
+    named = _LOCATION.match(message)
+    if not named:
+        return Problem(line_of(text, ()), "", message)
+    parts = tuple(int(part) - 1 if part.isdecimal() else part for part in named[1].split("."))
+    return Problem(line_of(text, parts), named[1], named[2])
 
 
 def toml_data(text: str, source: str = "definition") -> dict[str, Any]:

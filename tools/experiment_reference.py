@@ -24,7 +24,7 @@ from experiments.load import parse_experiment
 from experiments.rendering import ProfileName
 from experiments.schema.keys import Key, is_tag, keys, models_inside
 from experiments.trials import KINDS
-from experiments.trials.kind import TrialDeclaration
+from experiments.trials.declared import TrialDeclaration
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "docs" / "reference" / "every-key.toml"
 HEADER = ("key", "type", "default", "range", "meaning", "example")

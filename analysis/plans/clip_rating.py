@@ -27,7 +27,8 @@ from experiments.design import rated_levels
 from experiments.errors import InputError
 from experiments.trials.clip_rating.columns import RATINGS
 from experiments.trials.clip_rating.declaration import clip_rating_of
-from experiments.trials.scales import RatedScale, scale_called, scales_of
+from experiments.trials.declared import RatedScale
+from experiments.trials.scales import scale_called, scales_of
 
 # Ratings of a study: cell means, their tests, and what is computed beside them.
 

@@ -21,7 +21,8 @@ from analysis.within.anova import AnovaResult
 from analysis.within.estimates import margin_of
 from analysis.within.marginal_means import margin
 from experiments.error_bars import within_participant_errors
-from experiments.trials.scales import RatedScale, scale_called
+from experiments.trials.declared import RatedScale
+from experiments.trials.scales import scale_called
 
 Floats = NDArray[np.float64]
 

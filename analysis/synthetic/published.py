@@ -15,7 +15,8 @@ from analysis.within.contrasts import effect_members, effect_name, orthonormal_b
 from experiments.definition import Experiment
 from experiments.design import rated_levels
 from experiments.errors import InputError, did_you_mean
-from experiments.trials.scales import RatedScale, scales_of
+from experiments.trials.declared import RatedScale
+from experiments.trials.scales import scales_of
 
 FOLDER = Path(__file__).parent
 

@@ -20,7 +20,8 @@ from analysis.synthetic.targets import GivenWay, Steps, Targets, TestTarget, mak
 from experiments.definition import Experiment
 from experiments.errors import InputError
 from experiments.load import SHIPPED, load_experiment
-from experiments.trials.scales import RatedScale, scale_called, scales_of
+from experiments.trials.declared import RatedScale
+from experiments.trials.scales import scale_called, scales_of
 
 # Means and covariance of the cells that give the wanted figures, and participants drawn from them.
 

@@ -21,7 +21,7 @@ from analysis.synthetic.published import (
     window,
 )
 from experiments.errors import InputError
-from experiments.trials.scales import RatedScale
+from experiments.trials.declared import RatedScale
 
 Floats = NDArray[np.float64]
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from experiments.design import ClipSpec
+from experiments.trials.declared import ClipSpec
 
 
 def every_clip(clips: Sequence[ClipSpec]) -> frozenset[ClipSpec]:

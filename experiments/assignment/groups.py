@@ -5,7 +5,7 @@ from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
 
 from experiments import design
-from experiments.design import ClipSpec
+from experiments.trials.declared import ClipSpec
 
 if TYPE_CHECKING:
     from experiments.definition import Experiment

@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from experiments.design import ClipSpec
 from experiments.errors import did_you_mean
+from experiments.trials.declared import ClipSpec
 
 
 def label(clip: ClipSpec) -> str:

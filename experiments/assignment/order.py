@@ -12,7 +12,7 @@ from experiments.assignment.groups import Seat, cells_of, seat_of
 from experiments.assignment.levels import seen_levels, sees
 from experiments.assignment.shares import share
 from experiments.assignment.trial import Shown, Trial
-from experiments.design import BlockSpec, ClipSpec
+from experiments.trials.declared import BlockSpec, ClipSpec
 
 if TYPE_CHECKING:
     from experiments.definition import Experiment

@@ -3,7 +3,7 @@
 import random
 from collections.abc import Sequence
 
-from experiments.design import ClipSpec
+from experiments.trials.declared import ClipSpec
 
 
 def sampled(

@@ -9,7 +9,7 @@ from experiments.assignment import levels, lists
 from experiments.assignment.every import every_clip
 from experiments.assignment.groups import Seat, clips_of, groups, name_of, names, seat_of
 from experiments.assignment.sample import sampled
-from experiments.design import ClipSpec
+from experiments.trials.declared import ClipSpec
 
 if TYPE_CHECKING:
     from experiments.definition import Experiment

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from experiments.design import ClipSpec
+from experiments.trials.declared import ClipSpec
 
 
 @dataclass(frozen=True)

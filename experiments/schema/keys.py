@@ -11,8 +11,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from experiments.definition import Experiment
-from experiments.trials import KINDS
-from experiments.trials.union import ByKind
+from experiments.trials.declared import ByKind
 
 
 class Key(NamedTuple):
@@ -30,8 +29,9 @@ class Key(NamedTuple):
     @property
     def tables(self) -> list[type[BaseModel]]:
         """The models that the key may hold, with keys of their own."""
-        if any(isinstance(mark, ByKind) for mark in self.field.metadata):
-            return [kind.declaration for kind in KINDS.values()]
+        for mark in self.field.metadata:
+            if isinstance(mark, ByKind):
+                return list(mark.models().values())
         return models_inside(self.field.annotation)
 
 

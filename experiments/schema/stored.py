@@ -5,7 +5,8 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from experiments.definition.experiment import STORED, Experiment
+from experiments.consistency import check_consistency
+from experiments.definition.experiment import Experiment
 from experiments.errors import InputError
 from experiments.schema.upgrades import upgraded
 from experiments.wrong_values import wrong_value
@@ -15,7 +16,7 @@ def load_stored(definition: Mapping[str, Any], number: int = 1) -> Experiment:
     """The declaration stored as JSON data of format `number`; InputError where it cannot be read."""
     data = upgraded(definition, number)
     try:
-        return Experiment.model_validate(data, context={STORED: True})
+        experiment = Experiment.model_validate(data)
     except ValidationError as error:
         first = error.errors()[0]
         path = ".".join(str(part) for part in first["loc"])
@@ -24,3 +25,12 @@ def load_stored(definition: Mapping[str, Any], number: int = 1) -> Experiment:
             f"the stored definition {name} (format {number}) cannot be read: {path}: {wrong_value(first)}; "
             "use the version of this program that stored it, and report this"
         ) from error
+    try:
+        check_consistency(experiment, has_data=True)
+    except ValueError as error:
+        name = definition.get("name", "without a name")
+        raise InputError(
+            f"the stored definition {name} (format {number}) cannot be read: {error}; "
+            "use the version of this program that stored it, and report this"
+        ) from error
+    return experiment

@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, StrictInt, model_validator
 
-from experiments.trials.kind import Answer
+from experiments.trials.declared import Answer
 
 MAX_CHOICES = 9
 """A key each."""

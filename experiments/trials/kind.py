@@ -2,75 +2,23 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
-
-from pydantic import Field
+from typing import TYPE_CHECKING, Any
 
 from experiments.assignment.compared import Compared
 from experiments.assignment.trial import Trial
 from experiments.base import Declaration
 from experiments.columns.view import View
-from experiments.design import BlockSpec, ClipSpec
 from experiments.schema.effects import Effect
-from experiments.trials.scales import RatedScale
+from experiments.trials.declared import Answer, BlockSpec, TrialDeclaration
 
 if TYPE_CHECKING:
     from experiments.definition import Experiment
 
 
-class TrialDeclaration(Declaration):
-    """What every kind declares; each adds its own keys, and a constant as its `kind`."""
-
-    kind: str
-    """Kind of trial."""
-    expected_seconds: Annotated[float, Field(gt=0)] = 6.0
-    """Seconds a trial takes on average, from which the length of a visit is reckoned."""
-
-    def asked(self, language: str) -> str:
-        """What participants are asked and may answer, in one line of the codebook."""
-        del language
-        return ""
-
-    def rated_scales(self) -> tuple[RatedScale, ...]:
-        """The scales on which each trial is rated; none where its answers are no ratings."""
-        return ()
-
-    def rates(self, experiment: "Experiment", clip: ClipSpec) -> bool:
-        """Whether trials ask about this clip; others of the design are only shown beside it."""
-        del experiment, clip
-        return True
-
-    def view_ms(self, lengths: Mapping[str, float]) -> float:
-        """How long one view of a trial lasts at least, in ms, by how long its clips last by their roles.
-
-        Clips at once last as long as the longest; a kind that shows them in turn says so.
-        """
-        return max(lengths.values(), default=0.0)
-
-    def shown_ms(self, lengths: Mapping[str, float]) -> float:
-        """How long all views before an answer last at least, in ms; a kind that asks for several says so."""
-        return self.view_ms(lengths)
-
-    def fault(self, experiment: "Experiment") -> str | None:
-        """What here does not fit the rest of the experiment: `path: what to do`; None where all is well."""
-        del experiment
-        return None
-
-
-class Answer(Declaration):
-    """What a participant answers to one trial; each kind adds its own keys, and a constant as its `kind`."""
-
-    kind: str
-    """Kind of the trial that is answered."""
-
-    @property
-    def given(self) -> bool:
-        """True where something was answered; a clip that could not be shown goes without."""
-        return any(value is not None for name, value in self if name != "kind")
-
-    def stored(self) -> dict[str, Any]:
-        """The payload of `trial_ratings`."""
-        return self.model_dump(mode="json", exclude={"kind"})
+def nothing_wrong(experiment: "Experiment") -> str | None:
+    """Kinds of which every declaration fits every experiment."""
+    del experiment
+    return None
 
 
 def nothing_more(experiment: "Experiment") -> tuple[str, ...]:
@@ -129,6 +77,8 @@ class Kind:
         Lines that `stimuli plan` adds: expected counts; InputError where the design cannot be analysed.
     adapts : bool
         Whether answers decide what is shown next: the server then follows its series.
+    fault : callable
+        What in the declared [trial] does not fit the rest of the experiment: `path: what to do`, or None.
     chooses : callable
         Whether a run's trials are chosen by the comparisons stored before it.
     assign_by : callable or None
@@ -151,6 +101,7 @@ class Kind:
     example: str
     further_examples: tuple[str, ...] = ()
     plan: "Callable[[Experiment], tuple[str, ...]]" = nothing_more
+    fault: "Callable[[Experiment], str | None]" = nothing_wrong
     check_response: Callable[[Mapping[str, Any]], int | None] = lambda _: None
     check_choices: "Callable[[Experiment], int]" = two_choices
     shares_clips: bool = False

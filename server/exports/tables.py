@@ -18,7 +18,8 @@ from experiments.definition import Experiment
 from experiments.design import rated_levels
 from experiments.errors import InputError
 from experiments.trials import KINDS
-from experiments.trials.scales import RatedScale, scales_of
+from experiments.trials.declared import RatedScale
+from experiments.trials.scales import scales_of
 from server.core.values import iso
 from server.exports import repository
 from server.exports.csv_lines import (

@@ -18,11 +18,11 @@ from blink_engine.speech import Speech, seed_of_speaker, speech_events, speech_s
 from experiments import design
 from experiments.counted import counted
 from experiments.definition import Experiment
-from experiments.design import ClipSpec
 from experiments.errors import InputError
 from experiments.rendering import RenderSettings
 from experiments.trials import KINDS
 from experiments.trials.counts import block_sizes, expected_minutes, trials_per_participant
+from experiments.trials.declared import ClipSpec
 from stimuli_builder.blinks.profile import PROFILE_FPS
 from stimuli_builder.clips.characters import DRAWN, Geometry, fingerprint, geometry
 from stimuli_builder.clips.curves import DECIMALS, Array, ClipCurve, Timing, clip_curve, generator, shown_by

@@ -4,6 +4,7 @@ from experiments.schema.effects import Effect
 from experiments.trials.clip_rating.answer import RatingAnswer, check_response
 from experiments.trials.clip_rating.columns import RATINGS
 from experiments.trials.clip_rating.declaration import ClipRating
+from experiments.trials.clip_rating.faults import fault
 from experiments.trials.clip_rating.page import ShownClipRating, shown
 from experiments.trials.clip_rating.plan import assign, block_size, check_choices, plan
 from experiments.trials.kind import Kind
@@ -113,6 +114,7 @@ CLIP_RATING = Kind(
     assign=assign,
     block_size=block_size,
     plan=plan,
+    fault=fault,
     shares_clips=True,
     groups=True,
     random_factors=True,

@@ -8,7 +8,7 @@ from pydantic import Field, StrictFloat, StrictInt, field_validator, model_valid
 from experiments.base import Declaration, Name
 from experiments.trials.clip_rating.declaration import MAX_SCALES
 from experiments.trials.clip_rating.scales import SCALE_NAME
-from experiments.trials.kind import Answer
+from experiments.trials.declared import Answer
 
 
 class ScaleAnswer(Declaration):

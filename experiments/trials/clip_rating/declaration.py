@@ -1,19 +1,14 @@
 """The keys of a [trial] whose kind is `clip_rating`."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from experiments.design import ClipSpec
 from experiments.errors import InputError
 from experiments.trials.clip_rating.reference import RatingReference
 from experiments.trials.clip_rating.scales import SCALE_NAME, AnyScale, Points, Slider
-from experiments.trials.kind import TrialDeclaration
-from experiments.trials.scales import RatedScale
-
-if TYPE_CHECKING:
-    from experiments.definition import Experiment
+from experiments.trials.declared import ClipSpec, HasFactors, HasTrial, RatedScale, TrialDeclaration
 
 MAX_SCALES = 8
 MAX_FRAMES_LOGGED = 20_000
@@ -80,7 +75,7 @@ class ClipRating(TrialDeclaration):
             raise ValueError(f"reference.label has no text in '{missing[0]}', which the question has")
         return self
 
-    def rates(self, experiment: "Experiment", clip: ClipSpec) -> bool:
+    def rates(self, experiment: HasFactors, clip: ClipSpec) -> bool:
         """Every clip, but references that are not rated themselves."""
         return self.reference is None or self.reference.rates(experiment, clip)
 
@@ -93,22 +88,6 @@ class ClipRating(TrialDeclaration):
     def shown_ms(self, lengths: Mapping[str, float]) -> float:
         """The view as often as the clip is shown."""
         return self.views * self.view_ms(lengths)
-
-    def fault(self, experiment: "Experiment") -> str | None:
-        """More views of a long performance than a trial may log; a reference that does not fit."""
-        levels = [level.render for factor in experiment.factors for level in factor.levels]
-        settings = [experiment.render, *(level.applied_to(experiment.render) for level in levels)]
-        if self.reference and any(one.performance for one in settings):
-            return "trial.reference: performances have no reference; leave it out, or show single blinks"
-        if self.reference and (wrong := self.reference.fault(experiment)):
-            return wrong
-        longest = max((round(one.seconds * one.fps) for one in settings if one.performance), default=0)
-        if longest * self.views <= MAX_FRAMES_LOGGED:
-            return None
-        return (
-            f"trial.views: {self.views} views of {longest} frames are more than the {MAX_FRAMES_LOGGED} that "
-            "a trial may log; show shorter clips, fewer frames a second or fewer views"
-        )
 
     @property
     def asked_scales(self) -> tuple[Points | Slider, ...]:
@@ -137,7 +116,7 @@ class ClipRating(TrialDeclaration):
         return tuple(scale.rated(f"answers.{scale.name}.response") for scale in self.asked_scales)
 
 
-def clip_rating_of(experiment: "Experiment") -> ClipRating:
+def clip_rating_of(experiment: HasTrial) -> ClipRating:
     """The experiment's trial as a rating of single clips; InputError where it is of another kind."""
     if not isinstance(experiment.trial, ClipRating):
         raise InputError(

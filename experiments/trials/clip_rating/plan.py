@@ -8,9 +8,9 @@ from experiments.assignment.groups import seat_of
 from experiments.assignment.order import single_clips
 from experiments.assignment.shares import lines, share
 from experiments.assignment.trial import Shown, Trial
-from experiments.design import BlockSpec
 from experiments.trials.clip_rating.declaration import clip_rating_of
 from experiments.trials.clip_rating.reference import RatingReference
+from experiments.trials.declared import BlockSpec
 
 if TYPE_CHECKING:
     from experiments.definition import Experiment

@@ -1,17 +1,11 @@
 """The reference of degradation category rating (ITU-T P.910): which clip comes before the rated one."""
 
-from typing import TYPE_CHECKING, Annotated, Self
+from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from experiments import design
 from experiments.base import Declaration, LevelName, Name, Translated
-from experiments.design import ClipSpec
-from experiments.errors import did_you_mean
-
-if TYPE_CHECKING:
-    from experiments.definition import Experiment
-    from experiments.definition.factors import Factor
+from experiments.trials.declared import ClipSpec, HasFactors
 
 
 class RatingReference(Declaration):
@@ -47,7 +41,7 @@ class RatingReference(Declaration):
             raise ValueError(f"expected factor and level, or cell; got {got}")
         return self
 
-    def of(self, experiment: "Experiment", clip: ClipSpec) -> ClipSpec:
+    def of(self, experiment: HasFactors, clip: ClipSpec) -> ClipSpec:
         """The reference of this clip; a clip of the reference's cell is its own."""
         if self.factor is not None and self.level is not None:
             levels = tuple(
@@ -68,90 +62,6 @@ class RatingReference(Declaration):
         itself = "rated too, against itself" if self.rate_itself else "not rated itself"
         return f"before each clip its reference: {named}, {itself}; {self.gap_ms} ms between the two"
 
-    def rates(self, experiment: "Experiment", clip: ClipSpec) -> bool:
+    def rates(self, experiment: HasFactors, clip: ClipSpec) -> bool:
         """Whether this clip is rated: all but the references, unless they are hidden among the others."""
         return self.rate_itself or self.of(experiment, clip) != clip
-
-    def fault(self, experiment: "Experiment") -> str | None:
-        """What here does not fit the design, as `path: what to do`; None where all is well."""
-        return (
-            self._fault_of_clip(experiment)
-            or self._fault_of_difference(experiment)
-            or (None if self.rate_itself else self._fault_of_rest(experiment))
-        )
-
-    def _fault_of_clip(self, experiment: "Experiment") -> str | None:
-        if self.factor is None:
-            cells = ["/".join(level for _, level in cell) for cell in design.cells(experiment)]
-            if self.cell not in cells:
-                return (
-                    f"trial.reference.cell: the design has no cell '{self.cell}'"
-                    f"{did_you_mean(str(self.cell), cells)}"
-                )
-            return None
-        if self.factor not in experiment.factor_names:
-            nearest = did_you_mean(self.factor, experiment.factor_names)
-            return f"trial.reference.factor: no factor is called '{self.factor}'{nearest}"
-        factor = experiment.factor(self.factor)
-        names = [level.name for level in factor.levels]
-        if self.level not in names:
-            return (
-                f"trial.reference.level: '{self.factor}' has no level '{self.level}'"
-                f"{did_you_mean(str(self.level), names)}"
-            )
-        return self._fault_of_factor(factor)
-
-    def _fault_of_factor(self, factor: "Factor") -> str | None:
-        if factor.between or factor.dealt:
-            return (
-                f"trial.reference.factor: participants see some levels of '{factor.name}' only; name a "
-                "factor of which everybody sees all"
-            )
-        return None
-
-    def _differing(self, experiment: "Experiment") -> list[str]:
-        """The factors in whose levels a reference can differ from its clip, in declared order."""
-        return [
-            factor.name
-            for factor in experiment.factors
-            if len(factor.levels) > 1
-            and (factor.name == self.factor if self.cell is None else not factor.between)
-        ]
-
-    def _fault_of_difference(self, experiment: "Experiment") -> str | None:
-        """A reference is another clip than some, and shows the blink of each."""
-        differing = self._differing(experiment)
-        if not differing:
-            return (
-                "trial.reference: every clip would be its own reference; name a factor of which each "
-                "participant sees two levels or more"
-            )
-        own = next((name for name in differing if name in experiment.exemplars.own_per), None)
-        if own is not None:
-            return (
-                f"exemplars.own_per: a reference shows the blink of its clip, but the levels of '{own}', in "
-                f"which the two differ, have blinks of their own; leave '{own}' out of own_per"
-            )
-        return None
-
-    def _fault_of_rest(self, experiment: "Experiment") -> str | None:
-        """Without the reference's own trials the rated cells must still be a crossed design."""
-        hidden = "or set rate_itself = true"
-        split = experiment.blocks.split_by
-        if self.factor is None and len(experiment.factors) > 1:
-            return (
-                f"trial.reference.cell: without ratings of '{self.cell}' the rated cells are not crossed; "
-                f"name factor and level, {hidden}"
-            )
-        name = self.factor or experiment.factor_names[0]
-        if split == name:
-            return (
-                f"blocks.split_by: the reference's level of '{name}' would be an empty block; "
-                f"split by another factor, {hidden}"
-            )
-        if len(experiment.factor(name).levels) < 3:
-            return (
-                f"trial.reference: '{name}' needs two levels beside the reference's to compare; "
-                f"add a level, {hidden}"
-            )
-        return None

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, StrictInt
 
 from experiments.trials.continuous_rating.declaration import CHECK_POINTS, MAX_SAMPLES
-from experiments.trials.kind import Answer
+from experiments.trials.declared import Answer
 
 Sample = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
 

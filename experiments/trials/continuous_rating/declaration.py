@@ -1,15 +1,12 @@
 """The keys of a [trial] whose kind is `continuous_rating`."""
 
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from experiments.base import Translated
 from experiments.errors import InputError
-from experiments.trials.kind import TrialDeclaration
-
-if TYPE_CHECKING:
-    from experiments.definition import Experiment
+from experiments.trials.declared import HasTrial, TrialDeclaration
 
 MAX_SAMPLES = 1800
 """Samples of one trace: 30 a second over a minute."""
@@ -76,7 +73,7 @@ def samples_of(frames: int, step: int) -> int:
     return (frames - 1) // step + 1
 
 
-def continuous_rating_of(experiment: "Experiment") -> ContinuousRating:
+def continuous_rating_of(experiment: HasTrial) -> ContinuousRating:
     """The experiment's trial as a continuous rating; InputError where it is of another kind."""
     if not isinstance(experiment.trial, ContinuousRating):
         raise InputError(

@@ -6,6 +6,7 @@ from experiments.trials.paired_comparison.answer import ComparisonAnswer, check_
 from experiments.trials.paired_comparison.columns import COMPARISONS
 from experiments.trials.paired_comparison.declaration import PairedComparison
 from experiments.trials.paired_comparison.page import ShownPairedComparison, shown
+from experiments.trials.paired_comparison.pairs import fault
 from experiments.trials.paired_comparison.plan import assign, block_size, check_choices, chooses, plan
 
 EFFECTS: dict[str, Effect] = {
@@ -67,6 +68,7 @@ PAIRED_COMPARISON = Kind(
     example=EXAMPLE,
     further_examples=FURTHER_EXAMPLES,
     plan=plan,
+    fault=fault,
     check_response=check_response,
     check_choices=check_choices,
     groups=True,

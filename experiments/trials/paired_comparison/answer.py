@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any, Literal
 
-from experiments.trials.kind import Answer
+from experiments.trials.declared import Answer
 
 CODES = {"left": 1, "right": 2, "tie": 3}
 """The number of each answer, as its key has it and an attention check asks for it."""

@@ -6,7 +6,7 @@ from itertools import combinations
 from typing import TYPE_CHECKING
 
 from experiments.assignment.incomplete_blocks import Block, balanced_blocks
-from experiments.design import ClipSpec
+from experiments.trials.declared import ClipSpec
 from experiments.trials.paired_comparison.declaration import IncompleteBlocks
 from experiments.trials.paired_comparison.pairs import Deal, Pair, alike
 

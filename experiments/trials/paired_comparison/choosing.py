@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from experiments.assignment.active import Edge, Stored, batch
 from experiments.assignment.compared import Compared
-from experiments.design import ClipSpec
+from experiments.trials.declared import ClipSpec
 from experiments.trials.paired_comparison.declaration import Active, paired_comparison_of
 from experiments.trials.paired_comparison.pairs import Pair, every_pair, item_of
 

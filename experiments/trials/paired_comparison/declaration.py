@@ -1,16 +1,13 @@
 """The keys of a [trial] whose kind is `paired_comparison`."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from experiments.base import Declaration, Name, Translated
 from experiments.errors import InputError
-from experiments.trials.kind import TrialDeclaration
-
-if TYPE_CHECKING:
-    from experiments.definition import Experiment
+from experiments.trials.declared import HasTrial, TrialDeclaration
 
 
 class SideBySide(Declaration):
@@ -219,14 +216,8 @@ class PairedComparison(TrialDeclaration):
             lasted += lengths["reference"] + self.reference.gap_ms
         return lasted
 
-    def fault(self, experiment: "Experiment") -> str | None:
-        """What in the pairs does not fit the experiment, in one line; None where all is well."""
-        from experiments.trials.paired_comparison.pairs import fault
 
-        return fault(experiment, self)
-
-
-def paired_comparison_of(experiment: "Experiment") -> PairedComparison:
+def paired_comparison_of(experiment: HasTrial) -> PairedComparison:
     """The experiment's trial as a paired comparison; InputError where it is of another kind."""
     if not isinstance(experiment.trial, PairedComparison):
         raise InputError(

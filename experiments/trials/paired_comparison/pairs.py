@@ -13,8 +13,8 @@ from experiments import design
 from experiments.assignment.groups import groups as groups_of
 from experiments.assignment.groups import of_group
 from experiments.assignment.incomplete_blocks import balanced_blocks, near_sizes
-from experiments.design import ClipSpec
 from experiments.errors import InputError, did_you_mean
+from experiments.trials.declared import ClipSpec
 from experiments.trials.paired_comparison.declaration import (
     AllPairs,
     DeclaredPairs,
@@ -43,8 +43,9 @@ class Pair(NamedTuple):
         return Pair(self.right, self.left)
 
 
-def fault(experiment: "Experiment", trial: PairedComparison) -> str | None:
+def fault(experiment: "Experiment") -> str | None:
     """What in the declared pairs does not fit the experiment, in one line; None where all is well."""
+    trial = paired_comparison_of(experiment)
     cells = ["/".join(level for _, level in cell) for cell in design.cells(experiment)]
     named: list[tuple[str, str]] = []
     if isinstance(trial.pairs, WithinFactor):

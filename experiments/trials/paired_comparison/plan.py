@@ -11,8 +11,8 @@ from experiments.assignment.groups import groups, name_of, of_group, seat_of
 from experiments.assignment.order import ordered_blocks, with_attention
 from experiments.assignment.shares import expected_slots, said_of_groups
 from experiments.assignment.trial import Shown, Trial
-from experiments.design import BlockSpec, ClipSpec
 from experiments.errors import InputError
+from experiments.trials.declared import BlockSpec, ClipSpec
 from experiments.trials.paired_comparison.blocks import BlockDeal
 from experiments.trials.paired_comparison.choosing import chosen_pairs
 from experiments.trials.paired_comparison.declaration import Active, IncompleteBlocks, paired_comparison_of

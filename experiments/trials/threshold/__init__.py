@@ -5,6 +5,7 @@ from experiments.trials.kind import Kind
 from experiments.trials.threshold.answer import ThresholdAnswer, check_response
 from experiments.trials.threshold.columns import THRESHOLDS
 from experiments.trials.threshold.declaration import Threshold
+from experiments.trials.threshold.faults import fault
 from experiments.trials.threshold.page import ShownThreshold, shown
 from experiments.trials.threshold.plan import assign, block_size, plan
 
@@ -99,6 +100,7 @@ THRESHOLD = Kind(
     example=EXAMPLE,
     further_examples=FURTHER_EXAMPLES,
     plan=plan,
+    fault=fault,
     check_response=check_response,
     adapts=True,
     groups=True,

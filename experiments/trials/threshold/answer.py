@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, StrictInt
 
-from experiments.trials.kind import Answer
+from experiments.trials.declared import Answer
 
 CODES = {"yes": 1, "no": 2, "first": 1, "second": 2}
 """The number of each answer, as its key has it and an attention check asks for it."""

@@ -1,16 +1,13 @@
 """The keys of a [trial] whose kind is `threshold`."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from experiments.base import Declaration, LevelName, Name, Translated
 from experiments.errors import InputError
-from experiments.trials.kind import TrialDeclaration
-
-if TYPE_CHECKING:
-    from experiments.definition import Experiment
+from experiments.trials.declared import HasTrial, TrialDeclaration
 
 
 class YesNo(Declaration):
@@ -200,14 +197,8 @@ class Threshold(TrialDeclaration):
             return sum(lengths.values()) + self.task.gap_ms
         return super().view_ms(lengths)
 
-    def fault(self, experiment: "Experiment") -> str | None:
-        """What in the series does not fit the experiment, in one line; None where all is well."""
-        from experiments.trials.threshold.faults import fault
 
-        return fault(experiment, self)
-
-
-def threshold_of(experiment: "Experiment") -> Threshold:
+def threshold_of(experiment: HasTrial) -> Threshold:
     """The experiment's trial as a threshold; InputError where it is of another kind."""
     if not isinstance(experiment.trial, Threshold):
         raise InputError(

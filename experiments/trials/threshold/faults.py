@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from experiments.assignment.groups import groups, name_of
 from experiments.errors import did_you_mean
-from experiments.trials.threshold.declaration import Range, Threshold, TwoInterval
+from experiments.trials.threshold.declaration import Range, Threshold, TwoInterval, threshold_of
 
 if TYPE_CHECKING:
     from experiments.definition import Experiment
@@ -16,9 +16,9 @@ MAX_TABLE = 500_000
 """Stimuli times considered parameters: one choice goes through all of them."""
 
 
-def fault(experiment: "Experiment", trial: Threshold) -> str | None:
+def fault(experiment: "Experiment") -> str | None:
     """The first fault; None where all is well."""
-    return next(_faults(experiment, trial), None)
+    return next(_faults(experiment, threshold_of(experiment)), None)
 
 
 def _faults(experiment: "Experiment", trial: Threshold) -> Iterator[str]:

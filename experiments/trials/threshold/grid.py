@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from itertools import product
 from typing import TYPE_CHECKING, Literal, NamedTuple, TypeVar
 
-from experiments.design import ClipSpec
+from experiments.trials.declared import ClipSpec
 from experiments.trials.threshold.declaration import Range, Series, Threshold, TwoInterval, threshold_of
 from experiments.trials.threshold.faults import number_of, tested
 

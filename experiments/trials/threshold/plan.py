@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from experiments.assignment.groups import groups, name_of, seat_of
 from experiments.assignment.order import ordered_blocks, with_attention
 from experiments.assignment.trial import Shown, Trial
-from experiments.design import BlockSpec
+from experiments.trials.declared import BlockSpec
 from experiments.trials.threshold.declaration import Series, Stop, threshold_of
 from experiments.trials.threshold.grid import (
     clip_of,

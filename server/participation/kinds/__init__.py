@@ -10,7 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar, get_args
 
 from experiments.definition import Experiment
-from experiments.trials.kind import Answer
+from experiments.trials.declared import Answer
 from server.core.errors import Invalid
 from server.participation.answer_schemas import RatingIn
 from server.participation.tallies import Counted, NumberedClip

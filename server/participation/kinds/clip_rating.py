@@ -9,7 +9,8 @@ from experiments.trials.clip_rating.answer import RatingAnswer, ScaleAnswer
 from experiments.trials.clip_rating.declaration import clip_rating_of
 from experiments.trials.clip_rating.page import ShownClipRating
 from experiments.trials.clip_rating.scales import SCALE_NAME
-from experiments.trials.scales import RatedScale, scales_of
+from experiments.trials.declared import RatedScale
+from experiments.trials.scales import scales_of
 from server.core.errors import Invalid
 from server.participation.answer_schemas import RatingIn
 from server.participation.kinds import Part, Preference, Served, answer_of, asked_in

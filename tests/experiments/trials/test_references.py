@@ -5,10 +5,10 @@ import re
 import pytest
 
 from experiments.definition import Experiment
-from experiments.design import ClipSpec
 from experiments.load import DefinitionError, parse_experiment
 from experiments.trials import KINDS
 from experiments.trials.counts import trials_per_participant
+from experiments.trials.declared import ClipSpec
 from tests.conftest import REPOSITORY
 
 DEMO = (REPOSITORY / "experiments" / "dcr-demo.toml").read_text(encoding="utf-8")

@@ -4,7 +4,7 @@ from abc import abstractmethod
 from collections.abc import Iterator
 
 from experiments.base import Declaration, Name, Translated
-from experiments.trials.scales import RatedScale
+from experiments.trials.declared import RatedScale
 
 SCALE_NAME = "rating"
 """Name of the scale of a [trial.scale], which has none of its own."""

@@ -14,7 +14,8 @@ from experiments.assignment.trial import Shown, Trial
 from experiments.base import Declaration, Translated
 from experiments.columns import Column, View, base, playback
 from experiments.columns.tables import rows_of
-from experiments.trials.kind import Answer, Kind, TrialDeclaration
+from experiments.trials.declared import Answer, TrialDeclaration
+from experiments.trials.kind import Kind
 
 if TYPE_CHECKING:
     from experiments.definition import Experiment
