@@ -15,8 +15,7 @@ from analysis.read.pool import Origin, Pool
 from analysis.read.study_answers import load_csv, read_runs
 from analysis.report.contents import Progress, held_against
 from analysis.report.write import write_report
-from experiments.capsule.declaration import MANIFEST, WRITTEN_BY_SERVER, ReportSource
-from experiments.capsule.packing import report_input
+from experiments.capsule import MANIFEST, WRITTEN_BY_SERVER, ReportSource, report_input
 from experiments.load import load_experiment
 from experiments.seal import read_clips_sha256, read_seal
 

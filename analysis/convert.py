@@ -8,7 +8,7 @@ import pandas as pd
 from pydantic import TypeAdapter, ValidationError
 
 from experiments.columns import Column
-from experiments.columns.names import plain_name, unlike
+from experiments.columns.column import plain_name, unlike
 from experiments.errors import InputError
 from experiments.wrong_values import expectation, shown, wrong_value
 

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from experiments.base import Translated
 from experiments.check_words import WORDS
 from experiments.check_words.words import Asked
+from experiments.declaration.base import Translated
 
 CheckName = Literal["digit", "direction", "shape", "first_blink", "first_eye"]
 CHECK_CELL = ""

@@ -5,16 +5,15 @@ The two places that read declarations ask: `experiments.load` and `experiments.s
 
 from pydantic import ValidationError
 
-from experiments.assignment import grouping, shares
-from experiments.assignment.checks import motion_checks_by_block
-from experiments.definition.assignment import Assignment
-from experiments.definition.experiment import Experiment
-from experiments.definition.flicker import silent_on_flicker, suggested_sentence
-from experiments.definition.languages import fault as language_fault
-from experiments.definition.names import refuse_repeats, refuse_reserved
+from experiments.assignment import groups, shares
+from experiments.assignment.order import motion_checks_by_block
+from experiments.declaration.base import refuse_repeats, refuse_reserved
+from experiments.declaration.experiment import Experiment
+from experiments.declaration.tables import Assignment
 from experiments.errors import did_you_mean
+from experiments.kinds import KINDS, reserved_names
 from experiments.rules import ScreenFormAnswer
-from experiments.trials import KINDS, reserved_names
+from experiments.wording import language_fault, silent_on_flicker, suggested_sentence
 from experiments.wrong_values import wrong_value
 
 
@@ -71,7 +70,7 @@ def _assignment_fits(experiment: Experiment) -> None:
         raise ValueError(f"factors: '{between}' is between participants; {dealt}")
     if experiment.assignment != Assignment() and not kind.shares_clips:
         raise ValueError(f"assignment: {dealt}")
-    if fault := shares.fault(experiment) or grouping.fault(experiment):
+    if fault := shares.fault_of_assignment(experiment) or groups.fault_of_grouping(experiment):
         raise ValueError(fault)
 
 

@@ -1,39 +1,36 @@
 """From a declared experiment to its cells, clips and blocks: pure functions, no randomness."""
 
 from itertools import product
-from typing import TYPE_CHECKING
 
-from experiments.rendering import RenderSettings
-from experiments.trials.declared import BlockSpec, ClipSpec
-
-if TYPE_CHECKING:
-    from experiments.definition import Experiment
+from experiments.declaration import Experiment
+from experiments.declaration.rendering import RenderSettings
+from experiments.declaration.trial import BlockSpec, ClipSpec
 
 
-def cells(experiment: "Experiment") -> list[tuple[tuple[str, str], ...]]:
+def cells(experiment: Experiment) -> list[tuple[tuple[str, str], ...]]:
     """Every combination of levels, last factor fastest."""
     names = [[(factor.name, level.name) for level in factor.levels] for factor in experiment.factors]
     return [tuple(combination) for combination in product(*names)]
 
 
-def clips(experiment: "Experiment") -> list[ClipSpec]:
+def clips(experiment: Experiment) -> list[ClipSpec]:
     """Every unique clip: cells times exemplars."""
     numbers = range(1, experiment.exemplars.per_cell + 1)
     return [ClipSpec(cell, number) for cell in cells(experiment) for number in numbers]
 
 
-def rated_clips(experiment: "Experiment") -> list[ClipSpec]:
+def rated_clips(experiment: Experiment) -> list[ClipSpec]:
     """The clips that trials ask about; a reference is only shown beside them."""
     return [clip for clip in clips(experiment) if experiment.trial.rates(experiment, clip)]
 
 
-def rated_levels(experiment: "Experiment", factor: str) -> list[str]:
+def rated_levels(experiment: Experiment, factor: str) -> list[str]:
     """The declared levels of a factor, in order, without one whose clips are only shown as references."""
     rated = {clip.level(factor) for clip in rated_clips(experiment)}
     return [level.name for level in experiment.factor(factor).levels if level.name in rated]
 
 
-def blocks(experiment: "Experiment") -> list[BlockSpec]:
+def blocks(experiment: Experiment) -> list[BlockSpec]:
     """Blocks in declared order, repeats included; a participant's order is drawn by the server."""
     every = clips(experiment)
     split = experiment.blocks.split_by
@@ -45,7 +42,7 @@ def blocks(experiment: "Experiment") -> list[BlockSpec]:
     return single * experiment.blocks.repeats
 
 
-def render_settings(experiment: "Experiment", spec: ClipSpec) -> RenderSettings:
+def render_settings(experiment: Experiment, spec: ClipSpec) -> RenderSettings:
     """The experiment's render settings with the overrides of this clip's levels, in factor order."""
     settings = experiment.render
     for factor_name, level_name in spec.levels:
@@ -54,7 +51,7 @@ def render_settings(experiment: "Experiment", spec: ClipSpec) -> RenderSettings:
     return settings
 
 
-def exemplar_key(experiment: "Experiment", spec: ClipSpec) -> str:
+def exemplar_key(experiment: Experiment, spec: ClipSpec) -> str:
     """Key of the blink a clip shows: clips with the same key show the same blink (see `Exemplars`)."""
     own = [level for factor, level in spec.levels if factor in experiment.exemplars.own_per]
     return "/".join([*own, f"{spec.exemplar:03d}"])

@@ -30,3 +30,19 @@ def did_you_mean(word: str, candidates: Iterable[str]) -> str:
 def and_others(number: int) -> str:
     """Return ` (and 2 more problems)`, to end a line that tells the first; nothing where it is alone."""
     return f" (and {number} more problem{'s' if number > 1 else ''})" if number else ""
+
+
+# Numbers with the noun that they count.
+
+
+def counted(number: int, noun: str) -> str:
+    """How many of what.
+
+    Examples
+    --------
+    >>> counted(1, "blink")
+    '1 blink'
+    >>> counted(2000, "frame")
+    '2,000 frames'
+    """
+    return f"{number:,} {noun}{'' if number == 1 else 's'}"

@@ -1,11 +1,13 @@
 """Output that is whole or absent: written under a temporary name beside the target, then renamed."""
 
 import errno
+import json
+import math
 import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO, TextIO
+from typing import IO, Any, TextIO
 
 from experiments.command_line import NO_ROOM
 from experiments.errors import InputError
@@ -104,3 +106,30 @@ def whole_private_file(path: Path) -> Iterator[IO[bytes]]:
             yield stream
             stream.flush()
             os.fsync(stream.fileno())
+
+
+# JSON of numbers: what is undefined or infinite becomes null.
+
+
+def json_text(value: Any) -> str:
+    """Indented JSON; JSON has no NaN, so what is undefined or infinite becomes null.
+
+    Parameters
+    ----------
+    value : Any
+        Dictionaries, lists, tuples, text, numbers and None, in any depth.
+
+    Returns
+    -------
+    str
+        The same text for the same value, ending in a line break.
+    """
+    return json.dumps(_finite(value), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(inner) for inner in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -4,19 +4,132 @@ import re
 import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
 from experiments.consistency import check_consistency
-from experiments.definition import Experiment
+from experiments.declaration import Experiment
 from experiments.errors import InputError, and_others, did_you_mean, nearest
 from experiments.schema.keys import Key, is_tag
-from experiments.schema.upgrades import upgraded
-from experiments.toml_keys import MAX_DEPTH, has_endless_key
-from experiments.toml_lines import line_of
+from experiments.schema.stored import upgraded
 from experiments.wrong_values import is_follower, wrong_value
+
+# Tell dotted keys that take seconds to read in TOML text, in one pass and before any reader gets it.
+
+MAX_DEPTH = 32
+"""Tables and lists in one another; dotted keys make tables of any depth in a few letters each."""
+PART = r"""(?:[\w-]++|"(?>(?:[^"\\\n]++|\\[^\n])*)"|'[^'\n]*+')"""
+"""One part of a dotted key, bare or quoted."""
+_PARTS = re.compile(PART)
+_DOT = r"[ \t]*+\.[ \t]*+"
+# Without a way back, and the rest of an unclosed string is swallowed: each letter is looked at a few times at
+# most. Groups repeat in atomic ones: Debian 12's Python 3.11.2 matches their possessive repeats wrongly.
+_TOKEN = re.compile(
+    r'"""(?>(?:[^"\\]++|\\.|"{1,2}+(?!"))*)(?:"{3,5}+|.*+)'
+    r"|'''(?>(?:[^']++|'{1,2}+(?!'))*)(?:'{3,5}+|.*+)"
+    r"|\#[^\n]*+"
+    rf"|(?P<key>{PART}(?>(?:{_DOT}{PART}){{0,{MAX_DEPTH}}}))(?>(?P<beyond>{_DOT}{PART})?)"
+    r"""|["'].*+""",
+    re.DOTALL,
+)
+
+
+def has_endless_key(text: str) -> bool:
+    """Whether a dotted key has more parts than tables may stand in one another.
+
+    The time to read one grows with the square of its parts. Dots in texts and comments do not count; behind
+    the first mistake of a text, where every reader stops, the answer says nothing.
+    """
+    return any(token["beyond"] is not None for token in _TOKEN.finditer(text))
+
+
+def sum_of_cubes(text: str) -> int:
+    """Of the parts of every dotted key, which is how the time grows that an editor of TOML takes."""
+    keys = (token["key"] for token in _TOKEN.finditer(text))
+    return sum(len(_PARTS.findall(key)) ** 3 for key in keys if key is not None and "." in key)
+
+
+# Find the line of a key in TOML text, because the standard parser keeps no positions.
+
+_HEADER = re.compile(r"^\s*+(\[\[?+)([^\]]++)\]\]?+\s*+(#.*)?$")
+_STRING_OR_COMMENT = re.compile(
+    r'"""(?:\\.|[^\\])*?"{3,5}|\'\'\'.*?\'{3,5}|"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\'|#[^\n]*', re.DOTALL
+)
+_PART = re.compile(rf"\s*+({PART}|[^.\s]++)\s*+")
+_KEY = re.compile(r"^\s*([A-Za-z0-9_\-\"'.]+)\s*=")
+
+
+def line_of(text: str, location: Sequence[object]) -> int | None:
+    """Return the line (from 1) of the deepest part of `location` that stands in `text`, or None.
+
+    `location` is a path of keys and list indices, as pydantic reports it. Arrays of tables (`[[a]]`) count
+    their headers; keys inside inline tables are found on the line of the table's own key.
+    """
+    places = _places(text)
+    prefix = list(location)
+    while prefix:
+        # `[[a]]` has no line of its own where one says `a`: its first element's is meant.
+        for key in (tuple(prefix), (*prefix, 0)):
+            if key in places:
+                return places[key]
+        prefix.pop()
+    return None
+
+
+@lru_cache(maxsize=1)
+def _places(text: str) -> dict[tuple[object, ...], int]:
+    places: dict[tuple[object, ...], int] = {}
+    counts: dict[tuple[object, ...], int] = {}
+    here: tuple[object, ...] = ()
+    depth = 0
+    for number, line in enumerate(_without_strings(text).split("\n"), start=1):
+        inside = depth > 0
+        depth += sum(line.count(bracket) for bracket in "[{") - sum(line.count(bracket) for bracket in "]}")
+        if inside:
+            continue  # of a value over several lines
+        header = _HEADER.match(line)
+        if header is not None:
+            here = _enter(_split(header[2]), header[1] == "[[", counts)
+            places.setdefault(here, number)
+            continue
+        key = _KEY.match(line)
+        if key is not None:
+            places.setdefault((*here, *_split(key[1])), number)
+    return places
+
+
+def _without_strings(text: str) -> str:
+    """The text with its values' strings and its comments emptied, every line where it was."""
+
+    def emptied(match: re.Match[str]) -> str:
+        token = match[0]
+        if token.startswith(('"""', "'''")):
+            return '""' + "\n" * token.count("\n")
+        # A quoted key says what it is called; quoted values do not matter.
+        return "" if token.startswith("#") else re.sub(r"[\[\]{}#=]", "_", token)
+
+    return _STRING_OR_COMMENT.sub(emptied, text)
+
+
+def _enter(keys: list[str], is_array: bool, counts: dict[tuple[object, ...], int]) -> tuple[object, ...]:
+    """The path of a table header, with the index of the latest element wherever a key is an array."""
+    here: tuple[object, ...] = ()
+    for position, key in enumerate(keys):
+        here = (*here, key)
+        last = position == len(keys) - 1
+        if last and is_array:
+            counts[here] = counts.get(here, -1) + 1
+        if here in counts:
+            here = (*here, counts[here])
+    return here
+
+
+def _split(dotted: str) -> list[str]:
+    return [part.strip().strip("\"'") for part in _PART.findall(dotted)]
+
 
 FOLDER = Path(__file__).parent
 _LOCATION = re.compile(r"^([a-z_]+(?:\.(?:[a-z_]+|\d+))*): (.*)$")

@@ -2,20 +2,246 @@
 
 import csv
 import io
+import math
 import re
 import unicodedata
 from collections import Counter, defaultdict
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import count, islice, product
 from math import prod
 from pathlib import PurePosixPath
 
 from experiments.errors import InputError, did_you_mean
-from experiments.factor_names import TAKES, name_and_frame
-from experiments.level_order import in_order
-from experiments.name_patterns import FIELD, NamePattern
+from experiments.kinds import reserved_names
 from experiments.text_tables import separator_of
-from experiments.trials import reserved_names
+
+# Patterns of file names such as `{character}_{speed}.mp4`: what stands in the place of each field.
+#
+# As a regular expression such a pattern takes time that grows with each further field as a power of the
+# name's length: a few fields and one long name that does not fit kept a server busy for minutes. Here each
+# place of a name is looked at once a field.
+
+FIELD = re.compile(r"\{([A-Za-z][A-Za-z0-9_]*)\}")
+
+
+@dataclass(frozen=True)
+class NamePattern:
+    """Texts and, between them, fields of one letter or more without a slash, each as short as it can be.
+
+    Attributes
+    ----------
+    texts : tuple of str
+        One more than fields.
+    fields : tuple of str
+    """
+
+    texts: tuple[str, ...]
+    fields: tuple[str, ...]
+
+    @classmethod
+    def read(cls, pattern: str) -> "NamePattern":
+        """The pattern that stands in a text."""
+        parts = FIELD.split(pattern)
+        return cls(tuple(parts[::2]), tuple(parts[1::2]))
+
+    def fit(self, name: str) -> Mapping[str, str] | None:
+        """What stands for each field in a whole name; None where the name does not follow the pattern.
+
+        >>> NamePattern.read("{face}_{speed}.mp4").fit("ada_slow.mp4")
+        {'face': 'ada', 'speed': 'slow'}
+        >>> NamePattern.read("{face}_{speed}.mp4").fit("ada.mp4")
+        """
+        if not name.startswith(self.texts[0]):
+            return None
+        # For each field, the places where it may begin, and from which it led nowhere.
+        dead: list[set[int]] = [set() for _ in self.fields]
+        begins, ends = [len(self.texts[0])], list[int]()
+        while len(ends) < len(self.fields):
+            number = len(begins) - 1
+            end = self._next_end(name, number, begins[-1], ends_after=begins[-1], dead=dead)
+            while end is None:
+                dead[number].add(begins.pop())
+                if not begins:
+                    return None
+                number -= 1
+                end = self._next_end(name, number, begins[-1], ends_after=ends.pop(), dead=dead)
+            ends.append(end)
+            begins.append(end + len(self.texts[number + 1]))
+        return {field: name[begin:end] for field, begin, end in zip(self.fields, begins, ends, strict=False)}
+
+    def _next_end(
+        self, name: str, number: int, begin: int, ends_after: int, dead: list[set[int]]
+    ) -> int | None:
+        """The next place where a field may end so that the rest is not known to fail."""
+        text, is_last = self.texts[number + 1], number + 1 == len(self.fields)
+        slash = name.find("/", begin)
+        limit = len(name) if slash < 0 else slash
+        if is_last:
+            end = len(name) - len(text)
+            return end if ends_after < end <= limit and name.endswith(text) else None
+        end = name.find(text, ends_after + 1) if text else ends_after + 1
+        while 0 <= end <= limit and end < len(name):
+            if end + len(text) not in dead[number + 1]:
+                return end
+            end = name.find(text, end + 1) if text else end + 1
+        return None
+
+
+# What a factor may be called, by the parts that file names have in its place.
+
+WORDS = {
+    "speed": "slow slower slowest medium middle normal fast faster fastest quick",
+    "emotion": "happy sad angry anger afraid fear fearful neutral disgust surprise joy",
+    "gender": "female male woman man women men girl boy nonbinary",
+    "age": "young middleaged old adult child",
+    "side": "left right centre center",
+    "direction": "up down upward downward upwards downwards forward forwards backward backwards",
+    "size": "tiny small medium large big huge",
+    "height": "low mid high",
+    "colour": "red green blue yellow black white grey gray orange purple brown pink",
+    "agent": "human robot android avatar person agent",
+    "condition": "control treatment baseline experimental",
+    "system": "ours baseline proposed mocap gt groundtruth reference natural ablation previous handmade",
+    "presence": "on off with without yes no present absent",
+    "quality": "original compressed reference impaired",
+    "profile": "real model",
+}  # fmt: skip
+"""Names of factors, each with words that its levels often are; the first that has all of them is taken."""
+TAKES = ("exemplar", "ex", "take", "rep", "clip", "no", "nr", "n", "v", "version", "item", "trial")
+"""Words that number clips of the same kind."""
+_KEYED = re.compile(r"([A-Za-z][A-Za-z0-9]*)([-=])(.+)")
+_NUMBERED = re.compile(r"([A-Za-z]+)()(\d+(?:[.p]\d+)?)")
+_WITH_UNIT = re.compile(r"(.*\d)(ms|s|fps|hz|px|mm|cm|deg|db|percent)", re.IGNORECASE)
+
+
+def name_and_frame(parts: Sequence[str]) -> tuple[str | None, str, str]:
+    """What a factor may be called by its levels, and what stands before and after each of them.
+
+    Parameters
+    ----------
+    parts : sequence of str
+        The parts of file names in one place, such as `speed-slow` and `speed-fast`, or `slow` and `fast`.
+
+    Returns
+    -------
+    str or None
+        The name; None where the parts do not give one away.
+    str
+        What begins each part without belonging to the level, such as `speed-`.
+    str
+        What ends each part likewise, such as the unit of `dur60ms`.
+    """
+    name, head = _name_and_head(parts)
+    tails = {fit[2] if (fit := _WITH_UNIT.fullmatch(part)) else "" for part in parts}
+    if name is None and len(tails) == 1 and (tail := tails.pop()):
+        name, head = _name_and_head([part.removesuffix(tail) for part in parts])
+        if name is not None:
+            return name, head, tail
+    return name, head, ""
+
+
+def _name_and_head(parts: Sequence[str]) -> tuple[str | None, str]:
+    for form in (_KEYED, _NUMBERED):
+        fits = [form.fullmatch(part) for part in parts]
+        heads = {fit[1] + fit[2] for fit in fits if fit is not None}
+        if None not in fits and len(heads) == 1:
+            head = heads.pop()
+            name = head.rstrip("-=").lower()
+            return (name if _free(name) else None), head
+    words = {re.sub(r"[^a-z]", "", part.lower()) for part in parts}
+    guessed = (name for name, levels in WORDS.items() if words <= set(levels.split()))
+    return next((name for name in guessed if _free(name)), None), ""
+
+
+def _free(name: str) -> bool:
+    return name not in reserved_names()
+
+
+# The order of levels that were read from file names: numbers by size, words of known scales by place.
+
+SCALES = tuple(
+    {word: rank for rank, word in enumerate(words.split())}
+    for words in (
+        "verylow lowest lower low mid medium middle moderate normal average high higher highest veryhigh",
+        "veryslow slowest slower slow medium middle moderate normal average quick fast quicker faster "
+        "quickest fastest veryfast",
+        "tiny verysmall smallest smaller small medium middle normal average big large bigger "
+        "larger biggest largest huge verylarge",
+        "xs s m l xl xxl",
+        "min medium mid max",
+        "minimum medium middle maximum",
+        "subtle slight weak mild light medium moderate strong severe extreme",
+        "veryshort shortest shorter short medium middle normal average long longer longest verylong",
+        "few some several many most all",
+        "little some half much full",
+        "partial half full complete",
+        "never rarely seldom sometimes occasionally often usually always",
+        "terrible bad poor fair okay good excellent perfect",
+        "freezing cold cool lukewarm warm hot",
+        "silent quiet soft medium normal loud",
+        "dark dim medium normal bright",
+        "baby child adolescent teen young adult middleaged old elderly",
+        "before during after",
+        "pre mid post",
+        "first second third fourth fifth sixth last",
+        "control treatment",
+        "left center centre middle right",
+        "no yes",
+        "off on",
+        "false true",
+        "without with",
+        "absent present",
+    )
+)
+"""Words of usual scales in their order."""
+LEAST = {"none", "zero", "nothing", "baseline"}
+"""Words that begin every scale."""
+_NUMBERED_LEVEL = re.compile(r"((?:[^\d+-]\D*)?)([+-]?\d+(?:\.\d+)?)(\D*)")
+
+
+def in_order(levels: Sequence[str]) -> list[str]:
+    """The different levels in the order of tables and contrasts.
+
+    Parameters
+    ----------
+    levels : sequence of str
+        As files or the rows of a table have them, repeated.
+
+    Returns
+    -------
+    list of str
+        By size where all are numbers, or one number between the same words (`2ms`, `10ms`); by their place
+        where all are words of one scale (`slow`, `medium`, `fast`); else as they came.
+    """
+    different = list(dict.fromkeys(levels))
+    for places in (_numbers(different), _places(different)):
+        if places is not None:
+            return [
+                level for _, level in sorted(zip(places, different, strict=True), key=lambda pair: pair[0])
+            ]
+    return different
+
+
+def _numbers(levels: Sequence[str]) -> list[float] | None:
+    """The number of each level; None unless every one has one and the same words around it."""
+    try:
+        numbers = [float(level) for level in levels]
+    except ValueError:
+        fits = [fit for level in levels if (fit := _NUMBERED_LEVEL.fullmatch(level)) is not None]
+        alike = len(fits) == len(levels) and len({(fit[1], fit[3]) for fit in fits}) == 1
+        return [float(fit[2]) for fit in fits] if alike else None
+    return numbers if all(map(math.isfinite, numbers)) else None
+
+
+def _places(levels: Sequence[str]) -> list[int] | None:
+    """The place of each level in the first scale that has them all; None without one."""
+    words = [re.sub(r"[\W_]", "", level.casefold()) for level in levels]
+    for scale in SCALES:
+        if all(word in scale or word in LEAST for word in words) and any(word in scale for word in words):
+            return [scale.get(word, -1) for word in words]
+    return None
+
 
 Placed = dict[str, tuple[dict[str, str], int]]
 """File name -> (levels by factor, exemplar)."""

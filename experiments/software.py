@@ -4,7 +4,7 @@ import platform
 import re
 from importlib import metadata
 
-from experiments.base import Declaration
+from experiments.declaration.base import Declaration
 
 PROGRAM = "palpebra"
 _NAME = re.compile(r"^[A-Za-z0-9._-]+")

@@ -4,8 +4,7 @@ import json
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from experiments.counted import counted
-from experiments.errors import did_you_mean
+from experiments.errors import counted, did_you_mean
 
 MAX_SHOWN = 60
 

@@ -2,9 +2,8 @@
 
 import os
 
-from experiments.command_line import run_command_line
+from experiments.command_line import lazy_app, run_command_line
 from experiments.errors import InputError
-from experiments.lazy_commands import lazy_app
 
 PRIVATE = 0o077
 COMMANDS = {

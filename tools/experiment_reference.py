@@ -16,15 +16,15 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from experiments.base import Language, LevelName, Name
-from experiments.definition import Experiment
-from experiments.definition.forms import Form, Question
-from experiments.definition.groups import Answer, GroupName
+from experiments.declaration import Experiment
+from experiments.declaration.base import Language, LevelName, Name
+from experiments.declaration.forms import Form, Question
+from experiments.declaration.rendering import ProfileName
+from experiments.declaration.tables import Answer, GroupName
+from experiments.declaration.trial import TrialDeclaration
+from experiments.kinds import KINDS
 from experiments.load import parse_experiment
-from experiments.rendering import ProfileName
 from experiments.schema.keys import Key, is_tag, keys, models_inside
-from experiments.trials import KINDS
-from experiments.trials.declared import TrialDeclaration
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "docs" / "reference" / "every-key.toml"
 HEADER = ("key", "type", "default", "range", "meaning", "example")

@@ -21,7 +21,7 @@ from pydantic_core import PydanticUndefined  # noqa: E402
 from sqlalchemy import Table  # noqa: E402
 
 from experiments.columns import RUN_COLUMNS, Column  # noqa: E402
-from experiments.trials import views  # noqa: E402
+from experiments.kinds import views  # noqa: E402
 from server.core.settings import Settings  # noqa: E402
 from server.models import Base  # noqa: E402
 from tools.experiment_reference import experiment_reference  # noqa: E402

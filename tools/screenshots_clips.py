@@ -20,8 +20,8 @@ from PIL import Image, ImageDraw, ImageFont
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
+from experiments.declaration.rendering import RenderSettings  # noqa: E402
 from experiments.errors import InputError  # noqa: E402
-from experiments.rendering import RenderSettings  # noqa: E402
 from stimuli_builder.blinks.blink_model import default_model  # noqa: E402
 from stimuli_builder.blinks.profile import resample, to_full_closure  # noqa: E402
 from stimuli_builder.blinks.textbook import textbook_profile  # noqa: E402

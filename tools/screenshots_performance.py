@@ -12,7 +12,7 @@ from PIL import Image, ImageDraw, ImageFont
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from experiments.rendering import RenderSettings  # noqa: E402
+from experiments.declaration.rendering import RenderSettings  # noqa: E402
 from stimuli_builder.characters.colour import linear_to_srgb  # noqa: E402
 from stimuli_builder.clips.characters import find_character, shipped_names  # noqa: E402
 from stimuli_builder.clips.curves import ClipCurve, frame_windows  # noqa: E402

@@ -4,8 +4,7 @@ import os
 from pathlib import Path
 
 from experiments.files import temporary_beside
-from experiments.manifest import file_sha256
-from experiments.source_video import SourceVideo
+from experiments.manifest import SourceVideo, file_sha256
 from video_conversion.conversion import Conversion, conversion_of
 from video_conversion.encoding import copy_pictures, encode, encoder_signature
 from video_conversion.prepared import Prepared

@@ -4,7 +4,7 @@ from pathlib import Path, PurePosixPath
 
 from pydantic import BaseModel, ConfigDict
 
-from experiments.source_video import FrameRate, SourceVideo
+from experiments.manifest import FrameRate, SourceVideo
 
 VIDEO_ENDINGS = (
     ".mp4", ".m4v", ".mov", ".webm", ".mkv", ".avi", ".mpg", ".mpeg", ".m2v", ".ts", ".mts", ".m2ts", ".wmv",

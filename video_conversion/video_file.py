@@ -11,7 +11,7 @@ from typing import Any
 import av
 from av.error import FFmpegError
 
-from experiments.source_video import ColourRange
+from experiments.manifest import ColourRange
 from video_conversion.frame_times import LONE_FRAME_RATE, constant_rate, typical_rate
 from video_conversion.prepared import major_brand
 

@@ -12,7 +12,7 @@ from analysis.commands.output import saying
 
 if TYPE_CHECKING:
     from analysis.capsule import Compared
-    from experiments.capsule.declaration import Capsule
+    from experiments.capsule import Capsule
 
 
 # `analysis check-paper`: what printed figures and sentences say about themselves.
@@ -61,8 +61,7 @@ def _check_document(file: Path, json: Path | None) -> int:
     from analysis.paper.document import read_document
     from analysis.paper.statistics import check_text
     from analysis.report.formats import wrap
-    from experiments.files import whole_file
-    from experiments.json import json_text
+    from experiments.files import json_text, whole_file
 
     result = check_text(read_document(file))
     if json is not None:
@@ -87,8 +86,7 @@ def _check_figures(figures: Path, json: Path | None) -> int:
     from analysis.paper import check as checks
     from analysis.paper.printed import load_figures
     from analysis.report.formats import wrap
-    from experiments.files import whole_file
-    from experiments.json import json_text
+    from experiments.files import json_text, whole_file
 
     paper = load_figures(figures)
     findings = checks.check_paper(paper)
@@ -138,8 +136,7 @@ def verify(
 
       analysis verify exp3-capsule.zip --no-report
     """
-    from experiments.capsule.declaration import REPORT_FOLDER
-    from experiments.capsule.opening import open_capsule
+    from experiments.capsule import REPORT_FOLDER, open_capsule
     from experiments.software import differences, present_software
 
     with TemporaryDirectory(prefix="capsule-") as temporary, saying("verifying") as say:
@@ -166,7 +163,7 @@ def _check_software(listed: "Capsule", folder: Path) -> None:
     """The versions of the list are those of the capsule's other file of them; else one was changed alone."""
     import json
 
-    from experiments.capsule.declaration import SOFTWARE_FILE
+    from experiments.capsule import SOFTWARE_FILE
     from experiments.errors import InputError
 
     path = folder / SOFTWARE_FILE

@@ -99,8 +99,7 @@ def save_json(path: Path | None, numbers: dict[str, Any], synthetic: bool | None
     Called before anything is printed: a reader like `head` that closes the pipe ends the command there.
     `synthetic` is put before numbers that do not say it.
     """
-    from experiments.files import whole_file
-    from experiments.json import json_text
+    from experiments.files import json_text, whole_file
 
     if path is None:
         return

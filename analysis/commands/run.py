@@ -18,7 +18,7 @@ from analysis.commands.output import (
 from experiments.errors import InputError
 
 if TYPE_CHECKING:
-    from experiments.definition import Experiment
+    from experiments.declaration import Experiment
 
 
 class Origin(StrEnum):

@@ -8,7 +8,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
-from experiments.base import Declaration
+from experiments.declaration.base import Declaration
 from experiments.errors import InputError, did_you_mean
 
 SHIPPED = Path(__file__).parent / "published" / "FIGURES.toml"

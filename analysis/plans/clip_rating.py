@@ -22,13 +22,13 @@ from analysis.report.within_contents import methods_of, part_of
 from analysis.within.anova import AnovaResult, linear_anova
 from analysis.within.between import BetweenDesign, between_design, no_groups
 from analysis.within.cell_means import CellTable, cell_table
-from experiments.definition import Experiment
+from experiments.declaration import Experiment
+from experiments.declaration.clip_rating import clip_rating_of
+from experiments.declaration.trial import RatedScale
 from experiments.design import rated_levels
 from experiments.errors import InputError
-from experiments.trials.clip_rating.columns import RATINGS
-from experiments.trials.clip_rating.declaration import clip_rating_of
-from experiments.trials.declared import RatedScale
-from experiments.trials.scales import scale_called, scales_of
+from experiments.kinds.clip_rating import RATINGS
+from experiments.kinds.scales import scale_called, scales_of
 
 # Ratings of a study: cell means, their tests, and what is computed beside them.
 

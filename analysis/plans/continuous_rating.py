@@ -11,10 +11,10 @@ from analysis.read.reading import Reading
 from analysis.report.contents import Contents
 from analysis.traces import ClipTraces, MeanTrace, lag_of, mean_trace
 from experiments import design
-from experiments.definition import Experiment
+from experiments.declaration import Experiment
+from experiments.declaration.continuous_rating import ContinuousRating, continuous_rating_of
 from experiments.errors import InputError
-from experiments.trials.continuous_rating.columns import TRACES
-from experiments.trials.continuous_rating.declaration import ContinuousRating, continuous_rating_of
+from experiments.kinds.continuous_rating import TRACES
 
 READING = Reading(
     TRACES,

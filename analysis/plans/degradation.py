@@ -14,11 +14,9 @@ from analysis.report.contents import Contents, Part, caption
 from analysis.report.formats import Table
 from analysis.report.numbers import DASH, fixed, interval
 from experiments import design
-from experiments.trials.clip_rating.declaration import clip_rating_of
-from experiments.trials.clip_rating.reference import RatingReference
-from experiments.trials.clip_rating.scales import SCALE_NAME
-from experiments.trials.declared import ClipSpec, RatedScale
-from experiments.trials.scales import scales_of
+from experiments.declaration.clip_rating import SCALE_NAME, RatingReference, clip_rating_of
+from experiments.declaration.trial import ClipSpec, RatedScale
+from experiments.kinds.scales import scales_of
 
 METHODS = (
     " DMOS is the mean over participants of their mean rating of a cell after its reference, with a 95% "

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from analysis.read.study_answers import StudyAnswers
 from experiments import rules
-from experiments.definition import Experiment
-from experiments.rules.exclusion import LeavesOutRuns, LeavesOutTrials, RunTrials, Source
+from experiments.declaration import Experiment
+from experiments.rules.exclusions import LeavesOutRuns, LeavesOutTrials, RunTrials, Source
 
 
 @dataclass(frozen=True)

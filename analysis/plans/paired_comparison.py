@@ -22,11 +22,10 @@ from analysis.report.json_output import exclusions_data, left_out, study_data
 from analysis.report.numbers import apa_p, fixed, p_value
 from experiments import design
 from experiments.assignment.groups import groups, name_of, of_group
-from experiments.definition import Experiment
+from experiments.declaration import Experiment
+from experiments.declaration.paired_comparison import CODES, paired_comparison_of
 from experiments.errors import InputError
-from experiments.trials.paired_comparison.answer import CODES
-from experiments.trials.paired_comparison.columns import COMPARISONS
-from experiments.trials.paired_comparison.declaration import paired_comparison_of
+from experiments.kinds.paired_comparison import COMPARISONS
 
 # The comparisons of a study: its cells as items, and their levels in the compared factors.
 

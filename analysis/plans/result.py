@@ -16,7 +16,7 @@ from analysis.within.simple_effects import SimpleEffect, reports_multivariate, s
 if TYPE_CHECKING:
     from analysis.plans.exclusions import Exclusions
     from analysis.robust import Companions
-    from experiments.definition import Experiment
+    from experiments.declaration import Experiment
 
 
 TIMES = " × "

@@ -12,12 +12,11 @@ from analysis.thresholds.answers import Answers, counted
 from analysis.thresholds.people import fit_thresholds
 from analysis.thresholds.plane_people import SeriesPlane, fit_planes, points_of
 from analysis.thresholds.series import Difference, SeriesFit, answers_of, differences, series_labels
-from experiments.definition import Experiment
+from experiments.declaration import Experiment
+from experiments.declaration.threshold import CODES, Threshold, YesNo, threshold_of
 from experiments.errors import InputError
-from experiments.trials.threshold.answer import CODES
-from experiments.trials.threshold.columns import THRESHOLDS
-from experiments.trials.threshold.declaration import Threshold, YesNo, threshold_of
-from experiments.trials.threshold.grid import model, series_of
+from experiments.kinds.threshold import THRESHOLDS
+from experiments.kinds.threshold_grid import model, series_of
 
 READING = Reading(THRESHOLDS, texts=("response", "series", "interval"), numbers=("value",))
 

@@ -12,7 +12,7 @@ from analysis.read.number_columns import IN_COVARIATE, numbers, unusual_numbers
 from analysis.read.reading import EXPORT_COLUMNS, rows_that_count
 from analysis.read.text_table import TextTable, read_text_table, texts_required
 from experiments.errors import InputError
-from experiments.trials.clip_rating.columns import RATINGS
+from experiments.kinds.clip_rating import RATINGS
 
 
 @dataclass(frozen=True)

@@ -20,9 +20,9 @@ from analysis.report.pictures import BESIDE, COLOURS, MARKERS, STYLE, new_figure
 from analysis.within.anova import AnovaResult
 from analysis.within.estimates import margin_of
 from analysis.within.marginal_means import margin
+from experiments.declaration.trial import RatedScale
 from experiments.error_bars import within_participant_errors
-from experiments.trials.declared import RatedScale
-from experiments.trials.scales import scale_called
+from experiments.kinds.scales import scale_called
 
 Floats = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from analysis.report.json_output import exclusions_data, left_out, study_data
 from analysis.report.numbers import fixed
 from analysis.report.threshold_contents import difference_sentence, differences_table
 from analysis.thresholds.plane_people import PlanesResult
-from experiments.trials.threshold.declaration import threshold_of
+from experiments.declaration.threshold import threshold_of
 
 if TYPE_CHECKING:
     from analysis.thresholds.plane_people import SeriesPlane

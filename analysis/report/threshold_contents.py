@@ -18,7 +18,7 @@ from analysis.thresholds.likelihood import function
 from analysis.thresholds.people import ThresholdsResult
 from analysis.thresholds.psychometric import Threshold
 from analysis.thresholds.series import answers_of
-from experiments.trials.threshold.declaration import threshold_of
+from experiments.declaration.threshold import threshold_of
 
 if TYPE_CHECKING:
     from analysis.thresholds.series import Difference, SeriesFit

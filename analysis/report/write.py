@@ -13,8 +13,7 @@ from analysis.report.latex import NEEDS, as_document, as_latex
 from analysis.report.numbers import heading_pieces, pieces, signed, signed_cell
 from analysis.report.word import as_docx
 from experiments.errors import InputError
-from experiments.files import whole_file
-from experiments.json import json_text
+from experiments.files import json_text, whole_file
 
 if TYPE_CHECKING:
     from jinja2 import Environment

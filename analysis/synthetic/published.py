@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from analysis.within.contrasts import effect_members, effect_name, orthonormal_basis
-from experiments.definition import Experiment
+from experiments.declaration import Experiment
+from experiments.declaration.trial import RatedScale
 from experiments.design import rated_levels
 from experiments.errors import InputError, did_you_mean
-from experiments.trials.declared import RatedScale
-from experiments.trials.scales import scales_of
+from experiments.kinds.scales import scales_of
 
 FOLDER = Path(__file__).parent
 

@@ -17,11 +17,11 @@ from analysis.synthetic.published import (
 )
 from analysis.synthetic.repair import Repaired, repair, value_of
 from analysis.synthetic.targets import GivenWay, Steps, Targets, TestTarget, make_feasible, make_targets
-from experiments.definition import Experiment
+from experiments.declaration import Experiment
+from experiments.declaration.trial import RatedScale
 from experiments.errors import InputError
+from experiments.kinds.scales import scale_called, scales_of
 from experiments.load import SHIPPED, load_experiment
-from experiments.trials.declared import RatedScale
-from experiments.trials.scales import scale_called, scales_of
 
 # Means and covariance of the cells that give the wanted figures, and participants drawn from them.
 

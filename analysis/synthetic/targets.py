@@ -20,8 +20,8 @@ from analysis.synthetic.published import (
     decimals,
     window,
 )
+from experiments.declaration.trial import RatedScale
 from experiments.errors import InputError
-from experiments.trials.declared import RatedScale
 
 Floats = NDArray[np.float64]
 

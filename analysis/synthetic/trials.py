@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from analysis.synthetic.published import DesignSpace
 from analysis.synthetic.synthesise import Synthetic
 from analysis.synthetic.targets import Steps
-from experiments.definition import Experiment
+from experiments.declaration import Experiment
+from experiments.declaration.trial import BlockSpec, ClipSpec, RatedScale
 from experiments.design import blocks, exemplar_key, rated_clips
 from experiments.files import whole_file
+from experiments.kinds.clip_rating import RATINGS
 from experiments.schema.canonical import definition_sha256
 from experiments.spreadsheet import guarded_row
-from experiments.trials.clip_rating.columns import RATINGS
-from experiments.trials.declared import BlockSpec, ClipSpec, RatedScale
 
 Integers = NDArray[np.int64]
 Row = dict[str, Any]

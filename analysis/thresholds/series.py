@@ -15,9 +15,9 @@ from analysis.thresholds.answers import Answers
 from analysis.thresholds.likelihood import Trials
 from analysis.thresholds.people import ThresholdsResult
 from analysis.within.adjustments import holm
-from experiments.definition import Experiment
-from experiments.trials.threshold.declaration import YesNo, threshold_of
-from experiments.trials.threshold.grid import seconds, series_of
+from experiments.declaration import Experiment
+from experiments.declaration.threshold import YesNo, threshold_of
+from experiments.kinds.threshold_grid import seconds, series_of
 
 
 @dataclass(frozen=True)

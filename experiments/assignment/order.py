@@ -1,25 +1,78 @@
 """Every clip for everyone, one a trial: in blocks, with practice before and attention checks between."""
 
 import random
-from collections.abc import Callable
-from itertools import cycle, islice
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Callable, Sequence
+from itertools import cycle, groupby, islice
+from typing import Literal
 
 from experiments import design
-from experiments.assignment.block_orders import block_orders
-from experiments.assignment.checks import attention_by_block
 from experiments.assignment.groups import Seat, cells_of, seat_of
-from experiments.assignment.levels import seen_levels, sees
-from experiments.assignment.shares import share
-from experiments.assignment.trial import Shown, Trial
-from experiments.trials.declared import BlockSpec, ClipSpec
+from experiments.assignment.incomplete_blocks import block_orders
+from experiments.assignment.shares import seen_levels, sees_levels, share
+from experiments.declaration import Experiment
+from experiments.declaration.trial import BlockSpec, ClipSpec
+from experiments.kinds.kind import Shown, Trial
 
-if TYPE_CHECKING:
-    from experiments.definition import Experiment
+# How many checks a run has in each block, and motion checks between its trials, for every kind of trial.
+
+RECRUITED_MOTION_CHECKS = 2
+RECRUITED_QUESTIONS = 1
+"""What `online_recruitment` asks of each run at least."""
+
+
+def motion_checks_by_block(experiment: Experiment) -> list[int]:
+    """How many motion checks each block has."""
+    declared = experiment.evidence
+    least = RECRUITED_MOTION_CHECKS if declared.online_recruitment else 0
+    return _spread(declared.motion_checks.per_block, least, len(design.blocks(experiment)))
+
+
+def attention_by_block(experiment: Experiment) -> list[int]:
+    """How many attention questions each block has."""
+    least = RECRUITED_QUESTIONS if experiment.evidence.online_recruitment else 0
+    return _spread(experiment.attention.per_block, least, len(design.blocks(experiment)))
+
+
+def _spread(per_block: int, least: int, blocks: int) -> list[int]:
+    """`per_block` in each block, and what is missing to `least` spread evenly over the blocks."""
+    counts = [per_block] * blocks
+    missing = max(0, least - sum(counts))
+    for number in range(missing):
+        counts[(2 * number + 1) * blocks // (2 * missing)] += 1
+    return counts
+
+
+def with_checks(experiment: Experiment, trials: Sequence[Trial], seed: int, available: int) -> list[Trial]:
+    """Put the declared number of checks into each block, at random places but never first.
+
+    Parameters
+    ----------
+    seed : int
+        Of the run; the order of the other trials does not depend on the checks.
+    available : int
+        How many check clips there are; none is drawn twice.
+    """
+    counts = motion_checks_by_block(experiment)
+    if not any(counts) or not available:
+        return list(trials)
+    rng = random.Random(f"{seed}/checks")
+    drawn = iter(rng.sample(range(available), available))
+    planned: list[Trial] = []
+    for block, members in groupby(trials, lambda trial: trial.block):
+        inside = list(members)
+        asked = min(counts[block - 1], len(inside)) if block else 0
+        places = rng.sample(range(1, len(inside) + 1), asked)
+        for position in sorted(places, reverse=True):
+            number = next(drawn, None)
+            if number is not None:
+                label = inside[0].block_label
+                inside.insert(position, Trial("check", block, label, check=number))
+        planned.extend(inside)
+    return planned
 
 
 def single_clips(
-    experiment: "Experiment", seed: int, slot: int, asked: Callable[[random.Random], int]
+    experiment: Experiment, seed: int, slot: int, asked: Callable[[random.Random], int]
 ) -> list[Trial]:
     """The trials of one participant in order.
 
@@ -47,13 +100,13 @@ def single_clips(
     return trials
 
 
-def _levels(experiment: "Experiment") -> list[BlockSpec]:
+def _levels(experiment: Experiment) -> list[BlockSpec]:
     """One block of each level of the split factor (or the one block of all clips), repeats left out."""
     every = design.blocks(experiment)
     return every[: len(every) // experiment.blocks.repeats]
 
 
-def ordered_blocks(experiment: "Experiment", rng: random.Random, slot: int) -> list[BlockSpec]:
+def ordered_blocks(experiment: Experiment, rng: random.Random, slot: int) -> list[BlockSpec]:
     """The blocks of one participant in order, repeats included."""
     declared = experiment.blocks
     levels = _levels(experiment)
@@ -65,11 +118,11 @@ def ordered_blocks(experiment: "Experiment", rng: random.Random, slot: int) -> l
     return [levels[index] for index in orders[slot % len(orders)]] * declared.repeats
 
 
-def _practice(experiment: "Experiment", seat: Seat, rng: random.Random) -> list[Trial]:
+def _practice(experiment: Experiment, seat: Seat, rng: random.Random) -> list[Trial]:
     """Clips from as many different cells as there are practice trials, exemplars at random."""
     seen, rates = seen_levels(experiment, seat.number), experiment.trial.rates
     own = (cell for cell in cells_of(experiment, seat) if rates(experiment, ClipSpec(cell, 1)))
-    cells = [cell for cell in own if sees(seen, cell)]
+    cells = [cell for cell in own if sees_levels(seen, cell)]
     rng.shuffle(cells)
     drawn = islice(cycle(cells), experiment.practice.trials)
     clips = [ClipSpec(cell, rng.randint(1, experiment.exemplars.per_cell)) for cell in drawn]
@@ -81,7 +134,7 @@ def _of_one(kind: Literal["practice", "main"], block: int, label: str, clip: Cli
 
 
 def with_attention(
-    experiment: "Experiment", main: list[Trial], rng: random.Random, asked: Callable[[random.Random], int]
+    experiment: Experiment, main: list[Trial], rng: random.Random, asked: Callable[[random.Random], int]
 ) -> list[Trial]:
     """Put the declared number of instructed ratings between a block's trials, never before the first."""
     trials = list(main)

@@ -10,22 +10,19 @@ from typing import Annotated
 
 from pydantic import Field
 
-from experiments.rules.attention import AttentionChecks
-from experiments.rules.drop_failed_plays import DropFailedPlays
-from experiments.rules.drop_slow_trials import DropSlowTrials
-from experiments.rules.exclude_attention import ExcludeAttention
-from experiments.rules.exclude_evidence import ExcludeEvidence
-from experiments.rules.exclude_fast import ExcludeFast
-from experiments.rules.exclude_incomplete import ExcludeIncomplete
-from experiments.rules.exclude_playback import ExcludePlayback
-from experiments.rules.exclude_straight_lining import ExcludeStraightLining
+from experiments.rules.exclusions import (
+    DropFailedPlays,
+    DropSlowTrials,
+    ExcludeAttention,
+    ExcludeEvidence,
+    ExcludeFast,
+    ExcludeIncomplete,
+    ExcludePlayback,
+    ExcludeStraightLining,
+)
 from experiments.rules.playback import PlaybackRules
-from experiments.rules.screen_attention import ScreenAttention
-from experiments.rules.screen_device import ScreenDevice
-from experiments.rules.screen_form_answer import ScreenFormAnswer
-from experiments.rules.warn_fast import WarnFast
-from experiments.rules.warn_pattern import WarnPattern
-from experiments.rules.warn_same_answer import WarnSameAnswer
+from experiments.rules.screening import AttentionChecks, ScreenAttention, ScreenDevice, ScreenFormAnswer
+from experiments.rules.warnings import WarnFast, WarnPattern, WarnSameAnswer
 
 ScreeningRule = Annotated[ScreenFormAnswer | ScreenAttention | ScreenDevice, Field(discriminator="rule")]
 """Ends a run while it goes on."""

@@ -4,9 +4,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from experiments.definition import Experiment
-from experiments.schema.effects import Effect, effect_of, effects_with
-from experiments.trials import KINDS
+from experiments.declaration import Experiment
+from experiments.kinds import KINDS
+from experiments.schema.effects import EFFECTS, Effect, effect_of, effects_with
 
 TAGS = ("kind", "type", "rule")
 
@@ -150,3 +150,15 @@ def _in_words(value: Any) -> str:
 def _short(value: Any) -> str:
     text = _in_words(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+# What a page needs to edit a declaration: every key with its type, limits and help.
+
+
+def editor_schema() -> dict[str, Any]:
+    """The declaration's JSON schema, and the effects of edits by path, those of each kind of trial apart."""
+    return {
+        "schema": Experiment.model_json_schema(),
+        "effects": dict(EFFECTS),
+        "trial_effects": {name: dict(kind.effects) for name, kind in KINDS.items()},
+    }

@@ -10,8 +10,8 @@ from typing import Any, Literal, NamedTuple, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from experiments.definition import Experiment
-from experiments.trials.declared import ByKind
+from experiments.declaration import Experiment
+from experiments.declaration.trial import ByKind
 
 
 class Key(NamedTuple):

@@ -14,8 +14,8 @@ const data = mkdtempSync(join(tmpdir(), "openapi-"));
 const TEXTS = new Set(["description", "summary", "title"]);
 const program = [
   "import json",
-  "from experiments.schema.editor import editor_schema",
-  "from experiments.trials import reserved_names",
+  "from experiments.schema.difference import editor_schema",
+  "from experiments.kinds import reserved_names",
   "from server.app import create_app",
   "from server.core.settings import Settings",
   "print(json.dumps([create_app(Settings()).openapi(), editor_schema(), sorted(reserved_names())], ensure_ascii=True))",

@@ -12,7 +12,7 @@ from sqlalchemy.exc import DBAPIError
 from sqlalchemy.orm import Session, SessionTransaction
 
 from experiments.errors import InputError
-from experiments.trials import views
+from experiments.kinds import views
 from server.models import Base
 
 # The second wall between laboratories: on PostgreSQL a member's transactions see her own studies' rows.

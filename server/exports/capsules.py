@@ -16,7 +16,7 @@ from rocrate.model.person import Person
 from rocrate.rocrate import ROCrate
 from sqlalchemy.orm import Session
 
-from experiments.capsule.declaration import (
+from experiments.capsule import (
     CAPSULE_FILE,
     MANIFEST,
     REPORT_FOLDER,
@@ -24,12 +24,13 @@ from experiments.capsule.declaration import (
     Capsule,
     CapsuleFile,
     ReportSource,
+    listed_files,
+    pack,
+    report_input,
 )
-from experiments.capsule.packing import listed_files, pack, report_input
-from experiments.definition import Experiment
+from experiments.declaration import Experiment
 from experiments.errors import InputError
-from experiments.files import whole_file
-from experiments.json import json_text
+from experiments.files import json_text, whole_file
 from experiments.manifest import Manifest
 from experiments.software import PROGRAM, Software, present_software
 from server.accounts.audit import record

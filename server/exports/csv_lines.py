@@ -12,11 +12,10 @@ from sqlalchemy import Connection
 from sqlalchemy.orm import Session
 
 from experiments.columns import View
-from experiments.columns.stretches import Stretch, Stretches
-from experiments.columns.view import Dialect, levels_at, with_levels
+from experiments.columns.view import Dialect, Stretch, Stretches, levels_at, with_levels
 from experiments.errors import InputError
+from experiments.kinds import KINDS
 from experiments.spreadsheet import csv_lines, csv_text
-from experiments.trials import KINDS
 from server.core.values import encoded
 from server.exports import repository
 from server.exports.extract import Extract

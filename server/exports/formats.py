@@ -13,7 +13,7 @@ from pydantic import TypeAdapter
 from sqlalchemy.orm import Session
 
 from experiments.columns import Column
-from experiments.columns.identities import IDENTITY_COLUMNS
+from experiments.columns.runs import IDENTITY_COLUMNS
 from experiments.errors import InputError
 from experiments.spreadsheet import guarded_csv
 from server.core.values import encoded, now

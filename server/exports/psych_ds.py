@@ -10,13 +10,13 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from sqlalchemy.orm import Session
 
 from experiments.columns import Column
-from experiments.definition import Experiment
-from experiments.definition.dataset import Creator
+from experiments.declaration import Experiment
+from experiments.declaration.tables import Creator
 from experiments.design import rated_levels
+from experiments.kinds import KINDS
+from experiments.kinds.scales import scales_of
 from experiments.rules import DropFailedPlays, DropSlowTrials, ExcludeIncomplete
 from experiments.spreadsheet import guarded_csv
-from experiments.trials import KINDS
-from experiments.trials.scales import scales_of
 from server.core.values import encoded, iso
 from server.exports.csv_lines import csv_pieces, zip_pieces
 from server.exports.extract import Extract

@@ -8,7 +8,7 @@ from typing import Any
 
 from sqlalchemy.orm import Session
 
-from experiments.json import json_text
+from experiments.files import json_text
 from experiments.manifest import MANIFEST_NAME
 from server.accounts.audit import record
 from server.accounts.identity import OPERATOR, Identity

@@ -6,7 +6,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from sqlalchemy.orm import Session
 
-from experiments.counted import counted
+from experiments.errors import counted
 from experiments.manifest import Manifest
 from experiments.schema.canonical import canonical, definition_sha256
 from experiments.seal import Seal, clips_sha256

@@ -12,14 +12,14 @@ from typing import Any, Literal
 from sqlalchemy.orm import Session
 
 from experiments.columns import RUN_COLUMNS, Column
-from experiments.columns.form_columns import FormColumn, form_columns, run_columns
-from experiments.columns.names import plain_name, unlike
-from experiments.definition import Experiment
+from experiments.columns.column import plain_name, unlike
+from experiments.columns.runs import FormColumn, form_columns, run_columns
+from experiments.declaration import Experiment
+from experiments.declaration.trial import RatedScale
 from experiments.design import rated_levels
 from experiments.errors import InputError
-from experiments.trials import KINDS
-from experiments.trials.declared import RatedScale
-from experiments.trials.scales import scales_of
+from experiments.kinds import KINDS
+from experiments.kinds.scales import scales_of
 from server.core.values import iso
 from server.exports import repository
 from server.exports.csv_lines import (

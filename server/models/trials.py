@@ -81,7 +81,7 @@ class Rating(Base):
     kind : str
         Of the trial, as declared.
     payload : dict of str to Any
-        The kind's answer (`experiments.trials.<kind>.answer`).
+        The kind's answer (`experiments.kinds.<kind>.answer`).
     playback : dict of str to Any or None
         Of each clip by its role, where a trial shows several; the columns then sum it up.
     disturbances : dict of str to int or None

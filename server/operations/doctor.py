@@ -16,8 +16,7 @@ from typing import Literal
 
 from sqlalchemy.exc import SQLAlchemyError
 
-from experiments.counted import counted
-from experiments.errors import InputError
+from experiments.errors import InputError, counted
 from server.accounts.schemas import TOKEN_DAYS_MAX
 from server.context import Services
 from server.core.db import COUNTING_POOL

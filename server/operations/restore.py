@@ -15,8 +15,7 @@ from pydantic import ValidationError
 from sqlalchemy import Connection, Table
 from sqlalchemy.exc import InterfaceError, OperationalError, StatementError
 
-from experiments.counted import counted
-from experiments.errors import InputError
+from experiments.errors import InputError, counted
 from server.context import Services
 from server.core.migrate import alembic_config, known_revision, with_wall, without_wall
 from server.core.settings import Settings, put_key, secret_key_path

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
-from experiments.counted import counted
-from experiments.errors import InputError
+from experiments.errors import InputError, counted
 from server.accounts.audit import record
 from server.core.changes import watched
 from server.core.db import Database, checked_url, open_database

@@ -19,9 +19,8 @@ from pydantic import (
 )
 
 from experiments.checks import CheckName
-from experiments.trials.clip_rating.declaration import MAX_FRAMES_LOGGED
-from experiments.trials.clip_rating.scales import SCALE_NAME
-from experiments.trials.union import AnyAnswer
+from experiments.declaration.clip_rating import MAX_FRAMES_LOGGED, SCALE_NAME
+from experiments.kinds.union import AnyAnswer
 
 # What pages measure of clips and views: bounded numbers and names.
 

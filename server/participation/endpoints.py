@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from sqlalchemy import Connection
 from sqlalchemy.orm import Session
 
-from experiments.trials import KINDS
+from experiments.kinds import KINDS
 from server.context import DatabaseDep, Services, ServicesDep
 from server.core.errors import ERROR_RESPONSES, ApiError, finished, refused_value
 from server.core.limits import RateLimit

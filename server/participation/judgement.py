@@ -12,10 +12,10 @@ from itertools import groupby
 from sqlalchemy import Connection
 from sqlalchemy.orm import Session
 
-from experiments.assignment.checks import attention_by_block, motion_checks_by_block
+from experiments.assignment.order import attention_by_block, motion_checks_by_block
 from experiments.checks import CHECK_KINDS
-from experiments.definition import Experiment
-from experiments.trials import KINDS
+from experiments.declaration import Experiment
+from experiments.kinds import KINDS
 from server.core.changes import Stopped, watched
 from server.core.db import Database
 from server.core.values import hash_token, now

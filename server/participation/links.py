@@ -7,10 +7,10 @@ from uuid import UUID
 
 from sqlalchemy.orm import Session
 
-from experiments.assignment.grouping import deciding
-from experiments.definition import Display, Experiment
+from experiments.assignment.groups import deciding
+from experiments.declaration import Display, Experiment
 from experiments.errors import did_you_mean
-from experiments.trials.counts import expected_minutes
+from experiments.kinds.scales import expected_minutes
 from server.context import Services
 from server.core.values import derived_token, hash_token, new_public_id, new_token, now
 from server.models import NO_SLOT, Link, Study, StudyRun

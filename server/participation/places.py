@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 from sqlalchemy.orm import Session
 
-from experiments.assignment.checks import with_checks
 from experiments.assignment.groups import name_of, names, seat_of
-from experiments.assignment.trial import Trial
-from experiments.definition import Experiment
-from experiments.trials import KINDS
+from experiments.assignment.order import with_checks
+from experiments.declaration import Experiment
+from experiments.kinds import KINDS
+from experiments.kinds.kind import Trial
 from server.models import StudyRun
 from server.participation import run_repository, series
 from server.participation.refusals import GroupRefused

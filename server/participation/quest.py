@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from experiments.trials.threshold.grid import Model, Point
+from experiments.kinds.threshold_grid import Model, Point
 
 if TYPE_CHECKING:
     from questplus import QuestPlus

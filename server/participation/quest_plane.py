@@ -16,7 +16,7 @@ import xarray
 from questplus import QuestPlus
 from questplus.psychometric_function import norm_cdf
 
-from experiments.trials.threshold.grid import Model
+from experiments.kinds.threshold_grid import Model
 
 
 class PlaneQuest(QuestPlus):  # type: ignore[misc]

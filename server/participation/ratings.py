@@ -8,9 +8,9 @@ from typing import Any
 from sqlalchemy import Connection
 
 from experiments.checks import CHECK_KINDS
-from experiments.definition import Experiment
-from experiments.trials import KINDS
-from experiments.trials.check import CheckAnswer
+from experiments.declaration import Experiment
+from experiments.declaration.any_trial import CheckAnswer
+from experiments.kinds import KINDS
 from server.core.errors import Conflict, Invalid, NotFound
 from server.core.values import hash_token
 from server.participation import rating_repository, series, warnings

@@ -7,10 +7,10 @@ from uuid import UUID
 from pydantic import BaseModel, Field, StringConstraints
 
 from experiments.checks import CheckName
-from experiments.definition import Display, Texts
-from experiments.definition.forms import Form
+from experiments.declaration import Display, Texts
+from experiments.declaration.forms import Form
+from experiments.kinds.union import AnyPage
 from experiments.rules import PlaybackRules
-from experiments.trials.union import AnyPage
 from server.models import STAGES
 from server.participation.answer_schemas import RunStatus, Tickets, TrialInfo, WarningShown
 

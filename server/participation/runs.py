@@ -7,12 +7,12 @@ from typing import Any, Literal
 
 from sqlalchemy.orm import Session
 
-from experiments.assignment.grouping import deciding, group_of_answer
-from experiments.definition import Experiment
-from experiments.definition.forms import Form, is_empty
+from experiments.assignment.groups import deciding, group_of_answer
+from experiments.declaration import Experiment
+from experiments.declaration.forms import Form, is_empty
 from experiments.errors import did_you_mean
+from experiments.kinds import KINDS
 from experiments.rules import ExcludeAttention
-from experiments.trials import KINDS
 from server.context import Services
 from server.core.repository import insert_once
 from server.core.values import new_public_id, now, visible

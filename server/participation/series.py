@@ -6,10 +6,9 @@ from typing import Any
 
 from sqlalchemy import Connection
 
-from experiments.assignment.trial import Trial
-from experiments.trials.threshold.answer import ThresholdAnswer
-from experiments.trials.threshold.declaration import Stop, TwoInterval, threshold_of
-from experiments.trials.threshold.grid import (
+from experiments.declaration.threshold import Stop, ThresholdAnswer, TwoInterval, threshold_of
+from experiments.kinds.kind import Trial
+from experiments.kinds.threshold_grid import (
     Model,
     Point,
     clip_of,

@@ -8,10 +8,10 @@ from fastapi import Request
 from fastapi.responses import JSONResponse
 from sqlalchemy.orm import Session
 
-from experiments.assignment.checks import motion_checks_by_block
+from experiments.assignment.order import motion_checks_by_block
 from experiments.checks import CHECK_KINDS, CheckName
-from experiments.definition import Experiment
-from experiments.trials import KINDS
+from experiments.declaration import Experiment
+from experiments.kinds import KINDS
 from server.context import Services
 from server.core.errors import Answer, finished
 from server.core.storage import clip_address

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal
 
 from experiments.rules import PlaybackRules
-from experiments.rules.disturbances import Consequence
+from experiments.rules.playback import Consequence
 from server.participation.answer_schemas import IMPOSSIBLE, PlaybackLog, RatingIn
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from typing import Any
 from sqlalchemy import Connection
 from sqlalchemy.orm import Session
 
-from experiments.trials import KINDS
+from experiments.kinds import KINDS
 from server.core.errors import ApiError, Conflict
 from server.core.values import hash_token
 from server.models import StudyRun, View, ViewClip

@@ -6,11 +6,11 @@ from typing import Any, NamedTuple
 
 from sqlalchemy import Connection
 
-from experiments.base import Translated
-from experiments.definition import Experiment
+from experiments.declaration import Experiment
+from experiments.declaration.base import Translated
+from experiments.kinds import KINDS
 from experiments.rules import ScreenAttention, WarningRule
-from experiments.rules.warning import GivenAnswer
-from experiments.trials import KINDS
+from experiments.rules.warnings import GivenAnswer
 from server.core.values import new_public_id, now
 from server.participation import rating_repository
 from server.participation.answer_schemas import WarningShown

@@ -10,7 +10,7 @@ from typing import IO
 
 from sqlalchemy.orm import Session
 
-from experiments.assignment.grouping import deciding
+from experiments.assignment.groups import deciding
 from experiments.files import whole_private_file
 from server.accounts.audit import record
 from server.accounts.identity import Identity, Operator

@@ -13,7 +13,7 @@ from pydantic import BaseModel, Field
 from sqlalchemy import Select
 from sqlalchemy.orm import Session
 
-from experiments.definition.retention import Retention
+from experiments.declaration.tables import Retention
 from server.accounts.audit import record
 from server.core.changes import Stopped, watched
 from server.core.db import Database

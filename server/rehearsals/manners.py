@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from experiments.errors import InputError, did_you_mean
-from experiments.trials.clip_rating.page import ShownClipRating
+from experiments.kinds.clip_rating import ShownClipRating
 from server.app import create_app
 from server.cli_common import migrated_services
 from server.context import SIMULATED_TIME, Services

@@ -11,11 +11,11 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from experiments.checks import CHECK_KINDS, CheckName
-from experiments.definition import Experiment
-from experiments.definition.forms import FormField
+from experiments.declaration import Experiment
+from experiments.declaration.forms import FormField
+from experiments.declaration.threshold import Threshold
 from experiments.errors import InputError, did_you_mean
-from experiments.trials.threshold.declaration import Threshold
-from experiments.trials.threshold.grid import Point, model, points_of
+from experiments.kinds.threshold_grid import Point, model, points_of
 from server.accounts.identity import OPERATOR
 from server.context import Services
 from server.core.values import derived_token

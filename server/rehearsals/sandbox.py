@@ -11,15 +11,15 @@ from typing import Any, NamedTuple
 from sqlalchemy.orm import Session
 
 from experiments.assignment.groups import names
-from experiments.definition import Experiment
+from experiments.declaration import Experiment
+from experiments.declaration.paired_comparison import PairedComparison
+from experiments.declaration.threshold import Threshold
 from experiments.errors import InputError
+from experiments.kinds.paired_comparison import assign, chooses
+from experiments.kinds.pairs import every_pair, item_of
+from experiments.kinds.scales import expected_minutes
+from experiments.kinds.threshold_grid import series_of, stimuli
 from experiments.manifest import Manifest
-from experiments.trials.counts import expected_minutes
-from experiments.trials.paired_comparison.declaration import PairedComparison
-from experiments.trials.paired_comparison.pairs import every_pair, item_of
-from experiments.trials.paired_comparison.plan import assign, chooses
-from experiments.trials.threshold.declaration import Threshold
-from experiments.trials.threshold.grid import series_of, stimuli
 from server.accounts.identity import OPERATOR
 from server.app import create_app
 from server.cli_common import migrated_services

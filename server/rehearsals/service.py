@@ -16,7 +16,7 @@ from pathlib import Path
 from pydantic import ValidationError
 from sqlalchemy.orm import Session
 
-from experiments.json import json_text
+from experiments.files import json_text
 from server.accounts.audit import record
 from server.accounts.identity import OPERATOR, Identity
 from server.context import Services

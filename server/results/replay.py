@@ -5,7 +5,7 @@ from datetime import datetime, timedelta
 
 from sqlalchemy.orm import Session
 
-from experiments.trials import KINDS
+from experiments.kinds import KINDS
 from server.core.errors import NotFound
 from server.core.storage import clip_address
 from server.models import Clip, Rating, Study, StudyRun, VersionClip, View, ViewClip

@@ -9,8 +9,8 @@ from typing import TypedDict
 
 from sqlalchemy.orm import Session
 
-from experiments.trials.declared import RatedScale
-from experiments.trials.scales import scale_called, scales_of
+from experiments.declaration.trial import RatedScale
+from experiments.kinds.scales import scale_called, scales_of
 from server.core.values import now
 from server.models import Study, StudyVersion
 from server.participation.tallies import RT_MS

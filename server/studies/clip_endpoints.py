@@ -10,7 +10,7 @@ from fastapi import APIRouter, Form, Header, Path, Response, UploadFile
 from fastapi.params import File
 from fastapi.responses import FileResponse, PlainTextResponse, RedirectResponse, StreamingResponse
 
-from experiments.source_video import FrameRate
+from experiments.manifest import FrameRate
 from server.accounts.identity import Identity, Viewer
 from server.accounts.workspaces import Uploader
 from server.context import Services, ServicesDep

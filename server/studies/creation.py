@@ -9,16 +9,18 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from experiments import design
-from experiments.assignment.checks import motion_checks_by_block
+from experiments.assignment.order import motion_checks_by_block
 from experiments.checks import CHECK_CELL
-from experiments.definition import Experiment
+from experiments.declaration import Experiment
 from experiments.errors import InputError, did_you_mean
-from experiments.load import DEMOS, SHIPPED, DefinitionError, Problem, locate, parse_experiment
+from experiments.kinds import KINDS
+from experiments.load import DEMOS, SHIPPED, DefinitionError, Problem, line_of, locate, parse_experiment
 from experiments.manifest import (
     MANIFEST_NAME,
     UPLOADED,
     CheckClip,
     Manifest,
+    SourceVideo,
     check_files,
     check_originals,
     read_manifest,
@@ -26,10 +28,7 @@ from experiments.manifest import (
 from experiments.manifest import Clip as DesignClip
 from experiments.own_clips import Placed, check_factorial, levels_from_names, levels_from_table
 from experiments.schema.canonical import definition_sha256
-from experiments.schema.upgrades import FORMAT
-from experiments.source_video import SourceVideo
-from experiments.toml_lines import line_of
-from experiments.trials import KINDS
+from experiments.schema.stored import FORMAT
 from server.accounts.audit import record
 from server.accounts.identity import Identity
 from server.accounts.workspace_repository import default_workspace

@@ -4,12 +4,12 @@ from sqlalchemy.orm import Session
 
 from experiments import design
 from experiments.assignment.groups import names
-from experiments.definition import Experiment
-from experiments.definition.languages import unlisted
+from experiments.declaration import Experiment
 from experiments.errors import InputError
+from experiments.kinds import KINDS
+from experiments.kinds.scales import block_sizes, expected_minutes, trials_per_participant
 from experiments.load import DefinitionError, toml_data
-from experiments.trials import KINDS
-from experiments.trials.counts import block_sizes, expected_minutes, trials_per_participant
+from experiments.wording import unlisted
 from server.accounts.identity import Identity
 from server.studies.creation import planned_experiment
 from server.studies.lookup import find_study

@@ -8,11 +8,10 @@ from typing import NamedTuple
 
 from sqlalchemy.orm import Session
 
-from experiments.definition import Experiment
-from experiments.definition.flicker import silent_on_flicker, suggested_sentence
-from experiments.definition.placeholders import unfilled, untranslated
+from experiments.declaration import Experiment
 from experiments.level_leaks import reported_leaks
 from experiments.manifest import Manifest
+from experiments.wording import silent_on_flicker, suggested_sentence, unfilled, untranslated
 from server.accounts.identity import Identity
 from server.core.errors import Conflict
 from server.models import Study, StudyVersion

@@ -8,12 +8,12 @@ from typing import Any
 import tomlkit
 
 from experiments import design
-from experiments.definition import Experiment
+from experiments.declaration import Experiment
+from experiments.declaration.clip_rating import SCALE_NAME
 from experiments.errors import InputError
 from experiments.manifest import UPLOADED, Clip, Manifest
 from experiments.own_clips import Placed, check_factorial, levels_of
 from experiments.schema.canonical import definition_sha256
-from experiments.trials.clip_rating.scales.scale import SCALE_NAME
 from server.core.errors import Conflict
 from server.core.storage import ClipStore
 from server.studies.schemas import OwnClips

@@ -5,8 +5,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
 
-from experiments.definition import Experiment
-from experiments.source_video import FrameRate, SourceVideo
+from experiments.declaration import Experiment
+from experiments.manifest import FrameRate, SourceVideo
 from server.core.values import Number, RequestBody
 from server.models import Right
 from server.participation.recruiter import Recruiter, without_refused

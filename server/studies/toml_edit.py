@@ -14,8 +14,7 @@ from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import AoT, Array, Comment, Table, Whitespace
 
 from experiments.errors import InputError
-from experiments.load import DefinitionError, is_deeper, toml_data
-from experiments.toml_keys import MAX_DEPTH, sum_of_cubes
+from experiments.load import MAX_DEPTH, DefinitionError, is_deeper, sum_of_cubes, toml_data
 from server.studies import toml_items
 
 TOO_DEEP = "lists or tables are nested too deeply; correct the text first"

@@ -19,11 +19,10 @@ from urllib.parse import quote
 
 from sqlalchemy.orm import Session
 
-from experiments.bounded_zip import BoundedZip, ZipListError
+from experiments.capsule import BoundedZip, ZipListError
 from experiments.files import whole_file
-from experiments.manifest import MANIFEST_NAME, Manifest
+from experiments.manifest import MANIFEST_NAME, Manifest, SourceVideo
 from experiments.own_clips import check_names, one_form, suggest_pattern
-from experiments.source_video import SourceVideo
 from server.accounts.identity import Identity
 from server.core.errors import ApiError, Invalid, NotFound
 from server.studies.lookup import find_study

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from experiments.counted import counted
+from experiments.errors import counted
 
 if TYPE_CHECKING:
     from stimuli_builder.actor.recording import Actor

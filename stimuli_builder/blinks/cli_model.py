@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from experiments.command_groups import command_group
+from experiments.command_line import command_group
 
 MODEL_HELP = """
 The PCA blink model: learn from recorded blinks, make new ones, hand curves to animation programs.

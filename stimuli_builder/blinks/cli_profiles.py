@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from experiments.command_groups import command_group
+from experiments.command_line import command_group
 
 LIBRARY_HELP = """
 The blink profiles that ship with the project.

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from experiments.counted import counted
+from experiments.errors import counted
 from stimuli_builder.blinks.both_eyes import asymmetry_lines
 from stimuli_builder.blinks.column_names import eye_pair
 from stimuli_builder.blinks.extract import EyeBlinks

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from experiments.counted import counted
+from experiments.errors import counted
 from stimuli_builder.blinks.review import Review
 
 FEW_BLINKS = 3

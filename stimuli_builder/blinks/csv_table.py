@@ -8,8 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from experiments.counted import counted
-from experiments.errors import InputError
+from experiments.errors import InputError, counted
 from experiments.spreadsheet import guarded_cell, guarded_row, unguarded_cell
 from experiments.text_tables import HEAD_BYTES, separator_of, utf8_stream
 

@@ -7,8 +7,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from experiments.counted import counted
-from experiments.errors import InputError
+from experiments.errors import InputError, counted
 from stimuli_builder.blinks.events.lid_event import LidEvent
 from stimuli_builder.blinks.events.recognise import Recognised
 from stimuli_builder.blinks.label_options import LabelOptions

@@ -9,8 +9,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from experiments.counted import counted
-from experiments.errors import InputError, did_you_mean
+from experiments.errors import InputError, counted, did_you_mean
 from experiments.files import temporary_beside, whole_text
 from stimuli_builder.blinks.blink_model import BlinkModel, default_model
 from stimuli_builder.blinks.export.curve import make_curve

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from experiments.counted import counted
-from experiments.errors import InputError, did_you_mean
+from experiments.errors import InputError, counted, did_you_mean
 from experiments.files import whole_file
 from stimuli_builder.blinks.blink_model import BlinkModel
 from stimuli_builder.blinks.extract import EyeBlinks

@@ -8,8 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from experiments.counted import counted
-from experiments.errors import InputError
+from experiments.errors import InputError, counted
 from stimuli_builder.blinks.csv_table import few, line_of
 from stimuli_builder.blinks.profile import Array
 

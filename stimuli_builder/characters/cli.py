@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from experiments.command_groups import command_group
+from experiments.command_line import command_group
 from stimuli_builder.characters.cli_face import bake_face
 from stimuli_builder.characters.cli_samples import bake_samples
 from stimuli_builder.characters.retired import load_retired, restore

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from experiments import design
-from experiments.assignment.checks import motion_checks_by_block
+from experiments.assignment.order import motion_checks_by_block
 from experiments.checks import CHECK_KINDS, CheckName
-from experiments.definition import Experiment
+from experiments.declaration import Experiment
+from experiments.declaration.rendering import RenderSettings
 from experiments.errors import InputError
 from experiments.manifest import MANIFEST_NAME, CheckClip, Manifest
-from experiments.rendering import RenderSettings
 from stimuli_builder.characters.writing import write_bytes
 from stimuli_builder.checks.jobs import CheckJob
 from stimuli_builder.clips.characters import geometry

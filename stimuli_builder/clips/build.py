@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
 
-from experiments.definition import Experiment
+from experiments.declaration import Experiment
+from experiments.kinds import KINDS
 from experiments.manifest import MANIFEST_NAME, Manifest
 from experiments.schema.canonical import definition_sha256
-from experiments.trials import KINDS
 from stimuli_builder.characters.writing import write_bytes
 from stimuli_builder.checks import plan as checks
 from stimuli_builder.checks.plan import planned_checks

@@ -10,7 +10,7 @@ import typer
 from experiments.errors import InputError
 
 if TYPE_CHECKING:
-    from experiments.rendering import RenderSettings
+    from experiments.declaration.rendering import RenderSettings
 
 CLIP_HELP = """
 Render one clip from a blink profile and a character.
@@ -122,7 +122,7 @@ def settings_from(**values: object) -> "RenderSettings":
     """Make settings; a value out of range ends in one line that names the option."""
     from pydantic import ValidationError
 
-    from experiments.rendering import RenderSettings
+    from experiments.declaration.rendering import RenderSettings
     from experiments.wrong_values import wrong_value
 
     try:

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.declaration.rendering import RenderSettings
 from experiments.errors import InputError
-from experiments.rendering import RenderSettings
 from stimuli_builder.blinks.lower_lid import lower_lid
 from stimuli_builder.blinks.profile import PROFILE_FPS, BlinkProfile, to_full_closure, to_natural_closure
 

@@ -16,13 +16,12 @@ from rich.text import Text
 from blink_engine import Event, Law, Parameters, Performance, StateChange, default_parameters, perform
 from blink_engine.speech import Speech, seed_of_speaker, speech_events, speech_states
 from experiments import design
-from experiments.counted import counted
-from experiments.definition import Experiment
-from experiments.errors import InputError
-from experiments.rendering import RenderSettings
-from experiments.trials import KINDS
-from experiments.trials.counts import block_sizes, expected_minutes, trials_per_participant
-from experiments.trials.declared import ClipSpec
+from experiments.declaration import Experiment
+from experiments.declaration.rendering import RenderSettings
+from experiments.declaration.trial import ClipSpec
+from experiments.errors import InputError, counted
+from experiments.kinds import KINDS
+from experiments.kinds.scales import block_sizes, expected_minutes, trials_per_participant
 from stimuli_builder.blinks.profile import PROFILE_FPS
 from stimuli_builder.clips.characters import DRAWN, Geometry, fingerprint, geometry
 from stimuli_builder.clips.curves import DECIMALS, Array, ClipCurve, Timing, clip_curve, generator, shown_by

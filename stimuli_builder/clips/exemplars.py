@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from experiments.declaration.rendering import RenderSettings
 from experiments.errors import InputError, nearest
-from experiments.rendering import RenderSettings
 from stimuli_builder.blinks.blink_model import BlinkModel, default_model
 from stimuli_builder.blinks.csv_table import NOTE, read_table
 from stimuli_builder.blinks.library import load_library

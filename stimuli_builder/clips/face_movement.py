@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.declaration.rendering import RenderSettings
 from experiments.errors import InputError
-from experiments.rendering import RenderSettings
 from stimuli_builder.characters.facekit.kit import Array
 from stimuli_builder.characters.facekit.sphere import smooth
 from stimuli_builder.clips.characters import DRAWN, Geometry

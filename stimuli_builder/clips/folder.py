@@ -10,10 +10,10 @@ from typing import Any, Self, TextIO
 
 import numpy as np
 
-from experiments.definition import Experiment
+from experiments.declaration import Experiment
+from experiments.declaration.rendering import RenderSettings
 from experiments.errors import InputError
 from experiments.manifest import MANIFEST_NAME, Clip, Manifest, file_sha256, read_manifest
-from experiments.rendering import RenderSettings
 from stimuli_builder.clips.curves import Array, ClipCurve, samples_per_frame
 from stimuli_builder.clips.design_clips import Options, PlannedClip
 

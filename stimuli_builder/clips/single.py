@@ -3,9 +3,9 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from experiments.declaration.rendering import PROFILES, RenderSettings
 from experiments.errors import InputError, did_you_mean
 from experiments.files import whole_file
-from experiments.rendering import PROFILES, RenderSettings
 from stimuli_builder.blinks.library import load_library
 from stimuli_builder.clips.characters import geometry
 from stimuli_builder.clips.curves import (

@@ -14,8 +14,7 @@ from webvtt.models import Caption
 
 from blink_engine import Performance, StateName, default_parameters, perform
 from blink_engine.speech import Speech, joined, seed_of_speaker, speech_events, speech_states
-from experiments.counted import counted
-from experiments.errors import InputError, did_you_mean
+from experiments.errors import InputError, counted, did_you_mean
 from experiments.files import check_targets, whole_text
 from stimuli_builder.blinks.export.curve import AnimationCurve
 from stimuli_builder.blinks.export.formats import CurveTarget, check_format, write_curve

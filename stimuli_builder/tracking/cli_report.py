@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from experiments.counted import counted
+from experiments.errors import counted
 from stimuli_builder.tracking.learn import Lesson
 from stimuli_builder.tracking.outcome import TrackSummary
 

@@ -7,8 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from experiments.counted import counted
-from experiments.errors import InputError
+from experiments.errors import InputError, counted
 from experiments.files import check_ending, check_targets, temporary_beside
 from stimuli_builder.blinks.plots import check_figure_name
 from stimuli_builder.progress import frame_progress, step_progress

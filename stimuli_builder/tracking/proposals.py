@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from experiments.counted import counted
+from experiments.errors import counted
 from stimuli_builder.tracking.labels import Labels
 
 DETECTED = "detector on single frames, not reviewed"

@@ -6,9 +6,9 @@ import random
 from collections.abc import Mapping
 from pathlib import Path
 
-from experiments.definition import Experiment
-from experiments.trials import KINDS
-from experiments.trials.paired_comparison.columns import COMPARISONS
+from experiments.declaration import Experiment
+from experiments.kinds import KINDS
+from experiments.kinds.paired_comparison import COMPARISONS
 
 Row = dict[str, object]
 

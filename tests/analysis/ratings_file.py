@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.definition import Experiment
-from experiments.trials.clip_rating.columns import RATINGS
+from experiments.declaration import Experiment
+from experiments.kinds.clip_rating import RATINGS
 
 Row = dict[str, object]
 

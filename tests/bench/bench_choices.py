@@ -11,10 +11,10 @@ from collections.abc import Callable
 from itertools import combinations
 
 from experiments import design
-from experiments.assignment.active import Stored, batch
+from experiments.kinds.pair_choice import Stored, batch
+from experiments.kinds.paired_comparison import assign
+from experiments.kinds.threshold_grid import Model, model
 from experiments.load import load_experiment
-from experiments.trials.paired_comparison.plan import assign
-from experiments.trials.threshold.grid import Model, model
 from server.participation import quest
 
 ITEMS, ANSWERS, PAIRS = 20, 2_000, 24

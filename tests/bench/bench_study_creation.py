@@ -17,7 +17,7 @@ from typing import Any
 
 from fastapi.testclient import TestClient
 
-from experiments.source_video import SourceVideo
+from experiments.manifest import SourceVideo
 from server.accounts import invitations
 from server.app import create_app
 from server.cli_common import migrated_services

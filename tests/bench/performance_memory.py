@@ -8,7 +8,7 @@ import resource
 import subprocess
 import sys
 
-from experiments.rendering import RenderSettings
+from experiments.declaration.rendering import RenderSettings
 from stimuli_builder.clips.design_clips import Options, look_of, performance_curve
 from stimuli_builder.clips.jobs import ClipJob, render
 

@@ -16,10 +16,10 @@ from scipy import special, stats
 from analysis.thresholds.likelihood import Interval
 from analysis.thresholds.plane import Points, counted_points, fit_plane
 from analysis.thresholds.plane_people import fit_plane_population
+from experiments.declaration.threshold import threshold_of
 from experiments.errors import InputError
+from experiments.kinds.threshold_grid import Model, model
 from experiments.load import load_experiment
-from experiments.trials.threshold.declaration import threshold_of
-from experiments.trials.threshold.grid import Model, model
 
 Array = NDArray[np.float64]
 THRESHOLD, SPREAD, TILT = 280.0, 40.0, 200.0

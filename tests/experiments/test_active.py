@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.assignment.active import Posterior, Stored, batch, posterior
+from experiments.kinds.pair_choice import Posterior, Stored, batch, posterior
 
 
 def test_gain_is_the_mutual_information_of_answer_and_score() -> None:

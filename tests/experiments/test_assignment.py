@@ -7,10 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments import design
-from experiments.assignment.block_orders import block_orders
-from experiments.definition import Experiment
+from experiments.assignment.incomplete_blocks import block_orders
+from experiments.declaration import Experiment
+from experiments.kinds.clip_rating import assign
 from experiments.load import load_experiment, parse_experiment
-from experiments.trials.clip_rating.plan import assign
 from tests.helpers.studies import SHORT
 
 seeds = st.integers(min_value=0, max_value=2**53 - 1)

@@ -3,8 +3,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.columns import RUN_COLUMNS, Column, names_of
-from experiments.trials import views
-from experiments.trials.clip_rating.columns import RATINGS
+from experiments.kinds import views
+from experiments.kinds.clip_rating import RATINGS
 
 
 @pytest.mark.parametrize("columns", [RUN_COLUMNS, *(view.columns for view in views())])

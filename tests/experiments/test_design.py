@@ -3,9 +3,9 @@ from collections import Counter
 import pytest
 
 from experiments import design
+from experiments.declaration.rendering import RenderOverrides, RenderSettings
+from experiments.kinds.scales import expected_minutes, trials_per_participant
 from experiments.load import load_experiment
-from experiments.rendering import RenderOverrides, RenderSettings
-from experiments.trials.counts import expected_minutes, trials_per_participant
 
 # design counts of Trutoiu et al. (2011), sections 4.1-4.3
 PAPER = {

@@ -2,7 +2,7 @@
 
 import pytest
 
-from experiments.definition.display import Display
+from experiments.declaration.tables import Display
 
 
 @pytest.mark.parametrize(("width", "height"), [(0, 0), (390, 600), (800, 300)])

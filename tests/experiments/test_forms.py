@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
-from experiments.definition.forms import (
+from experiments.declaration.forms import (
     ChoiceField,
     FormField,
     LikertField,

@@ -8,8 +8,7 @@ from importlib import import_module
 import pytest
 import typer
 
-from experiments.help_examples import broken, whole_examples
-from experiments.lazy_commands import commands_of
+from experiments.command_line import broken, commands_of, whole_examples
 
 PROGRAMS = ("stimuli", "server", "analysis")
 MODULES = {"stimuli": "stimuli_builder.cli", "server": "server.cli", "analysis": "analysis.cli"}

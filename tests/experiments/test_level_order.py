@@ -2,8 +2,7 @@
 
 import pytest
 
-from experiments.level_order import in_order
-from experiments.own_clips import levels_from_names, levels_of
+from experiments.own_clips import in_order, levels_from_names, levels_of
 
 
 @pytest.mark.parametrize(

@@ -3,8 +3,8 @@ import re
 
 import pytest
 
-from experiments.definition import Experiment
-from experiments.definition.languages import unlisted
+from experiments.declaration import Experiment
+from experiments.declaration.clip_rating import clip_rating_of
 from experiments.errors import InputError
 from experiments.load import (
     FOLDER,
@@ -16,9 +16,8 @@ from experiments.load import (
 )
 from experiments.rules import ScreenFormAnswer
 from experiments.schema.canonical import definition_sha256
-from experiments.schema.stored import load_stored
-from experiments.schema.upgrades import FORMAT
-from experiments.trials.clip_rating.declaration import clip_rating_of
+from experiments.schema.stored import FORMAT, load_stored
+from experiments.wording import unlisted
 from tests.helpers.studies import SHORT
 
 EXP1 = locate("exp1").read_text(encoding="utf-8")

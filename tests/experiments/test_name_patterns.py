@@ -6,7 +6,7 @@ import time
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.name_patterns import FIELD, NamePattern
+from experiments.own_clips import FIELD, NamePattern
 
 TEXT = st.sampled_from(["", "_", "a", "_a", "aa", "."])
 

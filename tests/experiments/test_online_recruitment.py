@@ -5,13 +5,13 @@ from itertools import product
 
 import pytest
 
-from experiments.assignment.checks import attention_by_block, motion_checks_by_block, with_checks
+from experiments.assignment.order import attention_by_block, motion_checks_by_block, with_checks
 from experiments.check_words import WORDS as CHECK_WORDS
-from experiments.definition import Experiment
-from experiments.definition.flicker import SENTENCES, mentions_flicker
+from experiments.declaration import Experiment
 from experiments.errors import InputError
+from experiments.kinds import KINDS
 from experiments.load import load_experiment, parse_experiment
-from experiments.trials import KINDS
+from experiments.wording import SENTENCES, mentions_flicker
 from tests.helpers.studies import SHORT
 
 FLICKERING = SHORT.replace('"Do you agree?"', '"Some clips flicker. Do you agree?"').replace(

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from experiments.definition.placeholders import unfilled, untranslated
 from experiments.load import locate, parse_experiment
+from experiments.wording import unfilled, untranslated
 from tests.helpers.studies import SHORT
 
 BANK = Path(__file__).parents[2] / "frontend/src/admin/builder/bank.ts"

@@ -9,13 +9,12 @@ from hypothesis import strategies as st
 
 from experiments.assignment.groups import seat_of
 from experiments.assignment.incomplete_blocks import balanced_blocks
-from experiments.assignment.levels import turn_of_last
-from experiments.assignment.shares import expected_counts, share
-from experiments.definition import Experiment
+from experiments.assignment.shares import expected_counts, share, turn_of_last
+from experiments.declaration import Experiment
+from experiments.kinds.clip_rating import CLIP_RATING
+from experiments.kinds.scales import trials_per_participant
 from experiments.load import DefinitionError, parse_experiment
 from experiments.schema.difference import difference
-from experiments.trials.clip_rating import CLIP_RATING
-from experiments.trials.counts import trials_per_participant
 from tests.helpers.faces import DEMO, faces
 
 relaxed = settings(deadline=None, max_examples=25)

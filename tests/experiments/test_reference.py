@@ -4,9 +4,9 @@ import tomllib
 
 import pytest
 
+from experiments.kinds import KINDS
 from experiments.load import parse_experiment
 from experiments.schema.keys import Key, keys
-from experiments.trials import KINDS
 from tests.conftest import REPOSITORY
 from tools.experiment_reference import EXAMPLES, Examples, experiment_reference, tables
 

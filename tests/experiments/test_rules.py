@@ -7,9 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.rules.warn_fast import WarnFast
-from experiments.rules.warn_pattern import WarnPattern
-from experiments.rules.warn_same_answer import WarnSameAnswer
+from experiments.rules.warnings import WarnFast, WarnPattern, WarnSameAnswer
 from tests.conftest import REPOSITORY
 
 NEW = '''from typing import Literal
@@ -22,7 +20,7 @@ class NewRule({base}):
 
     rule: Literal["new_rule"] = "new_rule"
 '''
-BASE, EXCLUSION = "experiments.base", "experiments.rules.exclusion"
+BASE, EXCLUSION = "experiments.declaration.base", "experiments.rules.exclusions"
 SETTINGS = "[mypy]\nfollow_imports = skip\nignore_missing_imports = True\n"
 PYDANTIC = "from typing import Any\nclass BaseModel: ...\ndef __getattr__(name: str) -> Any: ...\n"
 """Enough of it for the classes to be classes; the whole would take the checker ten seconds."""
@@ -61,7 +59,7 @@ def checked_before(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (
             "WarningRule = Annotated[",
             "server/participation/warnings.py",
-            "experiments.rules.warning",
+            "experiments.rules.warnings",
             "Warns",
             'has no attribute "lapses"',
         ),

@@ -10,15 +10,14 @@ from hypothesis import strategies as st
 
 from experiments import design
 from experiments.assignment.groups import clips_of, groups, seat_of
-from experiments.assignment.lists import label
 from experiments.assignment.order import ordered_blocks
-from experiments.assignment.shares import expected_counts, share
-from experiments.definition import Experiment
+from experiments.assignment.shares import expected_counts, list_label, share
+from experiments.declaration import Experiment
+from experiments.kinds.clip_rating import CLIP_RATING
+from experiments.kinds.scales import trials_per_participant
 from experiments.load import DefinitionError, load_experiment, locate, parse_experiment
 from experiments.schema.canonical import definition_sha256
 from experiments.schema.difference import difference
-from experiments.trials.clip_rating import CLIP_RATING
-from experiments.trials.counts import trials_per_participant
 
 EXP1 = locate("exp1").read_text(encoding="utf-8")
 people = st.integers(min_value=1, max_value=60)
@@ -151,7 +150,7 @@ def digest(experiment: Experiment) -> str:
     for slot in range(40):
         seat = seat_of(experiment, slot)
         blocks = [block.label for block in ordered_blocks(experiment, random.Random(slot), seat.number)]
-        sha.update(repr((sorted(map(label, share(experiment, seat))), blocks)).encode())
+        sha.update(repr((sorted(map(list_label, share(experiment, seat))), blocks)).encode())
     return sha.hexdigest()[:16]
 
 

@@ -3,8 +3,8 @@
 import pytest
 
 from experiments.errors import InputError
+from experiments.kinds import reserved_names
 from experiments.own_clips import levels_from_names, levels_from_table, suggest_pattern
-from experiments.trials import reserved_names
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.load import SHIPPED, DefinitionError, load_experiment, locate, parse_experiment, toml_data
-from experiments.toml_keys import MAX_DEPTH, has_endless_key
+from experiments.load import (
+    MAX_DEPTH,
+    SHIPPED,
+    DefinitionError,
+    has_endless_key,
+    load_experiment,
+    locate,
+    parse_experiment,
+    toml_data,
+)
 
 LONGEST = 500_000
 SOON_S = 5.0

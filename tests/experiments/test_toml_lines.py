@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.toml_lines import line_of
+from experiments.load import line_of
 
 TEXT = '''\
 title = "one # not a comment"   # a [comment] = 2

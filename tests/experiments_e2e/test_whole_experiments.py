@@ -11,8 +11,8 @@ import pytest
 from sqlalchemy import text
 
 from experiments import design
+from experiments.kinds.clip_rating import RATINGS
 from experiments.load import FOLDER
-from experiments.trials.clip_rating.columns import RATINGS
 from server.app import create_app
 from server.context import Services
 from server.core.settings import Settings

@@ -11,9 +11,9 @@ import av
 import numpy as np
 
 from experiments import design
-from experiments.assignment.checks import motion_checks_by_block
+from experiments.assignment.order import motion_checks_by_block
 from experiments.checks import CHECK_KINDS
-from experiments.definition import Experiment
+from experiments.declaration import Experiment
 from experiments.manifest import MANIFEST_NAME, CheckClip, Clip, Manifest
 from experiments.schema.canonical import definition_sha256
 

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 from pyrage.x25519 import Identity
 
+from experiments.declaration.clip_rating import SCALE_NAME
+from experiments.kinds.clip_rating import RATINGS
 from experiments.load import parse_experiment
 from experiments.manifest import MADE_ELSEWHERE, UPLOADED
-from experiments.trials.clip_rating.columns import RATINGS
-from experiments.trials.clip_rating.declaration import SCALE_NAME
 from server.context import Services
 from server.core.settings import Settings
 from server.core.values import now

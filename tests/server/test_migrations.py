@@ -6,7 +6,7 @@ from alembic.runtime.migration import MigrationContext
 from sqlalchemy import Connection, inspect, select, text
 
 from experiments.columns import Dialect
-from experiments.trials import views
+from experiments.kinds import views
 from server.core.db import Database
 from server.core.migrate import current_revision, downgrade, newest_revision, upgrade
 from server.models import Base, StudyVersion

@@ -4,13 +4,11 @@ import random
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from experiments.definition import Experiment
-from experiments.trials.clip_rating.answer import RatingAnswer, ScaleAnswer
-from experiments.trials.clip_rating.declaration import clip_rating_of
-from experiments.trials.clip_rating.page import ShownClipRating
-from experiments.trials.clip_rating.scales import SCALE_NAME
-from experiments.trials.declared import RatedScale
-from experiments.trials.scales import scales_of
+from experiments.declaration import Experiment
+from experiments.declaration.clip_rating import SCALE_NAME, RatingAnswer, ScaleAnswer, clip_rating_of
+from experiments.declaration.trial import RatedScale
+from experiments.kinds.clip_rating import ShownClipRating
+from experiments.kinds.scales import scales_of
 from server.core.errors import Invalid
 from server.participation.answer_schemas import RatingIn
 from server.participation.kinds import Part, Preference, Served, answer_of, asked_in

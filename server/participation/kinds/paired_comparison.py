@@ -5,9 +5,14 @@ import random
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from experiments.definition import Experiment
-from experiments.trials.paired_comparison.answer import CODES, ComparisonAnswer, check_response
-from experiments.trials.paired_comparison.declaration import OneAfterTheOther, paired_comparison_of
+from experiments.declaration import Experiment
+from experiments.declaration.paired_comparison import (
+    CODES,
+    ComparisonAnswer,
+    OneAfterTheOther,
+    check_response,
+    paired_comparison_of,
+)
 from server.core.errors import Invalid
 from server.participation.answer_schemas import RatingIn
 from server.participation.kinds import Part, Preference, Served, answer_of, asked_in

@@ -4,9 +4,8 @@ import random
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from experiments.definition import Experiment
-from experiments.trials.threshold.answer import CODES, ThresholdAnswer
-from experiments.trials.threshold.declaration import YesNo, threshold_of
+from experiments.declaration import Experiment
+from experiments.declaration.threshold import CODES, ThresholdAnswer, YesNo, threshold_of
 from server.core.errors import Invalid
 from server.participation.answer_schemas import RatingIn
 from server.participation.kinds import Part, Preference, Served, answer_of, asked_in

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from sqlalchemy.orm import Session
 
 from experiments import design
-from experiments.trials.continuous_rating.declaration import continuous_rating_of
+from experiments.declaration.continuous_rating import continuous_rating_of
 from server.models import Study, StudyVersion
 from server.participation.tally_pools import pooled
 from server.results.repository import Pool, blinks_of_cells, traces_of

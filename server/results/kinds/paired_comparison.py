@@ -8,8 +8,8 @@ from itertools import combinations
 from sqlalchemy.orm import Session
 
 from experiments import design
-from experiments.definition import Experiment
-from experiments.trials.paired_comparison.answer import CODES
+from experiments.declaration import Experiment
+from experiments.declaration.paired_comparison import CODES
 from server.models import Study, StudyVersion
 from server.participation.tally_pools import PooledTally, pooled
 from server.results.repository import Pool, cells_of

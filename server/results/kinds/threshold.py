@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 from sqlalchemy.orm import Session
 
 from experiments import design
-from experiments.definition import Experiment
-from experiments.trials.threshold.declaration import Series, TwoInterval, threshold_of
-from experiments.trials.threshold.grid import Point, model, seconds, series_of
+from experiments.declaration import Experiment
+from experiments.declaration.threshold import Series, TwoInterval, threshold_of
+from experiments.kinds.threshold_grid import Point, model, seconds, series_of
 from server.models import Study, StudyVersion
 from server.participation.tally_pools import pooled
 from server.results.repository import (

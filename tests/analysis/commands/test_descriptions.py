@@ -5,9 +5,9 @@ import sys
 
 import pytest
 
-from experiments.definition import Experiment
+from experiments.declaration import Experiment
 
-TOLD = "from experiments.definition import Experiment as E; print(E.model_fields['name'].description)"
+TOLD = "from experiments.declaration import Experiment as E; print(E.model_fields['name'].description)"
 ALONE = "from analysis import cli; cli.run_command_line = lambda app: None; cli.main(); "
 
 

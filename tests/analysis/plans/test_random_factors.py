@@ -12,7 +12,7 @@ from analysis.plans.clip_rating import READING, analyse_study
 from analysis.plans.result import Analysis
 from analysis.plans.sensitivity import fit_with_random, holds_for, mixed_model, ordinal_model, said_of_random
 from analysis.read.study_answers import load_csv
-from experiments.trials.clip_rating import CLIP_RATING
+from experiments.kinds.clip_rating import CLIP_RATING
 from tests.analysis.ratings_file import Row, rows_of, simulate, write_export
 from tests.helpers.faces import faces
 

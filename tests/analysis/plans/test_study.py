@@ -14,7 +14,7 @@ from analysis.report.json_output import as_data, left_out
 from experiments import rules
 from experiments.errors import InputError
 from experiments.load import load_experiment, locate, parse_experiment
-from experiments.rules.exclusion import LeavesOutRuns, RunTrials
+from experiments.rules.exclusions import LeavesOutRuns, RunTrials
 from tests.analysis.ratings_file import change, rows_of, simulate, write_export
 from tests.analysis.study_database import make_database
 

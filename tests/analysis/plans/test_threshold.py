@@ -19,10 +19,10 @@ from analysis.thresholds.answers import counted
 from analysis.thresholds.psychometric import fit_threshold
 from experiments import rules
 from experiments.errors import InputError
+from experiments.kinds import KINDS
+from experiments.kinds.threshold import THRESHOLDS
+from experiments.kinds.threshold_grid import series_of, stimuli
 from experiments.load import locate, parse_experiment
-from experiments.trials import KINDS
-from experiments.trials.threshold.columns import THRESHOLDS
-from experiments.trials.threshold.grid import series_of, stimuli
 
 BASE = re.sub(
     r"(?s)\[trial\].*?(?=\[display\])",

@@ -17,11 +17,11 @@ from analysis.report.contents import Contents
 from analysis.report.numbers import fixed
 from analysis.report.write import write_report
 from analysis.thresholds.plane import counted_points, fit_plane
-from experiments.definition import Experiment
+from experiments.declaration import Experiment
 from experiments.errors import InputError
+from experiments.kinds.threshold import THRESHOLDS
+from experiments.kinds.threshold_grid import points, series_in_group, series_of
 from experiments.load import parse_experiment
-from experiments.trials.threshold.columns import THRESHOLDS
-from experiments.trials.threshold.grid import points, series_in_group, series_of
 from tests.helpers.studies import SHORT
 from tests.helpers.thresholds import FACTORS, YES_NO, text_with
 

@@ -23,7 +23,7 @@ from analysis.report.numbers import apa_p, fixed, interval, p_value, share, sum_
 from analysis.report.within_contents import contents_of, sentences
 from analysis.report.within_tables import all_tables, corrected_df, paper_table
 from analysis.report.write import self_check, write_report
-from experiments.json import json_text
+from experiments.files import json_text
 from experiments.load import load_experiment
 from tests.analysis.ratings_file import rows_of, simulate, write_export
 

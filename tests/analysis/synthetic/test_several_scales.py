@@ -15,8 +15,8 @@ from analysis.synthetic.targets import Steps
 from analysis.synthetic.trials import write_ratings
 from analysis.within.anova import within_anova
 from analysis.within.cell_means import cell_table
+from experiments.declaration.trial import RatedScale
 from experiments.errors import InputError
-from experiments.trials.declared import RatedScale
 from tests.analysis.synthetic.test_synthetic import read_rows
 
 EFFECTS = ["character=9", "eeriness/blink=4", "tiredness/character:blink=0"]

@@ -17,9 +17,9 @@ from analysis.within.anova import within_anova
 from analysis.within.cell_means import cell_table
 from analysis.within.pairwise import one_factor_pairs
 from experiments.errors import InputError
+from experiments.kinds.clip_rating import RATINGS
+from experiments.kinds.scales import trials_per_participant
 from experiments.load import load_experiment
-from experiments.trials.clip_rating.columns import RATINGS
-from experiments.trials.counts import trials_per_participant
 
 for name in ("test_after_moves", "test_value"):
     globals()[name].__test__ = False

@@ -9,7 +9,7 @@ from playwright.sync_api import expect
 from typer.testing import CliRunner
 
 from analysis.cli import app
-from experiments.counted import counted
+from experiments.errors import counted
 from experiments.load import load_experiment, locate
 from server.app import create_app
 from server.rehearsals.person import Person, Rater

@@ -18,8 +18,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from experiments.base import Translated
-from experiments.trials.clip_rating.scales.scale import Scale
+from experiments.declaration.base import Translated
+from experiments.declaration.clip_rating import Scale
 
 
 class Magnitude(Scale):
@@ -80,13 +80,13 @@ export function widget({ scale, question, language, choose, enter }: Ask): Widge
 
 SCALE: dict[str, str | Edit] = {
     "experiments/trials/clip_rating/scales/magnitude.py": MAGNITUDE,
-    "experiments/trials/clip_rating/scales/__init__.py": Edit(
+    "experiments/declaration/clip_rating.py": Edit(
         "AnyScale = Annotated[Points |",
-        "from experiments.trials.clip_rating.scales.magnitude import Magnitude  # noqa: E402\n\n"
+        "from experiments.declaration.clip_rating.magnitude import Magnitude  # noqa: E402\n\n"
         "AnyScale = Annotated[Magnitude | Points |",
     ),
     "frontend/src/participant/trials/scales/magnitude.ts": MAGNITUDE_WIDGET,
-    "experiments/trials/clip_rating/__init__.py": Edit(
+    "experiments/kinds/clip_rating.py": Edit(
         'not_applicable = { en = "I cannot say" }\n',
         'not_applicable = { en = "I cannot say" }\n\n[[trial.scales]]\nname = "speed"\ntype = "magnitude"\n'
         'minimum = 0.0\nmaximum = 500.0\nunit = { en = "ms" }\nreverse = false\n'
@@ -105,7 +105,7 @@ from collections.abc import Mapping
 from typing import ClassVar, Literal
 
 from experiments.columns.column import Column
-from experiments.definition.forms.question import Question
+from experiments.declaration.forms import Question
 
 
 class DecimalField(Question):
@@ -161,9 +161,9 @@ export const type: TypeOfField<"decimal"> = {
 
 FIELD: dict[str, str | Edit] = {
     "experiments/definition/forms/decimal.py": DECIMAL,
-    "experiments/definition/forms/__init__.py": Edit(
+    "experiments/declaration/forms.py": Edit(
         "FormField = Annotated[\n",
-        "from experiments.definition.forms.decimal import DecimalField  # noqa: E402\n\n"
+        "from experiments.declaration.forms.decimal import DecimalField  # noqa: E402\n\n"
         "FormField = Annotated[\n    DecimalField |\n",
     ),
     "frontend/src/participant/screens/fields/decimal.ts": DECIMAL_CONTROL,

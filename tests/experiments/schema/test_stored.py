@@ -8,13 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.base import IMPLIED, Declaration
+from experiments.declaration.base import IMPLIED, Declaration
 from experiments.errors import InputError
 from experiments.load import DefinitionError, load_experiment, locate, parse_experiment
 from experiments.schema.canonical import canonical, definition_sha256
 from experiments.schema.keys import keys
-from experiments.schema.stored import load_stored
-from experiments.schema.upgrades import FORMAT, Step, earlier_names, upgraded
+from experiments.schema.stored import FORMAT, Step, earlier_names, load_stored, upgraded
 from tests.conftest import REPOSITORY
 
 FORMATS = sorted((REPOSITORY / "tests" / "golden" / "definitions").glob("format_*"))

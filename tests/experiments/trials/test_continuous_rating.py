@@ -4,11 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from experiments.declaration.continuous_rating import MAX_SAMPLES, ContinuousAnswer, samples_of, step_frames
 from experiments.errors import InputError
+from experiments.kinds.continuous_rating import CONTINUOUS_RATING
 from experiments.load import load_experiment, parse_experiment
-from experiments.trials.continuous_rating import CONTINUOUS_RATING
-from experiments.trials.continuous_rating.answer import ContinuousAnswer
-from experiments.trials.continuous_rating.declaration import MAX_SAMPLES, samples_of, step_frames
 from tests.helpers.studies import SHORT
 
 REPOSITORY = Path(__file__).resolve().parents[3]

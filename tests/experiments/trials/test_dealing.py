@@ -9,14 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments import design
-from experiments.assignment.compared import Compared
-from experiments.assignment.trial import Trial
-from experiments.definition import Experiment
+from experiments.declaration import Experiment
 from experiments.errors import InputError
+from experiments.kinds.kind import Compared, Trial
+from experiments.kinds.paired_comparison import assign, deal, plan
+from experiments.kinds.pairs import BlockDeal, every_pair
 from experiments.load import DefinitionError
-from experiments.trials.paired_comparison.blocks import BlockDeal
-from experiments.trials.paired_comparison.pairs import every_pair
-from experiments.trials.paired_comparison.plan import assign, deal, plan
 from tests.experiments.trials.test_paired_comparison import declared
 
 BLOCKS = 'dealing = {{ by = "bibd", clips_per_block = {size}, blocks_per_person = {each} }}'

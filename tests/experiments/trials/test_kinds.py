@@ -12,17 +12,16 @@ from pydantic import TypeAdapter, ValidationError
 
 from experiments import design
 from experiments.columns import names_of
-from experiments.definition import Experiment
+from experiments.declaration import Experiment
+from experiments.kinds import KINDS, reserved_names, views
+from experiments.kinds.kind import Kind
+from experiments.kinds.scales import block_sizes, trials_per_participant
 from experiments.load import DefinitionError, locate, parse_experiment
 from experiments.schema.canonical import definition_sha256
 from experiments.schema.difference import difference
 from experiments.schema.effects import effect_of, effects_with
 from experiments.schema.keys import paths
-from experiments.schema.stored import load_stored
-from experiments.schema.upgrades import FORMAT
-from experiments.trials import KINDS, reserved_names, views
-from experiments.trials.counts import block_sizes, trials_per_participant
-from experiments.trials.kind import Kind
+from experiments.schema.stored import FORMAT, load_stored
 from tests.conftest import REPOSITORY
 from tests.experiments.trials.toy import TOY
 

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments import design
-from experiments.definition import Experiment
+from experiments.declaration import Experiment
 from experiments.errors import InputError
+from experiments.kinds.paired_comparison import assign, plan
+from experiments.kinds.pairs import Deal, every_pair, groups
 from experiments.load import FOLDER, DefinitionError, load_experiment, parse_experiment
-from experiments.trials.paired_comparison.pairs import Deal, every_pair, groups
-from experiments.trials.paired_comparison.plan import assign, plan
 from tests.experiments.trials.test_kinds import text_with
 
 TRIAL = """\

@@ -4,11 +4,11 @@ import re
 
 import pytest
 
-from experiments.definition import Experiment
+from experiments.declaration import Experiment
+from experiments.declaration.trial import ClipSpec
+from experiments.kinds import KINDS
+from experiments.kinds.scales import trials_per_participant
 from experiments.load import DefinitionError, parse_experiment
-from experiments.trials import KINDS
-from experiments.trials.counts import trials_per_participant
-from experiments.trials.declared import ClipSpec
 from tests.conftest import REPOSITORY
 
 DEMO = (REPOSITORY / "experiments" / "dcr-demo.toml").read_text(encoding="utf-8")

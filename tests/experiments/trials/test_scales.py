@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from experiments.errors import InputError
+from experiments.kinds.scales import scale_called, scales_of
 from experiments.load import load_experiment
-from experiments.trials.scales import scale_called, scales_of
 
 REPOSITORY = Path(__file__).parents[3]
 

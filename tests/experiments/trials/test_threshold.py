@@ -6,11 +6,11 @@ from collections import Counter
 import pytest
 
 from experiments import design
-from experiments.definition import Experiment
+from experiments.declaration import Experiment
+from experiments.kinds.scales import block_sizes
+from experiments.kinds.threshold import THRESHOLD
+from experiments.kinds.threshold_grid import Point, model, points, seconds, series_of, stimuli
 from experiments.load import DefinitionError, parse_experiment
-from experiments.trials.counts import block_sizes
-from experiments.trials.threshold import THRESHOLD
-from experiments.trials.threshold.grid import Point, model, points, seconds, series_of, stimuli
 from tests.experiments.trials.test_kinds import text_with
 from tests.helpers.thresholds import TWO_INTERVAL
 

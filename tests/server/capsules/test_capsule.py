@@ -15,8 +15,7 @@ from hypothesis import HealthCheck, given, settings, strategies
 from typer.testing import CliRunner
 
 from analysis.cli import app as analysis
-from experiments.capsule.declaration import CAPSULE_FILE, MANIFEST, SOFTWARE_FILE
-from experiments.capsule.opening import CapsuleError, open_capsule
+from experiments.capsule import CAPSULE_FILE, MANIFEST, SOFTWARE_FILE, CapsuleError, open_capsule
 from experiments.errors import InputError
 from experiments.load import FOLDER, parse_experiment
 from experiments.manifest import Manifest
@@ -200,8 +199,7 @@ def test_what_is_no_capsule_gets_one_line(tmp_path: Path, content: bytes) -> Non
 
 def relist(folder: Path) -> None:
     """Write the list anew, as somebody would who means to deceive, or to correct."""
-    from experiments.capsule.declaration import Capsule
-    from experiments.capsule.packing import listed_files
+    from experiments.capsule import Capsule, listed_files
 
     data = json.loads((folder / CAPSULE_FILE).read_text(encoding="utf-8"))
     data.pop("sha256")
@@ -212,7 +210,7 @@ def relist(folder: Path) -> None:
 
 @pytest.mark.parametrize("path", ["/etc/hostname", "../outside.csv", "data/none.csv"])
 def test_a_report_made_of_files_outside_is_refused(unpacked: Path, path: str) -> None:
-    from experiments.capsule.declaration import Capsule
+    from experiments.capsule import Capsule
 
     data = json.loads((unpacked / CAPSULE_FILE).read_text(encoding="utf-8"))
     data.pop("sha256")

@@ -8,9 +8,9 @@ import pytest
 from fastapi.testclient import TestClient
 
 from experiments.columns import RUN_COLUMNS
+from experiments.kinds.clip_rating import RATINGS
 from experiments.load import parse_experiment
 from experiments.manifest import read_manifest
-from experiments.trials.clip_rating.columns import RATINGS
 from server.accounts.identity import OPERATOR
 from server.context import Services
 from server.studies.creation import add_version

@@ -7,10 +7,10 @@ import pytest
 from fastapi.testclient import TestClient
 
 from experiments.columns import Column, View
-from experiments.columns.stretches import Stretches
-from experiments.columns.tables import rows_of
-from experiments.trials import views
-from experiments.trials.continuous_rating import CONTINUOUS_RATING
+from experiments.columns.base import rows_of
+from experiments.columns.view import Stretches
+from experiments.kinds import views
+from experiments.kinds.continuous_rating import CONTINUOUS_RATING
 from server.context import Services
 from server.exports import csv_lines
 from server.exports.csv_lines import ExportBrokenOff, csv_pieces, rating_table

@@ -3,7 +3,7 @@ import io
 import json
 from typing import Any
 
-from experiments.trials.clip_rating.columns import RATINGS
+from experiments.kinds.clip_rating import RATINGS
 from server.context import Services
 from server.exports.csv_lines import rating_rows
 from server.exports.extract import EVERYTHING

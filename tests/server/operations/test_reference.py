@@ -5,7 +5,7 @@ from tests.conftest import REPOSITORY
 
 def test_every_exported_column_is_explained() -> None:
     from experiments.columns import RUN_COLUMNS
-    from experiments.trials import views
+    from experiments.kinds import views
 
     page = (REPOSITORY / "docs" / "data-dictionary.md").read_text(encoding="utf-8")
     for column in (*RUN_COLUMNS, *(column for view in views() for column in view.columns)):

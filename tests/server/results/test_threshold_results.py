@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from experiments.trials.threshold.grid import model
+from experiments.kinds.threshold_grid import model
 from server.context import Services
 from server.models import StudyRun
 from tests.helpers.admins import Admin

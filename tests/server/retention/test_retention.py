@@ -9,7 +9,7 @@ from fastapi.testclient import TestClient
 from pydantic import ValidationError
 from sqlalchemy import select
 
-from experiments.definition.retention import Retention
+from experiments.declaration.tables import Retention
 from experiments.load import parse_experiment
 from server.context import Services, open_services
 from server.core.settings import Settings

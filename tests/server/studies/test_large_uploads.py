@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.capsule.opening import CapsuleError, open_capsule
+from experiments.capsule import CapsuleError, open_capsule
 from server.context import Services
 from server.studies import uploads
 from tests.helpers.admins import Admin

@@ -13,7 +13,7 @@ from fastapi.testclient import TestClient
 
 from analysis.plans.plan import plan_of, study_contents
 from analysis.read.study_answers import load_csv
-from experiments.trials.continuous_rating import CONTINUOUS_RATING
+from experiments.kinds.continuous_rating import CONTINUOUS_RATING
 from server.context import Services
 from server.exports.extract import ExportOrigin, Extract
 from server.exports.formats import FORMATS

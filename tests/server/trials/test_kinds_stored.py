@@ -8,8 +8,8 @@ import pytest
 from fastapi.testclient import TestClient
 from sqlalchemy import text
 
-from experiments.definition import Experiment
-from experiments.trials import KINDS
+from experiments.declaration import Experiment
+from experiments.kinds import KINDS
 from server.context import Services
 from server.models import Rating, StudyRun, TrialClip
 from tests.experiments.trials.toy import TOY

@@ -7,7 +7,7 @@ from statistics import NormalDist
 
 import pytest
 
-from experiments.trials.threshold.grid import Model, Point
+from experiments.kinds.threshold_grid import Model, Point
 from server.participation import quest
 
 STIMULI = tuple(float(value) for value in range(50, 401, 25))

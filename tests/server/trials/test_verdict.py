@@ -3,7 +3,7 @@ from dataclasses import replace
 import pytest
 
 from experiments.rules import PlaybackRules
-from experiments.rules.disturbances import Disturbances
+from experiments.rules.playback import Disturbances
 from server.participation.verdict import Playback, frames_in_log, is_settled, judge
 
 CLIP = "a" * 64

@@ -9,7 +9,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from experiments.rules import WarnFast, WarnPattern, WarnSameAnswer
-from experiments.rules.warning import GivenAnswer
+from experiments.rules.warnings import GivenAnswer
 from server.context import Services
 from server.models import RunEvent
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from experiments.rendering import RenderSettings
+from experiments.declaration.rendering import RenderSettings
 from stimuli_builder.checks.jobs import OWN_LOOK_QP, first_blink, first_eye
 from stimuli_builder.clips.curves import ClipCurve
 from stimuli_builder.clips.design_clips import Options, look_of

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from experiments import design
+from experiments.declaration.rendering import RenderSettings
 from experiments.errors import InputError
 from experiments.load import load_experiment
-from experiments.rendering import RenderSettings
 from stimuli_builder.blinks.library import load_library
 from stimuli_builder.clips.exemplars import exemplar, recorded_order
 

@@ -9,10 +9,10 @@ import pytest
 
 from blink_engine import STATE_NAMES
 from blink_engine.events import EVENT_KINDS
+from experiments.declaration.rendering import EventKind, RenderOverrides, RenderSettings, State
 from experiments.errors import InputError
 from experiments.load import load_experiment, parse_experiment
 from experiments.manifest import read_manifest
-from experiments.rendering import EventKind, RenderOverrides, RenderSettings, State
 from stimuli_builder.clips.build import Machines, build
 from stimuli_builder.clips.design_clips import TIMER_SHARES, Options, performance_curve, planned_clips
 from stimuli_builder.clips.frames import PAINTED_KEPT, FramePainter

@@ -9,8 +9,8 @@ import pytest
 from typer.testing import CliRunner
 
 from blink_engine.speech import Speech, joined, speech_events, speech_states
+from experiments.declaration.rendering import RenderSettings
 from experiments.errors import InputError
-from experiments.rendering import RenderSettings
 from stimuli_builder.cli import app
 from stimuli_builder.clips.design_clips import performance_curve
 from stimuli_builder.performance.run import (

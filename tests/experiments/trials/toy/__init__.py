@@ -10,15 +10,14 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import Field
 
 from experiments import design
-from experiments.assignment.trial import Shown, Trial
-from experiments.base import Declaration, Translated
 from experiments.columns import Column, View, base, playback
-from experiments.columns.tables import rows_of
-from experiments.trials.declared import Answer, TrialDeclaration
-from experiments.trials.kind import Kind
+from experiments.columns.base import rows_of
+from experiments.declaration.base import Declaration, Translated
+from experiments.declaration.trial import Answer, TrialDeclaration
+from experiments.kinds.kind import Kind, Shown, Trial
 
 if TYPE_CHECKING:
-    from experiments.definition import Experiment
+    from experiments.declaration import Experiment
 
 
 class SameOrNot(TrialDeclaration):

@@ -9,10 +9,12 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from experiments import trials
+from experiments import kinds
+from experiments.declaration.any_trial import TRIALS
 from tests.experiments.trials.toy import TOY
 
-trials.KINDS[TOY.name] = TOY
+kinds.KINDS[TOY.name] = TOY
+TRIALS[TOY.name] = TOY.declaration
 
 import analysis.plans  # noqa: E402
 import server.participation.kinds  # noqa: E402
@@ -27,8 +29,7 @@ from sqlalchemy import text  # noqa: E402
 from analysis.plans.plan import plan_of, study_contents  # noqa: E402
 from analysis.read.study_answers import load_csv, load_database  # noqa: E402
 from analysis.report.write import write_report  # noqa: E402
-from experiments.schema.stored import load_stored  # noqa: E402
-from experiments.schema.upgrades import FORMAT  # noqa: E402
+from experiments.schema.stored import FORMAT, load_stored  # noqa: E402
 from server.accounts.identity import OPERATOR  # noqa: E402
 from server.app import create_app  # noqa: E402
 from server.context import open_services  # noqa: E402

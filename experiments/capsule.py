@@ -1,0 +1,324 @@
+"""A capsule: one zip with a study's data, declaration, clips and report, each file known by its hash."""
+
+import csv
+import hashlib
+import io
+import json
+import lzma
+import shutil
+import zipfile
+import zlib
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path, PurePosixPath
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, ValidationError
+
+from experiments.declaration.base import Declaration
+from experiments.errors import InputError
+from experiments.manifest import Sha256, file_sha256
+from experiments.software import Software
+
+# A zip that is opened without reading more at once than its list of files may have.
+
+MAX_DIRECTORY_BYTES = 8 << 20
+"""Of a zip's list of its files, which is read as a whole: an entry of 47 bytes takes hundreds."""
+
+
+class ZipListError(InputError):
+    """A zip names more files than anything that is taken here has."""
+
+
+class BoundedZip(io.FileIO):
+    """The file of a zip, for `ZipFile`, from which nothing larger than a directory may be is read at once.
+
+    `ZipFile` reads the directory in one piece, however many files it names, before they can be counted; files
+    are read in smaller ones.
+    """
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        """As of any file; ZipListError where more is asked for than the list may have."""
+        if size is not None and size > MAX_DIRECTORY_BYTES:
+            raise ZipListError(
+                f"the zip's list of files has {size >> 20} MiB, at most {MAX_DIRECTORY_BYTES >> 20} are read"
+            )
+        return super().read(-1 if size is None else size)
+
+
+# `capsule.json`: the list of a capsule's files, and what its report was made of.
+#
+# A capsule is a study's data, declaration, clips and report in one zip, of which each file is known by its
+# hash. The list shows damage and mistakes; who changes files on purpose can write another list too, so its
+# own hash (`sha256`) is worth printing in the paper.
+
+CAPSULE_FILE = "capsule.json"
+REPORT_FOLDER = "results"
+MANIFEST = "materials/manifest.json"
+"""Every clip with its hash."""
+SOFTWARE_FILE = "documentation/software.json"
+WRITTEN_BY_SERVER = ("methods.json", "methods.tex", "methods.txt")
+"""Of the report's folder: made of the server's database, so that they are held by their hashes alone."""
+
+
+class CapsuleFile(Declaration):
+    """A file of the capsule."""
+
+    path: Annotated[str, Field(min_length=1, max_length=400)]
+    """From the capsule's root, parts joined by slashes."""
+    bytes: Annotated[int, Field(ge=0)]
+    """Its length."""
+    sha256: Sha256
+    """SHA-256 of its bytes."""
+
+
+class ReportSource(Declaration):
+    """What the report was made of: the arguments of `analysis run`."""
+
+    definition: str
+    """Path of the declaration."""
+    answers: str
+    """Path of the table of answers."""
+    runs: str
+    """Path of the table of runs."""
+    origin: Literal["participant", "pilot", "simulated"]
+    """Whose answers."""
+    series: Annotated[int, Field(ge=1)]
+    """Which data series."""
+    sensitivity: bool
+    """Whether the parts that take long are in it."""
+    renamed: dict[str, str] = Field(default_factory=dict)
+    """Factors that have another name in the table of answers, by the name that the declaration has."""
+    seal: str | None = None
+    """Path of the sealed plan that the report is held against; none where the plan was not sealed."""
+    rebuilt: tuple[str, ...]
+    """Files of the report that making it again gives."""
+
+
+class Capsule(Declaration):
+    """`capsule.json`."""
+
+    format: Literal[1] = 1
+    """Of this file."""
+    study: str
+    """Name of the study."""
+    made: str
+    """Day on which it was made (ISO 8601)."""
+    report: ReportSource
+    """What the report was made of."""
+    software: Software
+    """What it was made with."""
+    files: Annotated[tuple[CapsuleFile, ...], Field(min_length=1)]
+    """Every other file."""
+
+    @property
+    def sha256(self) -> str:
+        """Hash over everything in this list: the identity of the capsule."""
+        text = json.dumps(self.model_dump(mode="json"), sort_keys=True, ensure_ascii=False)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    def text(self) -> str:
+        """`capsule.json`, its own hash in it."""
+        data = self.model_dump(mode="json") | {"sha256": self.sha256}
+        return json.dumps(data, indent=1, ensure_ascii=False) + "\n"
+
+
+# Make a capsule: list the files of a folder, and put them into a zip.
+
+AT_ONCE = 2**20
+
+
+def listed_files(folder: Path) -> tuple[CapsuleFile, ...]:
+    """Every file of a folder but `capsule.json`, by path."""
+    return tuple(
+        CapsuleFile(path=path, bytes=(folder / path).stat().st_size, sha256=file_sha256(folder / path))
+        for path in sorted(paths_in(folder))
+        if path != CAPSULE_FILE
+    )
+
+
+def paths_in(folder: Path) -> list[str]:
+    """Every file of a folder, and whatever else is no folder, as paths from it."""
+    return [path.relative_to(folder).as_posix() for path in folder.rglob("*") if not path.is_dir()]
+
+
+def pack(folder: Path, target: Path) -> None:
+    """Write the zip of a capsule's folder: the same bytes for the same files."""
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
+        for path in sorted(paths_in(folder)):
+            member = zipfile.ZipInfo(path)  # its time is the first that a zip can have
+            member.compress_type, member.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
+            with (folder / path).open("rb") as source, archive.open(member, "w", force_zip64=True) as stream:
+                shutil.copyfileobj(source, stream, AT_ONCE)
+
+
+def report_input(source: Path, target: Path, renamed: Mapping[str, str]) -> None:
+    """Copy a table of answers, its factors called as the declaration calls them; all else stays as it is."""
+    own = {name: factor for factor, name in renamed.items()}
+    with (
+        source.open("r", encoding="utf-8", newline="") as table,
+        target.open("w", encoding="utf-8", newline="") as copy,
+    ):
+        header = next(csv.reader([table.readline()]), [])
+        csv.writer(copy, lineterminator="\n").writerow([own.get(name, name) for name in header])
+        shutil.copyfileobj(table, copy, AT_ONCE)
+
+
+# Open a capsule: every file is there, none is foreign, each has the bytes that the list says.
+
+MAX_LIST_BYTES = 64 * 2**20
+_DAMAGED = (
+    zipfile.BadZipFile,
+    zlib.error,
+    lzma.LZMAError,
+    ValueError,
+    EOFError,
+    OSError,
+    NotImplementedError,
+)
+"""What reading a member of a spoilt zip raises."""
+
+
+class CapsuleError(InputError):
+    """A capsule is not what it says it is; the message begins with the file's name."""
+
+
+def open_capsule(capsule_path: Path, into: Path) -> tuple[Capsule, Path]:
+    """Check a capsule, a zip or a folder; return its list and the folder of its files.
+
+    Parameters
+    ----------
+    into : Path
+        An empty folder, into which a zip is unpacked.
+
+    Raises
+    ------
+    CapsuleError
+        A file is missing, foreign, or has other bytes than the list says: named by its path.
+    InputError
+        There is no capsule at this place.
+    """
+    if capsule_path.is_dir():
+        capsule = _read_list(capsule_path / CAPSULE_FILE, capsule_path)
+        _refuse_other_names(paths_in(capsule_path), capsule)
+        for file in capsule.files:
+            if (capsule_path / file.path).is_symlink():
+                raise CapsuleError(f"{file.path}: expected a file, got a link; unpack the capsule anew")
+            _compare(file, (capsule_path / file.path).stat().st_size, file_sha256(capsule_path / file.path))
+        return capsule, capsule_path
+    if not capsule_path.is_file():
+        raise InputError(
+            f"{capsule_path}: expected a capsule (a zip, or the folder of one), found nothing there"
+        )
+    try:
+        return _unpacked(capsule_path, into), into
+    except CapsuleError:
+        raise
+    except (*_DAMAGED, RuntimeError, ZipListError) as error:
+        raise CapsuleError(
+            f"{capsule_path.name}: expected the zip of a capsule ({error}); download it anew"
+        ) from error
+
+
+def _unpacked(capsule_path: Path, into: Path) -> Capsule:
+    with BoundedZip(capsule_path) as stream, zipfile.ZipFile(stream) as archive:
+        members = [member for member in archive.infolist() if not member.is_dir()]
+        names = [member.filename for member in members]
+        if repeated := [name for name, number in Counter(names).items() if number > 1]:
+            raise CapsuleError(
+                f"{repeated[0]}: stands twice in {capsule_path.name}; download the capsule anew"
+            )
+        if CAPSULE_FILE not in names:
+            raise CapsuleError(
+                f"{CAPSULE_FILE}: missing from {capsule_path.name}; it is no capsule, or a part of one"
+            )
+        head = archive.getinfo(CAPSULE_FILE)
+        if head.file_size > MAX_LIST_BYTES:
+            raise CapsuleError(
+                f"{CAPSULE_FILE}: {head.file_size:,} bytes, expected at most {MAX_LIST_BYTES:,}"
+            )
+        (into / CAPSULE_FILE).write_bytes(archive.read(head))
+        capsule = _read_list(into / CAPSULE_FILE, capsule_path)
+        _refuse_other_names(names, capsule)
+        _refuse_more_than_fits(capsule, into)
+        for file in capsule.files:
+            _unpack_one(archive, file, into)
+    return capsule
+
+
+def _unpack_one(archive: zipfile.ZipFile, file: CapsuleFile, into: Path) -> None:
+    """Write one member, no more bytes than the list says, and compare its hash."""
+    target = into / file.path
+    target.parent.mkdir(parents=True, exist_ok=True)
+    digest, size = hashlib.sha256(), 0
+    try:
+        with archive.open(file.path) as source, target.open("wb") as stream:
+            while size <= file.bytes and (piece := source.read(AT_ONCE)):
+                stream.write(piece)
+                digest.update(piece)
+                size += len(piece)
+    except _DAMAGED as error:
+        raise CapsuleError(f"{file.path}: its bytes were changed or damaged ({error})") from error
+    _compare(file, size, digest.hexdigest())
+
+
+def _read_list(path: Path, capsule_path: Path) -> Capsule:
+    if not path.is_file():
+        raise CapsuleError(
+            f"{CAPSULE_FILE}: missing from {capsule_path.name}; it is no capsule, or a part of one"
+        )
+    try:
+        data: Any = json.loads(path.read_text(encoding="utf-8"))
+        own = data.pop("sha256", None)
+        capsule = Capsule.model_validate(data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise CapsuleError(f"{CAPSULE_FILE}: {where}: {first['msg']}; it was changed or damaged") from error
+    except (ValueError, AttributeError, TypeError, RecursionError) as error:
+        raise CapsuleError(f"{CAPSULE_FILE}: not the JSON of a capsule ({error})") from error
+    if own != capsule.sha256:
+        raise CapsuleError(f"{CAPSULE_FILE}: its content was changed: it has another hash than it says")
+    for file in capsule.files:
+        parts = PurePosixPath(file.path).parts
+        if file.path.startswith("/") or ".." in parts or "\\" in file.path or file.path == CAPSULE_FILE:
+            raise CapsuleError(f"{file.path[:100]!r}: no path inside a capsule")
+    _refuse_sources_outside(capsule)
+    return capsule
+
+
+def _refuse_sources_outside(capsule: Capsule) -> None:
+    """What the report is made again from must be files of the list, whose hashes were compared."""
+    listed, report = {file.path for file in capsule.files}, capsule.report
+    for path in (report.definition, report.answers, report.runs, report.seal):
+        if path is not None and path not in listed:
+            raise CapsuleError(f"{CAPSULE_FILE}: the report was made of {path[:100]!r}, no file of the list")
+
+
+def _refuse_more_than_fits(capsule: Capsule, into: Path) -> None:
+    """Before anything is written: a list may claim any size."""
+    claimed, free = sum(file.bytes for file in capsule.files), shutil.disk_usage(into).free
+    if claimed > free:
+        raise CapsuleError(f"{CAPSULE_FILE}: its files take {claimed} bytes; {into} has {free} free")
+
+
+def _refuse_other_names(names: list[str], capsule: Capsule) -> None:
+    listed = {file.path for file in capsule.files} | {CAPSULE_FILE}
+    if missing := sorted(listed - set(names)):
+        raise CapsuleError(f"{missing[0]}: missing from the capsule{_more(missing)}; download it anew")
+    if foreign := sorted(set(names) - listed):
+        raise CapsuleError(
+            f"{foreign[0]}: foreign to the capsule, its list does not name it{_more(foreign)}; remove it"
+        )
+
+
+def _more(names: list[str]) -> str:
+    return f" (and {len(names) - 1} more)" if len(names) > 1 else ""
+
+
+def _compare(file: CapsuleFile, size: int, sha256: str) -> None:
+    if sha256 != file.sha256 or size != file.bytes:
+        raise CapsuleError(
+            f"{file.path}: its bytes were changed: expected sha256 {file.sha256[:12]}..., "
+            f"got {sha256[:12]}..."
+        )

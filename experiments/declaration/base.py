@@ -1,0 +1,77 @@
+"""The base of every declaration: frozen, and an unknown key is an error; and names within one."""
+
+from collections.abc import Iterable, Sequence
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, StringConstraints
+
+# Whether declarations read the descriptions of their keys, as schemas and references need them.
+#
+# A module that imports nothing, so that a command can say so before it imports anything else.
+
+_left_out = False
+
+
+def descriptions_are_read() -> bool:
+    """Return False once `leave_descriptions_out` was called."""
+    return not _left_out
+
+
+def leave_descriptions_out() -> None:
+    """Do not read them, for a program that writes no schema and no reference.
+
+    They are read from the sources as the models are made, which is a tenth of what a study's tables take.
+    To be called before `experiments.declaration.base` is imported; models made before keep theirs.
+    """
+    global _left_out
+    _left_out = True
+
+
+# The base of every declaration: frozen, and a key it does not know is an error.
+
+Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,39}$")]
+"""A factor, experiment or form name: letters, digits and underscores, at most 40, a letter first."""
+
+LevelName = Annotated[str, StringConstraints(pattern=r"^[^/\x00-\x1f]{1,60}$")]
+"""A level name: up to 60 printable characters without a slash, which separates levels in a cell label."""
+
+Language = Annotated[str, StringConstraints(pattern=r"^[a-z]{2}(-[A-Z]{2})?$")]
+"""A language tag such as `en`, `de` or `pt-BR`."""
+
+Translated = dict[Language, str]
+"""The same text in several languages, by language tag."""
+
+
+IMPLIED = "implied"
+"""Marks (in `Annotated`) the tag of the union member meant where no tag is given: it is not hashed."""
+
+
+class Declaration(BaseModel):
+    """A frozen piece of a declaration; unknown keys are refused by name.
+
+    The text under a key is its description: docs/reference/experiment.md and the API's schema are made of it.
+    """
+
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        json_schema_serialization_defaults_required=True,
+        use_attribute_docstrings=descriptions_are_read(),
+    )
+
+
+# Names within one declaration: each stands once, and none is a column of the export.
+
+
+def refuse_repeats(names: Sequence[str], what: str) -> None:
+    """ValueError where a name stands twice; `what` says whose names they are."""
+    repeated = sorted({name for name in names if names.count(name) > 1})
+    if repeated:
+        raise ValueError(f"each {what} needs a name of its own; '{repeated[0]}' stands twice")
+
+
+def refuse_reserved(names: Iterable[str], reserved: frozenset[str]) -> None:
+    """ValueError where a factor has the name of a column that stands beside it in the export."""
+    for name in names:
+        if name in reserved:
+            raise ValueError(f"factor '{name}' has the name of a ratings column; choose another")

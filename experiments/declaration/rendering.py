@@ -1,0 +1,196 @@
+"""How a clip of a cell is rendered: settings of the whole experiment, overridden by each level."""
+
+from pathlib import PurePath
+from typing import Annotated, Literal, Self
+
+from pydantic import AfterValidator, Field, model_validator
+
+from experiments.declaration.base import Declaration
+from experiments.errors import did_you_mean
+
+PROFILES = ("real", "phases", "model", "SL", "AL", "SL_ease", "AL_ease")
+"""Built-in blink profiles: recorded, drawn phase by phase, PCA model, and the four textbook curves (symmetric
+or asymmetric, linear or eased). Any other value names a CSV file of closure samples next to the experiment's
+TOML."""
+
+
+def _known_profile(value: str) -> str:
+    if value in PROFILES or PurePath(value).suffix == ".csv":
+        return value
+    near = did_you_mean(value, PROFILES)
+    raise ValueError(
+        f"expected one of {', '.join(PROFILES)} or a .csv file of closure samples, got '{value}'{near}"
+    )
+
+
+ProfileName = Annotated[str, AfterValidator(_known_profile)]
+Fps = Annotated[int, Field(ge=24, le=60)]
+DurationFrames = Annotated[float, Field(ge=3, le=600)]
+DurationMs = Annotated[float, Field(ge=100, le=2000)]
+LowerLidGain = Annotated[float, Field(ge=0, le=3)]
+MovedMm = Annotated[float, Field(ge=0, le=1)]
+CountingRate = Annotated[float, Field(ge=15, le=1000)]
+MIN_BLINK_MS, MAX_BLINK_MS = 100.0, 2000.0
+Timing = Literal["uniform", "intervals", "events", "none"]
+State = Literal["rest", "reading", "screen", "speaking", "listening"]
+EventKind = Literal["utterance_start", "utterance_end", "pause", "turn_end"]
+Seconds = Annotated[float, Field(ge=1, le=60)]
+PerMinute = Annotated[float, Field(ge=0.1, le=60)]
+Moment = Annotated[float, Field(ge=0, le=60)]
+Moments = Annotated[tuple[Moment, ...], Field(max_length=100)]
+
+
+class RenderSettings(Declaration):
+    """Everything the clip builder needs for one cell."""
+
+    character: str = "photorealistic"
+    """A shipped character (`stimuli character list`: `alder@8`, `cartoon`), or the path of a folder of
+    your own; a list of them is short for a last factor `character` with a level each. Left out, it is the
+    retired `photorealistic`, so that old declarations keep their meaning."""
+    profile: ProfileName = "real"
+    """Blink profile: recorded (`real`), made from recordings phase by phase (`phases`), of the paper's PCA
+    model, which closes too little (`model`), a textbook curve (`SL`, `AL`, `SL_ease`, `AL_ease`: symmetric or
+    asymmetric, linear or eased), or a CSV file of closure (0 open, 1 closed)."""
+    duration_frames: DurationFrames | None = None
+    """Length of the blink, in frames at `duration_frames_fps`, whatever rate the clip has; left out (and
+    `duration_ms` too), blinks keep their recorded length."""
+    duration_frames_fps: CountingRate = 30.0
+    """Rate at which `duration_frames` counts, in frames per second."""
+    duration_ms: DurationMs | None = None
+    """Length of the blink in milliseconds, instead of `duration_frames`."""
+    amplitude: Literal["full", "natural"] = "full"
+    """`full` (FC) closes the eye fully, to closure 1; `natural` (NC) keeps the closure that was measured."""
+    motion_blur: bool = True
+    """Mean of the 300 fps samples of an output frame in linear light (MB), or one sample of it (NB)."""
+    lower_lid: Literal["both", "vertical", "horizontal", "none"] = "none"
+    """Which recorded signals move the lower lid."""
+    lower_lid_gain: LowerLidGain = 1.0
+    """Size of the lower lid's motion relative to what was recorded; 0 holds it still. A clip that asks for
+    more than its character was baked for (1 mm up, 5 mm towards the nose) is refused."""
+    brow_mm: MovedMm | None = None
+    """How far the brows sink and draw together while the eye shuts, in mm at closure 1, in proportion to it;
+    0 holds them still. Left out, as the character was drawn or baked (`cartoon` 0.45, baked faces 0)."""
+    cheek_mm: MovedMm | None = None
+    """How far the cheeks rise while the eye shuts, in mm at closure 1; as `brow_mm`."""
+    squint_mm: MovedMm | None = None
+    """How far the skin below the eye draws up and towards the nose while it shuts, in mm at closure 1; as
+    `brow_mm`. The margin of the lower lid is `lower_lid`'s."""
+    gaze_mm: MovedMm | None = None
+    """How far the iris turns down, and half as far towards the nose, under the closing lid, in mm at closure
+    1 (0.2 is one degree); as `brow_mm`."""
+    eyes: Literal["alike", "separate"] = "alike"
+    """One signal drives both eyes, or the left and the right recording an eye each."""
+    performance: Timing | None = None
+    """Shows a performance of the blink engine for `seconds` instead of a single blink. What times its blinks:
+    a timer whose intervals lie evenly between half and one and a half times their mean (`uniform`), the
+    engine's fitted intervals (`intervals`), these and the events of `events_s` or `speech` (`events`), or
+    nothing, the eyes staying open (`none`). Blink n of an exemplar looks the same whatever times it. The keys
+    `profile` and of the blink's length are for single blinks."""
+    seconds: Seconds = 20.0
+    """Length of a performance, in seconds."""
+    state: State = "listening"
+    """What the person of a performance does, which sets the mean blink rate (docs/blink-engine.md)."""
+    blinks_per_minute: PerMinute | None = None
+    """Mean blink rate of a performance; left out, that published for its state."""
+    events_s: Moments = ()
+    """Moments that blinks answer where `performance` is `events`, in seconds from the clip's start."""
+    event: EventKind = "turn_end"
+    """What happens at the moments of `events_s`."""
+    speech: str = ""
+    """A recording with sound or subtitles (.vtt, .srt) next to the TOML whose pauses and turns blinks answer,
+    where `performance` is `events`; the person speaks then, and is in `state` between turns. Of subtitles
+    with several voices name one: `dialogue.vtt#Anna`."""
+    fps: Fps = 30
+    """Frame rate of the clip, in frames per second."""
+    width_px: Annotated[int, Field(ge=320, le=1920, multiple_of=2)] = 960
+    """Width of the clip, in pixels."""
+    height_px: Annotated[int, Field(ge=120, le=1200, multiple_of=2)] = 360
+    """Height of the clip, in pixels."""
+
+    @model_validator(mode="after")
+    def _one_length(self) -> Self:
+        if self.duration_ms is not None and self.duration_frames is not None:
+            raise ValueError("expected duration_frames or duration_ms, got both; leave one out")
+        length_ms = self.blink_ms
+        if length_ms is not None and not MIN_BLINK_MS - 1e-9 <= length_ms <= MAX_BLINK_MS + 1e-9:
+            raise ValueError(
+                f"expected a blink of {MIN_BLINK_MS:g} to {MAX_BLINK_MS:g} ms, got duration_frames "
+                f"{self.duration_frames:g} at {self.duration_frames_fps:g} fps, {length_ms:.0f} ms"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _performance_fits(self) -> Self:
+        answers = bool(self.events_s or self.speech)
+        if self.performance == "events" and not answers:
+            raise ValueError("performance is 'events': expected events_s or speech, got neither")
+        if self.events_s and max(self.events_s) > self.seconds:
+            raise ValueError(
+                f"events_s: expected moments within the {self.seconds:g} s, got {max(self.events_s):g}"
+            )
+        return self
+
+    @property
+    def blink_ms(self) -> float | None:
+        """Length of the blink in milliseconds; None where it keeps the recorded one."""
+        if self.duration_frames is None:
+            return self.duration_ms
+        return self.duration_frames * 1000 / self.duration_frames_fps
+
+
+class RenderOverrides(Declaration):
+    """What a level changes of [render]; a key left out stays as it is there."""
+
+    character: str | None = None
+    """As [render] `character`, for clips of this level."""
+    profile: ProfileName | None = None
+    """As [render] `profile`, for clips of this level."""
+    duration_frames: DurationFrames | None = None
+    """As [render] `duration_frames`, for clips of this level."""
+    duration_frames_fps: CountingRate | None = None
+    """As [render] `duration_frames_fps`, for clips of this level."""
+    duration_ms: DurationMs | None = None
+    """As [render] `duration_ms`, for clips of this level."""
+    amplitude: Literal["full", "natural"] | None = None
+    """As [render] `amplitude`, for clips of this level."""
+    motion_blur: bool | None = None
+    """As [render] `motion_blur`, for clips of this level."""
+    lower_lid: Literal["both", "vertical", "horizontal", "none"] | None = None
+    """As [render] `lower_lid`, for clips of this level."""
+    lower_lid_gain: LowerLidGain | None = None
+    """As [render] `lower_lid_gain`, for clips of this level."""
+    brow_mm: MovedMm | None = None
+    """As [render] `brow_mm`, for clips of this level."""
+    cheek_mm: MovedMm | None = None
+    """As [render] `cheek_mm`, for clips of this level."""
+    squint_mm: MovedMm | None = None
+    """As [render] `squint_mm`, for clips of this level."""
+    gaze_mm: MovedMm | None = None
+    """As [render] `gaze_mm`, for clips of this level."""
+    eyes: Literal["alike", "separate"] | None = None
+    """As [render] `eyes`, for clips of this level."""
+    performance: Timing | None = None
+    """As [render] `performance`, for clips of this level."""
+    seconds: Seconds | None = None
+    """As [render] `seconds`, for clips of this level."""
+    state: State | None = None
+    """As [render] `state`, for clips of this level."""
+    blinks_per_minute: PerMinute | None = None
+    """As [render] `blinks_per_minute`, for clips of this level."""
+    events_s: Moments | None = None
+    """As [render] `events_s`, for clips of this level."""
+    event: EventKind | None = None
+    """As [render] `event`, for clips of this level."""
+    speech: str | None = None
+    """As [render] `speech`, for clips of this level."""
+    fps: Fps | None = None
+    """As [render] `fps`, for clips of this level."""
+
+    def applied_to(self, settings: RenderSettings) -> RenderSettings:
+        """Return `settings` with this level's values in place, validated again."""
+        own = self.model_dump(exclude_none=True)
+        merged = settings.model_dump() | own
+        for length, other in (("duration_ms", "duration_frames"), ("duration_frames", "duration_ms")):
+            if length in own and other not in own:
+                merged[other] = None
+        return RenderSettings.model_validate(merged)

@@ -1,0 +1,26 @@
+"""The kinds of trial, and the registry that finds them by name.
+
+A new kind is its [trial] in `experiments.declaration`, its file here, and its line in `KINDS` and `TRIALS`.
+"""
+
+from experiments.columns.view import View
+from experiments.kinds.clip_rating import CLIP_RATING
+from experiments.kinds.continuous_rating import CONTINUOUS_RATING
+from experiments.kinds.kind import Kind
+from experiments.kinds.paired_comparison import PAIRED_COMPARISON
+from experiments.kinds.threshold import THRESHOLD
+
+KINDS: dict[str, Kind] = {
+    kind.name: kind for kind in (CLIP_RATING, PAIRED_COMPARISON, THRESHOLD, CONTINUOUS_RATING)
+}
+"""Every kind by the name that a TOML gives it; the first is meant where none is given."""
+
+
+def views() -> tuple[View, ...]:
+    """The SQL views of all kinds, which migrations make and a test compares with the database's own."""
+    return tuple(kind.view for kind in KINDS.values())
+
+
+def reserved_names() -> frozenset[str]:
+    """Names that no factor may have: they are columns beside it."""
+    return frozenset(name for view in views() for name in view.names)

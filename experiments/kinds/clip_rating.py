@@ -1,0 +1,455 @@
+"""Single clips rated on scales: what does not fit, who rates which, page, columns."""
+
+import random
+from dataclasses import replace
+from typing import Literal
+
+from experiments import design
+from experiments.assignment.groups import seat_of
+from experiments.assignment.order import single_clips
+from experiments.assignment.shares import lines, share
+from experiments.columns import base, playback
+from experiments.columns.base import rows_of
+from experiments.columns.column import Column
+from experiments.columns.view import Dialect, View
+from experiments.declaration import Experiment
+from experiments.declaration.base import Declaration, Translated
+from experiments.declaration.clip_rating import (
+    MAX_FRAMES_LOGGED,
+    SCALE_NAME,
+    AnyScale,
+    ClipRating,
+    Points,
+    RatingAnswer,
+    RatingReference,
+    check_response,
+    clip_rating_of,
+)
+from experiments.declaration.factors import Factor
+from experiments.declaration.trial import BlockSpec
+from experiments.errors import did_you_mean
+from experiments.kinds.kind import Kind, Shown, Trial
+from experiments.schema.effects import Effect
+
+# What in declared ratings of single clips does not fit the rest of the experiment.
+
+
+def fault(experiment: Experiment) -> str | None:
+    """More views of a long performance than a trial may log; a reference that does not fit."""
+    trial = clip_rating_of(experiment)
+    levels = [level.render for factor in experiment.factors for level in factor.levels]
+    settings = [experiment.render, *(level.applied_to(experiment.render) for level in levels)]
+    if trial.reference and any(one.performance for one in settings):
+        return "trial.reference: performances have no reference; leave it out, or show single blinks"
+    if trial.reference and (wrong := fault_of_reference(trial.reference, experiment)):
+        return wrong
+    longest = max((round(one.seconds * one.fps) for one in settings if one.performance), default=0)
+    if longest * trial.views <= MAX_FRAMES_LOGGED:
+        return None
+    return (
+        f"trial.views: {trial.views} views of {longest} frames are more than the {MAX_FRAMES_LOGGED} that "
+        "a trial may log; show shorter clips, fewer frames a second or fewer views"
+    )
+
+
+def fault_of_reference(reference: RatingReference, experiment: Experiment) -> str | None:
+    """What here does not fit the design, as `path: what to do`; None where all is well."""
+    return (
+        _fault_of_clip(reference, experiment)
+        or _fault_of_difference(reference, experiment)
+        or (None if reference.rate_itself else _fault_of_rest(reference, experiment))
+    )
+
+
+def _fault_of_clip(reference: RatingReference, experiment: Experiment) -> str | None:
+    if reference.factor is None:
+        cells = ["/".join(level for _, level in cell) for cell in design.cells(experiment)]
+        if reference.cell not in cells:
+            return (
+                f"trial.reference.cell: the design has no cell '{reference.cell}'"
+                f"{did_you_mean(str(reference.cell), cells)}"
+            )
+        return None
+    if reference.factor not in experiment.factor_names:
+        nearest = did_you_mean(reference.factor, experiment.factor_names)
+        return f"trial.reference.factor: no factor is called '{reference.factor}'{nearest}"
+    factor = experiment.factor(reference.factor)
+    names = [level.name for level in factor.levels]
+    if reference.level not in names:
+        return (
+            f"trial.reference.level: '{reference.factor}' has no level '{reference.level}'"
+            f"{did_you_mean(str(reference.level), names)}"
+        )
+    return _fault_of_factor(factor)
+
+
+def _fault_of_factor(factor: Factor) -> str | None:
+    if factor.between or factor.dealt:
+        return (
+            f"trial.reference.factor: participants see some levels of '{factor.name}' only; name a "
+            "factor of which everybody sees all"
+        )
+    return None
+
+
+def _differing(reference: RatingReference, experiment: Experiment) -> list[str]:
+    """The factors in whose levels a reference can differ from its clip, in declared order."""
+    return [
+        factor.name
+        for factor in experiment.factors
+        if len(factor.levels) > 1
+        and (factor.name == reference.factor if reference.cell is None else not factor.between)
+    ]
+
+
+def _fault_of_difference(reference: RatingReference, experiment: Experiment) -> str | None:
+    """A reference is another clip than some, and shows the blink of each."""
+    differing = _differing(reference, experiment)
+    if not differing:
+        return (
+            "trial.reference: every clip would be its own reference; name a factor of which each "
+            "participant sees two levels or more"
+        )
+    own = next((name for name in differing if name in experiment.exemplars.own_per), None)
+    if own is not None:
+        return (
+            f"exemplars.own_per: a reference shows the blink of its clip, but the levels of '{own}', in "
+            f"which the two differ, have blinks of their own; leave '{own}' out of own_per"
+        )
+    return None
+
+
+def _fault_of_rest(reference: RatingReference, experiment: Experiment) -> str | None:
+    """Without the reference's own trials the rated cells must still be a crossed design."""
+    hidden = "or set rate_itself = true"
+    split = experiment.blocks.split_by
+    if reference.factor is None and len(experiment.factors) > 1:
+        return (
+            f"trial.reference.cell: without ratings of '{reference.cell}' the rated cells are not crossed; "
+            f"name factor and level, {hidden}"
+        )
+    name = reference.factor or experiment.factor_names[0]
+    if split == name:
+        return (
+            f"blocks.split_by: the reference's level of '{name}' would be an empty block; "
+            f"split by another factor, {hidden}"
+        )
+    if len(experiment.factor(name).levels) < 3:
+        return (
+            f"trial.reference: '{name}' needs two levels beside the reference's to compare; "
+            f"add a level, {hidden}"
+        )
+    return None
+
+
+# What a single-clip rating exports: the base columns and the rating itself, one row a scale and play.
+#
+# A payload with one number is that of a [trial.scale]; one with `answers` has an object a scale.
+
+ANSWER: tuple[Column, ...] = (
+    Column(
+        "response",
+        "number",
+        "The rating as it was chosen on the scale, reverse-keyed or not; empty where not_applicable was.",
+        source="e.value",
+        member="response",
+    ),
+    Column(
+        "expected_response",
+        "integer",
+        "The answer asked for in an attention check, or right in a motion check.",
+        source="a",
+    ),
+)
+
+SCALE: tuple[Column, ...] = (
+    Column(
+        "scale",
+        "text",
+        "Name of the scale: rating where the study has one; empty in checks.",
+        source="CASE WHEN a.kind IN ('attention', 'check') THEN NULL ELSE e.key END",
+    ),
+    Column(
+        "not_applicable",
+        "boolean",
+        "True where the answer beside the scale (cannot say) was chosen.",
+        source="e.value",
+        member="not_applicable",
+        otherwise="false",
+    ),
+    Column(
+        "scale_rt",
+        "number",
+        "Response time from the clip's last frame to the answer on this scale, where there are several.",
+        unit="ms",
+        minimum=0,
+        source="e.value",
+        member="rt",
+    ),
+)
+
+_EACH: dict[Dialect, str] = {
+    "sqlite": "JOIN json_each(coalesce(json_extract(t.payload, '$.answers'), "
+    f"json_object('{SCALE_NAME}', json(t.payload)))) e\n",
+    "postgresql": "CROSS JOIN LATERAL json_each(coalesce(t.payload -> 'answers', "
+    f"json_build_object('{SCALE_NAME}', t.payload))) e\n",
+}
+
+
+REFERENCE: tuple[Column, ...] = (
+    Column(
+        "reference",
+        "text",
+        "Cell of the reference clip shown before; empty where the study has none.",
+        source="xc.cell",
+    ),
+    Column(
+        "reference_gap_ms",
+        "number",
+        "From the last frame of the reference to the first of the rated clip, as they were drawn.",
+        unit="ms",
+        minimum=0,
+        source="t.payload",
+        member="reference_gap_ms",
+    ),
+)
+
+
+def _rows(dialect: Dialect) -> str:
+    return rows_of("clip_rating", {"shown": "c", "reference": "xc"}, _EACH[dialect])
+
+
+RATINGS = View(
+    name="ratings",
+    title="Ratings: one row a play, or one a scale and play",
+    columns=(
+        *base.STUDY,
+        *base.RUN,
+        *base.TRIAL,
+        *base.CLIP,
+        *ANSWER,
+        *base.TIMES,
+        *playback.PLAYBACK,
+        *playback.SCREEN,
+        *base.EXCLUSION,
+        *base.SAVED,
+        *base.ORIGIN,
+        *playback.CLOCK,
+        *SCALE,
+        *playback.VIEWS,
+        *base.EVIDENCE,
+        *base.CHECK,
+        *playback.PRESENTATION,
+        *REFERENCE,
+    ),
+    rows=_rows,
+)
+
+
+# What of a single-clip rating the participant's page is told.
+#
+# A model of its own, so that a key added to the declaration reaches participants only when it is put here
+# too.
+
+
+class ShownRatingReference(Declaration):
+    """The label of the reference, and how long the canvas stays plain after it; not which clip it is."""
+
+    label: Translated
+    gap_ms: int
+
+
+class ShownClipRating(Declaration):
+    """The declared single-clip rating as the page gets it."""
+
+    kind: Literal["clip_rating"]
+    scales: tuple[AnyScale, ...]
+    arrangement: Literal["one_screen", "one_after_the_other"]
+    check_scale: Points
+    views: int
+    reference: ShownRatingReference | None = None
+    start: Literal["key", "fixation"]
+    fixation_ms: int
+    pointer_delay_ms: int
+    confirm: bool
+    comment: bool
+    expected_seconds: float
+
+
+def shown(experiment: Experiment) -> ShownClipRating:
+    """Return the part of the declared trial that its page needs."""
+    trial = clip_rating_of(experiment)
+    reference = trial.reference
+    return ShownClipRating(
+        kind=trial.kind,
+        scales=trial.asked_scales,
+        arrangement=trial.arrangement,
+        check_scale=trial.check_scale,
+        views=trial.views,
+        reference=reference and ShownRatingReference(label=reference.label, gap_ms=reference.gap_ms),
+        start=trial.start,
+        fixation_ms=trial.fixation_ms,
+        pointer_delay_ms=trial.pointer_delay_ms,
+        confirm=trial.confirm,
+        comment=trial.comment,
+        expected_seconds=trial.expected_seconds,
+    )
+
+
+# Who rates which clips in what order: everyone every clip, in blocks as declared.
+
+
+def assign(experiment: Experiment, seed: int, slot: int) -> list[Trial]:
+    """The trials of one participant in order, see `single_clips`; a check asks for any point of the scale."""
+    scale = clip_rating_of(experiment).check_scale
+
+    def asked(rng: random.Random) -> int:
+        return rng.randint(scale.minimum, scale.maximum)
+
+    trials = single_clips(experiment, seed, slot, asked)
+    reference = clip_rating_of(experiment).reference
+    return trials if reference is None else [_after(reference, experiment, trial) for trial in trials]
+
+
+def check_choices(experiment: Experiment) -> int:
+    """The points of the scale on which attention checks ask."""
+    scale = clip_rating_of(experiment).check_scale
+    return scale.maximum - scale.minimum + 1
+
+
+def _after(reference: RatingReference, experiment: Experiment, trial: Trial) -> Trial:
+    """The trial with its reference; checks have none."""
+    if trial.clip is None or trial.check is not None:
+        return trial
+    return replace(trial, shown=(*trial.shown, Shown("reference", reference.of(experiment, trial.clip))))
+
+
+def plan(experiment: Experiment) -> tuple[str, ...]:
+    """Groups, how often each clip is seen, and which clip comes before it."""
+    reference = clip_rating_of(experiment).reference
+    return lines(experiment) if reference is None else (*lines(experiment), reference.said())
+
+
+def block_size(experiment: Experiment, block: BlockSpec) -> int:
+    """One trial a clip of the participant's share, the largest where they differ."""
+    laps = len(experiment.assignment.lists) or 1
+    seats = (seat_of(experiment, slot) for slot in range(laps))
+    return max(len(share(experiment, seat).intersection(block.clips)) for seat in seats)
+
+
+# One clip after another, each rated on a scale.
+
+EFFECTS: dict[str, Effect] = {
+    "kind": "measured",
+    "scale": "measured",
+    "scales": "measured",
+    "arrangement": "measured",
+    "views": "measured",
+    "reference": "measured",
+    "reference.label": "wording",
+    "start": "measured",
+    "fixation_ms": "measured",
+    "pointer_delay_ms": "wording",
+    "confirm": "measured",
+    "comment": "wording",
+    "expected_seconds": "wording",
+}
+
+EXAMPLE = """\
+[trial]
+kind = "clip_rating"
+start = "key"
+expected_seconds = 7.2
+
+[trial.scale]
+minimum = 1
+maximum = 7
+question = { en = "How natural was this blink?" }
+low = { en = "very unnatural" }
+high = { en = "very natural" }
+"""
+
+FURTHER_EXAMPLES = (
+    """\
+[trial]
+kind = "clip_rating"
+arrangement = "one_screen"
+
+[[trial.scales]]
+name = "naturalness"
+type = "points"
+minimum = 1
+maximum = 5
+question = { en = "How natural was this blink?" }
+labels = [
+    { en = "not at all" },
+    { en = "a little" },
+    { en = "moderately" },
+    { en = "rather" },
+    { en = "very" },
+]
+
+[[trial.scales]]
+name = "eeriness"
+type = "slider"
+minimum = 0.0
+maximum = 100.0
+step = 1.0
+question = { en = "How eerie was it?" }
+low = { en = "not at all" }
+high = { en = "extremely" }
+show_value = true
+reverse = true
+not_applicable = { en = "I cannot say" }
+""",
+    """\
+[trial]
+kind = "clip_rating"
+
+[trial.scale]
+minimum = 1
+maximum = 5
+question = { en = "How impaired is the second clip, compared with the first?" }
+labels = [
+    { en = "Very annoying" },
+    { en = "Annoying" },
+    { en = "Slightly annoying" },
+    { en = "Perceptible, but not annoying" },
+    { en = "Imperceptible" },
+]
+
+[trial.reference]
+factor = "compression"
+level = "none"
+label = { en = "Reference" }
+gap_ms = 2000
+rate_itself = true
+""",
+    """\
+[trial]
+kind = "clip_rating"
+scale = { type = "slider", question = { en = "Alike?" }, low = { en = "no" }, high = { en = "yes" } }
+reference = { cell = "none/natural", label = { en = "Reference" } }
+""",
+)
+
+CLIP_RATING = Kind(
+    declaration=ClipRating,
+    answer=RatingAnswer,
+    view=RATINGS,
+    roles=("shown",),
+    effects=EFFECTS,
+    page=ShownClipRating,
+    shown=shown,
+    assign=assign,
+    block_size=block_size,
+    plan=plan,
+    fault=fault,
+    shares_clips=True,
+    groups=True,
+    random_factors=True,
+    example=EXAMPLE,
+    further_examples=FURTHER_EXAMPLES,
+    check_response=check_response,
+    check_choices=check_choices,
+)

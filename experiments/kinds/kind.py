@@ -1,0 +1,174 @@
+"""What a kind of trial is made of, and a trial as it is assigned to a participant."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+from experiments.columns.view import View
+from experiments.declaration import Experiment
+from experiments.declaration.base import Declaration
+from experiments.declaration.trial import Answer, BlockSpec, ClipSpec, TrialDeclaration
+from experiments.schema.effects import Effect
+
+# What is stored of a comparison, for designs that choose by it.
+
+
+class Compared(NamedTuple):
+    """Comparisons of two clips, equal in side and answer.
+
+    Attributes
+    ----------
+    left, right : str
+        The clips as lists name them, cell and exemplar joined by a slash.
+    winner : {"left", "right", "tie"} or None
+        None where the pair was dealt to somebody who is still under way.
+    times : int
+        How many such comparisons there are.
+    """
+
+    left: str
+    right: str
+    winner: Literal["left", "right", "tie"] | None
+    times: int
+
+
+# One trial as it is assigned to a participant, of any kind.
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A clip of a trial and the role in which it is shown."""
+
+    role: str
+    clip: ClipSpec
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One trial as assigned: practice has block 0; attention checks have no clip.
+
+    Attributes
+    ----------
+    series : str
+        Name of the adaptive series it belongs to, empty where there is none.
+    check : int or None
+        Which of the study's check clips a motion check shows, from 0.
+    """
+
+    kind: Literal["practice", "main", "attention", "check"]
+    block: int
+    block_label: str
+    shown: tuple[Shown, ...] = ()
+    expected_response: int | None = None
+    series: str = ""
+    check: int | None = None
+
+    @property
+    def clip(self) -> ClipSpec | None:
+        """The clip of a trial that shows one; None for checks."""
+        return self.shown[0].clip if self.shown else None
+
+
+# What a kind of trial is made of. Everything else reads it from here.
+
+
+def nothing_wrong(experiment: Experiment) -> str | None:
+    """Kinds of which every declaration fits every experiment."""
+    del experiment
+    return None
+
+
+def nothing_more(experiment: Experiment) -> tuple[str, ...]:
+    """What a plan says of a kind whose trials the cells and exemplars tell already."""
+    del experiment
+    return ()
+
+
+def two_choices(experiment: Experiment) -> int:
+    """The answers that an attention check offers at least."""
+    del experiment
+    return 2
+
+
+def never(experiment: Experiment) -> bool:
+    """No kind's trials depend on what is stored unless it says so."""
+    del experiment
+    return False
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of trial.
+
+    Attributes
+    ----------
+    declaration : type
+        The model of the TOML's [trial]; the constant of its `kind` is the name.
+    answer : type
+        The model of what a participant answers to one trial, and how that is stored.
+    view : View
+        The rows it exports.
+    roles : tuple of str
+        The clips a trial shows, in the order of their places (`shown`; `left`, `right`).
+    effects : mapping of str to {"wording", "measured"}
+        What an edit of each key of the declaration does to stored answers, by path below [trial].
+    page : type
+        What of the declaration the participant's page is told.
+    shown : callable
+        Makes the page's model (`page`) from the declaration.
+    assign : callable
+        The trials of one participant in order, by declaration, seed and slot.
+    block_size : callable
+        Trials of one participant in a block, attention checks not counted.
+    example : str
+        A [trial] as TOML, for the reference; it is what a newcomer copies.
+    further_examples : tuple of str
+        Of keys that exclude one another, so that the reference shows each.
+    shares_clips : bool
+        Whether it follows [assignment]; else that is refused.
+    groups : bool
+        Whether it follows factors between participants; else they are refused.
+    random_factors : bool
+        Whether it follows random factors: deals their levels, and analyses them as random.
+    plan : callable
+        Lines that `stimuli plan` adds: expected counts; InputError where the design cannot be analysed.
+    adapts : bool
+        Whether answers decide what is shown next: the server then follows its series.
+    fault : callable
+        What in the declared [trial] does not fit the rest of the experiment: `path: what to do`, or None.
+    chooses : callable
+        Whether a run's trials are chosen by the comparisons stored before it.
+    assign_by : callable or None
+        As `assign`, with the comparisons stored before, where `chooses` says so.
+    check_response : callable
+        The number that an answer, as stored, is to an attention check, which asks for one.
+    check_choices : callable
+        How many numbers an attention check may ask for.
+    """
+
+    declaration: type[TrialDeclaration]
+    answer: type[Answer]
+    view: View
+    roles: tuple[str, ...]
+    effects: Mapping[str, Effect]
+    page: type[Declaration]
+    shown: Callable[[Experiment], Declaration]
+    assign: Callable[[Experiment, int, int], list[Trial]]
+    block_size: Callable[[Experiment, BlockSpec], int]
+    example: str
+    further_examples: tuple[str, ...] = ()
+    plan: Callable[[Experiment], tuple[str, ...]] = nothing_more
+    fault: Callable[[Experiment], str | None] = nothing_wrong
+    check_response: Callable[[Mapping[str, Any]], int | None] = lambda _: None
+    check_choices: Callable[[Experiment], int] = two_choices
+    shares_clips: bool = False
+    groups: bool = False
+    random_factors: bool = False
+    adapts: bool = False
+    chooses: Callable[[Experiment], bool] = never
+    assign_by: Callable[[Experiment, int, int, Sequence[Compared]], list[Trial]] | None = None
+
+    @property
+    def name(self) -> str:
+        """As the TOML, the database and the API name it."""
+        return str(self.declaration.model_fields["kind"].default)

@@ -1,0 +1,105 @@
+"""Rules of [[screening]], which end a run while it goes on: answers of forms, attention checks, the device."""
+
+from collections.abc import Sequence
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from experiments.declaration.base import Declaration, Name, Translated
+from experiments.declaration.forms import Form, Question
+from experiments.errors import did_you_mean
+
+# Attention checks: instructed ratings between the trials.
+
+
+class AttentionChecks(Declaration):
+    """Instructed ratings put between trials: 'please answer 2 this time'."""
+
+    per_block: Annotated[int, Field(ge=0, le=10)] = 0
+    """Checks in each block, at random places but never first. They are stored with kind `attention`."""
+    text: Translated = Field(
+        default_factory=lambda: {
+            "en": "Attention check: please answer **{response}** on this screen.",
+            "de": "Aufmerksamkeitsprüfung: Bitte antworten Sie hier mit **{response}**.",
+        }
+    )
+    """Markdown of the check, `{response}` standing for the answer asked for."""
+
+
+# Screening by failed attention checks.
+
+
+class ScreenAttention(Declaration):
+    """Screen out as soon as more than `more_than` attention checks were answered otherwise than asked."""
+
+    rule: Literal["attention_checks_failed"] = "attention_checks_failed"
+    """Names this rule."""
+    more_than: Annotated[int, Field(ge=0)] = 0
+    """Failed checks that are still allowed; 0 ends the run at the first."""
+
+
+# Screening by the device.
+
+
+class ScreenDevice(Declaration):
+    """Screen out where browser, screen or window cannot show the clips as [display] asks.
+
+    Without this rule the page explains what is missing, and the link stays open for another device.
+    """
+
+    rule: Literal["device"] = "device"
+    """Names this rule."""
+
+
+# Screening by an answer of a form.
+
+
+class ScreenFormAnswer(Declaration):
+    """Screen out by an answer: one of `refused`, or a number under `below` or over `above`.
+
+    The run ends as soon as the form is sent. A question left open screens nobody out: make it required.
+    """
+
+    rule: Literal["form_answer"] = "form_answer"
+    """Names this rule."""
+    form: Name
+    """Name of the form."""
+    field: Name
+    """Name of the question in it."""
+    refused: tuple[str, ...] = ()
+    """Values of options that end the run; for questions with options."""
+    below: int | None = None
+    """A number smaller than this ends the run; for numbers and ratings."""
+    above: int | None = None
+    """A number larger than this ends the run; for numbers and ratings."""
+
+    def screens_out(self, answer: object) -> bool:
+        """True where this answer (text, number, or list of texts) ends the run."""
+        if isinstance(answer, int):
+            low = self.below is not None and answer < self.below
+            return low or (self.above is not None and answer > self.above)
+        given = answer if isinstance(answer, list) else [answer]
+        return any(value in self.refused for value in given)
+
+    def fault(self, forms: Sequence[Form]) -> str | None:
+        """What is wrong with this rule, given the declared forms; None where nothing is."""
+        form = next((form for form in forms if form.name == self.form), None)
+        if form is None:
+            return f"no form is called '{self.form}'{did_you_mean(self.form, [form.name for form in forms])}"
+        field = next((field for field in form.fields if field.name == self.field), None)
+        if field is None:
+            near = did_you_mean(self.field, [field.name for field in form.fields])
+            return f"form '{form.name}' has no field '{self.field}'{near}"
+        return self._fault_of(field)
+
+    def _fault_of(self, field: Question) -> str | None:
+        limits = self.below is not None or self.above is not None
+        if field.screened_by == "limits":
+            fits = limits and not self.refused
+            return None if fits else f"'{field.name}' is a number: give `below` or `above`, not `refused`"
+        if field.screened_by is None:
+            return f"'{field.name}' is free text; only choices and numbers can be screened"
+        if limits or not self.refused:
+            return f"'{field.name}' is a choice: give `refused`, not `below` or `above`"
+        wrong = next((value for value in self.refused if value not in field.values), None)
+        return f"'{field.name}' has no option '{wrong}'{did_you_mean(wrong, field.values)}" if wrong else None

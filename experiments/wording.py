@@ -1,0 +1,271 @@
+"""The texts of a study: their languages, whether consent mentions flicker, placeholders left unfilled."""
+
+import re
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple, get_args
+
+from pydantic import BaseModel
+
+from experiments.assignment.order import motion_checks_by_block
+from experiments.declaration import Experiment
+from experiments.declaration.base import Translated
+
+# The languages of declared texts: each has at least the study's first, which participants fall back on.
+
+Text = tuple[str, dict[str, str]]
+"""Dotted path of a declared text, items of lists from 1, and the text by language."""
+
+
+def language_fault(declared: BaseModel, languages: Sequence[str]) -> str | None:
+    """What is wrong with the first text that lacks the first of `languages`, or None."""
+    first, missing = languages[0], [text for text in _texts(declared) if languages[0] not in text[1]]
+    if not missing:
+        return None
+    path, text = missing[0]
+    undeclared = [language for language in text if language not in languages]
+    has = f"one in {', '.join(text)} alone" if text else "an empty table"
+    unlisted = f", and languages does not list {', '.join(undeclared)}" if undeclared else ""
+    others = f" ({len(missing) - 1} more lack it)" if len(missing) > 1 else ""
+    return (
+        f"{path}: expected a text in {first}, the first of languages, got {has}{unlisted}; add {first} to "
+        f"the text, or correct languages{others}"
+    )
+
+
+def unlisted(declared: BaseModel, languages: Sequence[str]) -> str:
+    """A sentence on texts that nobody is offered, since their language is not listed; empty where none is."""
+    texts = list(_texts(declared))
+    codes = {code: None for _, text in texts for code in text if code not in languages}
+    if not codes:
+        return ""
+    path = next(path for path, text in texts if not codes.keys().isdisjoint(text))
+    return (
+        f"Texts in {', '.join(codes)} are offered to nobody, such as that of {path}: languages lists "
+        f"{', '.join(languages)} alone."
+    )
+
+
+def _texts(declared: BaseModel, prefix: str = "") -> Iterator[Text]:
+    """Every text that was written; those by default have the languages of the page and no others.
+
+    A stored declaration holds its defaults too: what is as by default counts as not written.
+    """
+    for key, field in type(declared).model_fields.items():
+        value = getattr(declared, key)
+        if key in declared.model_fields_set and value != field.get_default(call_default_factory=True):
+            yield from _within(value, f"{prefix}{key}", is_translated(field.annotation))
+
+
+def _within(value: Any, path: str, is_text: bool) -> Iterator[Text]:
+    if isinstance(value, BaseModel):
+        yield from _texts(value, f"{path}.")
+    elif isinstance(value, tuple):
+        for number, item in enumerate(value, start=1):
+            yield from _within(item, f"{path}.{number}", is_text)
+    elif is_text and isinstance(value, dict):
+        yield path, value
+
+
+def is_translated(annotation: Any) -> bool:
+    """True where a key of this type holds a text in several languages."""
+    return annotation == Translated or any(map(is_translated, get_args(annotation)))
+
+
+# Whether consent mentions flicker, which some people are sensitive to and must know before they agree.
+
+WORDS = {
+    "ar": r"وميض|وماض|تومض|يومض|تخفق|صرع",
+    "de": r"flacker|flicker|flimmer|blitz|photosens|fotosens|lichtempfindlich|epilep",
+    "en": r"flicker|flash|strob|photosens|epilep",
+    "es": r"destell|titil|centelle|parpade(?:an|antes)|fotosens|epilep|epilép",
+    "fr": r"scintill|clignot|papillot|vacill|photosens|épilep",
+    "it": r"sfarfall|lampegg|tremol|intermitten|fotosens|epiless|epilett",
+    "ja": r"ちらつ|点滅|明滅|フリッカ|フラッシュ|光過敏|光感受性|てんかん",
+    "nl": r"flikker|flits|fotosens|lichtgevoelig|epilep",
+    "pl": r"migot|migoc|migaj|błysk|fotosens|światłoczu|wrażliw\w* na światło|epilep|padacz",
+    "pt": r"cintil|tremel|bruxule|tremul|lampej|piscantes|fotossens|epilep|epilép",
+    "zh": r"闪烁|闪光|闪动|频闪|光敏|癫痫|閃爍|閃光|癲癇",
+}
+"""Parts of words by which a consent mentions flicker, in each language of the page; none of them is about
+blinking."""
+SENTENCES = {
+    "ar": "تعرض بعض المقاطع القصيرة نقاطًا تومض بسرعة.",
+    "de": "Einige kurze Clips zeigen flimmernde Punkte.",
+    "en": "A few short clips show flickering dots.",
+    "es": "Algunos clips breves muestran puntos que titilan.",
+    "fr": "Quelques courts clips montrent des points qui scintillent.",
+    "it": "Alcune brevi clip mostrano punti che sfarfallano.",
+    "ja": "いくつかの短い映像では、点がちらつきます。",
+    "nl": "Enkele korte clips tonen flikkerende stippen.",
+    "pl": "Niektóre krótkie klipy pokazują migoczące kropki.",
+    "pt": "Alguns clipes curtos mostram pontos que cintilam.",
+    "zh": "部分短片会显示闪烁的圆点。",
+}
+"""A sentence for a consent; English and German are read by the authors, the others await a reader."""
+
+
+def mentions_flicker(text: str, language: str) -> bool:
+    """Whether a text mentions flicker; True in languages whose words are not known: nothing can be said."""
+    known = WORDS.get(language.partition("-")[0].lower())
+    return known is None or re.search(known, text, re.IGNORECASE) is not None
+
+
+def silent_on_flicker(experiment: Experiment) -> list[str]:
+    """Languages of a study with motion checks of dots whose consent does not mention flicker."""
+    if not any(motion_checks_by_block(experiment)):
+        return []
+    if all(kind.startswith("first_") for kind in experiment.evidence.motion_checks.kinds):
+        return []
+    return [
+        language
+        for language in experiment.languages
+        if not mentions_flicker(experiment.texts[language].consent, language)
+    ]
+
+
+def suggested_sentence(language: str) -> str:
+    """A sentence that a consent in this language can use."""
+    return SENTENCES.get(language.partition("-")[0].lower(), SENTENCES["en"])
+
+
+# Placeholders that nobody has filled in, in the texts that participants read.
+#
+# Templates of consent forms have marks such as `[Title]` and `[name, institution, e-mail]`. A text that still
+# has one must not reach participants.
+
+_CODE = re.compile(r"`[^`\n]*`")
+_LINK = re.compile(r"\[[^\[\]\n]*\](?:\([^)\s]+\)|\[[^\[\]\n]*\])|<(?:https?|mailto):[^>\s]*>")
+_BRACKETS = re.compile(r"[\[［]([^\[\]［］\n]{1,80})[\]］]")
+_BRACES = re.compile(r"\{\{[^{}\n]{1,80}\}\}|\$\{[^{}\n]{1,80}\}|<<[^<>\n]{1,80}>>")
+_WORDS = re.compile(r"\b(?:TODO|TBD|TBC|FIXME|XXX+|[Ll]orem ipsum)\b")
+_DOUBTFUL = re.compile(r"(?<![{$])\{[^\W\d_][^{}\n]{0,60}\}|<[^\W\d_][^<>@:/\n]{0,60}>|\bXX\b|_{3,}|\?{3,}")
+_RULE = re.compile(r"^\s{0,3}_(\s*_){2,}\s*$", re.MULTILINE)
+_KEYS = re.compile(
+    r"(?:the )?(?:space(?: ?bar)?|enter|return|escape|esc|shift|tab|ctrl|control|alt|delete|backspace|"
+    r"left|right|up|down|page (?:up|down)|home|end|f\d{1,2}|leertaste|eingabe(?:taste)?|umschalt|strg|"
+    r"links|rechts|oben|unten|sic|…|\.\.\.|[^\W_]|\d[\d\s,.:%–-]*)",
+    re.IGNORECASE,
+)
+"""What stands in brackets without being a placeholder: a key to press, one character, a number, `[sic]`."""
+_ASIDES = re.compile(
+    r"optional|required|mandatory|(?:please )?(?:specify|explain|describe)|freiwillig|"
+    r"pflicht(?:feld|angabe)?|"
+    r"erforderlich|bitte (?:angeben|nennen|erläutern)|facultati[fv]e?|obligatoire|(?:veuillez )?préciser|"
+    r"opcional|obligatorio|obrigatório|especifi(?:car|que)|facoltativo|obbligatorio|specificare|optioneel|"
+    r"verplicht|opcjonalne|wymagane|任意|必須|可选|选填|必填|e\.g\..*|i\.e\..*|z\. ?B\..*|"
+    r"[^\W\d_].*\b(?:19|20)\d\d[a-z]?",
+    re.IGNORECASE,
+)
+"""What brackets say to people: that an answer is optional, to specify it, examples, sources by year."""
+MAX_MARKS_NAMED = 5
+
+
+class Unfilled(NamedTuple):
+    """One text in one language with marks that nobody has filled in.
+
+    Attributes
+    ----------
+    path : str
+        As the TOML has it, with the language: `texts.en.consent`.
+    certain : bool
+        False where the marks may be meant as they are.
+    """
+
+    path: str
+    language: str
+    marks: tuple[str, ...]
+    certain: bool
+
+    def __str__(self) -> str:
+        named = ", ".join(self.marks[:MAX_MARKS_NAMED])
+        more = len(self.marks) - MAX_MARKS_NAMED
+        rest = f" and {more} more" if more > 0 else ""
+        one = len(self.marks) == 1
+        if not self.certain:
+            of = f"{self.path} (language {self.language})"
+            return f"{of} has {named}{rest}. Should this be filled in before participants read it?"
+        return (
+            f"{self.path} (language {self.language}) still has {'a placeholder' if one else 'placeholders'} "
+            f"that nobody filled in: {named}{rest}. Replace {'it' if one else 'each'}, or put `backticks` "
+            f"around {'it' if one else 'one'} that participants are to read as it is."
+        )
+
+
+def unfilled(declared: Experiment) -> list[Unfilled]:
+    """The texts with placeholders, in the languages that participants are offered; certain ones first."""
+    texts = []
+    for path, language, text in participant_texts(declared):
+        if language not in declared.languages:
+            continue
+        plain = _LINK.sub(" ", _CODE.sub(" ", text))
+        if path.startswith("attention.text"):
+            plain = plain.replace("{response}", " ")  # the page fills it in
+        if certain := tuple(dict.fromkeys(_certain(plain))):
+            texts.append(Unfilled(path, language, certain, certain=True))
+        elif doubtful := tuple(dict.fromkeys(_DOUBTFUL.findall(_RULE.sub(" ", plain)))):
+            texts.append(Unfilled(path, language, doubtful, certain=False))
+    return sorted(texts, key=lambda text: not text.certain)
+
+
+def _certain(text: str) -> Iterator[str]:
+    for match in _BRACKETS.finditer(text):
+        inside = match[1].strip()
+        if any(map(str.isalpha, inside)) and not (_KEYS.fullmatch(inside) or _ASIDES.fullmatch(inside)):
+            yield match[0]
+    for pattern in (_BRACES, _WORDS):
+        yield from pattern.findall(text)
+
+
+class ParticipantText(NamedTuple):
+    """A text that participants read, in one language."""
+
+    path: str
+    language: str
+    text: str
+
+
+def participant_texts(declared: Experiment) -> Iterator[ParticipantText]:
+    """Every page and every translated text, and the title where participants read it."""
+    if not declared.participant_title:
+        yield from (ParticipantText("title", language, declared.title) for language in declared.languages[:1])
+    for language, pages in declared.texts.items():
+        for name in type(pages).model_fields:
+            yield ParticipantText(f"texts.{language}.{name}", language, getattr(pages, name))
+    for path, text in translated_texts(declared):
+        yield from (ParticipantText(f"{path}.{code}", code, words) for code, words in text.items())
+
+
+def translated_texts(declared: BaseModel, prefix: str = "") -> Iterator[tuple[str, dict[str, str]]]:
+    """Dotted path of each text that has translations (items of lists from 1), and the text by language."""
+    for key, field in type(declared).model_fields.items():
+        yield from _placeholders_within(
+            getattr(declared, key), f"{prefix}{key}", is_translated(field.annotation)
+        )
+
+
+def _placeholders_within(value: Any, path: str, is_text: bool) -> Iterator[tuple[str, dict[str, str]]]:
+    if isinstance(value, BaseModel):
+        yield from translated_texts(value, f"{path}.")
+    elif isinstance(value, tuple):
+        for number, item in enumerate(value, start=1):
+            yield from _placeholders_within(item, f"{path}.{number}", is_text)
+    elif is_text and isinstance(value, dict):
+        yield path, value
+
+
+def untranslated(declared: Experiment) -> dict[str, list[str]]:
+    """Language -> paths of texts that participants who read it get in the study's first language."""
+    first, *others = declared.languages
+    missing: dict[str, list[str]] = {}
+    written = [(path, text) for path, text in translated_texts(declared) if text.get(first)]
+    for language in others:
+        pages, first_pages = declared.texts[language], declared.texts[first]
+        empty = [
+            f"texts.{language}.{name}"
+            for name in type(pages).model_fields
+            if getattr(first_pages, name).strip() and not getattr(pages, name).strip()
+        ]
+        lacking = [*empty, *(path for path, text in written if not text.get(language))]
+        if lacking:
+            missing[language] = lacking
+    return missing
