@@ -113,9 +113,9 @@ def posterior(items: int, stored: Mapping[Edge, Stored]) -> Posterior:
         if furthest < CLOSE_ENOUGH:
             break
     posterior = Posterior(scores, precision)
-    for edge, count in stored.items():
-        if count.open:
-            posterior.expect(edge, count.open)
+    for edge, answers in stored.items():
+        if answers.open:
+            posterior.expect(edge, answers.open)
     return posterior
 
 

@@ -1,4 +1,4 @@
-"""Rules of [[screening]], which end a run while it goes on: answers of forms, attention checks, the device."""
+"""Rules of [[screening]], which end a run while it goes on: forms, attention checks, the device."""
 
 from collections.abc import Sequence
 from typing import Annotated, Literal

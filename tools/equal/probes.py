@@ -15,14 +15,17 @@ from pathlib import Path
 from typing import Any
 
 ADDRESSES = {
-    "KINDS": ("experiments.trials:KINDS",),
+    "KINDS": ("experiments.kinds:KINDS", "experiments.trials:KINDS"),
     "definition_sha256": ("experiments.schema.canonical:definition_sha256",),
-    "editor_schema": ("experiments.schema.editor:editor_schema",),
+    "editor_schema": (
+        "experiments.schema.difference:editor_schema",
+        "experiments.schema.editor:editor_schema",
+    ),
     "load_experiment": ("experiments.load:load_experiment",),
     "load_stored": ("experiments.schema.stored:load_stored",),
     "planned_clips": ("stimuli_builder.clips.design_clips:planned_clips",),
     "ClipOptions": ("stimuli_builder.clips.design_clips:Options",),
-    "reserved_names": ("experiments.trials:reserved_names",),
+    "reserved_names": ("experiments.kinds:reserved_names", "experiments.trials:reserved_names"),
 }
 PLACES = 200
 """Participants of each example whose trials are compared."""
