@@ -14,6 +14,7 @@ from experiments.errors import InputError, did_you_mean
 from stimuli_builder.characters import cartoon
 from stimuli_builder.characters.atlas import Atlas, LevelCodes, load_atlas
 from stimuli_builder.characters.cartoon import BROW_DROP_MM
+from stimuli_builder.characters.cartoon_eye import OPENING_MM
 from stimuli_builder.characters.colour import LINEAR_OF_CODE, srgb_to_linear
 from stimuli_builder.characters.declaration import LowerLid as DeclaredLowerLid
 from stimuli_builder.characters.retired import load_retired
@@ -323,7 +324,7 @@ class CartoonCharacter:
             size,
             scale,
             cartoon.INTER_OCULAR_MM,
-            cartoon.OPENING_MM,
+            OPENING_MM,
             lower_range_mm=None,
             moved_mm={"brow": BROW_DROP_MM},
             blink_rows=(first + SPARE_PX, first + rows - SPARE_PX),
