@@ -2,7 +2,7 @@
 
 from itertools import product
 
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.declaration.rendering import RenderSettings
 from experiments.declaration.trial import BlockSpec, ClipSpec
 

@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from experiments.consistency import check_consistency
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError, and_others, did_you_mean, nearest
 from experiments.schema.keys import Key, is_tag
 from experiments.schema.stored import upgraded

@@ -12,8 +12,8 @@ from typing import Any, Literal
 
 from pydantic import ValidationError
 
-from experiments.declaration import Experiment
 from experiments.declaration.base import Declaration
+from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError
 from experiments.manifest import Sha256
 from experiments.schema.difference import difference

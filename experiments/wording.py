@@ -7,8 +7,8 @@ from typing import Any, NamedTuple, get_args
 from pydantic import BaseModel
 
 from experiments.assignment.order import motion_checks_by_block
-from experiments.declaration import Experiment
 from experiments.declaration.base import Translated
+from experiments.declaration.experiment import Experiment
 
 # The languages of declared texts: each has at least the study's first, which participants fall back on.
 

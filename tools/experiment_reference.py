@@ -16,8 +16,8 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from experiments.declaration import Experiment
 from experiments.declaration.base import Language, LevelName, Name
+from experiments.declaration.experiment import Experiment
 from experiments.declaration.forms import Form, Question
 from experiments.declaration.rendering import ProfileName
 from experiments.declaration.tables import Answer, GroupName

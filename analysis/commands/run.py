@@ -18,7 +18,7 @@ from analysis.commands.output import (
 from experiments.errors import InputError
 
 if TYPE_CHECKING:
-    from experiments.declaration import Experiment
+    from experiments.declaration.experiment import Experiment
 
 
 class Origin(StrEnum):

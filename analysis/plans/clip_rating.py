@@ -22,8 +22,8 @@ from analysis.report.within_contents import methods_of, part_of
 from analysis.within.anova import AnovaResult, linear_anova
 from analysis.within.between import BetweenDesign, between_design, no_groups
 from analysis.within.cell_means import CellTable, cell_table
-from experiments.declaration import Experiment
 from experiments.declaration.clip_rating import clip_rating_of
+from experiments.declaration.experiment import Experiment
 from experiments.declaration.trial import RatedScale
 from experiments.design import rated_levels
 from experiments.errors import InputError

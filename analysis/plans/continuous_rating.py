@@ -11,8 +11,8 @@ from analysis.read.reading import Reading
 from analysis.report.contents import Contents
 from analysis.traces import ClipTraces, MeanTrace, lag_of, mean_trace
 from experiments import design
-from experiments.declaration import Experiment
 from experiments.declaration.continuous_rating import ContinuousRating, continuous_rating_of
+from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError
 from experiments.kinds.continuous_rating import TRACES
 

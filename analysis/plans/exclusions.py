@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from analysis.read.study_answers import StudyAnswers
 from experiments import rules
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.rules.exclusions import LeavesOutRuns, LeavesOutTrials, RunTrials, Source
 
 

@@ -34,7 +34,7 @@ from analysis.within.anova import AnovaResult
 from analysis.within.cell_means import CellTable
 from analysis.within.effects import Effect
 from analysis.within.simple_effects import SIGNIFICANCE, first_p, first_test, reports_multivariate
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError
 
 MAX_RULES = 6

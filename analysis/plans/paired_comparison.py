@@ -22,7 +22,7 @@ from analysis.report.json_output import exclusions_data, left_out, study_data
 from analysis.report.numbers import apa_p, fixed, p_value
 from experiments import design
 from experiments.assignment.groups import groups, name_of, of_group
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.declaration.paired_comparison import CODES, paired_comparison_of
 from experiments.errors import InputError
 from experiments.kinds.paired_comparison import COMPARISONS

@@ -14,14 +14,14 @@ from analysis.read.pool import Pool, origins, pooled
 from analysis.read.reading import Reading
 from analysis.read.study_answers import RunEvidence, StudyAnswers, with_verdicts
 from analysis.report.contents import Contents, evidence_section
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError, did_you_mean
 from experiments.kinds.scales import scale_called
 from experiments.schema.canonical import definition_sha256
 
 if TYPE_CHECKING:
     from analysis.report.contents import Contents
-    from experiments.declaration import Experiment
+    from experiments.declaration.experiment import Experiment
 
 
 # What the data of a kind of trial can be asked: a file of its name here, with `PLAN`.

@@ -16,7 +16,7 @@ from analysis.within.simple_effects import SimpleEffect, reports_multivariate, s
 if TYPE_CHECKING:
     from analysis.plans.exclusions import Exclusions
     from analysis.robust import Companions
-    from experiments.declaration import Experiment
+    from experiments.declaration.experiment import Experiment
 
 
 TIMES = " × "

@@ -12,7 +12,7 @@ from analysis.thresholds.answers import Answers, counted
 from analysis.thresholds.people import fit_thresholds
 from analysis.thresholds.plane_people import SeriesPlane, fit_planes, points_of
 from analysis.thresholds.series import Difference, SeriesFit, answers_of, differences, series_labels
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.declaration.threshold import CODES, Threshold, YesNo, threshold_of
 from experiments.errors import InputError
 from experiments.kinds.threshold import THRESHOLDS

@@ -20,7 +20,7 @@ from analysis.read.reading import RUN_FLAGS, RUN_TEXTS, TRIAL_PLACES, Reading
 from analysis.read.text_table import categorical, read_text_table
 from experiments.columns.runs import EVIDENCE_COLUMNS
 from experiments.database_url import with_driver
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError
 
 

@@ -13,7 +13,7 @@ from experiments.columns.base import VERDICTS
 from experiments.columns.runs import EVIDENCE_COLUMNS
 
 if TYPE_CHECKING:
-    from experiments.declaration import Experiment
+    from experiments.declaration.experiment import Experiment
     from experiments.seal import Seal
 
 

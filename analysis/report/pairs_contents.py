@@ -20,7 +20,7 @@ from analysis.report.json_output import exclusions_data, left_out, study_data
 from analysis.report.numbers import apa_p, fixed, p_value
 from analysis.report.pictures import COLOURS, STYLE, in_both_formats, new_figure, write_note
 from analysis.report.r_models import pairs_files
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 
 # Sentences about paired comparisons in APA style.
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from analysis.within.contrasts import effect_members, effect_name, orthonormal_basis
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.declaration.trial import RatedScale
 from experiments.design import rated_levels
 from experiments.errors import InputError, did_you_mean

@@ -17,7 +17,7 @@ from analysis.synthetic.published import (
 )
 from analysis.synthetic.repair import Repaired, repair, value_of
 from analysis.synthetic.targets import GivenWay, Steps, Targets, TestTarget, make_feasible, make_targets
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.declaration.trial import RatedScale
 from experiments.errors import InputError
 from experiments.kinds.scales import scale_called, scales_of

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from analysis.synthetic.published import DesignSpace
 from analysis.synthetic.synthesise import Synthetic
 from analysis.synthetic.targets import Steps
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.declaration.trial import BlockSpec, ClipSpec, RatedScale
 from experiments.design import blocks, exemplar_key, rated_clips
 from experiments.files import whole_file

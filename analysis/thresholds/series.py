@@ -15,7 +15,7 @@ from analysis.thresholds.answers import Answers
 from analysis.thresholds.likelihood import Trials
 from analysis.thresholds.people import ThresholdsResult
 from analysis.within.adjustments import holm
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.declaration.threshold import YesNo, threshold_of
 from experiments.kinds.threshold_grid import seconds, series_of
 

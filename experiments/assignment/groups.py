@@ -5,7 +5,7 @@ from itertools import product
 from typing import NamedTuple
 
 from experiments import design
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.declaration.forms import Question
 from experiments.declaration.trial import ClipSpec
 from experiments.errors import did_you_mean

@@ -19,7 +19,7 @@ from functools import lru_cache
 from itertools import combinations, islice, permutations
 from math import comb
 
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 
 MAX_BLOCKS = 2_000
 MAX_LAMBDA = 12

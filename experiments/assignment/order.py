@@ -9,9 +9,9 @@ from experiments import design
 from experiments.assignment.groups import Seat, cells_of, seat_of
 from experiments.assignment.incomplete_blocks import block_orders
 from experiments.assignment.shares import seen_levels, sees_levels, share
-from experiments.declaration import Experiment
+from experiments.assignment.trial import Shown, Trial
+from experiments.declaration.experiment import Experiment
 from experiments.declaration.trial import BlockSpec, ClipSpec
-from experiments.kinds.kind import Shown, Trial
 
 # How many checks a run has in each block, and motion checks between its trials, for every kind of trial.
 

@@ -8,7 +8,7 @@ from math import gcd, lcm, prod
 from experiments import design
 from experiments.assignment.groups import Seat, clips_of, groups, name_of, names, seat_of
 from experiments.assignment.incomplete_blocks import balanced_blocks, block_orders, near_sizes
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.declaration.factors import Factor
 from experiments.declaration.trial import ClipSpec
 from experiments.errors import did_you_mean

@@ -1,13 +1,7 @@
 """The columns of the runs CSV: one row a visit."""
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
-from typing import Any
-
 from experiments.columns.base import ORIGINS, VERDICTS
-from experiments.columns.column import Column, unlike
-from experiments.declaration import Experiment
-from experiments.declaration.forms import Form, FormField, is_empty
+from experiments.columns.column import Column
 
 
 def _share(signal: str, description: str) -> Column:
@@ -141,7 +135,6 @@ RUN_COLUMNS: tuple[Column, ...] = (
     *CALIBRATION_COLUMNS,
 )
 
-
 # The columns of the identities CSV: who participants are to their recruiter.
 
 IDENTITY_COLUMNS: tuple[Column, ...] = (
@@ -152,71 +145,3 @@ IDENTITY_COLUMNS: tuple[Column, ...] = (
     Column("link_label", "text", "Label of a personal link; empty for other links."),
     Column("parameters", "text", "JSON object of the parameters of the address."),
 )
-
-
-# The answers of questionnaires as columns: one a question, and one an option where several may be chosen.
-
-PREFIX = "form_"
-"""No column of runs or answers begins so, nor can a factor's name be taken for one."""
-
-
-@dataclass(frozen=True)
-class FormColumn:
-    """A column and the answer it holds: of a form's field, or of one option where several may be chosen."""
-
-    column: Column
-    form: str
-    field: str
-    option: str | None = None
-
-    def value(self, answers: Mapping[str, Mapping[str, Any]]) -> Any:
-        """The cell, of a run's answers by form and field; empty where nothing was answered."""
-        answer = answers.get(self.form, {}).get(self.field)
-        if is_empty(answer):
-            return ""
-        if self.option is not None:
-            return int(isinstance(answer, list) and self.option in answer)
-        return "; ".join(map(str, answer)) if isinstance(answer, list) else answer
-
-
-def form_columns(definitions: Iterable[Experiment]) -> list[FormColumn]:
-    """The columns of all versions' forms, in order; what later versions say of a question counts."""
-    known: dict[tuple[str, str, str | None], FormColumn] = {}
-    for experiment in definitions:
-        language = experiment.languages[0]
-        for form in experiment.forms:
-            for field in form.fields:
-                for column in _of_field(form, field, language):
-                    key = (column.form, column.field, column.option)
-                    known[key] = _united(known.get(key), column)
-    return list(_named(known.values()))
-
-
-def run_columns(forms: Iterable[FormColumn]) -> list[Column]:
-    """The columns of the runs CSV of a study with these questions, which stand in the place of `FORMS`."""
-    columns: list[Column] = []
-    for column in RUN_COLUMNS:
-        columns.extend([one.column for one in forms] if column is FORMS else [column])
-    return columns
-
-
-def _of_field(form: Form, field: FormField, language: str) -> Iterator[FormColumn]:
-    asked = field.label.get(language) or next(iter(field.label.values()))
-    for option, column in field.columns(f"{PREFIX}{form.name}_{field.name}", asked, language).items():
-        yield FormColumn(column, form.name, field.name, option)
-
-
-def _united(before: FormColumn | None, after: FormColumn) -> FormColumn:
-    """The later column, with the options that only earlier versions had."""
-    if before is None or not before.column.values:
-        return after
-    values = tuple(dict.fromkeys((*before.column.values, *after.column.values)))
-    labels = tuple({**dict(before.column.labels), **dict(after.column.labels)}.items())
-    return replace(after, column=replace(after.column, values=values, labels=labels))
-
-
-def _named(columns: Iterable[FormColumn]) -> Iterator[FormColumn]:
-    """The columns under names of which none stands twice (`a_b` with `c` is spelled as `a` with `b_c`)."""
-    taken: set[str] = set()
-    for one in columns:
-        yield replace(one, column=replace(one.column, name=unlike(one.column.name, taken)))

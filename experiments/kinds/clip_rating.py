@@ -8,11 +8,11 @@ from experiments import design
 from experiments.assignment.groups import seat_of
 from experiments.assignment.order import single_clips
 from experiments.assignment.shares import lines, share
+from experiments.assignment.trial import Shown, Trial
 from experiments.columns import base, playback
 from experiments.columns.base import rows_of
 from experiments.columns.column import Column
 from experiments.columns.view import Dialect, View
-from experiments.declaration import Experiment
 from experiments.declaration.base import Declaration, Translated
 from experiments.declaration.clip_rating import (
     MAX_FRAMES_LOGGED,
@@ -25,10 +25,11 @@ from experiments.declaration.clip_rating import (
     check_response,
     clip_rating_of,
 )
+from experiments.declaration.experiment import Experiment
 from experiments.declaration.factors import Factor
 from experiments.declaration.trial import BlockSpec
 from experiments.errors import did_you_mean
-from experiments.kinds.kind import Kind, Shown, Trial
+from experiments.kinds.kind import Kind
 from experiments.schema.effects import Effect
 
 # What in declared ratings of single clips does not fit the rest of the experiment.

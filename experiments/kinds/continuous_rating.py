@@ -5,11 +5,11 @@ from typing import Literal
 
 from experiments.assignment.order import single_clips
 from experiments.assignment.shares import lines as planned
+from experiments.assignment.trial import Trial
 from experiments.columns import base, playback
 from experiments.columns.base import rows_of
 from experiments.columns.column import Column
 from experiments.columns.view import View
-from experiments.declaration import Experiment
 from experiments.declaration.base import Declaration, Translated
 from experiments.declaration.clip_rating import Points
 from experiments.declaration.continuous_rating import (
@@ -19,8 +19,9 @@ from experiments.declaration.continuous_rating import (
     check_response,
     continuous_rating_of,
 )
+from experiments.declaration.experiment import Experiment
 from experiments.kinds.clip_rating import block_size
-from experiments.kinds.kind import Kind, Trial
+from experiments.kinds.kind import Kind
 from experiments.schema.effects import Effect
 
 # What a continuous rating exports: the base columns and the trace, one row a play.

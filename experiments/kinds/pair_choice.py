@@ -8,10 +8,10 @@ from itertools import count
 from math import erf, exp, log2, pi, sqrt
 from math import log as ln
 
-from experiments.declaration import Experiment
+from experiments.assignment.trial import Compared
+from experiments.declaration.experiment import Experiment
 from experiments.declaration.paired_comparison import Active, paired_comparison_of
 from experiments.declaration.trial import ClipSpec
-from experiments.kinds.kind import Compared
 from experiments.kinds.pairs import Pair, every_pair, item_of
 
 # Active sampling: the pairs of items that tell most next, given the comparisons that are stored.

@@ -9,12 +9,13 @@ from typing import Literal
 from experiments.assignment.groups import groups, name_of, of_group, seat_of
 from experiments.assignment.order import ordered_blocks, with_attention
 from experiments.assignment.shares import expected_slots, said_of_groups
+from experiments.assignment.trial import Compared, Shown, Trial
 from experiments.columns import base, playback
 from experiments.columns.base import rows_of
 from experiments.columns.column import Column
 from experiments.columns.view import View
-from experiments.declaration import Experiment
 from experiments.declaration.base import Declaration, Translated
+from experiments.declaration.experiment import Experiment
 from experiments.declaration.paired_comparison import (
     Active,
     ComparisonAnswer,
@@ -26,7 +27,7 @@ from experiments.declaration.paired_comparison import (
 )
 from experiments.declaration.trial import BlockSpec, ClipSpec
 from experiments.errors import InputError
-from experiments.kinds.kind import Compared, Kind, Shown, Trial
+from experiments.kinds.kind import Kind
 from experiments.kinds.pair_choice import chosen_pairs
 from experiments.kinds.pairs import BlockDeal, Deal, Pair, check_connected, every_pair, fault, item_of
 from experiments.schema.effects import Effect

@@ -10,7 +10,7 @@ from experiments import design
 from experiments.assignment.groups import groups as groups_of
 from experiments.assignment.groups import of_group
 from experiments.assignment.incomplete_blocks import Block, balanced_blocks, near_sizes
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.declaration.paired_comparison import (
     AllPairs,
     DeclaredPairs,

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from experiments import design
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.declaration.trial import RatedScale
 from experiments.errors import InputError, did_you_mean
 from experiments.kinds import KINDS

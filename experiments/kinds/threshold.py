@@ -6,12 +6,13 @@ from typing import Literal
 
 from experiments.assignment.groups import groups, name_of, seat_of
 from experiments.assignment.order import ordered_blocks, with_attention
+from experiments.assignment.trial import Shown, Trial
 from experiments.columns import base, playback
 from experiments.columns.base import rows_of
 from experiments.columns.column import Column
 from experiments.columns.view import View
-from experiments.declaration import Experiment
 from experiments.declaration.base import Declaration, Translated
+from experiments.declaration.experiment import Experiment
 from experiments.declaration.threshold import (
     Series,
     Stop,
@@ -22,7 +23,7 @@ from experiments.declaration.threshold import (
     threshold_of,
 )
 from experiments.declaration.trial import BlockSpec
-from experiments.kinds.kind import Kind, Shown, Trial
+from experiments.kinds.kind import Kind
 from experiments.kinds.threshold_grid import (
     clip_of,
     exemplar_at,

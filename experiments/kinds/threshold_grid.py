@@ -6,7 +6,7 @@ from itertools import product
 from typing import Literal, NamedTuple, TypeVar
 
 from experiments.assignment.groups import groups, name_of
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.declaration.threshold import Range, Series, Threshold, TwoInterval, threshold_of
 from experiments.declaration.trial import ClipSpec
 from experiments.errors import did_you_mean

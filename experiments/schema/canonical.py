@@ -8,8 +8,8 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from experiments.declaration import Experiment
 from experiments.declaration.base import IMPLIED
+from experiments.declaration.experiment import Experiment
 from experiments.schema.keys import is_tag
 from experiments.schema.stored import earlier_names
 

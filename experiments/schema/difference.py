@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.kinds import KINDS
 from experiments.schema.effects import EFFECTS, Effect, effect_of, effects_with
 

@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.declaration.trial import ByKind
 
 

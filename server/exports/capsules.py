@@ -28,7 +28,7 @@ from experiments.capsule import (
     pack,
     report_input,
 )
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError
 from experiments.files import json_text, whole_file
 from experiments.manifest import Manifest

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.text import Text
 from sqlalchemy.exc import SQLAlchemyError
 
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError
 from experiments.files import check_targets, whole_file, whole_text
 from server.accounts.audit import record

@@ -6,7 +6,7 @@ from typing import Literal, get_args
 from sqlalchemy import ColumnElement
 from sqlalchemy.orm import Session
 
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from server.models import Study, StudyRun
 from server.studies.lookup import definition_of
 from server.studies.repository import ids_of_series

@@ -10,7 +10,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from sqlalchemy.orm import Session
 
 from experiments.columns import Column
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.declaration.tables import Creator
 from experiments.design import rated_levels
 from experiments.kinds import KINDS

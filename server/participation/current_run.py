@@ -6,7 +6,7 @@ from typing import Any, NamedTuple, assert_never
 
 from sqlalchemy.orm import Session
 
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.rules import ScreenAttention, ScreenDevice, ScreenFormAnswer
 from server.core.errors import ApiError
 from server.core.values import new_public_id, now

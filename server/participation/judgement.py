@@ -14,7 +14,7 @@ from sqlalchemy.orm import Session
 
 from experiments.assignment.order import attention_by_block, motion_checks_by_block
 from experiments.checks import CHECK_KINDS
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.kinds import KINDS
 from server.core.changes import Stopped, watched
 from server.core.db import Database

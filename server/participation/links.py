@@ -8,7 +8,8 @@ from uuid import UUID
 from sqlalchemy.orm import Session
 
 from experiments.assignment.groups import deciding
-from experiments.declaration import Display, Experiment
+from experiments.declaration.experiment import Experiment
+from experiments.declaration.tables import Display
 from experiments.errors import did_you_mean
 from experiments.kinds.scales import expected_minutes
 from server.context import Services

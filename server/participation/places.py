@@ -8,9 +8,9 @@ from sqlalchemy.orm import Session
 
 from experiments.assignment.groups import name_of, names, seat_of
 from experiments.assignment.order import with_checks
-from experiments.declaration import Experiment
+from experiments.assignment.trial import Trial
+from experiments.declaration.experiment import Experiment
 from experiments.kinds import KINDS
-from experiments.kinds.kind import Trial
 from server.models import StudyRun
 from server.participation import run_repository, series
 from server.participation.refusals import GroupRefused

@@ -8,8 +8,8 @@ from typing import Any
 from sqlalchemy import Connection
 
 from experiments.checks import CHECK_KINDS
-from experiments.declaration import Experiment
 from experiments.declaration.any_trial import CheckAnswer
+from experiments.declaration.experiment import Experiment
 from experiments.kinds import KINDS
 from server.core.errors import Conflict, Invalid, NotFound
 from server.core.values import hash_token

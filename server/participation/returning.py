@@ -7,7 +7,7 @@ from datetime import datetime, timedelta
 
 from sqlalchemy.orm import Session
 
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from server.context import Services
 from server.core.values import hash_token, now
 from server.models import NO_SLOT, Link, Study, StudyRun

@@ -7,8 +7,8 @@ from uuid import UUID
 from pydantic import BaseModel, Field, StringConstraints
 
 from experiments.checks import CheckName
-from experiments.declaration import Display, Texts
 from experiments.declaration.forms import Form
+from experiments.declaration.tables import Display, Texts
 from experiments.kinds.union import AnyPage
 from experiments.rules import PlaybackRules
 from server.models import STAGES

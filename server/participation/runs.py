@@ -8,7 +8,7 @@ from typing import Any, Literal
 from sqlalchemy.orm import Session
 
 from experiments.assignment.groups import deciding, group_of_answer
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.declaration.forms import Form, is_empty
 from experiments.errors import did_you_mean
 from experiments.kinds import KINDS

@@ -6,8 +6,8 @@ from typing import Any
 
 from sqlalchemy import Connection
 
+from experiments.assignment.trial import Trial
 from experiments.declaration.threshold import Stop, ThresholdAnswer, TwoInterval, threshold_of
-from experiments.kinds.kind import Trial
 from experiments.kinds.threshold_grid import (
     Model,
     Point,

@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session
 
 from experiments.assignment.order import motion_checks_by_block
 from experiments.checks import CHECK_KINDS, CheckName
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.kinds import KINDS
 from server.context import Services
 from server.core.errors import Answer, finished

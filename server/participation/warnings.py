@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 from sqlalchemy import Connection
 
-from experiments.declaration import Experiment
 from experiments.declaration.base import Translated
+from experiments.declaration.experiment import Experiment
 from experiments.kinds import KINDS
 from experiments.rules import ScreenAttention, WarningRule
 from experiments.rules.warnings import GivenAnswer

@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from experiments.checks import CHECK_KINDS, CheckName
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.declaration.forms import FormField
 from experiments.declaration.threshold import Threshold
 from experiments.errors import InputError, did_you_mean

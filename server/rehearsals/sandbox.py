@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from sqlalchemy.orm import Session
 
 from experiments.assignment.groups import names
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.declaration.paired_comparison import PairedComparison
 from experiments.declaration.threshold import Threshold
 from experiments.errors import InputError

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field
 from html import escape
 
 from experiments.assignment.order import attention_by_block, motion_checks_by_block
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.rules import ExclusionRule, ScreeningRule
 from server.participation.recruiter import NAMES
 from server.results.methods_repository import Number, UsedVersion, begun_with

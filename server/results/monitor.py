@@ -9,7 +9,7 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from experiments.assignment.groups import names
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from server.core.values import now
 from server.models import Study
 from server.models.runs import STAGES

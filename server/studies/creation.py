@@ -11,7 +11,7 @@ from sqlalchemy.orm import Session
 from experiments import design
 from experiments.assignment.order import motion_checks_by_block
 from experiments.checks import CHECK_CELL
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError, did_you_mean
 from experiments.kinds import KINDS
 from experiments.load import DEMOS, SHIPPED, DefinitionError, Problem, line_of, locate, parse_experiment

@@ -4,7 +4,7 @@ from sqlalchemy.orm import Session
 
 from experiments import design
 from experiments.assignment.groups import names
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError
 from experiments.kinds import KINDS
 from experiments.kinds.scales import block_sizes, expected_minutes, trials_per_participant

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from sqlalchemy.orm import Session
 
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.level_leaks import reported_leaks
 from experiments.manifest import Manifest
 from experiments.wording import silent_on_flicker, suggested_sentence, unfilled, untranslated

@@ -9,7 +9,7 @@ from urllib.parse import urlencode
 from sqlalchemy.orm import Session
 
 from experiments.assignment.groups import names
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.errors import did_you_mean
 from server.accounts.audit import record
 from server.accounts.identity import Identity

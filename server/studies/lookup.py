@@ -2,7 +2,7 @@
 
 from sqlalchemy.orm import Session
 
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.errors import did_you_mean
 from experiments.schema.stored import load_stored
 from server.accounts import workspace_repository as workspaces

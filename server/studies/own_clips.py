@@ -8,8 +8,8 @@ from typing import Any
 import tomlkit
 
 from experiments import design
-from experiments.declaration import Experiment
 from experiments.declaration.clip_rating import SCALE_NAME
+from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError
 from experiments.manifest import UPLOADED, Clip, Manifest
 from experiments.own_clips import Placed, check_factorial, levels_of

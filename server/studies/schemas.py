@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
 
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.manifest import FrameRate, SourceVideo
 from server.core.values import Number, RequestBody
 from server.models import Right

@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 from sqlalchemy.orm import Session
 
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.manifest import Manifest
 from experiments.schema.difference import Change, changes_what_is_measured, difference
 from server.accounts.identity import Identity

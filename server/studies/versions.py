@@ -10,7 +10,7 @@ from sqlalchemy import Connection
 from sqlalchemy.orm import Session
 
 from experiments.checks import CHECK_CELL, CheckName
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.schema.stored import load_stored
 from server.core.repository import clips_of_version, version_by_id
 from server.participation.tallies import NumberedClip, numbers

@@ -9,7 +9,7 @@ from pathlib import Path
 from experiments import design
 from experiments.assignment.order import motion_checks_by_block
 from experiments.checks import CHECK_KINDS, CheckName
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.declaration.rendering import RenderSettings
 from experiments.errors import InputError
 from experiments.manifest import MANIFEST_NAME, CheckClip, Manifest

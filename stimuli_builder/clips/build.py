@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
 
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.kinds import KINDS
 from experiments.manifest import MANIFEST_NAME, Manifest
 from experiments.schema.canonical import definition_sha256

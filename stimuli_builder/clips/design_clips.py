@@ -16,7 +16,7 @@ from rich.text import Text
 from blink_engine import Event, Law, Parameters, Performance, StateChange, default_parameters, perform
 from blink_engine.speech import Speech, seed_of_speaker, speech_events, speech_states
 from experiments import design
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.declaration.rendering import RenderSettings
 from experiments.declaration.trial import ClipSpec
 from experiments.errors import InputError, counted

@@ -10,7 +10,7 @@ from typing import Any, Self, TextIO
 
 import numpy as np
 
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.declaration.rendering import RenderSettings
 from experiments.errors import InputError
 from experiments.manifest import MANIFEST_NAME, Clip, Manifest, file_sha256, read_manifest

@@ -11,7 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from experiments import design
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError, and_others, did_you_mean, nearest
 from experiments.files import whole_file
 from experiments.manifest import MADE_ELSEWHERE, MANIFEST_NAME, Clip, Manifest

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.kinds.clip_rating import RATINGS
 
 Row = dict[str, object]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.schema.canonical import definition_sha256
 from server.core import migrate
 from server.core.db import Database

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from experiments import design
 from experiments.assignment.incomplete_blocks import block_orders
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.kinds.clip_rating import assign
 from experiments.load import load_experiment, parse_experiment
 from tests.helpers.studies import SHORT

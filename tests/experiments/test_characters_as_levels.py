@@ -6,7 +6,7 @@ from collections.abc import Callable
 import pytest
 
 from experiments import design
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.load import DefinitionError, parse_experiment
 from experiments.schema.canonical import definition_sha256
 from tests.helpers.faces import DEMO, HEAD, PROFILES, faces

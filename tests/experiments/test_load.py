@@ -3,8 +3,8 @@ import re
 
 import pytest
 
-from experiments.declaration import Experiment
 from experiments.declaration.clip_rating import clip_rating_of
+from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError
 from experiments.load import (
     FOLDER,

@@ -7,7 +7,7 @@ import pytest
 
 from experiments.assignment.order import attention_by_block, motion_checks_by_block, with_checks
 from experiments.check_words import WORDS as CHECK_WORDS
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError
 from experiments.kinds import KINDS
 from experiments.load import load_experiment, parse_experiment

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from experiments.assignment.groups import seat_of
 from experiments.assignment.incomplete_blocks import balanced_blocks
 from experiments.assignment.shares import expected_counts, share, turn_of_last
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.kinds.clip_rating import CLIP_RATING
 from experiments.kinds.scales import trials_per_participant
 from experiments.load import DefinitionError, parse_experiment

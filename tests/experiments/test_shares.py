@@ -12,7 +12,7 @@ from experiments import design
 from experiments.assignment.groups import clips_of, groups, seat_of
 from experiments.assignment.order import ordered_blocks
 from experiments.assignment.shares import expected_counts, list_label, share
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.kinds.clip_rating import CLIP_RATING
 from experiments.kinds.scales import trials_per_participant
 from experiments.load import DefinitionError, load_experiment, locate, parse_experiment

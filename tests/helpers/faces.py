@@ -1,6 +1,6 @@
 """The demonstration of faces with any number of them."""
 
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.load import locate, parse_experiment
 
 DEMO = locate("faces-demo").read_text(encoding="utf-8")

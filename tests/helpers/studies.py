@@ -11,7 +11,7 @@ from fastapi import FastAPI
 from fastapi.testclient import TestClient
 from starlette.testclient import TestClient as StarletteClient
 
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.load import parse_experiment
 from server.app import create_app
 from server.context import Services

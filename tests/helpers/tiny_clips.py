@@ -13,7 +13,7 @@ import numpy as np
 from experiments import design
 from experiments.assignment.order import motion_checks_by_block
 from experiments.checks import CHECK_KINDS
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.manifest import MANIFEST_NAME, CheckClip, Clip, Manifest
 from experiments.schema.canonical import definition_sha256
 

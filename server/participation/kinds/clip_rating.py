@@ -4,8 +4,8 @@ import random
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from experiments.declaration import Experiment
 from experiments.declaration.clip_rating import SCALE_NAME, RatingAnswer, ScaleAnswer, clip_rating_of
+from experiments.declaration.experiment import Experiment
 from experiments.declaration.trial import RatedScale
 from experiments.kinds.clip_rating import ShownClipRating
 from experiments.kinds.scales import scales_of

@@ -5,13 +5,13 @@ import random
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from experiments.declaration import Experiment
 from experiments.declaration.continuous_rating import (
     ContinuousAnswer,
     continuous_rating_of,
     samples_of,
     step_frames,
 )
+from experiments.declaration.experiment import Experiment
 from server.core.errors import Invalid
 from server.participation.answer_schemas import RatingIn
 from server.participation.kinds import Part, Preference, Served, answer_of, asked_in

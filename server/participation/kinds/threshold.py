@@ -4,7 +4,7 @@ import random
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.declaration.threshold import CODES, ThresholdAnswer, YesNo, threshold_of
 from server.core.errors import Invalid
 from server.participation.answer_schemas import RatingIn

@@ -8,7 +8,7 @@ from itertools import combinations
 from sqlalchemy.orm import Session
 
 from experiments import design
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.declaration.paired_comparison import CODES
 from server.models import Study, StudyVersion
 from server.participation.tally_pools import PooledTally, pooled

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from sqlalchemy.orm import Session
 
 from experiments import design
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.declaration.threshold import Series, TwoInterval, threshold_of
 from experiments.kinds.threshold_grid import Point, model, seconds, series_of
 from server.models import Study, StudyVersion

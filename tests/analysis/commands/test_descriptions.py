@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 
 TOLD = "from experiments.declaration import Experiment as E; print(E.model_fields['name'].description)"
 ALONE = "from analysis import cli; cli.run_command_line = lambda app: None; cli.main(); "

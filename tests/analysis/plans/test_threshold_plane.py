@@ -17,7 +17,7 @@ from analysis.report.contents import Contents
 from analysis.report.numbers import fixed
 from analysis.report.write import write_report
 from analysis.thresholds.plane import counted_points, fit_plane
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError
 from experiments.kinds.threshold import THRESHOLDS
 from experiments.kinds.threshold_grid import points, series_in_group, series_of

@@ -13,7 +13,7 @@ from analysis.plans.plan import prepare
 from analysis.plans.sensitivity import mixed_model, ordinal_model
 from analysis.read.study_answers import load_csv
 from analysis.report.contents import Section
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.load import load_experiment
 from tests.analysis.ratings_file import rows_of, simulate, write_export
 from tests.analysis.report.r_process import needed, run_together

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments import design
-from experiments.declaration import Experiment
+from experiments.assignment.trial import Compared, Trial
+from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError
-from experiments.kinds.kind import Compared, Trial
 from experiments.kinds.paired_comparison import assign, deal, plan
 from experiments.kinds.pairs import BlockDeal, every_pair
 from experiments.load import DefinitionError

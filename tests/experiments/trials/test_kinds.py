@@ -12,7 +12,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from experiments import design
 from experiments.columns import names_of
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.kinds import KINDS, reserved_names, views
 from experiments.kinds.kind import Kind
 from experiments.kinds.scales import block_sizes, trials_per_participant

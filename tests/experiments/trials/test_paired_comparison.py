@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments import design
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError
 from experiments.kinds.paired_comparison import assign, plan
 from experiments.kinds.pairs import Deal, every_pair, groups

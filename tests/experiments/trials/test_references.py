@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.declaration.trial import ClipSpec
 from experiments.kinds import KINDS
 from experiments.kinds.scales import trials_per_participant

@@ -6,7 +6,7 @@ from collections import Counter
 import pytest
 
 from experiments import design
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.kinds.scales import block_sizes
 from experiments.kinds.threshold import THRESHOLD
 from experiments.kinds.threshold_grid import Point, model, points, seconds, series_of, stimuli

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.load import load_experiment
 from experiments.rules import DropFailedPlays, DropSlowTrials, ExcludeIncomplete
 from server.exports.psych_ds import LANGUAGES, script

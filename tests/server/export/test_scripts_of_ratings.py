@@ -12,7 +12,7 @@ import pytest
 
 from analysis.plans.plan import plan_of, study_contents
 from analysis.read.study_answers import load_csv
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.load import load_experiment
 from server.exports.psych_ds import APPLIED, script
 from tests.analysis.ratings_file import Row, rows_of, simulate, write_export

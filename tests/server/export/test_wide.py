@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from experiments.columns.runs import form_columns
+from experiments.columns.form_columns import form_columns
 from experiments.load import parse_experiment
 from server.context import Services
 from server.exports import tables

@@ -8,7 +8,7 @@ import pytest
 from fastapi.testclient import TestClient
 from sqlalchemy import text
 
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.kinds import KINDS
 from server.context import Services
 from server.models import Rating, StudyRun, TrialClip

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from experiments.load import load_experiment
 from stimuli_builder.characters.writing import write_example_character
 from stimuli_builder.clips.build import Machines, Report, build

@@ -10,14 +10,15 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import Field
 
 from experiments import design
+from experiments.assignment.trial import Shown, Trial
 from experiments.columns import Column, View, base, playback
 from experiments.columns.base import rows_of
 from experiments.declaration.base import Declaration, Translated
 from experiments.declaration.trial import Answer, TrialDeclaration
-from experiments.kinds.kind import Kind, Shown, Trial
+from experiments.kinds.kind import Kind
 
 if TYPE_CHECKING:
-    from experiments.declaration import Experiment
+    from experiments.declaration.experiment import Experiment
 
 
 class SameOrNot(TrialDeclaration):

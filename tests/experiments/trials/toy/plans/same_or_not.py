@@ -8,7 +8,7 @@ from analysis.report.contents import Contents, Part, caption
 from analysis.report.formats import Table
 from analysis.report.json_output import left_out
 from analysis.report.numbers import fixed
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from tests.experiments.trials.toy import TOY
 
 

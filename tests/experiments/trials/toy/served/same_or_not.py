@@ -4,7 +4,7 @@ import random
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from experiments.declaration import Experiment
+from experiments.declaration.experiment import Experiment
 from server.participation.answer_schemas import RatingIn
 from server.participation.kinds import Part, Preference, Served, answer_of
 from server.participation.tallies import Counted, NumberedClip
