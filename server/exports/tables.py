@@ -13,8 +13,7 @@ from sqlalchemy.orm import Session
 
 from experiments.columns import RUN_COLUMNS, Column
 from experiments.columns.column import plain_name, unlike
-from experiments.columns.form_columns import form_columns, run_columns
-from experiments.columns.runs import FormColumn
+from experiments.columns.form_columns import FormColumn, form_columns, run_columns
 from experiments.declaration.experiment import Experiment
 from experiments.declaration.trial import RatedScale
 from experiments.design import rated_levels
