@@ -1,98 +1,12 @@
 """One cartoon eye: margins calibrated to the declared opening, eyeball, lid, lashes."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import skia
-from numpy.typing import NDArray
 
-# How the cartoon is inked: paths, tapered strokes and soft shades, in mm with y up.
-
-Curve = NDArray[np.float64]
-Point = tuple[float, float]
-
-
-def colour(code: str, opacity: float = 1.0) -> int:
-    """The skia colour of `#rrggbb` at an opacity in 0-1."""
-    red, green, blue = (int(code[i : i + 2], 16) for i in (1, 3, 5))
-    return int(skia.Color(red, green, blue, round(255 * opacity)))
-
-
-def polygon(xs: Curve, ys: Curve, closed: bool = True) -> skia.Path:
-    """The path through the points (xs, ys)."""
-    path = skia.Path()
-    path.addPoly([skia.Point(float(x), float(y)) for x, y in zip(xs, ys, strict=True)], closed)
-    return path
-
-
-def between(xs: Curve, upper: Curve, lower: Curve) -> skia.Path:
-    """The area between two curves over the same xs."""
-    return polygon(np.r_[xs, xs[::-1]], np.r_[upper, lower[::-1]])
-
-
-def bezier(points: Sequence[Point], steps: int = 24) -> tuple[Curve, Curve]:
-    """Points along a chain of cubic Beziers: a start, then two handles and an end for each."""
-    t = np.linspace(0.0, 1.0, steps)[:, None]
-    nodes = np.array(points, dtype=float)
-    parts = [
-        (1 - t) ** 3 * nodes[i]
-        + 3 * t * (1 - t) ** 2 * nodes[i + 1]
-        + 3 * t**2 * (1 - t) * nodes[i + 2]
-        + t**3 * nodes[i + 3]
-        for i in range(0, len(nodes) - 3, 3)
-    ]
-    line = np.vstack(parts)
-    return line[:, 0], line[:, 1]
-
-
-def fill(canvas: skia.Canvas, path: skia.Path, paint_colour: int, blur_mm: float = 0.0) -> None:
-    """Fill a path, its edge softened by `blur_mm`."""
-    canvas.drawPath(path, _paint(blur_mm, Color=paint_colour))
-
-
-def taper(
-    canvas: skia.Canvas,
-    xs: Curve,
-    ys: Curve,
-    width_mm: float,
-    paint_colour: int,
-    *,
-    ends: tuple[float, float] = (0.15, 0.15),
-    peak: float = 0.5,
-    blur_mm: float = 0.0,
-) -> None:
-    """Ink a line that swells to `width_mm` at `peak` of its length and thins to `ends` shares of it."""
-    t = np.linspace(0.0, 1.0, len(xs))
-    rise = np.sin(np.pi / 2 * np.clip(t / peak, 0, 1)) if peak > 0 else np.ones_like(t)
-    fall = np.sin(np.pi / 2 * np.clip((1 - t) / (1 - peak), 0, 1)) if peak < 1 else np.ones_like(t)
-    swell = np.where(t < peak, ends[0] + (1 - ends[0]) * rise, ends[1] + (1 - ends[1]) * fall)
-    dx, dy = np.gradient(xs), np.gradient(ys)
-    length = np.maximum(np.hypot(dx, dy), 1e-9)
-    nx, ny = -dy / length * swell * width_mm / 2, dx / length * swell * width_mm / 2
-    outline = polygon(np.r_[xs + nx, (xs - nx)[::-1]], np.r_[ys + ny, (ys - ny)[::-1]])
-    fill(canvas, outline, paint_colour, blur_mm)
-
-
-def glow(
-    canvas: skia.Canvas, centre: Point, radius_mm: float, stops: Sequence[int], at: Sequence[float]
-) -> None:
-    """A disc shaded from its centre outwards."""
-    shader = skia.GradientShader.MakeRadial(centre, radius_mm, list(stops), list(at))
-    canvas.drawCircle(*centre, radius_mm, _paint(0.0, Shader=shader))
-
-
-def wash(canvas: skia.Canvas, start: Point, end: Point, stops: Sequence[int], at: Sequence[float]) -> None:
-    """A linear shade over everything the canvas is clipped to."""
-    canvas.drawPaint(_paint(0.0, Shader=skia.GradientShader.MakeLinear([start, end], list(stops), list(at))))
-
-
-def _paint(blur_mm: float, **settings: object) -> skia.Paint:
-    paint = skia.Paint(AntiAlias=True, **settings)
-    if blur_mm > 0:
-        paint.setMaskFilter(skia.MaskFilter.MakeBlur(skia.kNormal_BlurStyle, blur_mm))
-    return paint
-
+from stimuli_builder.characters.cartoon_pen import Curve, between, colour, fill, glow, polygon, taper, wash
 
 OPENING_MM = 11.0
 NASAL_MM, LATERAL_MM = -13.4, 13.6

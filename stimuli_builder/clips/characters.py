@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from experiments.errors import InputError, did_you_mean
 from stimuli_builder.characters import cartoon
 from stimuli_builder.characters.atlas import Atlas, LevelCodes, load_atlas
-from stimuli_builder.characters.cartoon import BROW_DROP_MM
 from stimuli_builder.characters.cartoon_eye import OPENING_MM
+from stimuli_builder.characters.cartoon_face import BROW_DROP_MM
 from stimuli_builder.characters.colour import LINEAR_OF_CODE, srgb_to_linear
 from stimuli_builder.characters.declaration import LowerLid as DeclaredLowerLid
 from stimuli_builder.characters.retired import load_retired
