@@ -204,7 +204,7 @@ def is_safe(address: str) -> bool:
 
 KEY_LENGTH_MIN = 32
 """Characters of a secret key that somebody sets; the ones that are made here have 64."""
-REPOSITORY = Path(__file__).resolve().parent.parent
+REPOSITORY = Path(__file__).resolve().parents[2]
 
 
 class Settings(BaseSettings):

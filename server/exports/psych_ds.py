@@ -128,7 +128,7 @@ def _in_plan(experiment: Experiment, factor: Mapping[str, Any], column: Mapping[
 
 def _environment() -> Environment:
     environment = Environment(
-        loader=PackageLoader("server", "export/templates"),
+        loader=PackageLoader("server", "exports/templates"),
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,

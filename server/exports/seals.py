@@ -81,7 +81,7 @@ def page(seal: Seal) -> str:
     declared = canonical(seal.experiment, frozenset(), {})
     parts = [(key, _text(declared[key])) for key in TABLES if key in declared]
     environment = Environment(
-        loader=PackageLoader("server", "seals"), autoescape=True, undefined=StrictUndefined
+        loader=PackageLoader("server", "exports/templates"), autoescape=True, undefined=StrictUndefined
     )
     template = environment.get_template("seal.html.j2")
     return template.render(

@@ -1,1 +1,0 @@
-"""Adaptive series: what was answered decides what is shown next."""
