@@ -36,6 +36,9 @@ UNSTEADIER; and next to a covered look. Shut eyes have 0.88 or more, squinting o
 less under a hand, 0.74 or less under a narrow bar, and 0.55 to 0.85 where a hand or a cheek comes in."""
 UNSTEADIER = (0.065, 0.09)
 """Spreads, hardly more than a shut eye's and as a hand's, between which the correlation needed rises."""
+FELLOW = 1.25
+"""Spread of the other eye, in its lower quartiles, from which on it moved too: eyes shut and turn together.
+A small thing over one eye, with familiar surroundings, leaves the other as it was."""
 WITNESSES = 5
 """So many steady looks must be as familiar: one alone may show a cover as it comes in."""
 RING_WIDE, RING_HIGH = 0.68, 0.42
@@ -47,7 +50,7 @@ SMOOTHED = 0.03
 """Blur of the surroundings in eye's widths, so that noise and single lashes count little."""
 IN_PICTURE = 0.4
 """Part of the surroundings that two looks must both show to be compared."""
-COVERED = "{} covered: lids are not read steadily, and what surrounds them is not as usual"
+COVERED = "{} covered: lids are not read steadily; what surrounds them and the other eye do not say shut"
 UNSTEADY = "{} covered, shut tightly or turned away: its lids are not read steadily"
 """What an unsteady contour can mean in a recording without steady looks to compare its surroundings with."""
 NAMES = {(True,): "eye", (True, False): "left eye", (False, True): "right eye", (True, True): "both eyes"}
@@ -136,15 +139,16 @@ def _steady(spreads: Values) -> Flags:
 def _likeness_to_steady(spreads: Values, least: Values, surroundings: Looks | None) -> Values:
     """How like steady looks' the surroundings of eyes are whose spread is above `least` (looks, eyes).
 
-    -1 where the recording has too few steady looks to tell.
+    -1 where the recording has too few steady looks to tell, or the other eye is as steady as ever.
     """
     alike = np.full(spreads.shape, -1.0)
     if surroundings is None:
         return alike
+    unsteady = spreads > FELLOW * np.percentile(spreads, 25, axis=0)
     for eye in range(spreads.shape[1]):
         steady = surroundings[_steady(spreads)[:, eye], eye]
         if len(steady) >= WITNESSES:
-            for look in np.flatnonzero(spreads[:, eye] > least[eye]):
+            for look in np.flatnonzero((spreads[:, eye] > least[eye]) & unsteady.all(1)):
                 alike[look, eye] = np.sort(likenesses(surroundings[look, eye], steady))[-WITNESSES]
     return alike
 

@@ -240,6 +240,12 @@ def test_unsteady_eyes_in_strange_surroundings_are_covered(spread):
     assert all(why.startswith("left eye covered: ") and "surrounds" in why for why in told.values())
 
 
+def test_a_small_thing_over_one_eye_is_a_cover_in_the_usual_surroundings_too():
+    """Eyes shut and look aside together: where the other one is as ever, this one is not shut."""
+    seen = {n: [0.025, 0.025] for n in range(40)} | {n: [0.075, 0.026] for n in range(10, 25)}
+    assert set(covered_frames(VIDEO, seen, 6, surroundings())) == set(range(10, 25))
+
+
 def test_one_steady_look_at_a_cover_makes_no_cover_familiar():
     seen = looks(0.025, []) | {n: [0.09, 0.09] for n in range(10, 25)} | {9: [0.03, 0.03]}
     assert set(covered_frames(VIDEO, seen, 6, surroundings(others=range(9, 25)))) == set(range(10, 25))
