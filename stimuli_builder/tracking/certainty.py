@@ -99,9 +99,18 @@ def doubt(
     if before is not None and jump_px(points, before) > JUMP_SHARE * width:
         return "the eyes jump from one frame to the next"
     if fits_badly(errors, width):
-        rms = float(np.sqrt((errors**2).mean()))
-        return f"the picture fits badly: stated error {rms:.1f} px is {rms / width:.0%} of the eye's width"
+        return f"the picture fits badly: {_error_in_words(errors, width)}"
     return ""
+
+
+def glare_hides(errors: Values, width: float) -> str:
+    """Why stated errors (points,) that glare has raised make a frame doubtful, or an empty string."""
+    return f"glare hides the lids: {_error_in_words(errors, width)}" if fits_badly(errors, width) else ""
+
+
+def _error_in_words(errors: Values, width: float) -> str:
+    rms = float(np.sqrt((errors**2).mean()))
+    return f"stated error {rms:.1f} px is {rms / width:.0%} of the eye's width"
 
 
 def fits_badly(errors: Values, width: float) -> bool:

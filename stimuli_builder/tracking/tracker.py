@@ -9,12 +9,14 @@ from stimuli_builder.tracking.certainty import (
     DIFFERING_SHARE,
     doubt,
     fits_badly,
+    glare_hides,
     lid_difference,
     stated_errors,
 )
 from stimuli_builder.tracking.detected_start import DetectedStart
 from stimuli_builder.tracking.faults import Faults
 from stimuli_builder.tracking.fit import Fit, Fitter
+from stimuli_builder.tracking.glare import GlareCheck
 from stimuli_builder.tracking.light import Light
 from stimuli_builder.tracking.model import CoupledModel
 from stimuli_builder.tracking.outcome import Status, TrackedFrame
@@ -61,6 +63,7 @@ class Tracker:
         self._stillness = None if fps is None else Stillness(fps)
         self._fitter = Fitter(model)
         self._faults = Faults(model)
+        self._glare = GlareCheck(model)
         self._finder = Finder(self._fitter)
         self._last: Fit | None = None
         self._lost_frames = 0
@@ -249,5 +252,14 @@ class Tracker:
         points = self._points(fit)
         difference = None if hint is None else lid_difference(points, hint)
         errors = stated_errors(self.model, fit, None if difference is None else difference * widths(points))
-        why = doubt(self.model, fit, points, errors, difference, before)
-        return points, errors, why or self._faults.flat(fit) or self._unseen
+        why = (
+            doubt(self.model, fit, points, errors, difference, before)
+            or self._faults.flat(fit)
+            or self._unseen
+        )
+        if self._picture is not None:
+            # As recorded: evened light would move what is saturated.
+            hidden, glare = self._glare.of(fit, self._picture)
+            errors = np.hypot(errors, widths(points) * np.repeat(hidden, EYE_POINTS))
+            why = why or glare or glare_hides(errors, widths(points))
+        return points, errors, why
