@@ -74,7 +74,7 @@ class AdminSession(Base):
     Attributes
     ----------
     provider : str or None
-        Who signed it in (`server.providers`) and may so sign it out; None for a password.
+        Who signed it in (`server.accounts.provider_sign_in`) and may so sign it out; None for a password.
     """
 
     __tablename__ = "admin_sessions"

@@ -124,7 +124,9 @@ class StudyRun(Base):
 
 
 class RecruiterIdentity(Base):
-    """Who a run's person is to the recruiter, encrypted; read and written by `server.identities`.
+    """Who a run's person is to the recruiter, encrypted.
+
+    Read and written by `server.participation.identity_repository`.
 
     Attributes
     ----------

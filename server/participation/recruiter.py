@@ -25,7 +25,7 @@ from server.participation.refusals import IdentifierInvalid, RecruiterNotSet, Si
 # there is a code for it. code_complete, code_failed_check: completion codes; one is made for each run where
 # absent. code_screened_out: of who is screened out; without it none is shown, so that nobody is paid by
 # mistake. signature_parameter: which address parameter has the signature of the participant's id
-# (server.participants. signatures); without it addresses are not signed. secret_name: another name makes
+# (here, below); without it addresses are not signed. secret_name: another name makes
 # another secret.
 
 Code = Annotated[str, StringConstraints(max_length=100)]

@@ -2,7 +2,7 @@
 
 The queries are for people who doubt a number: each gives its own. What is asked of the database is less. Runs
 are counted in one pass, answers to checks by the index that has them alone, and plays are read from the
-tallies, which are kept with each rating and checked by a full count (`server.tallies`).
+tallies, which are kept with each rating and checked by a full count (`server.participation.tally_pools`).
 """
 
 from collections import Counter

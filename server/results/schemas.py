@@ -391,7 +391,7 @@ class TimelineTrial(BaseModel):
     clip_sha256: str | None
     play: int
     answer: dict[str, Any] = Field(description="As its kind of trial stores it.")
-    response: float | None = Field(description="The answer on the scale, of kinds that have one.")
+    response: int | float | None = Field(description="The answer on the scale, of kinds that have one.")
     expected_response: int | None
     rt: float | None
     comment: str | None

@@ -11,17 +11,6 @@ class Edit(NamedTuple):
 
 
 MAGNITUDE = '''\
-"""A number that is typed: magnitude estimation."""
-
-from collections.abc import Iterator
-from typing import Annotated, Literal
-
-from pydantic import Field
-
-from experiments.declaration.base import Translated
-from experiments.declaration.clip_rating import Scale
-
-
 class Magnitude(Scale):
     """A number typed into a box, from 0 to `maximum`."""
 
@@ -79,11 +68,9 @@ export function widget({ scale, question, language, choose, enter }: Ask): Widge
 """
 
 SCALE: dict[str, str | Edit] = {
-    "experiments/trials/clip_rating/scales/magnitude.py": MAGNITUDE,
     "experiments/declaration/clip_rating.py": Edit(
         "AnyScale = Annotated[Points |",
-        "from experiments.declaration.clip_rating.magnitude import Magnitude  # noqa: E402\n\n"
-        "AnyScale = Annotated[Magnitude | Points |",
+        MAGNITUDE + "\n\nAnyScale = Annotated[Magnitude | Points |",
     ),
     "frontend/src/participant/trials/scales/magnitude.ts": MAGNITUDE_WIDGET,
     "experiments/kinds/clip_rating.py": Edit(
@@ -98,16 +85,6 @@ SCALE: dict[str, str | Edit] = {
 }
 
 DECIMAL = '''\
-"""A number with a fraction."""
-
-import random
-from collections.abc import Mapping
-from typing import ClassVar, Literal
-
-from experiments.columns.column import Column
-from experiments.declaration.forms import Question
-
-
 class DecimalField(Question):
     """A number with a fraction, such as a dioptre."""
 
@@ -160,11 +137,9 @@ export const type: TypeOfField<"decimal"> = {
 """
 
 FIELD: dict[str, str | Edit] = {
-    "experiments/definition/forms/decimal.py": DECIMAL,
     "experiments/declaration/forms.py": Edit(
         "FormField = Annotated[\n",
-        "from experiments.declaration.forms.decimal import DecimalField  # noqa: E402\n\n"
-        "FormField = Annotated[\n    DecimalField |\n",
+        DECIMAL + "\n\nFormField = Annotated[\n    DecimalField |\n",
     ),
     "frontend/src/participant/screens/fields/decimal.ts": DECIMAL_CONTROL,
 }

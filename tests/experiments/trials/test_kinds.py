@@ -12,6 +12,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from experiments import design
 from experiments.columns import names_of
+from experiments.declaration.any_trial import TRIALS
 from experiments.declaration.experiment import Experiment
 from experiments.kinds import KINDS, reserved_names, views
 from experiments.kinds.kind import Kind
@@ -36,14 +37,14 @@ ALL = {kind.name: kind for kind in (*KINDS.values(), TOY)} | {
 
 @pytest.fixture(params=ALL)
 def kind(request: pytest.FixtureRequest) -> Iterator[Kind]:
-    """The kind, registered by the one line that a new kind needs."""
+    """The kind, registered by the two lines that a new kind needs."""
     made = ALL[request.param]
     before = KINDS.get(made.name)
-    KINDS[made.name] = made
+    KINDS[made.name], TRIALS[made.name] = made, made.declaration
     Experiment.model_rebuild(force=True)
     yield made
     if before is None:
-        del KINDS[made.name]
+        del KINDS[made.name], TRIALS[made.name]
         Experiment.model_rebuild(force=True)
     else:
         KINDS[made.name] = before

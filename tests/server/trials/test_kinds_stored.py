@@ -8,6 +8,7 @@ import pytest
 from fastapi.testclient import TestClient
 from sqlalchemy import text
 
+from experiments.declaration.any_trial import TRIALS
 from experiments.declaration.experiment import Experiment
 from experiments.kinds import KINDS
 from server.context import Services
@@ -19,10 +20,10 @@ from tests.helpers.studies import SHORT, Participant, add_study
 @pytest.fixture
 def toy() -> Iterator[None]:
     """The tests' own kind, registered for one test."""
-    KINDS[TOY.name] = TOY
+    KINDS[TOY.name], TRIALS[TOY.name] = TOY, TOY.declaration
     Experiment.model_rebuild(force=True)
     yield
-    del KINDS[TOY.name]
+    del KINDS[TOY.name], TRIALS[TOY.name]
     Experiment.model_rebuild(force=True)
 
 
