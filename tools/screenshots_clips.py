@@ -22,9 +22,8 @@ sys.path.insert(0, str(ROOT))
 
 from experiments.declaration.rendering import RenderSettings  # noqa: E402
 from experiments.errors import InputError  # noqa: E402
-from stimuli_builder.blinks.blink_model import default_model  # noqa: E402
+from stimuli_builder.blinks.blink_model import default_model, textbook_profile  # noqa: E402
 from stimuli_builder.blinks.profile import resample, to_full_closure  # noqa: E402
-from stimuli_builder.blinks.textbook import textbook_profile  # noqa: E402
 from stimuli_builder.characters.colour import linear_to_srgb  # noqa: E402
 from stimuli_builder.clips.characters import find_character, geometry, shipped_names  # noqa: E402
 from stimuli_builder.clips.curves import ClipCurve, Timing, clip_curve, frame_weights  # noqa: E402

@@ -1,24 +1,30 @@
-"""The PCA blink model: learns from recorded profiles, makes new ones (paper 3.3.2, Figure 7)."""
+"""New blinks: the PCA blink model (paper 3.3.2), three phases modelled apart, and the textbook blinks."""
 
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Literal, get_args
 
 import numpy as np
 
-from experiments.errors import InputError
+from experiments.errors import InputError, did_you_mean
 from experiments.files import whole_text
+from stimuli_builder.blinks.library import load_library
 from stimuli_builder.blinks.profile import (
     PROFILE_FPS,
+    SAMPLES_PER_CLIP_FRAME,
     Array,
     BlinkProfile,
     phase_spline,
     resample,
     resample_phases,
+    split_duration,
     with_minimum_at_peak,
 )
+
+# The PCA blink model: learns from recorded profiles, makes new ones (paper 3.3.2, Figure 7).
 
 SHIPPED_MODEL = Path(__file__).parent / "library" / "model.json"
 MODEL_FORMAT = "palpebra-blink-model-1"
@@ -235,3 +241,226 @@ def _signed(rows: Array) -> Array:
     """Fix each component's sign (its largest entry positive): an SVD leaves it to the machine."""
     largest = rows[np.arange(len(rows)), np.abs(rows).argmax(axis=1)]
     return rows * np.where(largest < 0, -1.0, 1.0)[:, None]
+
+
+# New blinks that close as recorded ones do: three phases modelled apart, drawn between neighbours.
+#
+# The PCA model (paper 3.3.2) scales closing and opening to one length and draws coefficients evenly: closed
+# phases of different lengths cancel in the mean, so its blinks close less than the recorded ones and turn
+# in a cusp. Here a blink is its closing, closed and opening phase, each with length and form, and a peak
+# closure.
+
+TOP = 0.97
+"""Part of the peak closure above which a lid counts as closed: the closed phase."""
+NODES = 25
+NEIGHBOURS = 3
+SPREAD = 0.12
+"""Spread of the noise on drawn lengths and openings, as part of the recordings' own spread."""
+
+
+@dataclass(frozen=True, eq=False)
+class PhaseModel:
+    """Recorded blinks taken apart.
+
+    Parameters
+    ----------
+    numbers : (blinks, 4) array
+        Logarithms of the closing, closed and opening length in samples at 300 fps, and the peak closure.
+    forms : (blinks, 3, NODES) array
+        Closure over each phase, 1 at the peak, over even shares of the phase.
+    trained_on : tuple of str
+    """
+
+    numbers: Array
+    forms: Array
+    trained_on: tuple[str, ...]
+
+    @classmethod
+    def fit(cls, profiles: Sequence[BlinkProfile]) -> "PhaseModel":
+        """Take recorded profiles of one eye apart; three or more are needed."""
+        if len(profiles) < 3:
+            raise InputError(f"the blink model needs 3 profiles or more, got {len(profiles)}")
+        parts = [_apart(profile) for profile in profiles]
+        return cls(
+            np.array([numbers for numbers, _ in parts]),
+            np.array([forms for _, forms in parts]),
+            tuple(profile.profile_id for profile in profiles),
+        )
+
+    def sample(
+        self, duration_frames_30fps: float | None, rng: np.random.Generator, *, profile_id: str
+    ) -> BlinkProfile:
+        """Draw a blink between a recorded one and one of its nearest neighbours.
+
+        Lengths and peak are w a + (1 - w) b + noise, forms w A + (1 - w) B; w is even over 0.5 to 1, a and b
+        two recorded blinks of which b is one of the three nearest to a. Given a duration (frames at 30 fps)
+        the blink is scaled to it. The same generator state gives the same blink.
+        """
+        spread = np.maximum(self.numbers.std(axis=0), 1e-6)
+        one = int(rng.integers(len(self.numbers)))
+        away = (((self.numbers - self.numbers[one]) / spread) ** 2).sum(1)
+        near = np.argsort(away, kind="stable")[1 : 1 + NEIGHBOURS]
+        two = int(near[rng.integers(near.size)])
+        weight = float(rng.uniform(0.5, 1.0))
+        numbers = weight * self.numbers[one] + (1 - weight) * self.numbers[two]
+        numbers = numbers + rng.normal(0, SPREAD, 4) * spread
+        forms = weight * self.forms[one] + (1 - weight) * self.forms[two]
+        blink = _together(numbers, forms, profile_id)
+        return blink if duration_frames_30fps is None else resample(blink, duration_frames_30fps)
+
+
+def _apart(profile: BlinkProfile) -> tuple[Array, Array]:
+    """Lengths, peak and forms of one blink."""
+    closure = profile.closure[profile.onset_index : profile.end_index + 1]
+    peak = float(closure.max())
+    share = closure / peak
+    frames = np.arange(closure.size)
+    top = np.flatnonzero(share >= TOP)
+    # Where 97% is crossed between samples.
+    first = np.interp(TOP, share[top[0] - 1 : top[0] + 1], frames[top[0] - 1 : top[0] + 1]) if top[0] else 0.0
+    last = float(top[-1])
+    if top[-1] + 1 < closure.size:
+        last = float(np.interp(TOP, share[top[-1] : top[-1] + 2][::-1], frames[top[-1] : top[-1] + 2][::-1]))
+    ends = [(0.0, float(first)), (float(first), last), (last, float(closure.size - 1))]
+    grid = np.linspace(0, 1, NODES)
+    forms = [np.interp(start + grid * (end - start), frames, share) for start, end in ends]
+    lengths = [max(end - start, 0.5) for start, end in ends]
+    return np.array([*np.log(lengths), peak]), np.array(forms)
+
+
+def _together(numbers: Array, forms: Array, profile_id: str) -> BlinkProfile:
+    """Lay the phases one after the other and read them at 300 fps."""
+    lengths = np.maximum(np.exp(numbers[:3]), [3.0, 0.5, 4.0])
+    peak = float(np.clip(numbers[3], 0.05, 1.0))
+    starts = np.concatenate([[0.0], np.cumsum(lengths)])
+    grid = np.linspace(0, 1, NODES)
+    times = np.concatenate([starts[k] + grid * lengths[k] for k in range(3)])
+    # The phases share their ends: the mean of both sides leaves no step.
+    values = np.maximum(np.concatenate(list(forms)), 0.0)
+    samples = np.interp(np.arange(int(np.ceil(starts[-1])) + 1), times, values)
+    closure = np.round(np.clip(samples / samples.max() * peak, 0.0, 1.0), 9)
+    closure[0] = closure[-1] = 0.0
+    minimum = int(closure.argmax())
+    return with_minimum_at_peak(
+        BlinkProfile(
+            profile_id=profile_id,
+            closure=closure,
+            minimum_index=minimum,
+            down_frames=minimum,
+            up_frames=closure.size - 1 - minimum,
+            amplitude=peak,
+            source="phase model",
+            fps=PROFILE_FPS,
+        )
+    )
+
+
+# The four textbook blinks: linear and ease-in/ease-out, symmetric and asymmetric (paper 3.3.3, 3.3.4).
+
+TextbookKind = Literal["SL", "AL", "SL_ease", "AL_ease"]
+TEXTBOOK_KINDS: tuple[TextbookKind, ...] = get_args(TextbookKind)
+
+_TITLES = {
+    "SL": "symmetric linear",
+    "AL": "asymmetric linear",
+    "SL_ease": "symmetric ease-in/ease-out",
+    "AL_ease": "asymmetric ease-in/ease-out",
+}
+
+
+@lru_cache(maxsize=1)
+def recorded_down_fraction() -> float:
+    """Median share of the closing phase among the shipped recordings."""
+    return float(np.median([profile.down_fraction for profile in load_library()]))
+
+
+def textbook_profile(
+    kind: TextbookKind,
+    duration_frames: float,
+    *,
+    start_level: float = 0.0,
+    end_level: float = 0.0,
+    peak_closure: float = 1.0,
+    subframe_phase: float = 0.0,
+    down_fraction: float | None = None,
+    handle: float = 1 / 3,
+) -> BlinkProfile:
+    """Return a textbook blink.
+
+    Parameters
+    ----------
+    kind : {"SL", "AL", "SL_ease", "AL_ease"}
+        S: both phases of one length; A: phases in the recorded ratio. Ease: a cubic Bezier a phase.
+    duration_frames : float
+        Onset to end, in frames at 30 fps.
+    start_level, end_level : float
+        Closure before onset and after the end.
+    peak_closure : float
+        Closure at the minimum, 1 for a blink that closes.
+    subframe_phase : float in [0, 1)
+        By which part of a 30 fps frame the onset comes after a frame's beginning; the start level is
+        held for as many samples (whole 300 fps samples) before the onset.
+    down_fraction : float, optional
+        Share of the closing phase in an asymmetric blink; the recordings' median without it.
+    handle : float in [0, 1]
+        Bezier control points lie at this share of the phase's length from either end, level with it:
+        in proportion to the lengths of the phases, as the paper has them. 1/3 is what animation
+        programs set by themselves.
+    """
+    if kind not in TEXTBOOK_KINDS:
+        raise InputError(f"unknown textbook blink '{kind}'{did_you_mean(kind, TEXTBOOK_KINDS)}")
+    _check_levels(start_level, end_level, peak_closure, subframe_phase, handle)
+    symmetric = kind.startswith("SL")
+    fraction = 0.5 if symmetric else (recorded_down_fraction() if down_fraction is None else down_fraction)
+    down, up = split_duration(duration_frames, fraction)
+    ease = handle if kind.endswith("ease") else None
+    lead = int(subframe_phase * SAMPLES_PER_CLIP_FRAME)
+    closure = np.concatenate(
+        [
+            np.full(lead, start_level),
+            start_level + (peak_closure - start_level) * _rise(down, ease),
+            (end_level + (peak_closure - end_level) * _rise(up, ease)[::-1])[1:],
+        ]
+    )
+    return BlinkProfile(
+        profile_id=_name(kind, duration_frames, start_level, end_level, peak_closure, lead, down),
+        closure=closure,
+        minimum_index=lead + down,
+        down_frames=down,
+        up_frames=up,
+        amplitude=peak_closure - min(start_level, end_level),
+        source=f"textbook: {_TITLES[kind]}",
+    )
+
+
+def _name(kind: str, duration: float, start: float, end: float, peak: float, lead: int, down: int) -> str:
+    levels = f"s{start * 1000:.0f}-e{end * 1000:.0f}-p{peak * 1000:.0f}"
+    return f"textbook-{kind}-{duration:g}f-d{down}-{levels}-lead{lead}"
+
+
+def _check_levels(start: float, end: float, peak: float, phase: float, handle: float) -> None:
+    if not (0 <= start < peak <= 1 and 0 <= end < peak):
+        raise InputError(
+            f"levels need 0 <= start, end < peak <= 1, got start {start:g}, end {end:g}, peak {peak:g}"
+        )
+    if not 0 <= phase < 1:
+        raise InputError(f"sub-frame phase must be at least 0 and below 1, got {phase:g}")
+    if not 0 <= handle <= 1:
+        raise InputError(f"Bezier handle must be between 0 and 1, got {handle:g}")
+
+
+def _rise(length_frames: int, handle: float | None) -> Array:
+    """From 0 to 1 in `length_frames` steps, linear or along a cubic Bezier with level handles."""
+    time = np.linspace(0.0, 1.0, length_frames + 1)
+    if handle is None:
+        return time
+    # Bezier points (0, 0), (handle, 0), (1 - handle, 1), (1, 1): solve x(u) = time, then y(u).
+    u = time.copy()
+    low, high = np.zeros_like(time), np.ones_like(time)
+    for _ in range(60):
+        x = 3 * u * (1 - u) ** 2 * handle + 3 * u**2 * (1 - u) * (1 - handle) + u**3
+        low, high = np.where(x < time, u, low), np.where(x < time, high, u)
+        u = (low + high) / 2
+    u[0], u[-1] = 0.0, 1.0
+    rise: Array = u * u * (3 - 2 * u)
+    return rise

@@ -5,7 +5,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from experiments.errors import counted
-from stimuli_builder.blinks.column_names import eye_of, eye_pair, left_and_right
+from stimuli_builder.blinks.columns import eye_of, eye_pair, left_and_right
 from stimuli_builder.blinks.csv_table import few
 from stimuli_builder.blinks.extract import EyeBlinks, eye_profiles
 from stimuli_builder.blinks.measure import MeasuredBlink, closure_at_300

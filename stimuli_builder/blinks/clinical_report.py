@@ -12,7 +12,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from experiments.errors import counted
 from stimuli_builder.blinks.both_eyes import asymmetry_lines
-from stimuli_builder.blinks.column_names import eye_pair
+from stimuli_builder.blinks.columns import eye_pair
 from stimuli_builder.blinks.extract import EyeBlinks
 from stimuli_builder.blinks.plots import sequence_figure, series_figure
 from stimuli_builder.blinks.profile import Array

@@ -1,18 +1,145 @@
 """Find the blinks of a distance series: onset, minimum and end by the paper's two criteria (3.3.1)."""
 
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import percentile_filter
 from scipy.signal import find_peaks
 
-from stimuli_builder.blinks.bottom import turning_frame
-from stimuli_builder.blinks.events.lid_event import LidEvent
-from stimuli_builder.blinks.gaps import runs
-from stimuli_builder.blinks.label_options import DEFAULT_OPTIONS, LabelOptions
+from experiments.errors import InputError, did_you_mean
+from stimuli_builder.blinks.events.rules import LidEvent
 from stimuli_builder.blinks.profile import Array
 from stimuli_builder.blinks.series import PAPER_FPS, box_filter, scaled_frames
+from stimuli_builder.blinks.times import runs
+
+# The values of the labelling rule and their named sets.
+
+
+@dataclass(frozen=True)
+class LabelOptions:
+    """Values of the labelling rule; all frame counts are at 300 fps, as the paper's, and scale with the rate.
+
+    Exactly one of the three gradient limits is given.
+
+    Parameters
+    ----------
+    filter_frames : float
+        Width of the zero-phase filter.
+    gradient_frames : float
+        Window over which the gradient is averaged.
+    gradient_peak : float or None
+        Largest averaged gradient at onset and end, as part of the greatest one of the same phase.
+    gradient_opening : float or None
+        The same as part of the eye's opening per 300 fps frame.
+    gradient_px : float or None
+        The same in pixels per 300 fps frame (the paper's 0.1).
+    opening_px : float
+        Opening of the eye in pixels that `gradient_px` supposes where the series is not in pixels.
+    baseline_frames : float
+        The baseline is the mean over so many frames on either side of the minimum.
+    search_frames : float
+        How far from the minimum the onset and the end are looked for.
+    minimum_depth : float
+        Least depth of a blink as part of the eye's opening; smaller dips are twitches and noise.
+    minimum_tolerance : float
+        Frames this close to the lowest one, as part of the amplitude, may be the minimum; 0: only the lowest.
+    """
+
+    filter_frames: float = 10
+    gradient_frames: float = 20
+    gradient_peak: float | None = 0.035
+    gradient_opening: float | None = None
+    gradient_px: float | None = None
+    opening_px: float = 60.0
+    baseline_frames: float = 100
+    search_frames: float = 300
+    minimum_depth: float = 0.23
+    minimum_tolerance: float = 0.01
+
+    def __post_init__(self) -> None:
+        if [self.gradient_peak, self.gradient_opening, self.gradient_px].count(None) != 2:
+            raise InputError(
+                "give one gradient limit: as part of the peak, of the opening, or in pixels a frame"
+            )
+        for name, value in vars(self).items():
+            least = "0 or more" if name == "minimum_tolerance" else "greater than 0"
+            if value is not None and not (value > 0 or (value == 0 and least == "0 or more")):
+                raise InputError(f"{name.replace('_', '-')} must be {least}, got {value:g}")
+        for name in ("gradient_peak", "minimum_depth", "minimum_tolerance"):
+            value = getattr(self, name)
+            if value is not None and value >= 1:
+                raise InputError(f"{name.replace('_', '-')} is a part of the whole, below 1, got {value:g}")
+
+
+DEFAULT_OPTIONS = LabelOptions()
+PRESETS = MappingProxyType(
+    {
+        "velocity": DEFAULT_OPTIONS,
+        "relative": LabelOptions(
+            gradient_frames=10, gradient_peak=None, gradient_opening=0.001, minimum_tolerance=0
+        ),
+        "paper": LabelOptions(gradient_frames=10, gradient_peak=None, gradient_px=0.1, minimum_tolerance=0),
+    }
+)
+
+
+def preset(name: str) -> LabelOptions:
+    """Return the named set of values: "velocity", "relative" or "paper" (0.1 px a frame)."""
+    if name not in PRESETS:
+        raise InputError(f"unknown preset '{name}'{did_you_mean(name, [*PRESETS, 'classifier'])}")
+    return PRESETS[name]
+
+
+# Where a blink turns: the frame of its minimum, told from its flanks where the bottom is flat.
+
+FLANK = (0.1, 0.5)
+"""Parts of the amplitude, from the bottom, between which a flank is steep: they say when the lid turned."""
+
+
+def turning_frame(smooth: Array, onset: int, lowest: int, end: int, tolerance: float) -> int:
+    r"""Frame between onset and end at which closing turns to opening.
+
+    A lid lingers where it turns: noise of a hundredth of the amplitude decides which frame is lowest, and
+    the filter moves it towards the slower flank. So frames within `tolerance` of the lowest (as part of the
+    amplitude) count alike, and of these the one is taken that parts the bottom as the flanks are steep:
+
+    .. math:: t = t_c + (t_o - t_c) \, T_c / (T_c + T_o) \tag{1}
+
+    t_c and t_o are where closing and opening pass the lower level of FLANK, T_c and T_o how long each takes
+    from one level to the other.
+
+    Parameters
+    ----------
+    smooth : (n,) array
+        Filtered distance.
+    lowest : int
+        Frame of its least value; returned as it is with a tolerance of 0, or where a flank is missing.
+    """
+    open_level = float(np.interp(lowest, [onset, end], [smooth[onset], smooth[end]]))
+    amplitude = open_level - float(smooth[lowest])
+    if tolerance == 0 or amplitude <= 0:
+        return lowest
+    sides = (smooth[onset : lowest + 1][::-1], smooth[lowest : end + 1])
+    reach = np.array([[_first_above(side, smooth[lowest] + p * amplitude) for p in FLANK] for side in sides])
+    if not np.isfinite(reach).all():
+        return lowest
+    closing, opening = np.diff(reach, axis=1)[:, 0]
+    turn = lowest - reach[0, 0] + reach[:, 0].sum() * closing / (closing + opening)
+    alike = np.arange(int(np.ceil(lowest - reach[0, 0])), int(lowest + reach[1, 0]) + 1)
+    alike = alike[smooth[alike] <= smooth[lowest] + tolerance * amplitude]
+    return int(alike[np.argmin(np.abs(alike - turn))])
+
+
+def _first_above(values: Array, level: float) -> float:
+    """Place, between frames, where `values` first rises through a level; NaN where it does not."""
+    above = np.flatnonzero(values > level)
+    if not above.size or above[0] == 0:
+        return float("nan")
+    after = int(above[0])
+    return after - 1 + float((level - values[after - 1]) / (values[after] - values[after - 1]))
+
 
 Frames = NDArray[np.intp]
 

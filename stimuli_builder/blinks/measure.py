@@ -8,9 +8,8 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
 from experiments.errors import InputError
-from stimuli_builder.blinks.events.lid_event import LidEvent
-from stimuli_builder.blinks.label_options import LabelOptions
-from stimuli_builder.blinks.labelling import LabelledBlink, RefusedMinimum
+from stimuli_builder.blinks.events.rules import LidEvent
+from stimuli_builder.blinks.labelling import LabelledBlink, LabelOptions, RefusedMinimum
 from stimuli_builder.blinks.profile import PROFILE_FPS, Array
 from stimuli_builder.blinks.series import BlinkSeries, box_filter, scaled_frames
 

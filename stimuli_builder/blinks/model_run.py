@@ -11,15 +11,23 @@ from rich.table import Table
 
 from experiments.errors import InputError, counted, did_you_mean
 from experiments.files import temporary_beside, whole_text
-from stimuli_builder.blinks.blink_model import BlinkModel, default_model
-from stimuli_builder.blinks.export.curve import make_curve
-from stimuli_builder.blinks.export.formats import CurveTarget, check_format, write_curve
+from stimuli_builder.blinks.blink_model import (
+    TEXTBOOK_KINDS,
+    BlinkModel,
+    PhaseModel,
+    default_model,
+    textbook_profile,
+)
+from stimuli_builder.blinks.export import CurveTarget, check_format, make_curve, write_curve
 from stimuli_builder.blinks.library import load_library
-from stimuli_builder.blinks.phase_model import PhaseModel
 from stimuli_builder.blinks.plots import check_figure_name, model_figure, profiles_figure, save_figure
-from stimuli_builder.blinks.profile import BlinkProfile, resample, to_full_closure
-from stimuli_builder.blinks.profile_table import read_profile_table, write_profile_table
-from stimuli_builder.blinks.textbook import TEXTBOOK_KINDS, textbook_profile
+from stimuli_builder.blinks.profile import (
+    BlinkProfile,
+    read_profile_table,
+    resample,
+    to_full_closure,
+    write_profile_table,
+)
 
 EYES = ("auto", "each", "both")
 DEFAULT_COMPONENTS = 5

@@ -1,25 +1,25 @@
 """What `stimuli blinks` does: read, label, apply the review, write everything or nothing."""
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from experiments.errors import InputError
-from experiments.files import check_ending, check_targets
+from experiments.files import check_ending, check_targets, whole_text
 from stimuli_builder.blinks.both_eyes import all_profiles, asymmetry_lines, both_eyes
-from stimuli_builder.blinks.column_names import eye_of
-from stimuli_builder.blinks.console_report import print_blinks, print_written
+from stimuli_builder.blinks.columns import eye_of
+from stimuli_builder.blinks.csv_table import read_table
 from stimuli_builder.blinks.events.recognise import recognise
-from stimuli_builder.blinks.extract import EyeBlinks, blinks_of, rate_doubts, why_no_blink
-from stimuli_builder.blinks.file_endings import TABLE
-from stimuli_builder.blinks.label_options import LabelOptions
-from stimuli_builder.blinks.outputs import MoreOutputs
-from stimuli_builder.blinks.profile import BlinkProfile
-from stimuli_builder.blinks.profile_table import write_profile_table
+from stimuli_builder.blinks.export import AnimationCurve, CurveTarget, check_format, write_curve
+from stimuli_builder.blinks.extract import EyeBlinks, blinks_of, rate_doubts, why_no_blink, without_blinks
+from stimuli_builder.blinks.labelling import LabelOptions
+from stimuli_builder.blinks.profile import Array, BlinkProfile, write_profile_table
 from stimuli_builder.blinks.review import (
     Review,
     decide,
@@ -31,8 +31,221 @@ from stimuli_builder.blinks.review import (
     write_reviews,
 )
 from stimuli_builder.blinks.series import BlinkSeries, read_series
-from stimuli_builder.blinks.tables import blinks_frame, summarise, write_blinks, write_events, write_summary
-from stimuli_builder.blinks.units import iris_table
+from stimuli_builder.blinks.tables import (
+    blinks_frame,
+    print_blinks,
+    print_written,
+    summarise,
+    write_blinks,
+    write_events,
+    write_summary,
+)
+from stimuli_builder.blinks.units import (
+    Scale,
+    check_scale,
+    closure_course,
+    iris_table,
+    scale_doubt,
+    scale_of,
+    write_lids,
+)
+
+# Endings of the files that `stimuli blinks` writes: what is in a file is what its name says.
+
+TABLE = (".csv", ".txt")
+CURVES = {
+    "csv": TABLE,
+    "arkit": TABLE,
+    "json": (".json",),
+    "blender": (".py",),
+    "maya": (".anim",),
+    "gltf": (".gltf",),
+    "usd": (".usda", ".usd"),
+}
+"""Endings of `--curve` by `--curve-format`."""
+
+
+def check_curve(path: Path | None, format_name: str) -> None:
+    """Refuse a curve whose ending is not of its format; name the format that the ending is of."""
+    if path is None:
+        return
+    endings, ending = CURVES[format_name], path.suffix.lower()
+    other = next((name for name, of_format in CURVES.items() if ending in of_format), None)
+    if ending not in endings and other is not None:
+        raise InputError(
+            f"--curve {path.name}: --curve-format {format_name} is written as {' or '.join(endings)}; add "
+            f"--curve-format {other}, or end the name so"
+        )
+    check_ending(path, endings, "--curve")
+
+
+# The tracked recording itself as an animation curve: every frame's closure, looking down included.
+
+
+def recorded_curve(eyes: Sequence[EyeBlinks], closed: float | None = None) -> AnimationCurve:
+    """Closure of both lids over a whole recording at its own rate, gaps filled by straight lines.
+
+    With one column both eyes move alike; of two, one without a blink stays open where `closed` is not given.
+    The lower lids' motion is the track's where it is known, else 0.
+
+    Parameters
+    ----------
+    closed : float, optional
+        Distance at lid contact of eyes without a blink.
+
+    Raises
+    ------
+    InputError
+        There are more than two columns, or nothing tells the closed level: no blink, and no `closed`.
+    """
+    if len(eyes) > 2:
+        raise InputError(f"a curve has two eyes; choose them with --column, got {len(eyes)} columns")
+    if closed is None and not any(eye.blinks for eye in eyes):
+        columns = ", ".join(f"'{eye.series.column}'" for eye in eyes)
+        raise InputError(f"no blink in {columns}: nothing tells where its lids are closed: give --closed")
+    left, right = eyes[0], eyes[-1]
+    if len(eyes) == 2 and eye_of(left.series.column) == "right":
+        left, right = right, left
+    blinks = [(f"blink {b.number}", b.onset_s * left.series.fps) for b in left.blinks or right.blinks]
+    lower = left.series
+    return AnimationCurve(
+        fps=left.series.fps,
+        left=_course(left, closed),
+        right=_course(right, closed),
+        lower_up_mm=_motion(lower.lower_up_mm, lower.distance.size),
+        lower_nasal_mm=_motion(lower.lower_nasal_mm, lower.distance.size),
+        blinks=tuple(blinks),
+    )
+
+
+def _course(eye: EyeBlinks, closed: float | None) -> Array:
+    level = eye.closed_distance(closed)
+    if level is None:
+        return np.zeros(eye.series.distance.size)
+    return _filled(closure_course(eye.series, level))
+
+
+def _motion(place_mm: Array | None, count: int) -> Array:
+    """Motion of the lower lid against its usual place; nothing where no track tells it."""
+    if place_mm is None or not np.isfinite(place_mm).any():
+        return np.zeros(count)
+    return _filled(place_mm - np.nanmedian(place_mm))
+
+
+def _filled(values: Array) -> Array:
+    known = np.flatnonzero(np.isfinite(values))
+    return np.interp(np.arange(values.size), known, values[known])
+
+
+# What else `stimuli blinks` writes of a recording: the report, every frame in units, an animation curve.
+
+
+@dataclass(frozen=True)
+class MoreOutputs:
+    """Options of `stimuli blinks` for outputs beside the blinks table."""
+
+    report: Path | None = None
+    lids: Path | None = None
+    scale: str | None = None
+    curve: Path | None = None
+    curve_format: str = "csv"
+
+    @property
+    def paths(self) -> tuple[Path | None, ...]:
+        """Files to be written."""
+        return self.report, self.lids, self.curve
+
+    def check(self) -> None:
+        """Refuse a format or a scale nobody knows before anything is read."""
+        check_format(self.curve_format, CurveTarget(), "--curve-format")
+        if self.scale is not None:
+            check_scale(self.scale)
+            if self.lids is None and self.report is None:
+                sys.stderr.write(
+                    "note: --scale has no effect here: mm stand in what --lids and --report write\n"
+                )
+
+    def check_names(self) -> None:
+        """Refuse names that tell of another kind of file."""
+        check_curve(self.curve, self.curve_format)
+        check_ending(self.report, (".html", ".htm"), "--report")
+        check_ending(self.lids, TABLE, "--lids")
+
+    def prepared(
+        self, source: Path, eyes: Sequence[EyeBlinks], frame: pd.DataFrame, closed: float | None
+    ) -> list[Callable[[], None]]:
+        """Work out what is asked for; what comes back writes it and cannot be refused any more.
+
+        Parameters
+        ----------
+        closed : float or None
+            Distance at lid contact that was given, for eyes without a blink too.
+
+        Raises
+        ------
+        InputError
+            The scale cannot be told, or a column without a blink has no closed level.
+        """
+        if not any(self.paths):
+            return []
+        table = read_table(source)
+        scale = self._scale(table, eyes, source)
+        doubts = [doubt for eye in eyes if (doubt := scale_doubt(eye.series, scale))]
+        for doubt in doubts:
+            sys.stderr.write(f"warning: {doubt}\n")
+        writers: list[Callable[[], None]] = []
+        if self.curve is not None:
+            text = write_curve(self.curve_format, recorded_curve(eyes, closed), CurveTarget())
+            writers.append(partial(_write_text, self.curve, text))
+        if self.lids is not None:
+            writers.append(partial(write_lids, self.lids, _with_closed(self.lids, eyes, closed), scale))
+        if self.report is not None:
+            from stimuli_builder.blinks.clinical_report import report_text
+
+            page = report_text(source, eyes, frame, scale, [*_doubts(table, eyes), *doubts])
+            writers.append(partial(_write_text, self.report, page))
+        return writers
+
+    def _scale(self, table: pd.DataFrame, eyes: Sequence[EyeBlinks], source: Path) -> Scale | None:
+        scale, first = scale_of(table, self.scale, source), eyes[0].series
+        if scale is not None and not first.is_px:
+            raise InputError(
+                f"--scale makes mm of px, and '{first.column}' is in another unit (names of columns in px "
+                "end in _px): leave --scale out, or label a track"
+            )
+        return scale
+
+
+def _with_closed(
+    path: Path, eyes: Sequence[EyeBlinks], closed: float | None
+) -> list[tuple[BlinkSeries, float]]:
+    """Each series with its closed distance; an eye of which nothing tells it is left out, and said."""
+    known = [(eye.series, eye.closed_distance(closed)) for eye in eyes]
+    for series, level in known:
+        if level is None:
+            sys.stderr.write(
+                f"note: {path}: without {series.column}, which has no blink (--closed tells it)\n"
+            )
+    levels = [(series, level) for series, level in known if level is not None]
+    if not levels:
+        raise InputError(f"{path}: there is no blink, and nothing tells where lids are closed: give --closed")
+    return levels
+
+
+def _write_text(path: Path, text: str) -> None:
+    with whole_text(path) as stream:
+        stream.write(text)
+
+
+def _doubts(table: pd.DataFrame, eyes: Sequence[EyeBlinks]) -> list[str]:
+    """What a track says of its own frames, and rates that are unlikely."""
+    lines = [*without_blinks(eyes), *rate_doubts(eyes), *eyes[0].series.notes]
+    lost = int((table["status"] == "lost").sum()) if "status" in table.columns else 0
+    if lost:
+        lines.append(f"{lost:,} of {len(table):,} frames are lost")
+    if "error_px" in table.columns and table["error_px"].notna().any():
+        lines.append(f"stated error of the points, median: {table['error_px'].median():.2f} px")
+    return lines
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from experiments.errors import InputError, nearest
 from experiments.files import whole_file
 from stimuli_builder.blinks.csv_table import read_table, write_table
-from stimuli_builder.blinks.events.levels import local_opening
+from stimuli_builder.blinks.events.candidates import local_opening
 from stimuli_builder.blinks.profile import OPEN_PERCENTILE, Array
-from stimuli_builder.blinks.series import BlinkSeries
-from stimuli_builder.blinks.tracked_lid import FISSURE_LENGTH_MM
+from stimuli_builder.blinks.series import FISSURE_LENGTH_MM, BlinkSeries
 
 INTER_OCULAR_MM = 60.0
 """Between the middles of both eyes' openings; people differ by some 6% (sd)."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from experiments.declaration.rendering import RenderSettings
 from experiments.errors import InputError
-from stimuli_builder.blinks.lower_lid import lower_lid
+from stimuli_builder.blinks.export import lower_lid
 from stimuli_builder.blinks.profile import PROFILE_FPS, BlinkProfile, to_full_closure, to_natural_closure
 
 # Which samples of a 300 fps signal an output frame shows, and with what weight.

@@ -10,13 +10,17 @@ import pandas as pd
 
 from experiments.declaration.rendering import RenderSettings
 from experiments.errors import InputError, nearest
-from stimuli_builder.blinks.blink_model import BlinkModel, default_model
+from stimuli_builder.blinks.blink_model import (
+    TEXTBOOK_KINDS,
+    BlinkModel,
+    PhaseModel,
+    TextbookKind,
+    default_model,
+    textbook_profile,
+)
 from stimuli_builder.blinks.csv_table import NOTE, read_table
 from stimuli_builder.blinks.library import load_library
-from stimuli_builder.blinks.phase_model import PhaseModel
-from stimuli_builder.blinks.profile import Array, BlinkProfile, resample
-from stimuli_builder.blinks.profile_table import read_profile_table
-from stimuli_builder.blinks.textbook import TEXTBOOK_KINDS, TextbookKind, textbook_profile
+from stimuli_builder.blinks.profile import Array, BlinkProfile, read_profile_table, resample
 from stimuli_builder.clips.curves import amplitude_of, generator, samples_per_frame
 
 # Blinks from files of closure samples at 300 fps: a table of profiles, or one blink alone.

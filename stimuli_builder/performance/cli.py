@@ -53,7 +53,7 @@ def performance(
 
       stimuli performance --duration 60 --state reading --out reading.json --format json
     """
-    from stimuli_builder.blinks.export.formats import CurveTarget
+    from stimuli_builder.blinks.export import CurveTarget
     from stimuli_builder.performance.run import PerformanceJob, write_performance
 
     write_performance(

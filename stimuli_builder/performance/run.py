@@ -16,8 +16,7 @@ from blink_engine import Performance, StateName, default_parameters, perform
 from blink_engine.speech import Speech, joined, seed_of_speaker, speech_events, speech_states
 from experiments.errors import InputError, counted, did_you_mean
 from experiments.files import check_targets, whole_text
-from stimuli_builder.blinks.export.curve import AnimationCurve
-from stimuli_builder.blinks.export.formats import CurveTarget, check_format, write_curve
+from stimuli_builder.blinks.export import AnimationCurve, CurveTarget, check_format, write_curve
 
 # Where somebody speaks by the times of subtitles (WebVTT, SubRip).
 
@@ -88,7 +87,7 @@ def _seconds(stamp: str) -> float:
 MAX_FRAMES = 6_000_000
 """A day at 60 frames a second; more is a slip of the keyboard, and would fill the memory."""
 LOWER_UP_MM, LOWER_IN_MM = 0.75, 2.6
-"""The lower lid's full travel: the middle of the ranges of `stimuli_builder.blinks.lower_lid`."""
+"""The lower lid's full travel: the middle of the ranges of `stimuli_builder.blinks.export`."""
 
 
 @dataclass(frozen=True)

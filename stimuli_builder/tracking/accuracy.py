@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 
 from experiments.errors import InputError
 from stimuli_builder.tracking.fit import Fit, Fitter
-from stimuli_builder.tracking.model import CoupledModel
-from stimuli_builder.tracking.picture import reduced, restored_points
+from stimuli_builder.tracking.mesh import reduced, restored_points
+from stimuli_builder.tracking.model import CoupledModel, TrainingOptions, train
 from stimuli_builder.tracking.search import Finder
 from stimuli_builder.tracking.shapes import EYE_POINTS, LidMarkers, Points, inter_eyelid_distances, widths
 from stimuli_builder.tracking.table import distance_columns, numbers, point_columns, track_rows
-from stimuli_builder.tracking.training import TrainingOptions, train
 from stimuli_builder.video import Picture
 
 Values = NDArray[np.float64]

@@ -11,22 +11,57 @@ from experiments.errors import InputError, counted
 from experiments.files import check_ending, check_targets, temporary_beside
 from stimuli_builder.blinks.plots import check_figure_name
 from stimuli_builder.progress import frame_progress, step_progress
-from stimuli_builder.tracking.cli_report import report_modes, report_track, warn
-from stimuli_builder.tracking.labelfree import label_free_lesson
-from stimuli_builder.tracking.labels import Labels, load_labels
-from stimuli_builder.tracking.learn import check_eyes, learn, open_video, training_steps
-from stimuli_builder.tracking.model import CoupledModel
-from stimuli_builder.tracking.model_file import load_model
-from stimuli_builder.tracking.plot import plot_track
-from stimuli_builder.tracking.preview import write_preview
-from stimuli_builder.tracking.proposals import by_hand, unmarked, unreviewed
-from stimuli_builder.tracking.relabel import worst_frames, write_relabel
+from stimuli_builder.tracking.labelfree import label_free_lesson, worst_frames, write_relabel
+from stimuli_builder.tracking.labels import Labels, by_hand, load_labels, unmarked, unreviewed
+from stimuli_builder.tracking.learn import Lesson, check_eyes, learn, open_video, training_steps
+from stimuli_builder.tracking.model import CoupledModel, TrainingOptions, load_model
+from stimuli_builder.tracking.preview import plot_track, write_preview
 from stimuli_builder.tracking.shapes import Points
 from stimuli_builder.tracking.survey import survey
+from stimuli_builder.tracking.table import TrackSummary
 from stimuli_builder.tracking.track import track_video
-from stimuli_builder.tracking.training import TrainingOptions
 from stimuli_builder.video import DamagedFileError, VideoInfo, declared_frames
 from stimuli_builder.video_writer import check_video_name
+
+# What `stimuli track` and `train` print: what a model was trained on, how a track went, warnings.
+
+REASONS_TOLD = 6
+
+
+def warn(line: str) -> None:
+    """Print a warning on stderr, unless there is nothing to say."""
+    if line:
+        sys.stderr.write(f"warning: {line}\n")
+
+
+def report_track(out: Path, summary: TrackSummary, prepared_s: float) -> None:
+    """Print how many frames were tracked, doubtful and lost, how fast, and the usual reasons."""
+    print(
+        f"{out}: {summary.frames:,} frames, {summary.tracked:,} tracked "
+        f"({summary.doubtful:,} of them doubtful), {summary.reinitialised:,} re-initialised, "
+        f"{summary.lost:,} lost\n"
+        f"{summary.fit_fps:,.0f} frames/s fit only, "
+        f"{summary.end_to_end_fps:,.0f} frames/s with decoding; "
+        f"{summary.total_s:,.1f} s after {prepared_s:,.1f} s for the model"
+    )
+    usual = sorted(summary.reasons.items(), key=lambda entry: -entry[1][0])
+    for (status, _), (number, first, whole) in usual[:REASONS_TOLD]:
+        print(f"{counted(number, 'frame')} {status}, the first is {first}: {whole}")
+    if summary.tracked == summary.doubtful:
+        warn("no frame is beyond doubt; look at a --preview before using any number")
+
+
+def report_modes(lesson: Lesson) -> None:
+    """Print how many frames trained and how much of their variance is kept."""
+    model = lesson.model
+    kept = [f"{share:.1%}" for share in model.variance_kept]
+    print(
+        f"trained on {len(model.examples)} frames: {model.mode_counts[0]} shape modes ({kept[0]}), "
+        f"{model.mode_counts[1]} appearance modes ({kept[1]}), "
+        f"{model.mode_counts[2]} coupled modes ({kept[2]}), "
+        f"{model.mesh.pixel_count:,} base pixels, labels {'refined' if lesson.refined else 'as given'}"
+    )
+
 
 Hints = Mapping[int, Points | str]
 VIDEO_SUFFIXES = {".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm", ".mts", ".mpg", ".wmv"}

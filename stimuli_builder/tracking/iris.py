@@ -1,16 +1,23 @@
 """Where the iris is and how wide: the circle across which the picture gets brightest, between the lids."""
 
+import csv
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.errors import InputError
+from experiments.files import whole_text
 from stimuli_builder.compiled import compiled
-from stimuli_builder.tracking.picture import reduced, reduced_points, restored_points
-from stimuli_builder.tracking.shapes import Points, eye_axis
-from stimuli_builder.video import Picture
+from stimuli_builder.tracking.mesh import reduced, reduced_points, restored_points
+from stimuli_builder.tracking.shapes import EYE_POINTS, Points, eye_axis
+from stimuli_builder.tracking.table import numbers, point_columns, track_rows
+from stimuli_builder.video import Picture, VideoInfo, frames
 
 Values = NDArray[np.float64]
 
@@ -176,3 +183,86 @@ def _grey(picture: NDArray[np.float32], axes: Values, u: float, v: float) -> flo
     top = picture[r, c] + fc * (picture[r, c + 1] - picture[r, c])
     low = picture[r + 1, c] + fc * (picture[r + 1, c + 1] - picture[r + 1, c])
     return float(top + fr * (low - top))
+
+
+# The irises of a tracked recording, frame by frame, and the millimetres in a pixel that follow.
+
+BELIEVED = ("tracked", "reinitialised")
+LEAST_FRAMES = 5
+"""Irises that must be seen before a scale is told."""
+
+
+@dataclass(frozen=True)
+class IrisSummary:
+    """What a recording's irises say.
+
+    Attributes
+    ----------
+    frames, seen : int
+        Frames of the track; irises seen, both eyes counted.
+    diameter_px : float
+        Median diameter; NaN where fewer than five were seen.
+    spread_px : float
+        Half of the range that the middle half of the diameters lies in.
+    """
+
+    frames: int
+    seen: int
+    diameter_px: float
+    spread_px: float
+
+    @property
+    def mm_per_px(self) -> float:
+        """Millimetres in a pixel if an iris is 11.7 mm wide."""
+        return IRIS_MM / self.diameter_px
+
+
+def write_irises(info: VideoInfo, track: Path, out: Path, advance: Callable[[], None]) -> IrisSummary:
+    """Measure the irises of every believed frame of a track into a CSV, and sum them up.
+
+    Raises
+    ------
+    InputError
+        The track has another number of frames than the video, or is none.
+    """
+    header = next(iter(track_rows(track)), {})
+    eyes = 2 if "x18" in header else 1
+    names, diameters, count = point_columns(eyes), [], 0
+    rows, pictures = track_rows(track), islice(frames(info.path), info.frame_count)
+    with whole_text(out) as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(["frame", "time_s", *iris_columns(eyes)])
+        for picture in pictures:
+            row = next(rows, None)
+            if row is None:
+                break
+            count += 1
+            believed = row["status"] in BELIEVED
+            points = numbers(row, names, str(track)).reshape(-1, EYE_POINTS, 2)
+            seen = [measure_iris(picture, eye) if believed else None for eye in points]
+            diameters += [one.diameter for one in seen if one is not None]
+            writer.writerow([row["frame"], row["time_s"], *(cell for one in seen for cell in _cells(one))])
+            advance()
+        if count != info.frame_count or next(rows, None) is not None:
+            raise InputError(
+                f"{track}: not a track of {info.path}, which has {info.frame_count} frames; give the video "
+                "that was tracked"
+            )
+    return _summary(count, diameters)
+
+
+def iris_columns(eyes: int) -> list[str]:
+    """Names of the columns: middle and diameter of each iris, image-left eye first."""
+    sides = ["left_", "right_"] if eyes == 2 else [""]
+    return [f"{side}iris_{what}_px" for side in sides for what in ("x", "y", "diameter")]
+
+
+def _cells(iris: Iris | None) -> list[str]:
+    return [""] * 3 if iris is None else [f"{value:.2f}" for value in (iris.x, iris.y, iris.diameter)]
+
+
+def _summary(count: int, diameters: list[float]) -> IrisSummary:
+    if len(diameters) < LEAST_FRAMES:
+        return IrisSummary(count, len(diameters), float("nan"), float("nan"))
+    low, middle, high = np.percentile(diameters, [25, 50, 75])
+    return IrisSummary(count, len(diameters), float(middle), float(high - low) / 2)

@@ -2,16 +2,81 @@
 
 import json
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from experiments.errors import InputError
+from experiments.errors import InputError, counted
 from experiments.files import whole_text
-from stimuli_builder.tracking.label_checks import check_frame
-from stimuli_builder.tracking.shapes import EYE_POINTS, LidMarkers, Points, default_markers
+from stimuli_builder.tracking.shapes import EYE_POINTS, LidMarkers, Points, default_markers, eye_axis
+
+# Whether the points of a label file can be the lids of eyes.
+
+ORDER_TOLERANCE = 0.06
+CROSSING_TOLERANCE = 0.12
+
+
+def check_frame(where: str, points: Points, eyes: int, size: tuple[int, int]) -> None:
+    """Refuse points of a frame that lie outside its picture, or that no eye has.
+
+    Parameters
+    ----------
+    where : str
+        File and frame, to begin the line with.
+    points : (9 or 18, 2) float64 array
+        In pixels.
+    eyes : int
+    size : (int, int)
+        Width and height of the picture.
+
+    Raises
+    ------
+    InputError
+        One line that names the first wrong point.
+    """
+    outside = np.flatnonzero(((points < -0.5) | (points > np.array(size) - 0.5)).any(1))
+    if len(outside):
+        x, y = points[outside[0]]
+        raise InputError(
+            f"{where}: point {outside[0] + 1} at ({x:g}, {y:g}) is outside the picture "
+            f"of {size[0]} x {size[1]}"
+        )
+    centres = [
+        points[start : start + EYE_POINTS].mean(0)[0] for start in range(0, eyes * EYE_POINTS, EYE_POINTS)
+    ]
+    if centres != sorted(centres):
+        raise InputError(f"{where}: the eyes are swapped; points 1 to 9 belong to the image-left eye")
+    for eye in range(eyes):
+        _check_eye(where, points[EYE_POINTS * eye : EYE_POINTS * (eye + 1)], EYE_POINTS * eye)
+
+
+def _check_eye(where: str, eye: Points, first: int) -> None:
+    """Refuse an eye whose outline crosses itself by more than the wobble of a closed eye's labels."""
+    if np.hypot(*(eye[5] - eye[0])) < 4:
+        raise InputError(
+            f"{where}: canthi {first + 1} and {first + 6} are under 4 px apart; label a larger eye"
+        )
+    along, down, width = eye_axis(eye)
+    x, y = (eye - eye[0]) @ along / width, (eye - eye[0]) @ down / width
+    sign = 1.0 if x[5] > 0 else -1.0
+    upper, lower = sign * x[:6], sign * x[[5, 6, 7, 8, 0]]
+    for order, names in ((np.diff(upper), range(6)), (-np.diff(lower), (5, 6, 7, 8, 0))):
+        wrong = np.flatnonzero(order < -ORDER_TOLERANCE)
+        if len(wrong):
+            a, b = list(names)[wrong[0]], list(names)[wrong[0] + 1]
+            raise InputError(
+                f"{where}: points {first + a + 1} and {first + b + 1} cross; check the point order"
+            )
+    steps = np.argsort(upper)
+    upper_y = np.interp(sign * x[6:9], upper[steps], y[:6][steps])
+    crossed = np.flatnonzero(upper_y - y[6:9] > CROSSING_TOLERANCE)
+    if len(crossed):
+        raise InputError(
+            f"{where}: lower-lid point {first + 7 + crossed[0]} lies above the upper lid; they cross"
+        )
+
 
 FEWEST_FRAMES = 3
 POINT_ORDER = (
@@ -215,3 +280,58 @@ def save_labels(labels: Labels, video: str, origin: str) -> None:
 
 def _rounded(frames: dict[int, Points]) -> dict[str, Any]:
     return {str(number): np.round(points, 3).tolist() for number, points in frames.items()}
+
+
+# Which frames of a label file a person has changed or accepted, and which are as a program proposed them.
+
+DETECTED = "detector on single frames, not reviewed"
+TRACKED = "proposed by the tracker for correction by hand"
+SAME_PX = 0.0006
+"""Points are written to 0.001 px: what nobody moved comes back nearer than this."""
+
+
+def as_proposed(labels: Labels) -> frozenset[int]:
+    """Frames whose points are still those proposed, and which nobody has accepted.
+
+    The labelling page keeps accepted frames alone, and leaves no proposal standing for them.
+    """
+    proposed = labels.proposed or {}
+    return frozenset(
+        number
+        for number, points in labels.frames.items()
+        if number in proposed
+        and proposed[number].shape == points.shape
+        and np.abs(points - proposed[number]).max() < SAME_PX
+    )
+
+
+def by_hand(labels: Labels) -> Labels:
+    """The same file with the frames alone that a person changed or accepted; there may be none."""
+    waiting = as_proposed(labels)
+    return replace(labels, frames={n: points for n, points in labels.frames.items() if n not in waiting})
+
+
+def unreviewed(labels: Labels) -> str:
+    """A line where labels given to be learnt from hold frames that nobody saw; empty where none is known."""
+    waiting, count = len(as_proposed(labels)), len(labels.frames)
+    if waiting:
+        return (
+            f"{labels.path}: {waiting} of {counted(count, 'frame')} are as they were proposed and nobody "
+            "accepted them; all train as given: correct or accept each on the labelling page"
+        )
+    if labels.proposed is None and labels.origin in (DETECTED, TRACKED):
+        return (
+            f"{labels.path}: its origin is '{labels.origin}' and it keeps no proposals, so that nothing "
+            "tells which frames a person saw; save it on the labelling page once they are right"
+        )
+    return ""
+
+
+def unmarked(labels: Labels) -> str:
+    """A line where a file of `--relabel` is of a version that marked no proposals; empty else."""
+    if labels.proposed is not None or labels.origin != TRACKED:
+        return ""
+    return (
+        f"{labels.path}: an earlier version wrote it and it keeps no proposals, so that all its "
+        f"{counted(len(labels.frames), 'frame')} count as corrected; remove it and run again if they are not"
+    )

@@ -10,11 +10,10 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from stimuli_builder.actor.recording import Blink, course, plan_blinks
-from stimuli_builder.blinks.blink_model import BlinkModel
+from stimuli_builder.blinks.blink_model import TEXTBOOK_KINDS, BlinkModel, textbook_profile
 from stimuli_builder.blinks.labelling import LabelledBlink, label_blinks
 from stimuli_builder.blinks.library import load_library
 from stimuli_builder.blinks.profile import Array, BlinkProfile, resample_phases
-from stimuli_builder.blinks.textbook import TEXTBOOK_KINDS, textbook_profile
 
 FPS = 300
 OPENING_PX = 34.0

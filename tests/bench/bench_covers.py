@@ -23,11 +23,11 @@ import cv2
 import numpy as np
 
 from stimuli_builder.tracking.labelfree import label_free_lesson
+from stimuli_builder.tracking.model import TrainingOptions
 from stimuli_builder.tracking.shapes import EYE_POINTS, Points, eye_axis
 from stimuli_builder.tracking.survey import survey
 from stimuli_builder.tracking.table import track_rows
 from stimuli_builder.tracking.track import track_video
-from stimuli_builder.tracking.training import TrainingOptions
 from stimuli_builder.video import Picture, frames, rgb, scan_video
 from stimuli_builder.video_writer import VideoWriter
 

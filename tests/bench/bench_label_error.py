@@ -18,8 +18,8 @@ import numpy as np
 from stimuli_builder.tracking.accuracy import cross_validate
 from stimuli_builder.tracking.certainty import lid_offsets
 from stimuli_builder.tracking.labels import Labels, load_labels
+from stimuli_builder.tracking.model import TrainingOptions
 from stimuli_builder.tracking.shapes import inter_eyelid_distances
-from stimuli_builder.tracking.training import TrainingOptions
 from stimuli_builder.video import read_frames, scan_video
 
 FOLDER = Path("../shared/data/face_video")

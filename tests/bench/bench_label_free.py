@@ -20,11 +20,11 @@ from bench_lid_events import METHODS, counts
 from stimuli_builder.tracking.certainty import lid_difference, lid_offsets
 from stimuli_builder.tracking.labelfree import label_free_lesson
 from stimuli_builder.tracking.labels import load_labels
+from stimuli_builder.tracking.model import TrainingOptions
 from stimuli_builder.tracking.shapes import Points, inter_eyelid_distances, widths
 from stimuli_builder.tracking.survey import survey
 from stimuli_builder.tracking.table import numbers, point_columns, track_rows
 from stimuli_builder.tracking.track import track_video
-from stimuli_builder.tracking.training import TrainingOptions
 from stimuli_builder.video import scan_video
 
 FOLDER = Path("../shared/data/face_video")

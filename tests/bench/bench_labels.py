@@ -14,14 +14,13 @@ from pathlib import Path
 import numpy as np
 
 from stimuli_builder.actor.recording import Actor, ActorOptions, Blink, label_points, plan_blinks, write_video
-from stimuli_builder.blinks.label_options import PRESETS, LabelOptions
-from stimuli_builder.blinks.labelling import label_blinks
+from stimuli_builder.blinks.labelling import PRESETS, LabelOptions, label_blinks
 from stimuli_builder.blinks.series import BlinkSeries, read_series
 from stimuli_builder.tracking.labels import Labels, save_labels
 from stimuli_builder.tracking.learn import learn
+from stimuli_builder.tracking.model import TrainingOptions
 from stimuli_builder.tracking.shapes import default_markers
 from stimuli_builder.tracking.track import track_video
-from stimuli_builder.tracking.training import TrainingOptions
 from stimuli_builder.video import scan_video
 from tests.bench.bench_blinks import matches
 from tests.bench.bench_tracking import print_line

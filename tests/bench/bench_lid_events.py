@@ -24,10 +24,10 @@ from scipy.signal import find_peaks
 
 from stimuli_builder.blinks.events.generated import CLOSED_EYE_S, generate
 from stimuli_builder.blinks.events.recognise import recognise
-from stimuli_builder.blinks.gaps import bridge_gaps, runs
 from stimuli_builder.blinks.labelling import label_blinks
 from stimuli_builder.blinks.profile import Array
 from stimuli_builder.blinks.series import BlinkSeries
+from stimuli_builder.blinks.times import bridge_gaps, runs
 
 SEED = 909
 SERIES = 20

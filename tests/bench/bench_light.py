@@ -16,10 +16,9 @@ import numpy as np
 from stimuli_builder.actor.recording import Actor, ActorOptions, label_points, write_truth, write_video
 from stimuli_builder.tracking.labels import Labels, save_labels
 from stimuli_builder.tracking.learn import learn
-from stimuli_builder.tracking.model import CoupledModel
+from stimuli_builder.tracking.model import CoupledModel, TrainingOptions
 from stimuli_builder.tracking.shapes import Points, default_markers, widths
 from stimuli_builder.tracking.tracker import Tracker
-from stimuli_builder.tracking.training import TrainingOptions
 from stimuli_builder.video import Picture, frames, scan_video
 
 SEEDS = (11, 12)

@@ -19,11 +19,11 @@ import numpy as np
 
 from stimuli_builder.tracking.labelfree import label_free_lesson
 from stimuli_builder.tracking.labels import Labels, load_labels
+from stimuli_builder.tracking.model import TrainingOptions
 from stimuli_builder.tracking.shapes import EYE_POINTS, Points, inter_eyelid_distances, widths
 from stimuli_builder.tracking.survey import survey
 from stimuli_builder.tracking.table import numbers, point_columns, track_rows
 from stimuli_builder.tracking.track import track_video
-from stimuli_builder.tracking.training import TrainingOptions
 from stimuli_builder.video import Picture, VideoInfo, frames, rgb, scan_video
 from stimuli_builder.video_writer import VideoWriter
 

@@ -23,10 +23,10 @@ from rendered_recordings import recordings
 
 from stimuli_builder.characters.facekit.kit import load_facekit
 from stimuli_builder.tracking.labelfree import label_free_lesson
+from stimuli_builder.tracking.model import TrainingOptions
 from stimuli_builder.tracking.shapes import Points, default_markers
 from stimuli_builder.tracking.survey import survey
 from stimuli_builder.tracking.table import numbers, point_columns
-from stimuli_builder.tracking.training import TrainingOptions
 from stimuli_builder.video import Picture, scan_video
 
 

@@ -26,12 +26,11 @@ from stimuli_builder.tracking.certainty import DOUBTFUL_SHARE, lid_offsets
 from stimuli_builder.tracking.labelfree import label_free_lesson
 from stimuli_builder.tracking.labels import Labels, load_labels
 from stimuli_builder.tracking.learn import lesson_from
-from stimuli_builder.tracking.model import CoupledModel
+from stimuli_builder.tracking.model import CoupledModel, TrainingOptions
 from stimuli_builder.tracking.shapes import LOWER_LID, UPPER_LID, Points, default_markers, widths
 from stimuli_builder.tracking.survey import survey
 from stimuli_builder.tracking.table import error_columns, numbers, point_columns, track_rows
 from stimuli_builder.tracking.track import track_video
-from stimuli_builder.tracking.training import TrainingOptions
 from stimuli_builder.video import Picture, VideoInfo, scan_video
 from stimuli_builder.video_writer import VideoWriter
 

@@ -24,9 +24,8 @@ from stimuli_builder.tracking.table import numbers, point_columns, track_rows
 from stimuli_builder.tracking.track import track_video
 
 try:
-    from stimuli_builder.tracking.model_file import load_model, save_model
+    from stimuli_builder.tracking.model import TrainingOptions, load_model, save_model
     from stimuli_builder.tracking.survey import survey
-    from stimuli_builder.tracking.training import TrainingOptions
     from stimuli_builder.video import scan_video
 except ModuleNotFoundError:  # an earlier revision, which has them in one file
     from stimuli_builder.tracking.labelfree import survey

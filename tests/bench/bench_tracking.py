@@ -19,11 +19,10 @@ from stimuli_builder.tracking.accuracy import compare_with_truth
 from stimuli_builder.tracking.fit import Fitter, linear_parts, work_out
 from stimuli_builder.tracking.labels import Labels, save_labels
 from stimuli_builder.tracking.learn import learn
-from stimuli_builder.tracking.model import CoupledModel
-from stimuli_builder.tracking.picture import reduced
+from stimuli_builder.tracking.mesh import reduced
+from stimuli_builder.tracking.model import CoupledModel, TrainingOptions, warped
 from stimuli_builder.tracking.shapes import default_markers
 from stimuli_builder.tracking.track import track_video
-from stimuli_builder.tracking.training import TrainingOptions, warped
 from stimuli_builder.video import frames, read_frames, scan_video
 
 

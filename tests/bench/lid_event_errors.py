@@ -17,10 +17,10 @@ from collections.abc import Sequence
 import numpy as np
 from bench_lid_events import SLACK_S, f1, matched, rates
 
+from stimuli_builder.blinks.events.candidates import depth_of
 from stimuli_builder.blinks.events.generated import Generated, Motion, generate
-from stimuli_builder.blinks.events.levels import depth_of
-from stimuli_builder.blinks.events.lid_event import LidEvent
 from stimuli_builder.blinks.events.recognise import recognise
+from stimuli_builder.blinks.events.rules import LidEvent
 from stimuli_builder.blinks.series import BlinkSeries
 
 BESIDE_S = 0.1

@@ -18,8 +18,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from stimuli_builder.blinks.gaps import runs
 from stimuli_builder.blinks.profile import Array
+from stimuli_builder.blinks.times import runs
 
 CHANGE = 0.3
 OPEN_FRAMES = 151

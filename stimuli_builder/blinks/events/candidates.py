@@ -1,14 +1,104 @@
 """Dips of a lid series that may be something, and the numbers by which they are told apart."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import percentile_filter
 from scipy.signal import find_peaks
 
-from stimuli_builder.blinks.events.courses import COURSE, courses
-from stimuli_builder.blinks.events.levels import Depth
-from stimuli_builder.blinks.profile import Array
+from stimuli_builder.blinks.profile import OPEN_PERCENTILE, Array
+from stimuli_builder.blinks.series import box_filter
+
+# The course of the lid about a dip, as means over spans of time that grow away from its deepest frame.
+
+SPANS_S = (0.0, 0.025, 0.06, 0.1, 0.15, 0.2, 0.27, 0.35, 0.45, 0.6, 0.8, 1.1, 1.5, 2.1)
+"""Ends of the spans on either side of the deepest frame: as fine as a blink moves, then coarser."""
+EDGES_S = np.concatenate([-np.array(SPANS_S[:0:-1]), SPANS_S])
+COURSE = tuple(f"from {a:g} to {b:g} s" for a, b in pairwise(EDGES_S))
+
+
+def courses(values: Array, peaks: NDArray[np.int64], fps: float) -> Array:
+    """Mean of a series (n,) over each span about each peak (p,): (p, spans); see `span_means`."""
+    return span_means(values, peaks.astype(np.float64), EDGES_S * fps)
+
+
+def span_means(values: Array, centres: Array, edges: Array) -> Array:
+    """Mean of a series (n,) between edges (s + 1,) about each centre (p,), both in frames: (p, s).
+
+    Samples are joined by straight lines, so that a span shorter than a frame has a mean too and the same
+    lid gives the same means at every rate. Beyond its ends the series keeps its last value.
+    """
+    reach = int(np.ceil(np.abs(edges).max())) + 2
+    long = np.pad(values, reach, mode="edge")
+    areas = np.concatenate([[0.0], np.cumsum((long[1:] + long[:-1]) / 2)])
+    places = np.clip(centres, 0, values.size - 1)[:, None] + reach + edges
+    left = np.floor(places).astype(np.int64)
+    part = places - left
+    area = areas[left] + long[left] * part + (long[left + 1] - long[left]) * part**2 / 2
+    return np.asarray(np.diff(area, axis=1) / np.diff(edges))
+
+
+# Depth of a lid series: how far the eye is closed, as part of how far it is open about then.
+
+OPEN_REACH_S = 5.0
+LEAST_OPEN = 0.6
+"""The local opening is at least this part of the recording's: else a long closed eye would count as open."""
+SMOOTHING_S = 0.033
+NOISE_FLOOR = 0.004
+
+
+@dataclass(frozen=True, eq=False)
+class Depth:
+    """A gapless piece of a series as depth r = 1 - d / opening.
+
+    Parameters
+    ----------
+    raw, smooth : (n,) arrays
+        Depth as measured and after a zero-phase average over 33 ms; 0 open.
+    opening : (n,) array
+        Opening taken as r = 0, in the unit of the series.
+    noise : float
+        Standard deviation of `raw` from frame to frame, as depth.
+    fps : float
+    """
+
+    raw: Array
+    smooth: Array
+    opening: Array
+    noise: float
+    fps: float
+
+
+def depth_of(distance: Array, fps: float) -> Depth:
+    """Return the depth of a gapless series (n,), its opening following a head that comes nearer."""
+    opening = local_opening(distance, fps)
+    raw = 1 - distance / opening
+    smooth = box_filter(raw, max(1.0, SMOOTHING_S * fps))
+    return Depth(raw, smooth, opening, frame_noise(raw), fps)
+
+
+def local_opening(distance: Array, fps: float) -> Array:
+    """Opening about each frame: the 85th percentile within 5 s, not below 0.6 of the recording's."""
+    stride = max(1, int(fps / 10))
+    coarse = distance[::stride]
+    reach = max(1, round(OPEN_REACH_S * fps / stride))
+    level = percentile_filter(coarse, OPEN_PERCENTILE, size=2 * reach + 1, mode="nearest")
+    whole = float(np.percentile(coarse, OPEN_PERCENTILE))
+    level = np.maximum(level, LEAST_OPEN * whole)
+    frames = np.arange(coarse.size) * stride
+    return np.maximum(np.interp(np.arange(distance.size), frames, level), 1e-9)
+
+
+def frame_noise(raw: Array) -> float:
+    """Noise of one frame from second differences, which lids moving smoothly hardly touch."""
+    if raw.size < 4:
+        return NOISE_FLOOR
+    second = np.diff(raw, 2)
+    spread = float(np.median(np.abs(second - np.median(second))))
+    return max(NOISE_FLOOR, 1.4826 * spread / 6**0.5)
+
 
 LEAST_PROMINENCE = 0.06
 NOISES = 2.5

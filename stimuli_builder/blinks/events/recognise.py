@@ -5,19 +5,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stimuli_builder.blinks.column_names import eye_pair
-from stimuli_builder.blinks.events.apart import apart
-from stimuli_builder.blinks.events.asymmetry import Asymmetry, asymmetry
-from stimuli_builder.blinks.events.candidates import LEVELS, RIPPLE, Candidate, candidate_at, crossing
+from stimuli_builder.blinks.columns import eye_pair
+from stimuli_builder.blinks.events.candidates import LEVELS, RIPPLE, Candidate, Depth, candidate_at, crossing
 from stimuli_builder.blinks.events.generated import CLASSES, CLOSED_EYE_S
-from stimuli_builder.blinks.events.levels import Depth
-from stimuli_builder.blinks.events.lid_event import LidEvent, PhaseFit
-from stimuli_builder.blinks.events.long_closure import with_long_closures
-from stimuli_builder.blinks.events.pieces import Piece, looked_at, partners
-from stimuli_builder.blinks.events.resting import Rest, bounds_of, rests_about
-from stimuli_builder.blinks.events.second_look import second_look
-from stimuli_builder.blinks.events.template import CLOSED, Timing, timing_of
-from stimuli_builder.blinks.events.winks import with_winks
+from stimuli_builder.blinks.events.network import Piece, looked_at, partners, second_look
+from stimuli_builder.blinks.events.rules import (
+    Asymmetry,
+    LidEvent,
+    PhaseFit,
+    apart,
+    asymmetry,
+    with_long_closures,
+    with_winks,
+)
+from stimuli_builder.blinks.events.template import CLOSED, Rest, Timing, bounds_of, rests_about, timing_of
 from stimuli_builder.blinks.profile import Array
 from stimuli_builder.blinks.series import BlinkSeries
 

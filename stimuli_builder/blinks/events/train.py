@@ -19,12 +19,19 @@ from numpy.typing import NDArray
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.neural_network import MLPClassifier
 
-from stimuli_builder.blinks.events.candidates import FEATURES, Candidate
+from stimuli_builder.blinks.events.candidates import FEATURES, Candidate, Depth
 from stimuli_builder.blinks.events.generated import CLASSES, Generated, Motion, generate
-from stimuli_builder.blinks.events.levels import Depth
-from stimuli_builder.blinks.events.network import FIRST_LOOK, SECOND_LOOK, Network, store
-from stimuli_builder.blinks.events.pieces import Measured, looked_at, measured
-from stimuli_builder.blinks.events.second_look import CONTEXT, contexts
+from stimuli_builder.blinks.events.network import (
+    CONTEXT,
+    FIRST_LOOK,
+    SECOND_LOOK,
+    Measured,
+    Network,
+    contexts,
+    looked_at,
+    measured,
+    store,
+)
 from stimuli_builder.blinks.profile import Array
 from stimuli_builder.blinks.series import BlinkSeries
 

@@ -11,10 +11,9 @@ from experiments.files import whole_file
 from stimuli_builder.blinks.blink_model import BlinkModel
 from stimuli_builder.blinks.both_eyes import all_profiles
 from stimuli_builder.blinks.extract import blinks_of
-from stimuli_builder.blinks.label_options import LabelOptions, preset
-from stimuli_builder.blinks.library.recordings import LIBRARY_FOLDER, Recording
-from stimuli_builder.blinks.profile import BlinkProfile
-from stimuli_builder.blinks.profile_table import write_profile_table
+from stimuli_builder.blinks.labelling import LabelOptions, preset
+from stimuli_builder.blinks.library.load import LIBRARY_FOLDER, Recording
+from stimuli_builder.blinks.profile import BlinkProfile, write_profile_table
 from stimuli_builder.blinks.series import read_series
 
 PROFILE_COLUMNS = (

@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from stimuli_builder.actor.recording import Actor, ActorOptions, truth_points, write_video
-from stimuli_builder.blinks.label_options import preset
+from stimuli_builder.blinks.labelling import preset
 from stimuli_builder.blinks.run import BlinksJob, run_blinks
 from stimuli_builder.tracking.labels import load_labels
 from tests.browser.admin.conftest import Dashboard

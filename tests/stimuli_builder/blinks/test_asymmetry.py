@@ -11,7 +11,7 @@ from stimuli_builder.blinks.both_eyes import asymmetry_lines
 from stimuli_builder.blinks.events.generated import Motion, course, plan
 from stimuli_builder.blinks.events.recognise import Recognised, recognise
 from stimuli_builder.blinks.extract import blinks_of
-from stimuli_builder.blinks.label_options import LabelOptions
+from stimuli_builder.blinks.labelling import LabelOptions
 from stimuli_builder.blinks.profile import Array
 from stimuli_builder.blinks.series import BlinkSeries
 

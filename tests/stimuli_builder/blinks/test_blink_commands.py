@@ -5,9 +5,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from stimuli_builder.blinks.label_options import PRESETS
+from stimuli_builder.blinks.labelling import PRESETS
 from stimuli_builder.blinks.library import load_library
-from stimuli_builder.blinks.profile_table import TABLE_COLUMNS, read_profile_table
+from stimuli_builder.blinks.profile import TABLE_COLUMNS, read_profile_table
 from stimuli_builder.blinks.tables import BLINK_COLUMNS
 
 GUIDE = (Path(__file__).parents[3] / "docs" / "blinks.md").read_text(encoding="utf-8")

@@ -10,15 +10,21 @@ import numpy as np
 import pytest
 
 from experiments.errors import InputError
-from stimuli_builder.blinks.blink_model import default_model
-from stimuli_builder.blinks.export.arkit import BLEND_SHAPES, timecode, to_arkit
-from stimuli_builder.blinks.export.blender import to_blender
-from stimuli_builder.blinks.export.curve import make_curve
-from stimuli_builder.blinks.export.maya import time_unit, to_maya
-from stimuli_builder.blinks.export.plain import CSV_COLUMNS, to_csv, to_json
+from stimuli_builder.blinks.blink_model import default_model, textbook_profile
+from stimuli_builder.blinks.export import (
+    BLEND_SHAPES,
+    CSV_COLUMNS,
+    make_curve,
+    time_unit,
+    timecode,
+    to_arkit,
+    to_blender,
+    to_csv,
+    to_json,
+    to_maya,
+)
 from stimuli_builder.blinks.library import load_library
 from stimuli_builder.blinks.profile import to_full_closure
-from stimuli_builder.blinks.textbook import textbook_profile
 
 BLENDER_PYTHON = Path(__file__).parents[3] / ".venv-bake" / "bin" / "python"
 

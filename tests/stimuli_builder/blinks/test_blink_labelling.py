@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 
 from experiments.errors import InputError
 from stimuli_builder.actor.recording import course, plan_blinks
-from stimuli_builder.blinks.label_options import DEFAULT_OPTIONS, LabelOptions, preset
-from stimuli_builder.blinks.labelling import find_blinks, label_blinks
+from stimuli_builder.blinks.labelling import DEFAULT_OPTIONS, LabelOptions, find_blinks, label_blinks, preset
 from stimuli_builder.blinks.series import read_series
 
 REAL = [

@@ -4,16 +4,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.errors import InputError
-from stimuli_builder.blinks.lower_lid import lower_lid
+from stimuli_builder.blinks.export import lower_lid
 from stimuli_builder.blinks.profile import (
     BlinkProfile,
+    read_profile_table,
     resample,
     resample_phases,
     split_duration,
     to_full_closure,
     to_natural_closure,
+    write_profile_table,
 )
-from stimuli_builder.blinks.profile_table import read_profile_table, write_profile_table
 
 
 def profile(peak=0.8, down=27, up=63, name="p", **more):

@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.errors import InputError
-from stimuli_builder.blinks.gaps import bridge_gaps, runs
 from stimuli_builder.blinks.series import box_filter, read_series, scaled_frames
+from stimuli_builder.blinks.times import bridge_gaps, runs
 
 
 @settings(deadline=None, max_examples=40)

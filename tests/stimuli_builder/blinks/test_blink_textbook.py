@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.errors import InputError
-from stimuli_builder.blinks.textbook import TEXTBOOK_KINDS, recorded_down_fraction, textbook_profile
+from stimuli_builder.blinks.blink_model import TEXTBOOK_KINDS, recorded_down_fraction, textbook_profile
 
 KINDS = st.sampled_from(TEXTBOOK_KINDS)
 

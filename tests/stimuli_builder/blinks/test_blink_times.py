@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from experiments.errors import InputError
-from stimuli_builder.blinks.export.arkit import timecode
+from stimuli_builder.blinks.export import timecode
 from stimuli_builder.blinks.profile import Array
 from stimuli_builder.blinks.series import read_series
 

@@ -2,11 +2,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from stimuli_builder.blinks.export import lower_lid
 from stimuli_builder.blinks.extract import blinks_of, eye_profiles
-from stimuli_builder.blinks.label_options import DEFAULT_OPTIONS
-from stimuli_builder.blinks.lower_lid import lower_lid
-from stimuli_builder.blinks.series import read_series
-from stimuli_builder.blinks.tracked_lid import FISSURE_LENGTH_MM, tracked_lower_lid
+from stimuli_builder.blinks.labelling import DEFAULT_OPTIONS
+from stimuli_builder.blinks.series import FISSURE_LENGTH_MM, read_series, tracked_lower_lid
 
 WIDTH_PX = 141.0
 OUTLINE = [(0, 0), (20, -20), (55, -30), (85, -30), (120, -20), (141, 0), (115, 12), (70, 15), (25, 12)]

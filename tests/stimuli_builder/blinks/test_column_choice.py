@@ -7,8 +7,7 @@ import pandas as pd
 import pytest
 
 from experiments.errors import InputError
-from stimuli_builder.blinks.column_choice import choose_columns
-from stimuli_builder.blinks.column_names import eye_pair
+from stimuli_builder.blinks.columns import choose_columns, eye_pair
 from stimuli_builder.blinks.events.recognise import recognise
 from stimuli_builder.blinks.series import BlinkSeries, read_series
 

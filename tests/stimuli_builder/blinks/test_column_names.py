@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from experiments.errors import InputError
-from stimuli_builder.blinks.column_names import eye_of, is_high_when_shut
+from stimuli_builder.blinks.columns import eye_of, is_high_when_shut
 from stimuli_builder.blinks.series import read_series
 
 

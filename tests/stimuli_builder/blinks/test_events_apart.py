@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from stimuli_builder.blinks.events.apart import apart
-from stimuli_builder.blinks.events.lid_event import LidEvent
 from stimuli_builder.blinks.events.recognise import _listed, _Told
+from stimuli_builder.blinks.events.rules import LidEvent, apart
 
 FPS = 100.0
 

@@ -6,14 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from stimuli_builder.blinks.events.candidates import find_candidates
-from stimuli_builder.blinks.events.courses import COURSE, courses
+from stimuli_builder.blinks.events.candidates import COURSE, courses, depth_of, find_candidates
 from stimuli_builder.blinks.events.generated import Motion, course, generate
-from stimuli_builder.blinks.events.levels import depth_of
 from stimuli_builder.blinks.events.recognise import recognise
 from stimuli_builder.blinks.events.train import true_kinds
 from stimuli_builder.blinks.extract import blinks_of
-from stimuli_builder.blinks.label_options import DEFAULT_OPTIONS
+from stimuli_builder.blinks.labelling import DEFAULT_OPTIONS
 from stimuli_builder.blinks.series import BlinkSeries, read_series
 from stimuli_builder.blinks.tables import EVENT_COLUMNS
 

@@ -7,8 +7,14 @@ import pytest
 
 from stimuli_builder.blinks.events.candidates import FEATURES
 from stimuli_builder.blinks.events.generated import CLASSES
-from stimuli_builder.blinks.events.network import FIRST_LOOK, SECOND_LOOK, Network, store, stored_network
-from stimuli_builder.blinks.events.second_look import CONTEXT
+from stimuli_builder.blinks.events.network import (
+    CONTEXT,
+    FIRST_LOOK,
+    SECOND_LOOK,
+    Network,
+    store,
+    stored_network,
+)
 
 
 def drawn(largest: float) -> Network:

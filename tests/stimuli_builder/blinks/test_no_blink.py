@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from stimuli_builder.blinks.profile_table import TABLE_COLUMNS, read_profile_table
+from stimuli_builder.blinks.profile import TABLE_COLUMNS, read_profile_table
 
 
 @pytest.fixture

@@ -5,8 +5,8 @@ import pytest
 from scipy.stats import ks_2samp
 
 from experiments.errors import InputError
+from stimuli_builder.blinks.blink_model import PhaseModel
 from stimuli_builder.blinks.library import load_library
-from stimuli_builder.blinks.phase_model import PhaseModel
 
 
 def facts(profile):

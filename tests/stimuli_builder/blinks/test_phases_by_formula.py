@@ -9,7 +9,7 @@ import pytest
 
 from stimuli_builder.blinks.events.recognise import recognise
 from stimuli_builder.blinks.extract import blinks_of
-from stimuli_builder.blinks.label_options import preset
+from stimuli_builder.blinks.labelling import preset
 from stimuli_builder.blinks.measure import MeasuredBlink
 from stimuli_builder.blinks.plots import series_figure
 from stimuli_builder.blinks.series import BlinkSeries

@@ -5,8 +5,7 @@ import pytest
 
 from stimuli_builder.blinks.events.candidates import FEATURES
 from stimuli_builder.blinks.events.generated import CLASSES, Motion, course, generate
-from stimuli_builder.blinks.events.pieces import looked_at
-from stimuli_builder.blinks.events.second_look import CONTEXT, contexts
+from stimuli_builder.blinks.events.network import CONTEXT, contexts, looked_at
 from stimuli_builder.blinks.events.train import labelled_features
 from stimuli_builder.blinks.profile import Array
 from stimuli_builder.blinks.series import BlinkSeries

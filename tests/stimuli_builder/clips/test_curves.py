@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from experiments.errors import InputError
 from experiments.load import load_experiment
-from stimuli_builder.blinks.textbook import textbook_profile
+from stimuli_builder.blinks.blink_model import textbook_profile
 from stimuli_builder.clips.curves import (
     LEAD_IN_S,
     LEAD_OUT_S,

@@ -8,7 +8,7 @@ import pytest
 
 from experiments.errors import InputError
 from stimuli_builder.blinks.library import load_library
-from stimuli_builder.blinks.profile_table import write_profile_table
+from stimuli_builder.blinks.profile import write_profile_table
 from stimuli_builder.clips.exemplars import read_closure_file, reading_note
 
 

@@ -11,8 +11,8 @@ from stimuli_builder.actor.recording import Actor, ActorOptions, label_points, w
 from stimuli_builder.cli import main
 from stimuli_builder.tracking.labels import Labels, save_labels
 from stimuli_builder.tracking.learn import Lesson, learn
+from stimuli_builder.tracking.model import TrainingOptions
 from stimuli_builder.tracking.shapes import default_markers
-from stimuli_builder.tracking.training import TrainingOptions
 from stimuli_builder.video import frames, scan_video
 
 

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from stimuli_builder.tracking import kernels, solving_kernels
 from stimuli_builder.tracking.fit import Fitter, linear_parts, similarity_directions, work_out
+from stimuli_builder.tracking.model import principal, train
 from stimuli_builder.tracking.shapes import default_markers, with_border
-from stimuli_builder.tracking.training import principal, train
 from stimuli_builder.video import Picture
 
 
@@ -21,7 +21,7 @@ def model(recording):
 
 
 def small():
-    from stimuli_builder.tracking.training import TrainingOptions
+    from stimuli_builder.tracking.model import TrainingOptions
 
     return TrainingOptions(base_pixels=3000)
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from stimuli_builder.tracking.labels import load_labels
-from stimuli_builder.tracking.model_file import save_model
+from stimuli_builder.tracking.model import save_model
 from stimuli_builder.video import opened, scan_video
 from stimuli_builder.video_writer import VideoWriter
 
@@ -145,7 +145,7 @@ def test_variable_frame_rate_is_refused_or_accepted_by_name(refused, recording, 
 
 
 def test_a_model_for_another_size_or_no_model(refused, recording, tmp_path, lesson):
-    from stimuli_builder.tracking.model_file import save_model
+    from stimuli_builder.tracking.model import save_model
 
     model, small = tmp_path / "model.npz", tmp_path / "small.mp4"
     save_model(lesson.model, model)

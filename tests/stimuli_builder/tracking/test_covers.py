@@ -11,20 +11,14 @@ from experiments.errors import InputError
 from stimuli_builder.characters.atlas import SHIPPED, load_atlas
 from stimuli_builder.characters.colour import linear_to_srgb
 from stimuli_builder.environments import cache_folder
-from stimuli_builder.tracking.covers import (
-    LEAST_SPREAD,
-    covered_frames,
-    likenesses,
-    surroundings_of,
-)
 from stimuli_builder.tracking.detector.detection import contour_spread
-from stimuli_builder.tracking.detector.face_mesh import FaceMesh
-from stimuli_builder.tracking.faults import Faults
+from stimuli_builder.tracking.detector.mesh import FaceMesh
 from stimuli_builder.tracking.fit import Fitter
 from stimuli_builder.tracking.labelfree import label_free_lesson
-from stimuli_builder.tracking.survey import survey
+from stimuli_builder.tracking.model import TrainingOptions
+from stimuli_builder.tracking.search import Faults
+from stimuli_builder.tracking.survey import LEAST_SPREAD, covered_frames, likenesses, surroundings_of, survey
 from stimuli_builder.tracking.track import track_video
-from stimuli_builder.tracking.training import TrainingOptions
 from stimuli_builder.video import frames, scan_video
 from tests.stimuli_builder.tracking.test_bad_input import write_frames
 from tests.stimuli_builder.tracking.test_files_as_they_come import written

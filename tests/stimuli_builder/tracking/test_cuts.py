@@ -10,10 +10,10 @@ import pytest
 from stimuli_builder.actor.recording import Actor, ActorOptions, write_truth, write_video
 from stimuli_builder.environments import cache_folder
 from stimuli_builder.tracking.labelfree import label_free_lesson
+from stimuli_builder.tracking.model import TrainingOptions
 from stimuli_builder.tracking.shapes import widths
 from stimuli_builder.tracking.survey import survey
 from stimuli_builder.tracking.track import track_video
-from stimuli_builder.tracking.training import TrainingOptions
 from stimuli_builder.video import frames, scan_video
 from tests.stimuli_builder.tracking.test_bad_input import write_frames
 from tests.stimuli_builder.tracking.test_files_as_they_come import written

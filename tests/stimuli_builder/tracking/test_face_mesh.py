@@ -12,8 +12,7 @@ from stimuli_builder.characters.atlas import SHIPPED, load_atlas
 from stimuli_builder.characters.colour import linear_to_srgb
 from stimuli_builder.environments import cache_folder
 from stimuli_builder.tracking.detector.detection import Detection
-from stimuli_builder.tracking.detector.face_mesh import SAME_FACE, FaceMesh, in_both, mirrored
-from stimuli_builder.tracking.detector.mesh import open_detector
+from stimuli_builder.tracking.detector.mesh import SAME_FACE, FaceMesh, in_both, mirrored, open_detector
 from stimuli_builder.tracking.shapes import widths
 from stimuli_builder.tracking.survey import _require_agreement
 from stimuli_builder.video import VideoInfo, frames, rgb

@@ -9,10 +9,10 @@ import pytest
 from experiments.errors import InputError
 from stimuli_builder.tracking.labels import Labels
 from stimuli_builder.tracking.learn import lesson_from, training_steps
+from stimuli_builder.tracking.model import TrainingOptions
 from stimuli_builder.tracking.shapes import default_markers
 from stimuli_builder.tracking.table import numbers, point_columns, track_rows
 from stimuli_builder.tracking.track import track_video
-from stimuli_builder.tracking.training import TrainingOptions
 from stimuli_builder.video import scan_video
 
 FRAMES = 24

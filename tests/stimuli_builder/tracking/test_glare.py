@@ -22,9 +22,9 @@ from stimuli_builder.tracking.glare import (
     opening_shares,
 )
 from stimuli_builder.tracking.labelfree import label_free_lesson
+from stimuli_builder.tracking.model import TrainingOptions
 from stimuli_builder.tracking.survey import survey
 from stimuli_builder.tracking.track import track_video
-from stimuli_builder.tracking.training import TrainingOptions
 from stimuli_builder.video import scan_video
 from tests.stimuli_builder.tracking.test_bad_input import write_frames
 

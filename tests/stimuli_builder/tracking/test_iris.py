@@ -9,8 +9,8 @@ from stimuli_builder.actor.face import EYE_CENTRES, EYE_WIDTH_PX, head_matrix
 from stimuli_builder.actor.recording import Actor, ActorOptions
 from stimuli_builder.actor.renderer import IRIS_RADIUS
 from stimuli_builder.tracking.iris import IRIS_MM, measure_iris
-from stimuli_builder.tracking.model_file import save_model
-from stimuli_builder.tracking.picture import restored_points
+from stimuli_builder.tracking.mesh import restored_points
+from stimuli_builder.tracking.model import save_model
 
 
 @pytest.fixture(scope="module")

@@ -8,10 +8,9 @@ from hypothesis import strategies as st
 from stimuli_builder.tracking import kernels
 from stimuli_builder.tracking.certainty import jump_px, lid_difference, lid_offsets
 from stimuli_builder.tracking.fit import Fitter
-from stimuli_builder.tracking.mesh import build_mesh
-from stimuli_builder.tracking.picture import same_picture, shows_something
+from stimuli_builder.tracking.mesh import build_mesh, same_picture, shows_something
+from stimuli_builder.tracking.model import warped
 from stimuli_builder.tracking.shapes import moved, with_border
-from stimuli_builder.tracking.training import warped
 
 EYE = np.array([[0, 5], [10, -4], [20, -8], [30, -8], [40, -4], [50, 5], [38, 12], [25, 14], [12, 12]], float)
 SHAPE = with_border(EYE + 70)

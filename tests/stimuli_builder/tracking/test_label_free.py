@@ -15,23 +15,22 @@ from hypothesis import strategies as st
 from experiments.errors import InputError
 from stimuli_builder.environments import cache_folder, ensure_environment
 from stimuli_builder.tracking.certainty import lid_difference, lid_offsets, with_errors
-from stimuli_builder.tracking.detector.close_up import spread_out
 from stimuli_builder.tracking.detector.detection import along, eye_points
-from stimuli_builder.tracking.detector.mesh import FACES_ASKED, open_detector
-from stimuli_builder.tracking.detector.mesh_client import MeshClient
+from stimuli_builder.tracking.detector.mesh import FACES_ASKED, MeshClient, open_detector, spread_out
 from stimuli_builder.tracking.labelfree import (
     FACE_SHARE,
     label_free_lesson,
     plausible,
     proposed_labels,
+    worst_frames,
+    write_relabel,
 )
 from stimuli_builder.tracking.labels import load_labels
-from stimuli_builder.tracking.relabel import worst_frames, write_relabel
+from stimuli_builder.tracking.model import TrainingOptions
 from stimuli_builder.tracking.shapes import widths
 from stimuli_builder.tracking.survey import Survey, survey
 from stimuli_builder.tracking.track import track_video
 from stimuli_builder.tracking.tracker import FROZEN, UNSEEN, Tracker
-from stimuli_builder.tracking.training import TrainingOptions
 from stimuli_builder.video import frames, rgb, scan_video
 from tests.stimuli_builder.tracking.test_bad_input import write_frames
 

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from stimuli_builder.tracking.detector.detection import Detection
-from stimuli_builder.tracking.detector.one_face import one_face
+from stimuli_builder.tracking.detector.detection import Detection, one_face
 from stimuli_builder.tracking.survey import further_faces
 
 

@@ -5,9 +5,9 @@ import pytest
 
 from stimuli_builder.blinks.labelling import label_blinks
 from stimuli_builder.tracking.learn import learn
+from stimuli_builder.tracking.model import TrainingOptions
 from stimuli_builder.tracking.table import distance_columns, numbers, track_rows
 from stimuli_builder.tracking.track import track_video
-from stimuli_builder.tracking.training import TrainingOptions
 from stimuli_builder.video import scan_video
 
 CLIPS = {

@@ -6,10 +6,8 @@ import json
 import numpy as np
 import pytest
 
-from stimuli_builder.tracking.labelfree import proposed_labels
-from stimuli_builder.tracking.labels import load_labels
-from stimuli_builder.tracking.proposals import as_proposed, by_hand, unmarked
-from stimuli_builder.tracking.relabel import write_relabel
+from stimuli_builder.tracking.labelfree import proposed_labels, write_relabel
+from stimuli_builder.tracking.labels import as_proposed, by_hand, load_labels, unmarked
 from stimuli_builder.tracking.shapes import default_markers
 from stimuli_builder.tracking.survey import Survey
 from stimuli_builder.video import scan_video

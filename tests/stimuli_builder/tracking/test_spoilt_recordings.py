@@ -12,7 +12,7 @@ import pytest
 
 from experiments.errors import InputError
 from stimuli_builder.environments import cache_folder
-from stimuli_builder.tracking.model_file import save_model
+from stimuli_builder.tracking.model import save_model
 from stimuli_builder.tracking.survey import survey
 from stimuli_builder.tracking.track import track_video
 from stimuli_builder.video import declared_frames, frames, scan_before_damage, scan_video

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from stimuli_builder.actor.recording import Actor, ActorOptions
-from stimuli_builder.tracking.hindsight import STOOD, Hindsight, alike, evenly_repeated
-from stimuli_builder.tracking.outcome import TrackedFrame
 from stimuli_builder.tracking.stillness import Stillness
-from stimuli_builder.tracking.track import track_video
+from stimuli_builder.tracking.table import TrackedFrame
+from stimuli_builder.tracking.track import STOOD, Hindsight, alike, evenly_repeated, track_video
 from stimuli_builder.tracking.tracker import FROZEN, STILL, Tracker
 from stimuli_builder.video import scan_video
 

@@ -9,7 +9,7 @@ import pytest
 from experiments.errors import InputError
 from stimuli_builder.tracking.accuracy import compare_with_truth, residual_limits
 from stimuli_builder.tracking.labels import load_labels
-from stimuli_builder.tracking.model_file import load_model, save_model
+from stimuli_builder.tracking.model import load_model, save_model
 from stimuli_builder.tracking.table import COLUMN_MEANINGS, track_columns
 from stimuli_builder.tracking.track import track_video
 from stimuli_builder.tracking.tracker import Tracker
@@ -136,7 +136,7 @@ def test_memory_does_not_grow_with_length(lesson, recording):
 
 def test_label_noise_is_averaged_out_by_refining(recording):
     from stimuli_builder.tracking.accuracy import refined_labels
-    from stimuli_builder.tracking.training import TrainingOptions
+    from stimuli_builder.tracking.model import TrainingOptions
 
     labels = load_labels(recording.labels)
     rng = np.random.default_rng(2)

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stimuli_builder.tracking.mesh import build_mesh
-from stimuli_builder.tracking.picture import reduced, reduced_points, restored_points
+from stimuli_builder.tracking.mesh import build_mesh, reduced, reduced_points, restored_points
+from stimuli_builder.tracking.model import warped
 from stimuli_builder.tracking.shapes import (
     default_markers,
     inter_eyelid_distances,
@@ -15,7 +15,6 @@ from stimuli_builder.tracking.shapes import (
     unmoved,
     with_border,
 )
-from stimuli_builder.tracking.training import warped
 
 OPEN_EYE = np.array(
     [[0, 5], [10, -4], [20, -8], [30, -8], [40, -4], [50, 5], [38, 12], [25, 14], [12, 12]], float
