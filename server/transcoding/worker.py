@@ -6,7 +6,7 @@ import signal
 import sys
 import time
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,6 +21,9 @@ from video_conversion.video_file import READ_AGAIN, NotAClip
 LOOK_S = 1.0
 LOOK_SHARE = 20
 """The folders are read again after at least 20 times as long as reading them took."""
+
+MAX_A_PROCESS = 64
+"""A process does at most so many files one after the other."""
 
 Video = tuple[Path, Path]
 """The folder of an upload, and one of its files."""
@@ -71,6 +74,18 @@ class Turns:
     def take(self, account: str) -> Video:
         """The next video of an account."""
         return self._queues[account].popleft()
+
+    def take_further(self, account: str, folder: Path, but: Container[Video]) -> list[Video]:
+        """The next videos of the same upload up to the first of `but`, as many as a process does."""
+        queue = self._queues[account]
+        further: list[Video] = []
+        while queue and queue[0][0] == folder and queue[0] not in but and len(further) + 1 < MAX_A_PROCESS:
+            further.append(queue.popleft())
+        return further
+
+    def put_first(self, account: str, videos: Iterable[Video]) -> None:
+        """Let videos that were taken be the next ones of their account again, in their order."""
+        self._queues.setdefault(account, deque()).extendleft(reversed(list(videos)))
 
     def put_last(self, account: str, video: Video) -> None:
         """Let a video wait behind the others of its account."""
@@ -156,9 +171,12 @@ def end_with_parent(parent: int) -> None:
 
 # The process that looks into uploaded videos and converts them: `python -m server.transcoding FOLDER`.
 #
-# A decoder reads what strangers may have made. Each file gets a process, and accounts take turns: a file
-# that takes longer than one turn is stopped while a file of another account has its turn, and goes on
-# afterwards. A file that ends its process is tried once more and then refused.
+# A decoder reads what strangers may have made, in a process for one account's files. While no other account
+# waits, it does short files one after the other until its turn is over, since a process for each takes longer
+# than a tiny file. Accounts take turns: a file that takes longer than one turn is stopped while a file of
+# another account has its turn, and goes on afterwards. A file that ends its process is tried once more and
+# then refused; the files after it are done by a fresh process. So is a file that seems unusable after others:
+# they may have used up the process's memory, or damaged it. Nothing is refused for what another file did.
 
 MAX_S_A_FILE = 900
 MAX_TRIES = 2
@@ -168,19 +186,28 @@ LONGEST_BUDGET_S = 30.0
 """No file keeps other accounts waiting for longer; one that needs more ends once nobody else waits."""
 """Where memory allows no further file, a file that took longer begins again later, with twice the budget."""
 LOOK_AGAIN_S = 0.25
+TRY_AFRESH = 3
+"""Status of a process that leaves its file to a fresh one."""
 FORKS = hasattr(os, "fork") and hasattr(signal, "SIGSTOP")
 
 
 @dataclass
 class _Started:
-    """A file that a process is at, running or stopped."""
+    """A file that a process is at, running or stopped, and those that the process does afterwards."""
 
     account: str
-    video: Video
+    folder: Path
+    videos: deque[Video]
     process: int
     end: int
-    """Handle that can be read from once the process has ended."""
+    """Handle from which a byte can be read for each file that is done, and the end of the process."""
     used_s: float = 0.0
+    """What the present file took so far."""
+
+    @property
+    def video(self) -> Video:
+        """The file that the process is at."""
+        return self.videos[0]
 
 
 class Worker:
@@ -224,22 +251,25 @@ class Worker:
         return bool(candidates)
 
     def _refresh(self, *, now: bool = False) -> None:
-        self._turns.refresh((started.video for started in self._started.values()), now=now)
+        taken = (video for started in self._started.values() for video in started.videos)
+        self._turns.refresh(taken, now=now)
 
     def _start(self, account: str) -> _Started | None:
-        """Start the next file of an account; None where it has gone, or there is no room for it."""
+        """Start the next files of an account; None where the first has gone, or there is no room for it."""
         if len(self._started) >= self._most and not self._make_room():
             return None
         folder, path = video = self._turns.take(account)
         if not path.exists():
             return None
-        try:
-            with (folder / BEGUN).open("a", encoding="utf-8") as stream:
-                stream.write(f"{path.name}\n")
-        except FileNotFoundError:
-            return None  # the upload was discarded
-        self._started[account] = _Started(account, video, *self._fork(folder, path))
+        videos = [video]
+        if not self._is_awaited(account):
+            videos += self._turns.take_further(account, folder, self._failures)
+        self._started[account] = _Started(account, folder, deque(videos), *self._fork(videos))
         return self._started[account]
+
+    def _is_awaited(self, account: str) -> bool:
+        """Whether another account waits for this one's turn to end."""
+        return bool({*self._turns.accounts(), *self._started} - {account})
 
     def _make_room(self) -> bool:
         """Give up the file that has taken longest, if it is over its budget: it begins again later."""
@@ -249,71 +279,82 @@ class Worker:
             return False
         self._budget_s[longest.video] = min(2 * budget, LONGEST_BUDGET_S)
         self._end(longest)
-        self._turns.put_last(longest.account, longest.video)
+        self._turns.put_last(longest.account, longest.videos.popleft())
+        self._turns.put_first(longest.account, longest.videos)
         return True
 
-    def _fork(self, folder: Path, path: Path) -> tuple[int, int]:
-        """Number of the process for a file, and the handle that can be read from once it has ended."""
+    def _fork(self, videos: list[Video]) -> tuple[int, int]:
+        """Number of the process for these files, and the handle that says how far it is."""
         parent = os.getpid()
-        end, held = os.pipe()
+        end, done = os.pipe()
         process = os.fork()
         if process:
-            os.close(held)
+            os.close(done)
             return process, end
         try:
             signal.signal(signal.SIGTERM, signal.SIG_DFL)
             end_with_parent(parent)
             os.close(self._lock)
             bound_memory(self._limit_each)
-            _prepare_one(folder, path)
-            os._exit(0)
+            os._exit(_prepare_several(videos, done))
         finally:  # of an error, or of a signal: nothing of the parent's is run here
             os._exit(1)
 
     def _run(self, started: _Started) -> None:
-        """Let a file have its turn, and go on for as long as no other account waits."""
+        """Let a process have its turn, and go on for as long as no other account waits."""
         begun = now = time.monotonic()
         turn_ends = begun + TURN_S
         os.kill(started.process, signal.SIGCONT)
         while now < turn_ends:
             if select.select([started.end], [], [], turn_ends - now)[0]:
-                self._take_result(started)
-                return
+                done = len(os.read(started.end, MAX_A_PROCESS))
+                if not done:
+                    self._take_result(started)
+                    return
+                for _ in range(done):
+                    self._note_done(started.videos.popleft())
+                started.used_s, begun = 0.0, time.monotonic()
             now = time.monotonic()
             if started.used_s + now - begun > MAX_S_A_FILE:
                 self._end(started)
-                _refuse(*started.video)
+                _refuse(*started.videos.popleft())
+                self._turns.put_first(started.account, started.videos)
                 return
             if now >= turn_ends:
                 self._refresh()
-                if not {*self._turns.accounts(), *self._started} - {started.account}:
+                if not self._is_awaited(started.account):
                     turn_ends = now + LOOK_AGAIN_S
         os.kill(started.process, signal.SIGSTOP)
         started.used_s += now - begun
 
+    def _note_done(self, video: Video) -> None:
+        self._budget_s.pop(video, None)
+        self._failures.pop(video, None)
+
     def _take_result(self, started: _Started) -> None:
         """Note that a process has ended; a file at which it ended by an error is tried once more."""
-        was_error = self._end(started, kill=False) != 0
-        self._budget_s.pop(started.video, None)
-        if not was_error:
-            self._failures.pop(started.video, None)
-            return
-        failures = self._failures[started.video] = self._failures.get(started.video, 0) + 1
+        status = self._end(started, kill=False)
+        if started.videos and os.waitstatus_to_exitcode(status) not in (0, TRY_AFRESH):
+            self._note_failure(started.account, started.videos.popleft())
+        self._turns.put_first(started.account, started.videos)
+
+    def _note_failure(self, account: str, video: Video) -> None:
+        failures = self._failures[video] = self._failures.get(video, 0) + 1
+        self._budget_s.pop(video, None)
         if failures < MAX_TRIES:
-            self._turns.put_last(started.account, started.video)
+            self._turns.put_last(account, video)
         else:
-            _refuse(*started.video)
+            _refuse(*video)
 
     def _end(self, started: _Started, *, kill: bool = True) -> int:
-        """Clear up after the process of a file, which is ended first unless it ends; return its status."""
+        """Clear up after a process, which is ended first unless it ends; return its status."""
         del self._started[started.account]
         if kill:
             os.kill(started.process, signal.SIGKILL)
         _, status = os.waitpid(started.process, 0)
         os.close(started.end)
-        folder = started.video[0]
-        (folder / BEGUN).unlink(missing_ok=True)
-        _remove_half_made(folder / CLIPS)
+        (started.folder / BEGUN).unlink(missing_ok=True)
+        _remove_half_made(started.folder / CLIPS)
         return status
 
 
@@ -341,9 +382,7 @@ def _work_in_turn(root: Path) -> None:
         turns.serve(accounts[0])
         if not path.exists():
             continue
-        with suppress(FileNotFoundError), (folder / BEGUN).open("a", encoding="utf-8") as stream:
-            stream.write(f"{path.name}\n")
-        _prepare_one(folder, path)
+        _prepare_one(folder, path, may_refuse=True)
 
 
 def _lock(root: Path) -> int | None:
@@ -379,11 +418,29 @@ def _refuse(folder: Path, path: Path) -> None:
     (folder / BEGUN).unlink(missing_ok=True)
 
 
-def _prepare_one(folder: Path, path: Path) -> None:
-    """Prepare one file, and write what became of it."""
+def _prepare_several(videos: Iterable[Video], done: int) -> int:
+    """Prepare files until the turn is over, with a byte to `done` for each; return the process's status."""
+    ends = time.monotonic() + TURN_S
+    for number, (folder, path) in enumerate(videos):
+        if number and time.monotonic() >= ends:
+            break
+        if not _prepare_one(folder, path, may_refuse=number == 0):
+            return TRY_AFRESH
+        os.write(done, b".")
+    return 0
+
+
+def _prepare_one(folder: Path, path: Path, *, may_refuse: bool) -> bool:
+    """Prepare one file and write what became of it; false where it was unusable and may not be refused."""
     with suppress(FileNotFoundError):  # the upload was discarded
-        write_record(folder, _record_of(folder, path, asked_rate(folder)))
+        with (folder / BEGUN).open("a", encoding="utf-8") as stream:
+            stream.write(f"{path.name}\n")
+        record = _record_of(folder, path, asked_rate(folder))
+        if record.problem is not None and not may_refuse:
+            return False
+        write_record(folder, record)
         (folder / BEGUN).unlink()
+    return True
 
 
 def _remove_half_made(clips: Path) -> None:

@@ -197,24 +197,133 @@ def test_with_room_for_one_file_a_long_one_begins_again_behind_the_other_account
     assert not [path.name for path in (long / ".clips").iterdir() if path.name.startswith(".")]
 
 
-def test_a_file_that_ends_its_process_is_refused_and_stops_no_other(
+def upload_of_videos(root: Path, names: str) -> Path:
+    folder = upload_of(root, "a", 1)
+    for name in names:
+        write_video(folder / f"{name}.webm", "libvpx-vp9")
+    return folder
+
+
+def usable(folder: Path) -> str:
+    """Names of the files of which clips can be made."""
+    return "".join(sorted(name[0] for name, record in records_of(folder).items() if record.problem is None))
+
+
+def note_processes(root: Path, monkeypatch: pytest.MonkeyPatch, instead: Callable[[str, str], None]) -> None:
+    """Let each file's process write its name down, after what is done `instead` with the names before it."""
+
+    def noted(path: Path, clips: Path, asked_fps: float | None) -> Any:
+        log = root / f"process_{os.getpid()}"
+        before = log.read_text() if log.exists() else ""
+        log.write_text(before + path.stem)
+        instead(path.stem, before)
+        return prepare(path, clips, asked_fps)
+
+    monkeypatch.setattr(worker, "TURN_S", 60.0)  # one turn, however busy the machine is
+    monkeypatch.setattr(worker, "prepare", noted)
+
+
+def processes(root: Path) -> list[str]:
+    """The names of the files that each process was at, in the order in which processes began."""
+    return [log.read_text() for log in sorted(root.glob("process_*"), key=lambda log: log.stat().st_ctime_ns)]
+
+
+def test_short_files_are_done_by_one_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    root = tmp_path / "uploads"
+    folder = upload_of_videos(root, "abcd")
+    note_processes(root, monkeypatch, lambda _name, _before: None)
+    worker.work(root)
+    assert (usable(folder), processes(root)) == ("abcd", ["abcd"])
+
+
+def test_a_process_ends_with_its_turn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    root = tmp_path / "uploads"
+    folder = upload_of_videos(root, "abc")
+    note_processes(root, monkeypatch, lambda _name, _before: None)
+    monkeypatch.setattr(worker, "TURN_S", 0.01)
+    worker.work(root)
+    assert (usable(folder), sorted(processes(root))) == ("abc", ["a", "b", "c"])
+
+
+@pytest.mark.parametrize("killer", ["a", "b", "d"])
+def test_a_file_that_ends_its_process_is_refused_and_costs_only_itself(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, killer: str
+) -> None:
+    root = tmp_path / "uploads"
+    folder = upload_of_videos(root, "abcd")
+
+    def ends(name: str, _before: str) -> None:
+        if name == killer:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+    note_processes(root, monkeypatch, ends)
+    worker.work(root)
+    assert usable(folder) == "abcd".replace(killer, "")
+    assert "decoder" in (records_of(folder)[f"{killer}.webm"].problem or "")
+    before, after = "abcd".split(killer)
+    assert processes(root) == [before + killer, *([after] if after else []), killer]
+    assert not (folder / worker.BEGUN).exists()
+
+
+def test_two_files_that_end_their_processes_cost_only_themselves(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     root = tmp_path / "uploads"
-    folder = upload_of(root, "a", 1)
-    write_video(folder / "a.webm", "libvpx-vp9")
-    write_video(folder / "b.webm", "libvpx-vp9")
+    folder = upload_of_videos(root, "abcdef")
 
-    def ends(path: Path, clips: Path, asked_fps: float | None) -> Any:
-        if path.name == "a.webm":
+    def ends(name: str, _before: str) -> None:
+        if name in "be":
             os.kill(os.getpid(), signal.SIGKILL)
-        return prepare(path, clips, asked_fps)
 
-    monkeypatch.setattr(worker, "prepare", ends)
+    note_processes(root, monkeypatch, ends)
     worker.work(root)
-    assert {name: record.problem is None for name, record in records_of(folder).items()} == {
-        "a.webm": False, "b.webm": True,
-    }  # fmt: skip
+    assert usable(folder) == "acdf"
+
+
+@pytest.mark.parametrize("problem", [MemoryError(), NotAClip("damaged")])
+def test_no_file_is_refused_for_what_files_before_it_did_to_the_process(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, problem: Exception
+) -> None:
+    root = tmp_path / "uploads"
+    folder = upload_of_videos(root, "abcd")
+
+    def fails_after_a(_name: str, before: str) -> None:
+        if before.startswith("a"):
+            raise problem
+
+    note_processes(root, monkeypatch, fails_after_a)
+    worker.work(root)
+    assert (usable(folder), processes(root)) == ("abcd", ["ab", "bcd"])
+
+
+def test_a_file_that_is_unusable_is_refused_once_it_is_the_first_of_its_process(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    root = tmp_path / "uploads"
+    folder = upload_of_videos(root, "abd")
+    (folder / "c.webm").write_bytes(bytes(100))
+    note_processes(root, monkeypatch, lambda _name, _before: None)
+    worker.work(root)
+    assert (usable(folder), processes(root)) == ("abd", ["abc", "cd"])
+    assert "cannot be read" in (records_of(folder)["c.webm"].problem or "")
+
+
+def test_each_file_of_a_process_has_the_time_limit_of_a_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    root = tmp_path / "uploads"
+    folder = upload_of_videos(root, "abcd")
+
+    def hangs(name: str, _before: str) -> None:
+        if name == "b":
+            signal.pause()
+
+    note_processes(root, monkeypatch, hangs)
+    monkeypatch.setattr(worker, "TURN_S", 1.0)
+    monkeypatch.setattr(worker, "LOOK_AGAIN_S", 0.1)
+    monkeypatch.setattr(worker, "MAX_S_A_FILE", 3.0)
+    worker.work(root)
+    assert usable(folder) == "acd"
 
 
 @pytest.mark.parametrize("machine_gib", [0.5, 1, 2, 4, 8, 16, 64, 1024])
