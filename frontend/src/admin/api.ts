@@ -1,7 +1,10 @@
-/** The typed client of the server, and the one shape of its refusals. */
+/** The typed client of the server, the one shape of its refusals, and what pages ask more than once. */
 
 import createClient from "openapi-fetch";
 import type { components, paths } from "../api/schema";
+import { queryOptions, useQuery } from "@tanstack/react-query";
+
+// The typed client of the server, and the one shape of its refusals.
 
 export const api = createClient<paths>({ baseUrl: "/" });
 
@@ -52,4 +55,52 @@ function errorDetail(body: unknown): { code: string; message: string } | null {
   const { error } = body;
   if (typeof error !== "object" || error === null || !("code" in error) || !("message" in error)) return null;
   return { code: String(error.code), message: String(error.message) };
+}
+
+// What pages ask of the server more than once.
+
+export const sessionQuery = queryOptions({
+  queryKey: ["session"],
+  queryFn: () => unwrap(api.GET("/api/admin/session")),
+  staleTime: 30_000,
+});
+
+export const studiesQuery = queryOptions({ queryKey: ["studies"], queryFn: () => unwrap(api.GET("/api/admin/studies")) });
+
+export const studyQuery = (study: string) =>
+  queryOptions({
+    queryKey: ["study", study],
+    queryFn: () => unwrap(api.GET("/api/admin/studies/{study}", { params: { path: { study } } })),
+  });
+
+export const sealQuery = (study: string) =>
+  queryOptions({
+    queryKey: ["study", study, "seal"],
+    queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/seal", { params: { path: { study } } })),
+  });
+
+export const launchChecksQuery = (study: string) =>
+  queryOptions({
+    queryKey: ["study", study, "launch-checks"],
+    queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/launch-checks", { params: { path: { study } } })),
+  });
+
+export const clipsQuery = (study: string) =>
+  queryOptions({
+    queryKey: ["clips", study],
+    queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/clips", { params: { path: { study } } })),
+    staleTime: 300_000,
+  });
+
+/** Whether the signed-in account has this right on a study. */
+export function useMay(study: string, right: Schemas["StudySummary"]["rights"][number]): boolean {
+  return useQuery(studyQuery(study)).data?.summary.rights.includes(right) ?? false;
+}
+
+export const workspacesQuery = queryOptions({ queryKey: ["workspaces"], queryFn: () => unwrap(api.GET("/api/admin/workspaces")) });
+
+/** The workspaces in which the signed-in account may make studies. */
+export function useOwnWorkspaces(): Schemas["MyWorkspace"][] {
+  const mine = useQuery(sessionQuery).data?.workspaces ?? [];
+  return mine.filter(({ role, second_factor_needed }) => role !== "viewer" && !second_factor_needed);
 }

@@ -1,9 +1,7 @@
 /** Addresses of the admin site; pages load when they are first opened. */
-
 import { createRootRoute, createRoute, createRouter, lazyRouteComponent, Outlet } from "@tanstack/react-router";
 import { Shell } from "./shell/Shell";
-import { ErrorAlert } from "./ui/Answer";
-import { NotFound } from "./ui/NotFound";
+import { ErrorAlert, NotFound } from "./ui/Answer";
 
 const root = createRootRoute({ component: Outlet, notFoundComponent: NotFound });
 

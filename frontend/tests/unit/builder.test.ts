@@ -16,13 +16,21 @@ import {
   valueAt,
   withMoved,
   withValue,
+  suggestionsFor,
 } from "../../src/admin/builder/data";
 import { begun, edited, latestToml, redone, undone, written } from "../../src/admin/builder/history";
-import { type Editor, editorOf, effectOf, EXPERIMENT, type Schema, starter, starterOf } from "../../src/admin/builder/schema";
-import { helpOf } from "../../src/admin/builder/help";
+import {
+  type Editor,
+  editorOf,
+  effectOf,
+  EXPERIMENT,
+  type Schema,
+  starter,
+  starterOf,
+  helpOf,
+  SECTIONS,
+} from "../../src/admin/builder/schema";
 import { shownClips } from "../../src/admin/builder/shown-clips";
-import { SECTIONS } from "../../src/admin/builder/sections";
-import { suggestionsFor } from "../../src/admin/builder/suggestions";
 
 const repository = fileURLToPath(new URL("../../../", import.meta.url));
 const python = ["bin/python", "Scripts/python.exe"].map((name) => join(repository, ".venv", name)).find(existsSync);

@@ -1,8 +1,8 @@
 import { describe, expect, it } from "vitest";
 import { browserName, soon } from "../../src/admin/ui/format";
-import { framesAt } from "../../src/admin/figures/playing";
+import { framesAt } from "../../src/admin/figures/Character";
 import { nearest } from "../../src/playground/faces";
-import { merge } from "../../src/admin/monitor/useMonitor";
+import { merge } from "../../src/admin/monitor/MonitorTab";
 
 describe("a curve played at another rate", () => {
   it("keeps its length in time, and is open before and after", () => {

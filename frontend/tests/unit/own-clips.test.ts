@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { sizeRemark } from "../../src/admin/clips/sizes";
+import { sizeRemark } from "../../src/admin/clips/UploadClips";
 import {
   declaredPattern,
   factorsOfTable,

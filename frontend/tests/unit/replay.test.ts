@@ -1,9 +1,19 @@
 import { describe, expect, it } from "vitest";
 import { arrange, topOf } from "../../src/admin/replay/arranging";
-import { answerWords, traceOf } from "../../src/admin/replay/facts";
-import { folding } from "../../src/admin/replay/folding";
-import { changeBefore, changesOf, type Clip, nextChange, type Play, playedBack, shownAt, type View } from "../../src/admin/replay/shown";
-import { marksOf } from "../../src/admin/replay/ViewFacts";
+import {
+  answerWords,
+  traceOf,
+  folding,
+  changeBefore,
+  changesOf,
+  type Clip,
+  nextChange,
+  type Play,
+  playedBack,
+  shownAt,
+  type View,
+} from "../../src/admin/replay/shown";
+import { marksOf } from "../../src/admin/replay/Timeline";
 import type { Schemas } from "../../src/admin/api";
 
 const CLIP: Clip = {

@@ -1,10 +1,9 @@
 import { describe, expect, it } from "vitest";
 import { cellRows, marginRows } from "../../src/admin/results/figure-rows";
-import { labelOfOrigin } from "../../src/admin/results/origins";
+import { labelOfOrigin, counted } from "../../src/admin/ui/format";
 import { cellLabels, cellPlot, countTicks, marginPlot } from "../../src/admin/results/plots";
 import { seriesLabels, seriesPlot } from "../../src/admin/results/threshold-plots";
 import { csvText } from "../../src/admin/ui/figure-files";
-import { counted } from "../../src/admin/ui/format";
 
 const factor = (name: string, ...levels: [string, string][]) => ({
   name,

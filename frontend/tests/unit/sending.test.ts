@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { Refused } from "../../src/admin/api";
-import { batchesOf, persistently } from "../../src/admin/clips/sending";
+import { batchesOf, persistently } from "../../src/admin/clips/useUpload";
 
 const sized = (...sizes: number[]) => sizes.map((size) => ({ size }));
 

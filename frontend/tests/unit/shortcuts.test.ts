@@ -1,6 +1,6 @@
 /** Whose a key is: the page's, or what has the focus. */
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
-import { isOwnKey } from "../../src/admin/ui/useShortcuts";
+import { isOwnKey } from "../../src/admin/ui/page-events";
 
 /** An element that lies in one of this tag or role. */
 class Focused extends EventTarget {

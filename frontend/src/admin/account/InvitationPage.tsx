@@ -1,15 +1,11 @@
 /** Where a one-time link leads: make an account. The token stands behind '#', so no log ever sees it. */
-
 import { Alert, Anchor, Text } from "@mantine/core";
 import { useMutation, useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
 import { useState } from "react";
 import { api, Refused, type Schemas, unwrap } from "../api";
 import { Answer } from "../ui/Answer";
-import { EntryForm, EntryPage } from "./EntryPage";
-import { NameField, PasswordField } from "./fields";
-import { ProviderButtons } from "./ProviderButtons";
-import { useEntered } from "./useEntered";
+import { EntryForm, EntryPage, NameField, PasswordField, ProviderButtons, useEntered } from "./entry";
 
 const CLOSED: Record<string, string> = {
   used: "This link has been used already.",

@@ -1,9 +1,90 @@
 /** Asking for a letter with a link, and where the links of letters lead. */
 
-import { useParams } from "@tanstack/react-router";
-import { ForgottenPage } from "./ForgottenPage";
-import { MailPage } from "./MailPage";
-import { NewPasswordPage } from "./NewPasswordPage";
+import { Alert, Anchor, Text, TextInput } from "@mantine/core";
+import { useMutation } from "@tanstack/react-query";
+import { Link, useParams } from "@tanstack/react-router";
+import { useState } from "react";
+import { api, unwrap } from "../api";
+import { EntryForm, EntryPage, PasswordField } from "./entry";
+
+/** Asks for a link by mail. The answer is the same whether there is such an account. */
+function ForgottenPage() {
+  const [name, setName] = useState("");
+  const send = useMutation({ mutationFn: () => unwrap(api.POST("/api/admin/session/forgotten", { body: { name } })) });
+  return (
+    <EntryPage title="Forgotten password">
+      {send.isSuccess ? (
+        <Alert title="Look into your mail" role="status">
+          If an account has this name or address, and a confirmed address, a link for a new password is on its way. It works once, for half
+          an hour.
+        </Alert>
+      ) : (
+        <EntryForm sending={send} button="Send me a link">
+          <TextInput
+            label="Name to sign in with, or your address of mail"
+            autoComplete="username"
+            required
+            value={name}
+            onChange={(event) => setName(event.currentTarget.value)}
+          />
+        </EntryForm>
+      )}
+      <Text size="sm" ta="center" mt="md">
+        <Anchor component={Link} to="/sign-in">
+          Back to sign in
+        </Anchor>
+      </Text>
+    </EntryPage>
+  );
+}
+
+// Where the link of a letter leads: confirm an address of mail. A click does it, for programs open links by themselves.
+
+function MailPage() {
+  const [token] = useState(() => window.location.hash.slice(1));
+  const send = useMutation({ mutationFn: () => unwrap(api.POST("/api/admin/session/mail", { body: { token: token || "-" } })) });
+  return (
+    <EntryPage title="Confirm your address">
+      {send.isSuccess ? (
+        <Alert title="The address is confirmed" role="status">
+          <Anchor component={Link} to="/">
+            Go on
+          </Anchor>
+        </Alert>
+      ) : (
+        <EntryForm sending={send} button="Confirm">
+          <Text size="sm">Links for a new password will go to this address.</Text>
+        </EntryForm>
+      )}
+    </EntryPage>
+  );
+}
+
+// Where the link of a letter leads: choose a new password. The token stands behind '#', so no log ever sees it.
+
+function NewPasswordPage() {
+  const [token] = useState(() => window.location.hash.slice(1));
+  const [password, setPassword] = useState("");
+  const send = useMutation({
+    mutationFn: () => unwrap(api.POST("/api/admin/session/new-password", { body: { token: token || "-", password } })),
+  });
+  return (
+    <EntryPage title="New password">
+      {send.isSuccess ? (
+        <Alert title="Your password is changed" role="status">
+          Everybody who was signed in to the account is signed out, and its API tokens have ended.{" "}
+          <Anchor component={Link} to="/sign-in">
+            Sign in
+          </Anchor>
+        </Alert>
+      ) : (
+        <EntryForm sending={send} button="Change the password">
+          <PasswordField label="New password" fresh value={password} onChange={setPassword} />
+        </EntryForm>
+      )}
+    </EntryPage>
+  );
+}
 
 /** `/letter/forgotten` asks for one; `/letter/password#TOKEN` and `/letter/address#TOKEN` are in them. */
 export function LetterPage() {

@@ -1,14 +1,41 @@
-import { Alert, Anchor, Text } from "@mantine/core";
-import { useMutation, useQuery } from "@tanstack/react-query";
-import { Link, useSearch } from "@tanstack/react-router";
+import { TextInput, Alert, Anchor, Text } from "@mantine/core";
+import { useMutation, useQueryClient, useQuery } from "@tanstack/react-query";
+import { useNavigate, Link, useSearch } from "@tanstack/react-router";
 import { useState } from "react";
-import { api, Refused, type Schemas, unwrap } from "../api";
-import { sessionQuery } from "../queries";
-import { CodeField, CodeForm } from "./CodeForm";
-import { EntryForm, EntryPage } from "./EntryPage";
-import { NameField, PasswordField } from "./fields";
-import { ProviderButtons, Refusal, waysQuery } from "./ProviderButtons";
-import { useEntered } from "./useEntered";
+import { api, unwrap, sessionQuery, Refused, type Schemas } from "../api";
+import { EntryForm, EntryPage, NameField, PasswordField, ProviderButtons, Refusal, waysQuery, useEntered } from "./entry";
+
+// The account's own second factor, after another service has signed one in.
+
+function CodeForm() {
+  const [code, setCode] = useState("");
+  const navigate = useNavigate();
+  const queries = useQueryClient();
+  const send = useMutation({
+    mutationFn: () => unwrap(api.POST("/api/admin/session/code", { body: { code } })),
+    onSuccess: async ({ next }) => {
+      await queries.invalidateQueries({ queryKey: sessionQuery.queryKey });
+      await navigate({ to: next ?? "/" });
+    },
+  });
+  return (
+    <EntryForm sending={send} button="Go on">
+      <CodeField value={code} onChange={setCode} />
+    </EntryForm>
+  );
+}
+
+function CodeField({ value, onChange }: { value: string; onChange: (value: string) => void }) {
+  return (
+    <TextInput
+      label="Code of your authenticator app, or a recovery code"
+      autoComplete="one-time-code"
+      autoFocus
+      value={value}
+      onChange={(event) => onChange(event.currentTarget.value)}
+    />
+  );
+}
 
 export function SignInPage() {
   const { code }: { code?: unknown } = useSearch({ strict: false });

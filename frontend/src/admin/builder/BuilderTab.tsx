@@ -1,15 +1,12 @@
 /** The builder: the declaration by forms, its TOML beneath, saved as a new version. */
-
 import { Button, Group, Stack } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useParams } from "@tanstack/react-router";
 import { useState } from "react";
-import { api, type Schemas, unwrap } from "../api";
-import { studyQuery } from "../queries";
-import { Answer } from "../ui/Answer";
+import { api, type Schemas, unwrap, studyQuery } from "../api";
+import { Answer, onDemand } from "../ui/Answer";
 import { ConfirmButton } from "../ui/ConfirmButton";
 import { when } from "../ui/format";
-import { onDemand } from "../ui/onDemand";
 import { isTable } from "./data";
 import { type Draft, forgetDraft, forgetWork, keptWork, otherWork } from "./kept";
 

@@ -1,14 +1,18 @@
-/** Questionnaires: from the bank, from a file, or made anew. */
+/** Forms and texts of a study: added from a bank of questionnaires, written in every language. */
 
-import { Button, FileButton, Group, Menu, Stack, Text } from "@mantine/core";
-import { downloadText } from "../ui/download";
-import { FORMS, inLanguages } from "./bank";
-import { isTable, listAt, textAt } from "./data";
-import { Field } from "./fields/Field";
-import { named } from "./fields/new-names";
-import { EXPERIMENT } from "./schema";
+import { Button, FileButton, Group, Menu, Stack, Text, Paper, SegmentedControl, SimpleGrid, Textarea } from "@mantine/core";
+import { downloadText, notify } from "../ui/useChange";
+import { FORMS, inLanguages, CONSENTS } from "./bank";
+import { isTable, listAt, textAt, labelOf, type Path } from "./data";
+import { Field, named } from "./fields/Field";
+import { EXPERIMENT, editorOf } from "./schema";
 import { useBuilderHere } from "./useBuilder";
-import { notify } from "../ui/notify";
+import { useEffect, useRef, useState } from "react";
+import { markdown } from "../../ui/markdown";
+import { languageName } from "../ui/format";
+import { useField } from "./fields/scalars";
+
+// Questionnaires: from the bank, from a file, or made anew.
 
 export function Forms() {
   const builder = useBuilderHere();
@@ -73,4 +77,94 @@ function formIn(text: string): unknown {
   } catch {
     return null;
   }
+}
+
+// The pages a participant reads: written on the left, as they will look on the right.
+
+export function Texts() {
+  const builder = useBuilderHere();
+  const [chosen, setChosen] = useState<string | null>(null);
+  const language = chosen !== null && builder.languages.includes(chosen) ? chosen : (builder.languages[0] ?? "en");
+  const editor = editorOf(EXPERIMENT.properties?.["texts"] ?? {});
+  const table = editor.kind === "languages" ? editorOf(editor.of) : null;
+  if (table?.kind !== "table") return null;
+  return (
+    <Stack>
+      {builder.languages.length > 1 && (
+        <SegmentedControl
+          aria-label="Language"
+          value={language}
+          onChange={setChosen}
+          data={builder.languages.map((code) => ({ value: code, label: languageName(code) }))}
+          style={{ alignSelf: "flex-start" }}
+        />
+      )}
+      <ConsentMenu language={language} />
+      {table.keys.map(([name, schema]) => (
+        <OnePage key={`${language}.${name}`} path={["texts", language, name]} schema={schema} required={table.required.includes(name)} />
+      ))}
+    </Stack>
+  );
+}
+
+function ConsentMenu({ language }: { language: string }) {
+  const builder = useBuilderHere();
+  const texts = CONSENTS[language] ?? {};
+  if (Object.keys(texts).length === 0) return null;
+  return (
+    <Group>
+      <Menu position="bottom-start">
+        <Menu.Target>
+          <Button size="xs" variant="light">
+            Begin the consent with ▾
+          </Button>
+        </Menu.Target>
+        <Menu.Dropdown>
+          {Object.entries(texts).map(([title, text]) => (
+            <Menu.Item key={title} onClick={() => builder.set(["texts", language, "consent"], text)}>
+              {title}
+            </Menu.Item>
+          ))}
+        </Menu.Dropdown>
+      </Menu>
+      <Text size="xs" c="dimmed">
+        Words in [brackets] are yours to fill in. Undo brings the text back.
+      </Text>
+    </Group>
+  );
+}
+
+function OnePage(props: { path: Path; schema: Parameters<typeof editorOf>[0]; required: boolean }) {
+  const { value, help, problem, set, required } = useField(props);
+  const text = textAt(value, []);
+  const label = labelOf(String(props.path.at(-1)));
+  return (
+    <SimpleGrid cols={{ base: 1, md: 2 }} spacing="sm">
+      <Textarea
+        label={`${label} (Markdown)`}
+        description={help}
+        error={problem}
+        required={required}
+        autosize
+        minRows={3}
+        maxRows={20}
+        value={text}
+        onChange={(event) => set(event.currentTarget.value === "" && !required ? undefined : event.currentTarget.value)}
+      />
+      <Paper withBorder p="sm" mt={{ base: 0, md: 25 }} role="group" aria-label={`${label}, as participants see it`}>
+        <Shown text={text} />
+      </Paper>
+    </SimpleGrid>
+  );
+}
+
+function Shown({ text }: { text: string }) {
+  const box = useRef<HTMLDivElement>(null);
+  useEffect(() => {
+    const parts = markdown(text === "" ? "*No text.*" : text);
+    // Inside this page they are no headings of it.
+    for (const part of parts) if (/^H\d$/.test(part.tagName)) part.setAttribute("role", "presentation");
+    box.current?.replaceChildren(...parts);
+  }, [text]);
+  return <div className="prose" ref={box} />;
 }

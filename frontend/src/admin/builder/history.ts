@@ -1,7 +1,5 @@
 /** States of a declaration under edit, with undo and redo. */
-
-import type { Data, Path } from "./data";
-import { pathName, withValue } from "./data";
+import { type Data, type Path, pathName, withValue } from "./data";
 
 interface State {
   data: Data;

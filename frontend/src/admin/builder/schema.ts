@@ -1,6 +1,7 @@
 /** The declaration's JSON schema, and which editor a key of it gets. */
 
 import declared from "../../api/declaration.json";
+import { labelOf } from "./data";
 
 export interface Schema {
   $ref?: string;
@@ -189,4 +190,108 @@ export function effectOf(path: string, trialKind: string): Effect | null {
     if (at === "trial.kind") return "measured";
   }
   return null;
+}
+
+// Help in the words of the page: the declaration's own texts name keys of the TOML, the forms show labels.
+
+const KEYS = new Set([EXPERIMENT, ...Object.values(EXPERIMENT.$defs ?? {})].flatMap((table) => Object.keys(table.properties ?? {})));
+const VALUES = new Set(Object.values(EXPERIMENT.$defs ?? {}).flatMap(valuesIn));
+/** The families of keys that playback's help speaks of at once. */
+const FAMILY = /`([a-z]+)_\*`/g;
+
+function valuesIn(schema: Schema): string[] {
+  return Object.values(schema.properties ?? {}).flatMap((key) => [
+    ...(key.enum ?? []),
+    ...(typeof key.const === "string" ? [key.const] : []),
+  ]);
+}
+
+const quoted = (words: string) => `“${words}”`;
+const inWords = (value: string) => value.replaceAll("_", " ");
+
+/** `pointer_delay_ms` reads “Pointer delay (ms)”, [[trial.scales]] “Scales”, `start = "fixation"` “Start” is “fixation”. */
+export function helpOf(schema: Schema): string {
+  return (schema.description ?? "")
+    .replaceAll(/`(\w+) = "?([\w ]+)"?`/g, (_, key: string, value: string) => `${quoted(labelOf(key))} is ${quoted(inWords(value))}`)
+    .replaceAll(/\[+([a-z]\w*(?:\.\w+)*)\]+/g, (_, path: string) =>
+      quoted(labelOf(path.split(".").findLast((part) => KEYS.has(part)) ?? path)),
+    )
+    .replaceAll(FAMILY, (_, stem: string) => quoted(`${labelOf(stem)} …`))
+    .replaceAll(/`(\w+)`/g, (_, word: string) => (VALUES.has(word) ? inWords(word) : KEYS.has(word) ? quoted(labelOf(word)) : word))
+    .replaceAll(/”\s+“/g, ", ")
+    .replaceAll("`", "")
+    .replaceAll(/\s+/g, " ")
+    .trim();
+}
+
+// The pages of the builder, and the keys of the declaration on each.
+
+export interface Section {
+  id: string;
+  label: string;
+  about: string;
+  keys: readonly string[];
+}
+
+const NAMED: readonly Section[] = [
+  {
+    id: "study",
+    label: "Study",
+    about: "What the study is called, where it comes from, and in which languages people may take part.",
+    keys: ["name", "title", "participant_title", "source", "version", "participants", "languages"],
+  },
+  {
+    id: "factors",
+    label: "Factors and clips",
+    about: "The factors and their levels make the cells; each cell has as many clips as exemplars. Order is that of tables and figures.",
+    keys: ["factors", "exemplars", "render"],
+  },
+  { id: "trial", label: "Trial", about: "What one trial shows and asks.", keys: ["trial"] },
+  {
+    id: "order",
+    label: "Practice and order",
+    about: "Practice, blocks, counterbalancing, and who sees which clips.",
+    keys: ["practice", "blocks", "assignment", "groups"],
+  },
+  {
+    id: "forms",
+    label: "Questionnaires",
+    about: "Pages of questions before and after the trials. Answers become columns of the runs.",
+    keys: ["forms"],
+  },
+  { id: "texts", label: "Texts", about: "The pages that participants read, in Markdown, in each language.", keys: ["texts"] },
+  {
+    id: "screen",
+    label: "Screen and playback",
+    about: "Size and surround of the clips, what the device must offer, and when a play counts.",
+    keys: ["display", "playback", "session"],
+  },
+  {
+    id: "rules",
+    label: "Checks and exclusions",
+    about: "Attention and motion checks, who is screened out or warned while taking part, and whose data the analysis leaves out.",
+    keys: ["attention", "evidence", "screening", "warnings", "exclusions"],
+  },
+  { id: "analysis", label: "Analysis", about: "The analysis, fixed before the data.", keys: ["analysis"] },
+  {
+    id: "dataset",
+    label: "Keeping and handing on",
+    about: "How long data of persons are kept, and who may use the data under which licence.",
+    keys: ["retention", "dataset"],
+  },
+];
+
+const placed = new Set(NAMED.flatMap((section) => section.keys));
+const further = Object.keys(EXPERIMENT.properties ?? {}).filter((key) => !placed.has(key));
+
+/** Every key of the declaration stands on one of these pages; a key that none names is on the last. */
+export const SECTIONS: readonly Section[] = [
+  ...NAMED,
+  ...(further.length > 0 ? [{ id: "further", label: "Further", about: "Further keys of the declaration.", keys: further }] : []),
+];
+
+/** The page on which the key at the beginning of a path is edited. */
+export function sectionOf(path: string): Section | undefined {
+  const [key = ""] = path.split(".");
+  return SECTIONS.find((section) => section.keys.includes(key));
 }

@@ -2,8 +2,7 @@
 
 import { useQueryClient } from "@tanstack/react-query";
 import { createContext, useContext, useEffect, useMemo, useState } from "react";
-import { api, Refused, type Schemas, unwrap } from "../api";
-import { sessionQuery } from "../queries";
+import { api, Refused, type Schemas, unwrap, sessionQuery } from "../api";
 import { type Data, isTable, listAt, type Path, textAt } from "./data";
 import { begun, edited, type History, latestToml, redone, rewritten, undone, written } from "./history";
 import { forgetWork, keepWork } from "./kept";

@@ -5,7 +5,7 @@ import { useVirtualizer } from "@tanstack/react-virtual";
 import { type RefObject, useRef } from "react";
 import type { Schemas } from "../api";
 import { counted } from "../ui/format";
-import { changesOf } from "./changes";
+import { changesOf } from "./ClipCard";
 import type { Upload } from "./useUpload";
 
 const ROW_PX = 56;

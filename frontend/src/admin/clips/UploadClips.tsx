@@ -1,12 +1,32 @@
 /** Clips of one's own: chosen or dropped, sent, looked into; what becomes of each. */
 
+import type { Schemas } from "../api";
 import { Alert, Button, FileInput, Group, Progress, Select, Stack, Text } from "@mantine/core";
 import { useState, type ReactNode } from "react";
-import type { Schemas } from "../api";
-import { onDemand } from "../ui/onDemand";
-import { LeftOut } from "./sending";
-import { sizeRemark } from "./sizes";
-import type { Upload } from "./useUpload";
+import { onDemand } from "../ui/Answer";
+import { LeftOut, type Upload } from "./useUpload";
+
+type Sized = Pick<Schemas["UploadedFile"], "name" | "width_px" | "height_px">;
+
+const sizeOf = ({ width_px, height_px }: Sized) => `${width_px} x ${height_px}`;
+const isUpright = ({ width_px, height_px }: Sized) => (height_px ?? 0) > (width_px ?? 0);
+
+/** A remark on clips whose size differs from that of most; null where all have one size. */
+export function sizeRemark(files: readonly Sized[]): string | null {
+  const groups = new Map<string, Sized[]>();
+  for (const file of files.filter(({ width_px, height_px }) => width_px != null && height_px != null))
+    groups.set(sizeOf(file), [...(groups.get(sizeOf(file)) ?? []), file]);
+  const [most = [], ...others] = [...groups.values()].sort((a, b) => b.length - a.length);
+  const odd = others.flat();
+  const [usual] = most;
+  const [first] = odd;
+  if (usual === undefined || first === undefined) return null;
+  const named = odd.length === 1 ? `${first.name} is` : `${first.name} and ${odd.length - 1} more are`;
+  const sizes = others.slice(0, 3).flatMap(([one]) => (one === undefined ? [] : sizeOf(one)));
+  const turned = odd.some((file) => isUpright(file) !== isUpright(usual)) ? " Is one turned the wrong way?" : "";
+  const rest = most.length > odd.length ? "most" : "others";
+  return `${named} ${sizes.join(" or ")} pixels, ${rest} are ${sizeOf(usual)}.${turned} Participants see the size, too: is it meant?`;
+}
 
 const MAX_PAIRS = 8;
 const RATES = ["24", "25", "30", "50", "60"];
@@ -194,4 +214,15 @@ function summary(shown: number, changed: number, refused: number): string {
     refused > 0 && `${count(refused)} that cannot be used`,
   ];
   return parts.filter(Boolean).join(", ");
+}
+
+/** Why a button cannot be pressed: what has to be given before. */
+export function StillNeeded({ parts }: { parts: readonly (string | false)[] }) {
+  const needed = parts.filter((part) => part !== false);
+  if (needed.length === 0) return null;
+  return (
+    <Text size="sm" role="status">
+      Still needed: {needed.join(", ")}.
+    </Text>
+  );
 }

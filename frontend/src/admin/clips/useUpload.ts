@@ -1,13 +1,192 @@
 /** An upload of clips: what is sent, how far the server is with it, what became of each file. It outlives the page. */
 
+import { api, Refused, type Schemas, unwrap } from "../api";
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
-import { api, type Schemas, unwrap } from "../api";
-import { beginUpload, replaceFile, sendFiles } from "./sending";
-import { type Tried, tryClips, withTried } from "./tried";
+
+// Files on their way to the server: in small requests, so that a broken line costs little and goes on where it broke.
+
+const MAX_BATCH = { files: 40, bytes: 16 * 1024 * 1024 };
+const WAITS_MS = [1000, 2000, 4000, 8000, 15_000];
+
+/** A name in the form in which the server keeps it. */
+const formOf = (name: string) => name.normalize("NFC");
+
+/** Files in requests of limited size, in order; a file above the limit is a request of its own. */
+export function batchesOf<F extends { size: number }>(files: readonly F[], most = MAX_BATCH): F[][] {
+  const batches: F[][] = [];
+  let bytes = 0;
+  for (const file of files) {
+    const last = batches.at(-1);
+    if (last === undefined || last.length >= most.files || bytes + file.size > most.bytes) {
+      batches.push([file]);
+      bytes = file.size;
+    } else {
+      last.push(file);
+      bytes += file.size;
+    }
+  }
+  return batches;
+}
+
+/** Whether it may go well a moment later: the line is broken, or the server restarts or is busy. */
+function passes(error: unknown): boolean {
+  return error instanceof Refused && (error.status === 0 || error.status === 408 || error.status === 429 || error.status >= 500);
+}
+
+/** What `attempt` gives, tried again after growing waits where it may go well later. */
+export async function persistently<T>(attempt: () => Promise<T>, waits: readonly number[] = WAITS_MS): Promise<T> {
+  for (const wait of waits) {
+    try {
+      return await attempt();
+    } catch (error) {
+      if (!passes(error)) throw error;
+      await new Promise((resolve) => setTimeout(resolve, wait));
+    }
+  }
+  return attempt();
+}
+
+async function beginUpload(fps: number | null): Promise<Schemas["UploadOut"]> {
+  const form = new FormData();
+  if (fps !== null) form.append("fps", String(fps));
+  return persistently(() => unwrap(api.POST("/api/admin/uploads", { body: {}, bodySerializer: () => form })));
+}
+
+/** Files that the server will not take, whatever the line; all others are there. */
+export class LeftOut extends Error {
+  override name = "LeftOut";
+  constructor(readonly reasons: readonly string[]) {
+    super(reasons.join(" "));
+  }
+}
+
+/** Send what the upload does not hold yet; `onSent` is told how many files are there. LeftOut where it refuses some. */
+async function sendFiles(id: string, files: readonly File[], onSent: (count: number) => void): Promise<void> {
+  const missing = await missingOf(id, files);
+  const reasons: string[] = [];
+  let sent = files.length - missing.length;
+  onSent(sent);
+  for (const batch of batchesOf(missing)) {
+    const refused = await sendBatch(id, batch);
+    reasons.push(...refused);
+    sent += batch.length - refused.length;
+    onSent(sent);
+  }
+  if (reasons.length > 0) throw new LeftOut(reasons);
+}
+
+async function missingOf(id: string, files: readonly File[]): Promise<File[]> {
+  const there = await persistently(() => unwrap(api.GET("/api/admin/uploads/{upload}", { params: { path: { upload: id } } })));
+  const known = new Map(there.files.map((file) => [file.name, file.bytes]));
+  return files.filter((file) => known.get(formOf(file.name)) !== file.size);
+}
+
+/** One request; where the server refuses a file, one for each file that it does not hold. Why each was refused. */
+async function sendBatch(id: string, batch: readonly File[]): Promise<string[]> {
+  try {
+    await persistently(() => unwrap(api.POST("/api/admin/uploads/{upload}/files", filesFor(id, batch))));
+    return [];
+  } catch (error) {
+    if (!(error instanceof Refused) || error.status !== 422) throw error;
+    if (batch.length === 1) return [error.message];
+  }
+  const refused: string[] = [];
+  for (const file of await missingOf(id, batch)) refused.push(...(await sendBatch(id, [file])));
+  return refused;
+}
+
+function filesFor(id: string, files: readonly File[], replaces?: string) {
+  const form = new FormData();
+  for (const file of files) form.append("files", file);
+  if (replaces !== undefined) form.append("replaces", replaces);
+  return { params: { path: { upload: id } }, body: { files: [] }, bodySerializer: () => form };
+}
+
+/** Put another file in the place of one of the upload's. */
+async function replaceFile(id: string, name: string, file: File): Promise<Schemas["UploadProgress"]> {
+  return persistently(() => unwrap(api.POST("/api/admin/uploads/{upload}/files", filesFor(id, [file], name))));
+}
+
+// Whether each clip of an upload plays: tried in the experimenter's browser by the decoder of the participant's page.
+
+type UploadedFile = Schemas["UploadedFile"];
+
+/** By the hash of a clip: why it does not play, or null where it does. Clips stay as they are, so this does too. */
+const known = new Map<string, string | null>();
+
+/** Most clips are H.264, High profile. */
+const H264: VideoDecoderConfig = { codec: "avc1.640028", codedWidth: 960, codedHeight: 360 };
+
+interface Tried {
+  /** By the name of a file: why its clip does not play. */
+  problems: ReadonlyMap<string, string>;
+  /** False where this browser has no decoder that could tell. */
+  canTell: boolean;
+}
+
+const clipKey = ({ sha256, fps, frames }: UploadedFile) => `${String(sha256)} ${String(fps)} ${String(frames)}`;
+
+/** Decode every clip, one after the other; those that could not be fetched are not judged. */
+async function tryClips(upload: string, files: readonly UploadedFile[], signal: AbortSignal): Promise<Tried> {
+  const problems = new Map<string, string>();
+  if (!(await decodesH264())) return { problems, canTell: false };
+  for (const file of files) {
+    if (signal.aborted) break;
+    if (file.state !== "ready" || file.sha256 == null) continue;
+    const key = clipKey(file);
+    if (!known.has(key)) {
+      const answer = await fetch(`/api/admin/uploads/${upload}/clips/${file.sha256}`, { signal }).catch(() => null);
+      if (!answer?.ok) continue;
+      known.set(key, await problemOf(await answer.arrayBuffer(), file));
+    }
+    const problem = known.get(key);
+    if (problem != null) problems.set(file.name, problem);
+  }
+  return { problems, canTell: true };
+}
+
+async function decodesH264(): Promise<boolean> {
+  if (!("VideoDecoder" in globalThis)) return false;
+  return VideoDecoder.isConfigSupported(H264).then(
+    ({ supported }) => supported === true,
+    () => false,
+  );
+}
+
+async function problemOf(bytes: ArrayBuffer, file: UploadedFile): Promise<string | null> {
+  // The video reader is loaded when clips are there, not with the page.
+  const { decodeClip } = await import("../../participant/playback/decode");
+  try {
+    const clip = await decodeClip(bytes, file.fps ?? null);
+    const isKept = "bitmaps" in clip;
+    const frames = isKept ? clip.bitmaps.length : clip.frames;
+    if (isKept) clip.bitmaps.forEach((bitmap) => bitmap.close());
+    else clip.close();
+    const [expected, got] = [shapeOf(file.frames, file.width_px, file.height_px), shapeOf(frames, clip.width, clip.height)];
+    return expected === got ? null : `expected ${expected}, got ${got}`;
+  } catch (error) {
+    return String(error);
+  }
+}
+
+const shapeOf = (frames: unknown, width: unknown, height: unknown) =>
+  `${String(frames)} frames of ${String(width)} x ${String(height)} pixels`;
+
+/** The upload with the clips that do not play among those that cannot be used. */
+function withTried(upload: Schemas["UploadOut"], tried: Tried | undefined): Schemas["UploadOut"] {
+  if (!tried || tried.problems.size === 0) return upload;
+  const files = upload.files.map((file): UploadedFile => {
+    const problem = tried.problems.get(file.name);
+    if (problem === undefined) return file;
+    const words = `the participant's page does not play it in this browser (${problem}); export it again as H.264 in MP4`;
+    return { ...file, state: "refused", problem: words };
+  });
+  return { ...upload, files };
+}
 
 const LOOK_EVERY_MS = 700;
-const keyOf = (purpose: string) => `palpebra.upload.${purpose}`;
+const storageKey = (purpose: string) => `palpebra.upload.${purpose}`;
 
 export interface Upload {
   /** Files that are there, of those that are being sent; null where nothing is sent. */
@@ -53,7 +232,7 @@ export function playNeeded({ received, plays }: Upload): string | false {
 /** The upload for this purpose, such as a new study; one that was begun before a reload is taken up. */
 export function useUpload(purpose: string): Upload {
   const queries = useQueryClient();
-  const [id, setId] = useState(() => localStorage.getItem(keyOf(purpose)));
+  const [id, setId] = useState(() => localStorage.getItem(storageKey(purpose)));
   const [fps, setFps] = useState<number | null>(null);
   const [sending, setSending] = useState<Upload["sending"]>(null);
   const path = { params: { path: { upload: id ?? "" } } };
@@ -78,7 +257,7 @@ export function useUpload(purpose: string): Upload {
     staleTime: Infinity,
   });
   const forget = () => {
-    localStorage.removeItem(keyOf(purpose));
+    localStorage.removeItem(storageKey(purpose));
     setId(null);
     setSending(null);
     send.reset();
@@ -89,7 +268,7 @@ export function useUpload(purpose: string): Upload {
     mutationFn: async (files) => {
       setSending({ sent: 0, of: files.length });
       const upload = id ?? (await beginUpload(fps)).id;
-      localStorage.setItem(keyOf(purpose), upload);
+      localStorage.setItem(storageKey(purpose), upload);
       setId(upload);
       await sendFiles(upload, files, (sent) => setSending({ sent, of: files.length }));
     },

@@ -1,12 +1,222 @@
-import { Anchor, Button, Card, Code, Group, SegmentedControl, SimpleGrid, Stack, Switch, Text, Title } from "@mantine/core";
+import {
+  Badge,
+  Button,
+  Card,
+  Code,
+  Group,
+  Progress,
+  Stack,
+  Switch,
+  Text,
+  Title,
+  FileInput,
+  Anchor,
+  SegmentedControl,
+  SimpleGrid,
+} from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
-import { useParams } from "@tanstack/react-router";
 import { useState } from "react";
-import { studyQuery, useMay } from "../queries";
-import { type DataOrigin, ORIGINS } from "../results/origins";
+import { api, type Schemas, unwrap, useMay, sealQuery, studyQuery } from "../api";
+import { type DataOrigin, when, counted, ORIGINS } from "../ui/format";
+import { Answer } from "../ui/Answer";
+import { ConfirmButton } from "../ui/ConfirmButton";
+import { useChange, notify } from "../ui/useChange";
+import { useParams } from "@tanstack/react-router";
 import { SeriesChooser } from "../ui/SeriesChooser";
-import { CapsuleCard } from "./CapsuleCard";
-import { SealCard } from "./SealCard";
+
+// The capsule of a study: made in the background, downloaded, verified by whoever has it.
+
+const isUnderWay = ({ status }: Schemas["CapsuleOut"]) => status === "queued" || status === "running";
+
+function CapsuleCard({ study, origin, series }: { study: string; origin: DataOrigin; series: number | null }) {
+  const path = { params: { path: { study } } };
+  const [clips, setClips] = useState(true);
+  const [sensitivity, setSensitivity] = useState(true);
+  const mayMake = useMay(study, "run");
+  const mayOpen = useMay(study, "export");
+  const capsules = useQuery({
+    queryKey: ["capsules", study],
+    queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/capsules", path)),
+    refetchInterval: ({ state }) => (state.data?.some(isUnderWay) ? 1_000 : false),
+  });
+  const make = useChange(
+    () => unwrap(api.POST("/api/admin/studies/{study}/capsules", { ...path, body: { origin, series, clips, sensitivity } })),
+    { touches: [["capsules", study]] },
+  );
+  const busy = capsules.data?.some(isUnderWay) ?? false;
+  return (
+    <Card withBorder>
+      <Title order={2} size="h4">
+        Capsule
+      </Title>
+      <Text size="sm" mt={4} mb="md" maw={720}>
+        Everything that can be handed on, in one zip: de-identified data, clips, definition, sealed plan, report and software versions, as
+        Psych-DS and RO-Crate. Whoever has it makes the report again with <Code>analysis verify</Code>. Its report is of one data series:
+        the one chosen above, or that of the active version beside the data of every series.
+      </Text>
+      {mayMake && (
+        <Group mb="sm">
+          <Switch label="with the clips" checked={clips} onChange={(event) => setClips(event.currentTarget.checked)} />
+          <Switch
+            label="with mixed and ordinal models"
+            checked={sensitivity}
+            onChange={(event) => setSensitivity(event.currentTarget.checked)}
+          />
+          <Button onClick={() => make.mutate(undefined)} loading={make.isPending} disabled={busy}>
+            Make a capsule
+          </Button>
+        </Group>
+      )}
+      <Answer of={capsules}>
+        {(rows) => (
+          <Stack gap="xs" role="status" aria-label="Capsules">
+            {rows.map((capsule) => (
+              <One key={capsule.id} study={study} capsule={capsule} mayOpen={mayOpen} mayRemove={mayMake} />
+            ))}
+          </Stack>
+        )}
+      </Answer>
+    </Card>
+  );
+}
+
+interface OneProps {
+  study: string;
+  capsule: Schemas["CapsuleOut"];
+  mayOpen: boolean;
+  mayRemove: boolean;
+}
+
+function One({ study, capsule, mayOpen, mayRemove }: OneProps) {
+  const { id, status, progress, message, bytes, sha256 } = capsule;
+  const remove = useChange(
+    () => unwrap(api.DELETE("/api/admin/studies/{study}/capsules/{capsule}", { params: { path: { study, capsule: id } } })),
+    { touches: [["capsules", study]], done: "The capsule is deleted." },
+  );
+  return (
+    <Group gap="sm">
+      <Badge color={status === "failed" ? "red.9" : status === "done" ? "teal.9" : "gray.7"}>{status}</Badge>
+      <Text size="sm">
+        {when(capsule.created_at)}, {capsule.origin}
+        {capsule.series != null && `, series ${capsule.series}`}
+        {!capsule.clips && ", without clips"}
+      </Text>
+      {isUnderWay(capsule) && (
+        <>
+          <Progress w={160} value={100 * progress} animated aria-label="Progress of the capsule" />
+          <Text size="sm">{message}</Text>
+        </>
+      )}
+      {status === "failed" && <Text size="sm">{message}</Text>}
+      {bytes != null && mayOpen && (
+        <Button component="a" size="compact-sm" variant="default" href={`/api/admin/studies/${study}/capsules/${id}.zip`} download>
+          Download ({(bytes / 2 ** 20).toFixed(1)} MiB)
+        </Button>
+      )}
+      {sha256 != null && (
+        <Text size="xs" c="dimmed">
+          SHA-256 <code>{sha256.slice(0, 12)}</code>
+        </Text>
+      )}
+      {mayRemove && !isUnderWay(capsule) && (
+        <ConfirmButton
+          size="compact-sm"
+          label="Delete"
+          question={`The capsule of ${when(capsule.created_at)} is deleted for good. The data stay, and another can be made of them.`}
+          confirm="Delete the capsule"
+          onConfirm={() => remove.mutate(undefined)}
+        />
+      )}
+    </Group>
+  );
+}
+
+// The plan of the study, sealed before its first participant.
+
+function SealCard({ study }: { study: string }) {
+  const seal = useQuery(sealQuery(study));
+  return (
+    <Card withBorder>
+      <Title order={2} size="h4">
+        Sealed plan
+      </Title>
+      <Text size="sm" mt={4} mb="sm">
+        Design, exclusions, analysis plan and power, fixed with a hash before the first participant. Reports list each deviation from it.
+      </Text>
+      <Answer of={seal}>
+        {(record) => (record.sealed_at === null ? <Unsealed study={study} seal={record} /> : <Sealed study={study} seal={record} />)}
+      </Answer>
+    </Card>
+  );
+}
+
+interface Props {
+  study: string;
+  seal: Schemas["SealOut"];
+}
+
+function Sealed({ study, seal }: Props) {
+  const address = (ending: string) => `/api/admin/studies/${study}/seal/plan.${ending}`;
+  return (
+    <Stack gap="xs">
+      <Text size="sm" className="wrap-anywhere">
+        Version {seal.version} was sealed {when(seal.sealed_at ?? "")}, {seal.power ? "with its power" : "without power"}; sha256{" "}
+        <code>{seal.sha256}</code>
+      </Text>
+      <Group>
+        <Button component="a" variant="default" size="xs" href={address("json")} download>
+          Sealed file (JSON)
+        </Button>
+        <Button component="a" variant="default" size="xs" href={address("html")} download>
+          Page to print
+        </Button>
+      </Group>
+    </Stack>
+  );
+}
+
+function Unsealed({ study, seal }: Props) {
+  const mayChange = useMay(study, "edit");
+  const [power, setPower] = useState<Record<string, unknown> | null>(null);
+  const make = useChange(() => unwrap(api.POST("/api/admin/studies/{study}/seal", { params: { path: { study } }, body: { power } })), {
+    touches: [["study", study, "seal"]],
+    done: "The plan is sealed.",
+  });
+  if (seal.participants > 0) return <Text size="sm">Not sealed: begun already by {counted(seal.participants, "participant")}.</Text>;
+  if (!mayChange) return <Text size="sm">Not sealed yet.</Text>;
+  return (
+    <Group align="end">
+      <FileInput
+        label="Power (may be left out)"
+        description="JSON that analysis power --json wrote"
+        accept=".json"
+        clearable
+        w={300}
+        onChange={(file) => void readObject(file).then(setPower)}
+      />
+      <ConfirmButton
+        label="Seal the plan"
+        question="A seal is never replaced: what is declared in this version is what reports will be held against."
+        confirm="Seal"
+        harmless
+        onConfirm={() => make.mutate(undefined)}
+      />
+    </Group>
+  );
+}
+
+/** The JSON object in a file; null, and said so, where there is none. */
+async function readObject(file: File | null): Promise<Record<string, unknown> | null> {
+  if (file === null) return null;
+  try {
+    const parsed: unknown = JSON.parse(await file.text());
+    if (typeof parsed === "object" && parsed !== null && !Array.isArray(parsed)) return { ...parsed };
+  } catch {
+    // Said below, as for JSON of another kind.
+  }
+  notify({ title: "That did not work", message: `${file.name}: expected the JSON of analysis power, got another file.`, color: "red" });
+  return null;
+}
 
 const FILES: [file: string, title: string, words: string][] = [
   ["ratings.csv", "Answers", "Tidy CSV: one row a play, one column a factor, with how each clip was shown."],

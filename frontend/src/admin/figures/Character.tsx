@@ -1,12 +1,46 @@
 /** A character that blinks along a closure curve at 30 frames a second, as in a clip without motion blur. */
 
-import { Button, Group, SegmentedControl, Stack, Switch } from "@mantine/core";
+import { Text, Button, Group, SegmentedControl, Stack, Switch } from "@mantine/core";
+import { useQuery } from "@tanstack/react-query";
+import { type ReactNode, useEffect, useRef, useState } from "react";
+import { api, type Schemas, unwrap } from "../api";
 import { useReducedMotion } from "@mantine/hooks";
-import { useEffect, useRef, useState } from "react";
 import { nearest } from "../../playground/faces";
-import type { Schemas } from "../api";
-import { framesAt } from "./playing";
-import { stripAddress, WithStrips } from "./WithStrips";
+
+// From a curve at its own sampling rate to what is shown frame by frame.
+
+/** Closure at each frame of `shownFps`, open before and after; by straight lines between samples. */
+export function framesAt(closure: readonly number[], fps: number, shownFps: number): number[] {
+  const length = Math.ceil(((closure.length - 1) / fps) * shownFps) + 1;
+  const inside = Array.from({ length }, (_, frame) => valueAt(closure, (frame * fps) / shownFps));
+  return [0, ...inside, 0];
+}
+
+function valueAt(values: readonly number[], position: number): number {
+  const last = values.length - 1;
+  const before = Math.min(last, Math.floor(position));
+  const [left = 0, right = 0] = [values[before], values[Math.min(last, before + 1)]];
+  return left + Math.min(1, position - before) * (right - left);
+}
+
+// What needs the characters' pictures, once they are known; where they are not made, how to make them.
+
+export const stripAddress = (character: string): string => `/api/admin/blinks/strips/${encodeURIComponent(character)}.webp`;
+
+export function WithStrips({ children }: { children: (strips: Schemas["Strips"]) => ReactNode }) {
+  const strips = useQuery({
+    queryKey: ["strips"],
+    queryFn: () => unwrap(api.GET("/api/admin/blinks/strips")),
+    staleTime: Number.POSITIVE_INFINITY,
+  });
+  if (strips.data === undefined) return null;
+  if (strips.data.characters.length > 0) return children(strips.data);
+  return (
+    <Text size="sm" c="dimmed">
+      The characters' pictures are not on this server; <code>make run</code> makes them, or <code>stimuli strips</code>.
+    </Text>
+  );
+}
 
 const FPS = 30;
 const REST_MS = 700;

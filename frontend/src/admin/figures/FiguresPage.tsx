@@ -1,10 +1,8 @@
 /** The recorded blinks and the model behind the clips. */
-
 import { Stack, Tabs, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { api, type Schemas, unwrap } from "../api";
-import { Answer } from "../ui/Answer";
-import { onDemand } from "../ui/onDemand";
+import { Answer, onDemand } from "../ui/Answer";
 
 const ModelSliders = onDemand(async () => (await import("./ModelSliders")).ModelSliders);
 const Recorded = onDemand(async () => (await import("./Recorded")).Recorded);

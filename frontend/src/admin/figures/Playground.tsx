@@ -5,7 +5,7 @@ import { useEffect, useRef } from "react";
 import { mountPlayground } from "../../playground/playground";
 import "../../playground/playground.css";
 import type { Schemas } from "../api";
-import { stripAddress, WithStrips } from "./WithStrips";
+import { stripAddress, WithStrips } from "./Character";
 
 export function Playground() {
   return (

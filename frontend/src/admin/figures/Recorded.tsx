@@ -2,9 +2,8 @@ import * as Plot from "@observablehq/plot";
 import { Button, Card, Group, SegmentedControl, SimpleGrid, Stack, Text, Title } from "@mantine/core";
 import { useMemo, useState } from "react";
 import type { Schemas } from "../api";
-import { ClosureFigure } from "../ui/ClosureFigure";
-import { downloadText } from "../ui/download";
-import { PlotFigure } from "../ui/PlotFigure";
+import { ClosureFigure, PlotFigure } from "../ui/PlotFigure";
+import { downloadText } from "../ui/useChange";
 import { Character } from "./Character";
 
 type Profile = Schemas["RecordedProfile"];

@@ -1,16 +1,110 @@
 /** A second look at labelled blinks, for `stimuli blinks --review`. The files stay on this computer. */
 
-import { Alert, Button, Group, SegmentedControl, Stack, Text, Title } from "@mantine/core";
-import "./labelling.css";
+import { Button, Card, Group, Table, Text, TextInput, Alert, SegmentedControl, Stack, Title } from "@mantine/core";
+import { useState } from "react";
+import { type Blink, blinkKey, decisionOn, edgesOf } from "../../labelling/review";
+import { fixed } from "../ui/format";
+import { type BlinkReview, useBlinkReview } from "./useBlinkReview";
 import { zoomedWindow } from "../../labelling/trace";
-import { BlinkCard, BlinkList } from "./BlinkList";
 import { OpenFile } from "./OpenFile";
 import { TraceView } from "./TraceView";
-import { useBlinkReview } from "./useBlinkReview";
-import { useShortcuts } from "../ui/useShortcuts";
-import { useUnsaved } from "../ui/useUnsaved";
+import { useShortcuts, useUnsaved } from "../ui/page-events";
+import "./labelling.css";
 
-type Review = ReturnType<typeof useBlinkReview>;
+/** The blink chosen: what was decided, and what can be. */
+function BlinkCard({ review, blink }: { review: BlinkReview; blink: Blink }) {
+  const decision = decisionOn(review.decisions, blink);
+  const [reason, setReason] = useState(decision.reason);
+  const { onset, end } = edgesOf(blink, review.decisions);
+  const moved = decision.onset !== null || decision.end !== null;
+  return (
+    <Card withBorder>
+      <Group align="end">
+        <Text fw={600} className="number">
+          Blink {blink.number}, frames {onset} to {end} ({fixed(((end - onset) * 1000) / review.fps, 0)} ms)
+        </Text>
+        <Button variant="default" onClick={() => review.decide(blink, "accept", "")} disabled={decision.decision === "accept"}>
+          Accept
+        </Button>
+        <form
+          onSubmit={(event) => {
+            event.preventDefault();
+            if (reason.trim() === "") return;
+            review.decide(blink, "reject", reason.trim());
+            if (document.activeElement instanceof HTMLElement) document.activeElement.blur();
+          }}
+        >
+          <Group align="end" gap="xs">
+            <TextInput
+              id="reject-reason"
+              label="Reason to reject it"
+              placeholder="talking"
+              value={reason}
+              onChange={(event) => setReason(event.currentTarget.value)}
+            />
+            <Button type="submit" variant="default" disabled={reason.trim() === ""}>
+              Reject
+            </Button>
+          </Group>
+        </form>
+        <Button variant="default" onClick={() => review.restore(blink)} disabled={!moved}>
+          Start and end as labelled
+        </Button>
+      </Group>
+    </Card>
+  );
+}
+
+/** All blinks of the column shown. */
+function BlinkList({ review }: { review: BlinkReview }) {
+  return (
+    <div className="blink-list" tabIndex={0} role="region" aria-label="Blinks">
+      <Table stickyHeader>
+        <Table.Thead>
+          <Table.Tr>
+            {["Blink", "Start", "End", "Closure", "Decision"].map((name) => (
+              <Table.Th key={name}>{name}</Table.Th>
+            ))}
+          </Table.Tr>
+        </Table.Thead>
+        <Table.Tbody>
+          {review.blinks.map((blink) => (
+            <Row key={blinkKey(blink)} review={review} blink={blink} />
+          ))}
+        </Table.Tbody>
+      </Table>
+    </div>
+  );
+}
+
+function Row({ review, blink }: { review: BlinkReview; blink: Blink }) {
+  const { decision, reason, onset: newOnset, end: newEnd } = decisionOn(review.decisions, blink);
+  const { onset, end } = edgesOf(blink, review.decisions);
+  return (
+    <Table.Tr>
+      <Table.Td>
+        <Button
+          size="compact-sm"
+          variant={blink === review.chosen ? "filled" : "default"}
+          aria-label={`Choose blink ${blink.number}`}
+          onClick={() => review.choose(blink, true)}
+        >
+          {blink.number}
+        </Button>
+      </Table.Td>
+      <Table.Td className="number">
+        {onset}
+        {newOnset !== null && " (moved)"}
+      </Table.Td>
+      <Table.Td className="number">
+        {end}
+        {newEnd !== null && " (moved)"}
+      </Table.Td>
+      <Table.Td className="number">{fixed(blink.closure)}</Table.Td>
+      <Table.Td>{decision === "reject" ? `rejected: ${reason}` : "accepted"}</Table.Td>
+    </Table.Tr>
+  );
+}
 
 export function BlinkReviewPage() {
   const review = useBlinkReview();
@@ -47,7 +141,7 @@ export function BlinkReviewPage() {
   );
 }
 
-function Reviewing({ review, values }: { review: Review; values: Float64Array }) {
+function Reviewing({ review, values }: { review: BlinkReview; values: Float64Array }) {
   const { window, setWindow, last, chosen } = review;
   const zoom = (factor: number): void => setWindow((now) => zoomedWindow(now, factor, (now.from + now.to) / 2, last));
   useShortcuts({

@@ -1,8 +1,6 @@
 /** Landmarks on frames of a video, for `stimuli track --labels`. The video stays on this computer. */
-
 import { Alert, Badge, Button, Card, Group, NumberInput, SegmentedControl, Stack, Text, Title } from "@mantine/core";
 import { useState } from "react";
-import "./labelling.css";
 import { FEWEST_FRAMES } from "../../labelling/label-file";
 import { at } from "../../labelling/points";
 import { FRAMES_BEFORE_PROPOSALS } from "../../labelling/propose";
@@ -10,8 +8,8 @@ import { ConfirmButton } from "../ui/ConfirmButton";
 import { OpenFile } from "./OpenFile";
 import { Stage } from "./Stage";
 import { useLabelling } from "./useLabelling";
-import { useShortcuts } from "../ui/useShortcuts";
-import { useUnsaved } from "../ui/useUnsaved";
+import { useShortcuts, useUnsaved } from "../ui/page-events";
+import "./labelling.css";
 
 type Labelling = ReturnType<typeof useLabelling>;
 

@@ -20,7 +20,7 @@ import {
   withEdge,
 } from "../../labelling/review";
 import { traceOf, type Window } from "../../labelling/trace";
-import { downloadText } from "../ui/download";
+import { downloadText } from "../ui/useChange";
 
 const NONE: Decisions = new Map();
 /** Shown at first: ten seconds. */
@@ -169,3 +169,5 @@ function readColumn(series: Table | null, table: BlinkTable | null, column: stri
     throw error;
   }
 }
+
+export type BlinkReview = ReturnType<typeof useBlinkReview>;

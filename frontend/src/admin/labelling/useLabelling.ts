@@ -1,12 +1,12 @@
 /** The work of the labelling page: a video, its labels with undo, and the start shape of each new frame. */
 
-import { useCallback, useState } from "react";
-import { labelsText, parseLabels } from "../../labelling/label-file";
+import { useEffect, useState, useEffectEvent, useCallback } from "react";
+import type { OpenedVideo } from "../../labelling/video";
+import type { Grey } from "../../labelling/grey";
 import { acceptedOf } from "../../labelling/labelled-frames";
-import { noticeOf } from "../../labelling/eyes";
-import { openForLabelling } from "../../labelling/open";
-import type { Point, Shape } from "../../labelling/points";
+import { type Start, startShape } from "../../labelling/start-shape";
 import {
+  type Work,
   atFrame,
   atNeighbour,
   labelFileOf,
@@ -20,12 +20,80 @@ import {
   withRedo,
   withUndo,
   withVideo,
-  type Work,
 } from "../../labelling/work";
-import { downloadText } from "../ui/download";
-import { mayReplace } from "../ui/useUnsaved";
-import { message, usePicture } from "./usePicture";
-import { useStart } from "./useStart";
+import { labelsText, parseLabels } from "../../labelling/label-file";
+import { noticeOf } from "../../labelling/eyes";
+import { openForLabelling } from "../../labelling/open";
+import type { Point, Shape } from "../../labelling/points";
+import { downloadText } from "../ui/useChange";
+import { mayReplace } from "../ui/page-events";
+
+// The picture of one frame of the opened video, as soon as it is decoded.
+
+interface Picture {
+  readonly number: number;
+  readonly canvas: HTMLCanvasElement;
+}
+
+function message(error: unknown): string {
+  return error instanceof Error ? error.message : String(error);
+}
+
+/** Null until the frame `current` of `video` is decoded; a frame that cannot be is told to `tell`. */
+function usePicture(video: OpenedVideo | null, current: number, tell: (problem: string) => void): Picture | null {
+  const [shown, setShown] = useState<{ video: OpenedVideo; picture: Picture } | null>(null);
+  useEffect(() => {
+    if (video === null) return;
+    let live = true;
+    video
+      .frame(current)
+      .then((canvas) => live && setShown({ video, picture: { number: current, canvas } }))
+      .catch((error: unknown) => live && tell(message(error)));
+    return () => {
+      live = false;
+    };
+  }, [video, current, tell]);
+  return shown?.video === video && shown.picture.number === current ? shown.picture : null;
+}
+
+// The shape that a frame without points begins with, as soon as it is worked out.
+
+interface Begun extends Start {
+  readonly video: OpenedVideo;
+  readonly eyes: 1 | 2;
+}
+
+/** Null for a labelled frame, and until the start of another is known; one that fails is told to `tell`. */
+function useStart({ opened, eyes, history, current }: Work, picture: Picture | null, tell: (problem: string) => void): Start | null {
+  const [start, setStart] = useState<Begun | null>(null);
+  const video = opened?.video ?? null;
+  const labelled = history.now.has(current);
+  // The frames count as they are when a new frame is opened: a start shape does not change under the hand.
+  const propose = useEffectEvent((from: NonNullable<Work["opened"]>, shown: Picture) =>
+    startShape(from, shown, acceptedOf(history.now), eyes, greysOf(from.video)),
+  );
+  useEffect(() => {
+    if (opened === null || video === null || picture === null || labelled) return;
+    let live = true;
+    propose(opened, picture)
+      .then((proposal) => live && setStart({ ...proposal, video, eyes }))
+      .catch((error: unknown) => live && tell(message(error)));
+    return () => {
+      live = false;
+    };
+  }, [opened, video, picture, labelled, eyes, tell]);
+  const fits = start !== null && start.video === video && start.eyes === eyes && start.number === current;
+  return fits && !labelled ? start : null;
+}
+
+/** Grey pictures of labelled frames, kept as long as their video is open. */
+const GREYS = new WeakMap<OpenedVideo, Map<number, Grey>>();
+
+function greysOf(video: OpenedVideo): Map<number, Grey> {
+  const kept = GREYS.get(video) ?? new Map<number, Grey>();
+  GREYS.set(video, kept);
+  return kept;
+}
 
 export function useLabelling() {
   const [work, setWork] = useState<Work>(NO_WORK);

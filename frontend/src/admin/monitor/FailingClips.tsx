@@ -1,11 +1,9 @@
 /** Clips that participants could not see: which, for how many people of how many, and why. */
-
 import { Alert, List } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
 import { api, type Schemas, unwrap } from "../api";
-import { counted } from "../ui/format";
-import { ruleWords } from "../ui/play-words";
+import { counted, ruleWords } from "../ui/format";
 
 type Failing = Schemas["FailingClip"];
 const MAX_LISTED = 5;

@@ -4,11 +4,10 @@ import { keepPreviousData, useInfiniteQuery, useQuery } from "@tanstack/react-qu
 import { Link, useParams } from "@tanstack/react-router";
 import { useState } from "react";
 import type { paths } from "../../api/schema";
-import { api, type Schemas, unwrap } from "../api";
-import { studyQuery } from "../queries";
+import { api, type Schemas, unwrap, studyQuery } from "../api";
 import { DataTable } from "../ui/DataTable";
 import { when } from "../ui/format";
-import { PagedAnswer } from "../ui/PagedAnswer";
+import { PagedAnswer } from "../ui/Answer";
 
 type Run = Schemas["RunSummary"];
 type Asked = NonNullable<paths["/api/admin/studies/{study}/runs"]["get"]["parameters"]["query"]>;

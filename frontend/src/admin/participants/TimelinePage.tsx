@@ -1,13 +1,250 @@
-import { Anchor, Button, Card, Group, Stack, Text, Title } from "@mantine/core";
+import { Button, Modal, Stack, Text, Group, TextInput, Anchor, Badge, Card, Title } from "@mantine/core";
+import { useDisclosure } from "@mantine/hooks";
 import { useQuery } from "@tanstack/react-query";
-import { Link, useParams } from "@tanstack/react-router";
-import { api, type Schemas, unwrap } from "../api";
-import { useMay } from "../queries";
+import { api, unwrap, type Schemas, useMay } from "../api";
 import { Answer } from "../ui/Answer";
-import { plain, when, words } from "../ui/format";
-import { IdentityButton } from "./IdentityButton";
-import { RunActions } from "./RunActions";
-import { TrialTable } from "./TrialTable";
+import { plain, fixed, ruleWords, VERDICT_COLOURS, when, words } from "../ui/format";
+import { useState } from "react";
+import { useChange } from "../ui/useChange";
+import { Link, useParams } from "@tanstack/react-router";
+import { type Column, DataTable } from "../ui/DataTable";
+
+interface IdentityProps {
+  study: string;
+  run: string;
+}
+
+/** For owners: who the participant is to the recruiter, asked for only when it is opened. */
+function IdentityButton({ study, run }: IdentityProps) {
+  const [opened, { open, close }] = useDisclosure(false);
+  return (
+    <>
+      <Button variant="default" onClick={open}>
+        Show identity
+      </Button>
+      <Modal opened={opened} onClose={close} title="Identity" closeButtonProps={{ "aria-label": "Close" }}>
+        {opened && <Identity study={study} run={run} />}
+      </Modal>
+    </>
+  );
+}
+
+function Identity({ study, run }: IdentityProps) {
+  const identity = useQuery({
+    queryKey: ["identity", study, run],
+    queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/runs/{run}/identity", { params: { path: { study, run } } })),
+    gcTime: 0,
+    staleTime: Infinity,
+  });
+  return (
+    <Answer of={identity}>
+      {(data) => (
+        <Stack gap="xs">
+          <Text>Recruiter’s id: {data.identifier || "none"}</Text>
+          <Text>Link: {data.link || "without a label"}</Text>
+          {Object.entries(data.parameters).map(([name, value]) => (
+            <Text size="sm" key={name} className="wrap-anywhere">
+              {name}: {plain(value)}
+            </Text>
+          ))}
+          <Text size="sm" c="dimmed">
+            The audit log notes that you have looked.
+          </Text>
+        </Stack>
+      )}
+    </Answer>
+  );
+}
+
+interface ActionsProps {
+  study: string;
+  summary: Schemas["RunSummary"];
+  mayErase: boolean;
+}
+
+function RunActions({ study, summary, mayErase }: ActionsProps) {
+  const path = { params: { path: { study, run: summary.run } } };
+  const touches = [
+    ["timeline", study, summary.run],
+    ["runs", study],
+    ["results", study],
+  ];
+  const include = useChange(() => unwrap(api.DELETE("/api/admin/studies/{study}/runs/{run}/exclusion", path)), {
+    touches,
+    done: "The run counts again.",
+  });
+  const exclude = useChange(
+    (reason: string) => unwrap(api.PUT("/api/admin/studies/{study}/runs/{run}/exclusion", { ...path, body: { reason } })),
+    { touches, done: "The run is excluded." },
+  );
+  const erase = useChange(
+    (confirm: string) => unwrap(api.POST("/api/admin/studies/{study}/runs/{run}/erase", { ...path, body: { confirm } })),
+    {
+      touches,
+      done: "The person's data are erased, in every visit known to be theirs. Reports made before still hold them: make those again.",
+    },
+  );
+  return (
+    <Group>
+      {summary.excluded ? (
+        <Button variant="default" onClick={() => include.mutate(undefined)}>
+          Undo the exclusion
+        </Button>
+      ) : (
+        <Ask
+          label="Exclude"
+          words="The data stay, marked as excluded, with your reason beside them. You can undo this."
+          field="Reason"
+          ready={(text) => text.trim().length >= 3}
+          onDone={(reason) => exclude.mutate(reason)}
+        />
+      )}
+      {mayErase && (
+        <Ask
+          label="Erase this person's data"
+          words={`Ratings, questionnaires and events of this person are deleted for good. To go on, type ${summary.run}.`}
+          field="Identifier of the run"
+          ready={(text) => text === summary.run}
+          onDone={(confirm) => erase.mutate(confirm)}
+        />
+      )}
+    </Group>
+  );
+}
+
+interface AskProps {
+  label: string;
+  words: string;
+  field: string;
+  ready: (text: string) => boolean;
+  onDone: (text: string) => void;
+}
+
+function Ask({ label, words, field, ready, onDone }: AskProps) {
+  const [opened, { open, close }] = useDisclosure(false);
+  const [text, setText] = useState("");
+  return (
+    <>
+      <Button variant="default" onClick={open}>
+        {label}
+      </Button>
+      <Modal opened={opened} onClose={close} title={label} closeButtonProps={{ "aria-label": "Close" }}>
+        <Text mb="md">{words}</Text>
+        <TextInput label={field} value={text} onChange={(event) => setText(event.currentTarget.value)} data-autofocus />
+        <Group justify="flex-end" mt="md">
+          <Button variant="default" onClick={close}>
+            Cancel
+          </Button>
+          <Button
+            color="red"
+            disabled={!ready(text)}
+            onClick={() => {
+              close();
+              onDone(text);
+            }}
+          >
+            {label}
+          </Button>
+        </Group>
+      </Modal>
+    </>
+  );
+}
+
+// Every play of a run: what was shown, frame by frame, and what was answered.
+
+type Trial = Schemas["TimelineTrial"];
+
+const COLUMNS: Column<Trial>[] = [
+  {
+    title: "Trial",
+    number: true,
+    cell: (trial) => (
+      <>
+        <ReplayLink trial={trial.trial_index} />
+        {trial.play > 1 && ` (play ${trial.play})`}{" "}
+        {trial.kind !== "main" && (
+          <Badge variant="default" size="sm">
+            {trial.kind}
+          </Badge>
+        )}
+      </>
+    ),
+  },
+  { title: "Clip", wrap: true, cell: (trial) => (trial.cell === null ? "–" : `${trial.cell} ${trial.exemplar ?? ""}`) },
+  {
+    title: "Answer",
+    number: true,
+    cell: (trial) => `${given(trial)}${trial.expected_response === null ? "" : ` (asked for ${trial.expected_response})`}`,
+  },
+  { title: "After", number: true, wide: true, cell: (trial) => (trial.rt === null ? "–" : `${fixed(trial.rt, 0)} ms`) },
+  {
+    title: "Shown",
+    cell: (trial) => (
+      <Badge color={VERDICT_COLOURS[trial.verdict] ?? "gray.7"} size="sm" title={ruleWords(trial.verdict_rule)}>
+        {trial.verdict}
+      </Badge>
+    ),
+  },
+  {
+    title: "Frames",
+    number: true,
+    wide: true,
+    cell: (trial) => (trial.frames_drawn === null ? "–" : `${trial.frames_drawn}, ${trial.frames_missing ?? 0} missing`),
+  },
+  { title: "Each frame drawn", wide: true, cell: (trial) => (trial.drawn === null ? "–" : <Ticks drawn={trial.drawn} />) },
+];
+
+/** The trial's number, which leads to its replay. */
+function ReplayLink({ trial }: { trial: number }) {
+  const { study = "", run = "" } = useParams({ strict: false });
+  return (
+    <Anchor
+      component={Link}
+      to={`/studies/${study}/participants/${run}/replay`}
+      search={{ trial } as never}
+      title={`Replay trial ${trial}`}
+    >
+      {trial}
+    </Anchor>
+  );
+}
+
+/** The one number, or what was answered on each scale. */
+function given({ response, answer }: Trial): string {
+  const answers = answer["answers"];
+  if (typeof answers !== "object" || answers === null) return String(response ?? "–");
+  return Object.entries(answers as Record<string, { response: number | null; not_applicable?: boolean }>)
+    .map(([scale, one]) => `${scale} ${one.response ?? (one.not_applicable ? "not applicable" : "–")}`)
+    .join(", ");
+}
+
+function TrialTable({ trials }: { trials: Trial[] }) {
+  return (
+    <DataTable
+      dense
+      rows={trials}
+      rowKey={(trial) => `${String(trial.trial_index)}-${String(trial.play)}`}
+      columns={COLUMNS}
+      empty="No ratings."
+    />
+  );
+}
+
+/** One tick a drawn frame, on a line of time. */
+function Ticks({ drawn }: { drawn: number[][] }) {
+  const times = drawn.map((pair) => pair[1] ?? 0);
+  const start = times[0] ?? 0;
+  const length = Math.max(1, (times.at(-1) ?? 0) - start);
+  return (
+    <svg viewBox="0 0 220 12" width={220} height={12} role="img" aria-label={`${times.length} frames in ${length.toFixed(0)} ms`}>
+      {times.map((time, index) => {
+        const x = 1 + (218 * (time - start)) / length;
+        return <line key={index} x1={x} x2={x} y1={1} y2={11} stroke="currentColor" strokeWidth={1} />;
+      })}
+    </svg>
+  );
+}
 
 /** A calibration as it is shown: what was not measured is left out. */
 function calibrationFacts(one: Schemas["TimelineCalibration"]): Record<string, string | number> {

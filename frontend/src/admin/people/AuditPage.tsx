@@ -3,7 +3,7 @@ import { useInfiniteQuery } from "@tanstack/react-query";
 import { api, unwrap } from "../api";
 import { DataTable } from "../ui/DataTable";
 import { plain, when, words } from "../ui/format";
-import { PagedAnswer } from "../ui/PagedAnswer";
+import { PagedAnswer } from "../ui/Answer";
 
 const A_PAGE = 50;
 

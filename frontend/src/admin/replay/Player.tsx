@@ -1,18 +1,113 @@
 /** One trial played back: the clip, the keys, the time line, and what the log says in words. */
 
+import { useEffect, useState, useEffectEvent, useMemo } from "react";
+import type { Pictures } from "./pictures";
+import {
+  type Clip,
+  type Folding,
+  answerWords,
+  traceOf,
+  folding,
+  changeBefore,
+  changesOf,
+  nextChange,
+  type Play,
+  playedBack,
+  shownAt,
+} from "./shown";
 import { Alert, Button, Group, NumberInput, SegmentedControl, Stack, Text } from "@mantine/core";
-import { useMemo, useState } from "react";
 import type { Schemas } from "../api";
-import { useShortcuts } from "../ui/useShortcuts";
+import { useShortcuts } from "../ui/page-events";
 import { arrange } from "./arranging";
-import { answerWords, traceOf } from "./facts";
-import { folding } from "./folding";
-import { changeBefore, changesOf, nextChange, type Play, playedBack, shownAt } from "./shown";
 import { Stage } from "./Stage";
-import { seconds, Timeline } from "./Timeline";
-import { marksOf, ViewFacts } from "./ViewFacts";
-import { usePictures } from "./usePictures";
-import { usePlaying } from "./usePlaying";
+import { seconds, Timeline, marksOf, ViewFacts } from "./Timeline";
+
+// The decoded clips of a trial, given up with it.
+
+interface Opened {
+  pictures: ReadonlyMap<string, Pictures>;
+  /** Why a clip has no pictures. */
+  problem: string | null;
+  isReady: boolean;
+}
+
+const NOTHING: Opened = { pictures: new Map(), problem: null, isReady: false };
+
+function usePictures(clips: readonly Clip[]): Opened {
+  const [opened, setOpened] = useState<Opened>(NOTHING);
+  useEffect(() => {
+    let isGone = false;
+    let made: [string, Pictures][] = [];
+    const close = (): void => made.forEach(([, pictures]) => pictures.close());
+    // The video reader is loaded when a replay is opened, not with the page.
+    const asked = clips.map(async (clip): Promise<[string, Pictures]> => {
+      const { openPictures } = await import("./pictures");
+      return [clip.clip_sha256, await openPictures(clip)];
+    });
+    void Promise.allSettled(asked).then((outcomes) => {
+      made = outcomes.flatMap((outcome) => (outcome.status === "fulfilled" ? [outcome.value] : []));
+      if (isGone) return close();
+      const failed = outcomes.find((outcome) => outcome.status === "rejected");
+      setOpened({ pictures: new Map(made), problem: failed ? problemOf(failed.reason) : null, isReady: true });
+    });
+    return () => {
+      isGone = true;
+      // Not in an updater of the state: React drops those of a component that goes.
+      close();
+      setOpened(NOTHING);
+    };
+  }, [clips]);
+  return opened;
+}
+
+const problemOf = (reason: unknown): string => (reason instanceof Error ? reason.message : String(reason));
+
+// The playhead of a replay: a moment of the trial, moved by time while it plays.
+
+interface Playing {
+  at_ms: number;
+  isPlaying: boolean;
+  rate: number;
+  seek: (at_ms: number) => void;
+  setRate: (rate: number) => void;
+  toggle: () => void;
+}
+
+function usePlaying(time: Folding, end_ms: number): Playing {
+  const [at_ms, setAt] = useState(0);
+  const [isPlaying, setPlaying] = useState(false);
+  const [rate, setRate] = useState(1);
+  const advance = useEffectEvent((by_ms: number): void => {
+    const folded = time.fold(at_ms) + by_ms * rate;
+    const isOver = folded >= time.length_ms;
+    setAt(isOver ? end_ms : time.unfold(folded));
+    if (isOver) setPlaying(false);
+  });
+  useEffect(() => {
+    if (!isPlaying) return;
+    let before: number | null = null;
+    let request = requestAnimationFrame(function tick(now) {
+      if (before !== null) advance(now - before);
+      before = now;
+      request = requestAnimationFrame(tick);
+    });
+    return () => cancelAnimationFrame(request);
+  }, [isPlaying]);
+  return {
+    at_ms,
+    isPlaying,
+    rate,
+    seek: (moment_ms) => {
+      setPlaying(false);
+      setAt(Math.min(Math.max(0, moment_ms), end_ms));
+    },
+    setRate,
+    toggle: () => {
+      if (!isPlaying && at_ms >= end_ms) setAt(0);
+      setPlaying(!isPlaying);
+    },
+  };
+}
 
 interface Props {
   replay: Schemas["Replay"];

@@ -6,7 +6,7 @@ import { Link, useNavigate, useParams, useSearch } from "@tanstack/react-router"
 import { api, type Schemas, unwrap } from "../api";
 import { Answer } from "../ui/Answer";
 import { words } from "../ui/format";
-import { useShortcuts } from "../ui/useShortcuts";
+import { useShortcuts } from "../ui/page-events";
 import { Player } from "./Player";
 import "./replay.css";
 

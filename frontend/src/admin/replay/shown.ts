@@ -2,7 +2,9 @@
  * What stood on the screen when, from the stored logs: every frame from the moment it was drawn to the next one's.
  * Times are ms since the start key of a play's first view, by the participant's clock.
  */
+
 import type { Schemas } from "../api";
+import { fixed, plain, words } from "../ui/format";
 
 export type Play = Schemas["ReplayedPlay"];
 export type Clip = Schemas["ReplayedClip"];
@@ -158,4 +160,99 @@ export function nextChange(changes: readonly number[], at_ms: number): number {
 
 export function changeBefore(changes: readonly number[], at_ms: number): number {
   return changes.findLast((moment) => moment < at_ms) ?? at_ms;
+}
+
+// What is said in words beside a replay.
+
+/** What was answered, whatever the kind of trial: each key of the answer that says something. */
+export function answerWords({ answer }: Play): string {
+  if (answer === null) return "no answer";
+  // How a trial came about, which is not what was answered: it is said after an answer, and makes none.
+  const { answers, values, known, arrangement, step_frames, moves, ...rest } = answer;
+  const parts: string[] = [];
+  if (isRecord(answers)) {
+    for (const [scale, one] of Object.entries(answers)) {
+      if (!isRecord(one)) continue;
+      parts.push(`${words(scale)} ${one["not_applicable"] === true ? "not applicable" : plain(one["response"] ?? "–")}`);
+    }
+  }
+  if (Array.isArray(values)) parts.push(`${values.length} samples of the slider`);
+  for (const [key, value] of Object.entries(rest)) {
+    const isSaid = key === "kind" || value === null || (key === "response" && parts.length > 0) || value === false;
+    if (!isSaid) parts.push(value === true ? words(key) : `${words(key)} ${typeof value === "string" ? words(value) : plain(value)}`);
+  }
+  if (parts.length === 0) return "no answer";
+  for (const [key, value] of Object.entries({ step_frames, moves, arrangement })) {
+    if (value !== undefined && value !== null) parts.push(`${words(key)} ${typeof value === "string" ? words(value) : plain(value)}`);
+  }
+  if (typeof known === "number") parts.push(`stimulus chosen by ${known === 1 ? "1 answer" : `${known} answers`} before`);
+  return parts.join(", ");
+}
+
+const isRecord = (value: unknown): value is Record<string, unknown> => typeof value === "object" && value !== null && !Array.isArray(value);
+
+/** "12, 15 to 18", or "none". */
+export function missingWords({ missing }: Lane): string {
+  return missing.map(([first, last]) => (first === last ? String(first) : `${first} to ${last}`)).join(", ") || "none";
+}
+
+export function longestWords({ stands }: Lane): string {
+  const longest = stands.toSorted((one, other) => other.to_ms - other.from_ms - (one.to_ms - one.from_ms))[0];
+  return longest ? `frame ${longest.index}, ${fixed(longest.to_ms - longest.from_ms, 1)} ms` : "–";
+}
+
+/** The slider of a continuous rating over the time line: when each sampled frame stood, and how far up the slider was. */
+export function traceOf(play: Play, played: PlayedBack, trial: Schemas["Replay"]["trial"]): [number, number][] {
+  const { values, step_frames } = play.answer ?? {};
+  const lane = played.scenes.at(-1)?.lanes[0];
+  if (trial.kind !== "continuous_rating" || !lane || !Array.isArray(values) || typeof step_frames !== "number") return [];
+  const range = Math.max(1e-9, trial.maximum - trial.minimum);
+  return values.flatMap((value: unknown, sample): [number, number][] => {
+    const stand = lane.stands.find(({ index }) => index >= sample * step_frames);
+    return stand && typeof value === "number" ? [[stand.from_ms, (value - trial.minimum) / range]] : [];
+  });
+}
+
+// Long waits, such as ten minutes before an answer, are drawn and played as short ones: a time line of knots.
+
+/** Waits longer than this are folded to it. */
+const FOLDED_MS = 1_500;
+
+type Knot = readonly [real_ms: number, folded_ms: number];
+
+export interface Folding {
+  knots: readonly Knot[];
+  length_ms: number;
+  fold(real_ms: number): number;
+  unfold(folded_ms: number): number;
+}
+
+/** Fold whatever is between these spans, up to `end_ms`; spans ascend and do not overlap. */
+export function folding(spans: readonly { start_ms: number; end_ms: number }[], end_ms: number): Folding {
+  const knots: Knot[] = [[0, 0]];
+  const add = (real_ms: number, is_wait: boolean): void => {
+    const [real_before, folded_before] = knots.at(-1) ?? [0, 0];
+    if (real_ms <= real_before) return;
+    const length = real_ms - real_before;
+    knots.push([real_ms, folded_before + (is_wait ? Math.min(length, FOLDED_MS) : length)]);
+  };
+  for (const span of spans) {
+    add(span.start_ms, true);
+    add(span.end_ms, false);
+  }
+  add(end_ms, true);
+  return {
+    knots,
+    length_ms: knots.at(-1)?.[1] ?? 0,
+    fold: (real_ms) => between(knots, real_ms, 0, 1),
+    unfold: (folded_ms) => between(knots, folded_ms, 1, 0),
+  };
+}
+
+function between(knots: readonly Knot[], value: number, from: 0 | 1, to: 0 | 1): number {
+  const after = knots.findIndex((knot) => knot[from] >= value);
+  const [right, left] = [knots[after < 0 ? knots.length - 1 : after], knots[after - 1]];
+  if (!right) return 0;
+  if (!left || after < 0) return right[to];
+  return left[to] + ((right[to] - left[to]) * (value - left[from])) / (right[from] - left[from]);
 }

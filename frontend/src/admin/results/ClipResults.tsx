@@ -1,10 +1,8 @@
 /** Every clip with its answers; the chosen one plays beside them. */
-
 import { Card, Group, ScrollArea, Stack, Table, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useMemo, useState } from "react";
-import type { Schemas } from "../api";
-import { clipsQuery } from "../queries";
+import { type Schemas, clipsQuery } from "../api";
 import { ClipCard } from "../clips/ClipCard";
 import { fixed } from "../ui/format";
 import type { Factors } from "./plots";

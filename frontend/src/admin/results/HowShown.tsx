@@ -1,9 +1,7 @@
 /** Response times and playback, whatever the kind of trial. */
-
 import { Card, Text, Title } from "@mantine/core";
 import { useMemo } from "react";
-import { words } from "../ui/format";
-import { methodWords, ruleWords } from "../ui/play-words";
+import { words, methodWords, ruleWords } from "../ui/format";
 import { PlotFigure } from "../ui/PlotFigure";
 import { delayRows, timeRows } from "./figure-rows";
 import { type AnyResults, delayPlot, timePlot } from "./plots";

@@ -1,14 +1,12 @@
 /** The results as the study's kind of trial shows them, charts and all: loaded once there are answers. */
-
 import { Alert, Card, SimpleGrid, Stack, Text, Title } from "@mantine/core";
 import { useMemo } from "react";
 import type { Schemas } from "../api";
-import { counted, when } from "../ui/format";
+import { counted, when, labelOfOrigin } from "../ui/format";
 import { PlotFigure } from "../ui/PlotFigure";
 import { ClipResults } from "./ClipResults";
 import { cellRows, marginRows } from "./figure-rows";
 import { HowShown } from "./HowShown";
-import { labelOfOrigin } from "./origins";
 import { PairResults } from "./PairResults";
 import { type AnyResults, cellPlot, type Factors, labelsOf, marginPlot } from "./plots";
 import { ThresholdResults } from "./ThresholdResults";

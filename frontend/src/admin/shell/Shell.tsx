@@ -1,16 +1,70 @@
 /** The frame of every page: who is signed in, where one can go. */
 
-import { Alert, AppShell, Burger, Group, NavLink, Text } from "@mantine/core";
-import { useDisclosure } from "@mantine/hooks";
-import { useQuery } from "@tanstack/react-query";
+import { Button, Menu, useMantineColorScheme, Alert, AppShell, Burger, Group, NavLink, Text } from "@mantine/core";
 import { Link, Outlet, useLocation, useNavigate } from "@tanstack/react-router";
+import { api, type Schemas, unwrap, studyQuery, SIGN_IN_AGAIN, sessionQuery } from "../api";
+import { useChange } from "../ui/useChange";
+import { useDocumentTitle, useDisclosure } from "@mantine/hooks";
+import { useQuery } from "@tanstack/react-query";
 import { useEffect, useState } from "react";
-import { type Schemas, SIGN_IN_AGAIN } from "../api";
-import { sessionQuery } from "../queries";
-import { Answer } from "../ui/Answer";
-import { AccountMenu } from "./AccountMenu";
-import { onDemand } from "../ui/onDemand";
-import { usePageTitle } from "./usePageTitle";
+import { Answer, onDemand } from "../ui/Answer";
+
+function AccountMenu({ account }: { account: Schemas["AccountOut"] }) {
+  const { colorScheme, setColorScheme } = useMantineColorScheme();
+  const signOut = useChange(() => unwrap(api.DELETE("/api/admin/session")), {
+    touches: [],
+    // A fresh page: nothing of what was loaded stays in memory for whoever comes next.
+    then: () => window.location.assign("/admin/sign-in"),
+  });
+  return (
+    <Menu position="bottom-end">
+      <Menu.Target>
+        <Button variant="subtle" size="compact-md">
+          {account.name} ▾
+        </Button>
+      </Menu.Target>
+      <Menu.Dropdown>
+        <Menu.Label>{account.role}</Menu.Label>
+        <Menu.Item component={Link} to="/account">
+          My account
+        </Menu.Item>
+        {(["auto", "light", "dark"] as const).map((scheme) => (
+          <Menu.Item key={scheme} onClick={() => setColorScheme(scheme)} disabled={scheme === colorScheme}>
+            {scheme === "auto" ? "As the system" : scheme === "light" ? "Light" : "Dark"}
+          </Menu.Item>
+        ))}
+        <Menu.Divider />
+        <Menu.Item onClick={() => signOut.mutate(undefined)}>Sign out</Menu.Item>
+      </Menu.Dropdown>
+    </Menu>
+  );
+}
+
+// What the browser's tab says: the page, and the study that it is of.
+
+const PAGE_TITLES: Record<string, string> = {
+  "": "Studies",
+  new: "New study",
+  blinks: "Blinks",
+  labelling: "Label video",
+  "blink-review": "Review blinks",
+  people: "People",
+  workspaces: "Workspaces",
+  backups: "Backups",
+  audit: "Audit log",
+  account: "My account",
+};
+
+function usePageTitle(pathname: string): void {
+  const [first = "", study = "", tab = "design", run, part] = pathname.split("/").slice(1);
+  const isStudy = first === "studies" && study !== "" && study !== "new";
+  const title = useQuery({ ...studyQuery(study), enabled: isStudy }).data?.summary.title ?? study;
+  const page = `${(tab || "design").charAt(0).toUpperCase()}${(tab || "design").slice(1)}`;
+  const words = isStudy
+    ? [run === undefined ? page : `${part === "replay" ? "Replay of run" : "Run"} ${run.slice(0, 8)}`, title]
+    : [PAGE_TITLES[study === "new" ? "new" : first] ?? "Not found"];
+  useDocumentTitle([...words, "Palpebra"].join(" – "));
+}
 
 const SignInAgain = onDemand(async () => (await import("./SignInAgain")).SignInAgain);
 

@@ -1,11 +1,9 @@
 /** Asks for the password over the page that was open, so that nothing that was typed there is lost. */
-
 import { Anchor, Modal, Text } from "@mantine/core";
 import { useQueryClient } from "@tanstack/react-query";
 import { useEffect } from "react";
 import { SignInHere } from "../account/SignInPage";
-import type { Schemas } from "../api";
-import { sessionQuery } from "../queries";
+import { type Schemas, sessionQuery } from "../api";
 
 interface Props {
   account: Schemas["AccountOut"];

@@ -3,8 +3,8 @@
 import { Alert, Stack, Text } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
-import { launchChecksQuery, sealQuery, studyQuery } from "../queries";
-import { TurnedAway } from "./TurnedAway";
+import { launchChecksQuery, sealQuery, studyQuery } from "../api";
+import { TurnedAway } from "./StatusBadge";
 
 export function BeforeOpening({ study, status }: { study: string; status: string }) {
   const design = useQuery(studyQuery(study)).data?.design;

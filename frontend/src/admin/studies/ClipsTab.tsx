@@ -1,13 +1,81 @@
-import { Group, Select, Stack, Text } from "@mantine/core";
+import { Button, Group, Stack, Text, TextInput, Select } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
+import { useState, useMemo } from "react";
+import { api, unwrap, studyQuery, type Schemas, clipsQuery, useMay } from "../api";
+import { forgetWork, keptWork } from "../builder/kept";
+import { UploadClips, StillNeeded } from "../clips/UploadClips";
+import { playNeeded, useUpload } from "../clips/useUpload";
+import { useChange } from "../ui/useChange";
+import { declaredPattern, patternProblem } from "./file-pattern";
 import { useParams } from "@tanstack/react-router";
-import { useMemo, useState } from "react";
-import type { Schemas } from "../api";
-import { ClipGrid } from "../clips/ClipGrid";
-import { clipsQuery, useMay } from "../queries";
+import { ClipGrid } from "../clips/ClipCard";
 import { Answer } from "../ui/Answer";
 import { counted } from "../ui/format";
-import { AddClips } from "./AddClips";
+
+// Further clips, or others in the place of those there are: saved as a new version.
+
+function AddClips({ study }: { study: string }) {
+  const detail = useQuery(studyQuery(study)).data;
+  const sent = useUpload(`study ${study}`);
+  const upload = sent.received;
+  const [typed, setPattern] = useState<string | null>(null);
+  const files = upload?.files.map(({ name }) => name) ?? [];
+  const pattern = typed ?? (declaredPattern(detail?.design.factors ?? [], files) || (upload?.suggested_pattern ?? ""));
+  const needed = upload?.has_manifest === true ? false : patternProblem(pattern, files);
+  const notPlayed = playNeeded(sent);
+  const kept = keptWork(study);
+  const save = useChange(
+    () => {
+      const revision = detail?.summary.revision ?? 1;
+      const levels = upload?.has_manifest === true ? null : { pattern };
+      const body = { revision, toml: kept?.toml ?? detail?.toml ?? "", note: "clips", upload: upload?.id ?? null, levels };
+      return unwrap(api.POST("/api/admin/studies/{study}/versions", { params: { path: { study } }, body }));
+    },
+    {
+      touches: [
+        ["study", study],
+        ["clips", study],
+      ],
+      done: "Saved as a new version.",
+      before: () => forgetWork(study),
+      then: sent.forget,
+    },
+  );
+  return (
+    <details className="element">
+      <summary>Add or replace clips</summary>
+      <Stack gap="sm" mt="xs">
+        <Text size="sm">
+          A clip takes the place of the one with the same levels and exemplar. Clips of a level that is not declared yet: add the level in
+          the builder, leave it unsaved there, and come back: both are saved together.
+          {kept !== null && " The unsaved work of the builder will be saved with them."}
+        </Text>
+        <UploadClips upload={sent} />
+        {upload !== null && upload.files.length > 0 && (
+          <Group align="end">
+            {!upload.has_manifest && (
+              <TextInput
+                label="Pattern"
+                description="Names of factors in braces."
+                value={pattern}
+                onChange={(event) => setPattern(event.currentTarget.value)}
+                w={340}
+              />
+            )}
+            <Button
+              loading={save.isPending}
+              disabled={detail === undefined || needed !== false || notPlayed !== false}
+              onClick={() => save.mutate(undefined)}
+            >
+              Save as a new version
+            </Button>
+            <StillNeeded parts={[needed, notPlayed]} />
+          </Group>
+        )}
+      </Stack>
+    </details>
+  );
+}
 
 export function ClipsTab() {
   const { study = "" } = useParams({ strict: false });

@@ -1,9 +1,483 @@
-import { Alert, Stack, Tabs, TextInput, Title } from "@mantine/core";
-import { useRef, useState } from "react";
-import { FromDefinition } from "./FromDefinition";
-import { FromOwnClips } from "./FromOwnClips";
-import { useOwnWorkspaces } from "../queries";
-import { FromShipped } from "./FromShipped";
+/** A new study: from a shipped one, from a definition, or from clips of one's own. */
+
+import { useDebouncedValue } from "@mantine/hooks";
+import { useQuery } from "@tanstack/react-query";
+import { api, type Schemas, unwrap, Refused, studiesQuery, useOwnWorkspaces } from "../api";
+import { Design, TomlText } from "./Design";
+import { useNavigate, Link } from "@tanstack/react-router";
+import { useChange } from "../ui/useChange";
+import {
+  Button,
+  Select,
+  Stack,
+  TextInput,
+  Alert,
+  SegmentedControl,
+  Table,
+  Text,
+  Textarea,
+  Anchor,
+  Card,
+  Group,
+  SimpleGrid,
+  Title,
+  Tabs,
+} from "@mantine/core";
+import { useState, useRef } from "react";
+import { UploadClips, StillNeeded } from "../clips/UploadClips";
+import { playNeeded, useUpload } from "../clips/useUpload";
+import { factorsOfTable, fieldsOf, levelsByPattern, patternProblem, reservedProblem, unnamedFactors, withNames } from "./file-pattern";
+import { Answer } from "../ui/Answer";
+
+// TOML with its problems, checked while typing, and what it expands to.
+
+interface Props {
+  toml: string;
+  onChange: (toml: string) => void;
+}
+
+function DefinitionEditor({ toml, onChange }: Props) {
+  const checked = useCheck(toml);
+  return (
+    <>
+      <TomlText toml={toml} onChange={onChange} problems={checked?.problems ?? []} />
+      {checked?.design !== null && checked?.design !== undefined && <Design design={checked.design} />}
+    </>
+  );
+}
+
+/** What the server says of a definition, half a second after the last key. */
+function useCheck(toml: string): Schemas["Checked"] | undefined {
+  const [settled] = useDebouncedValue(toml, 500);
+  const { data } = useQuery({
+    queryKey: ["check", settled],
+    queryFn: () => unwrap(api.POST("/api/admin/definitions/check", { body: { toml: settled } })),
+    enabled: settled.trim() !== "",
+    placeholderData: (before) => before,
+  });
+  return settled.trim() === "" ? undefined : data;
+}
+
+const isTaken = (error: Error | null) => error instanceof Refused && error.code === "name_taken";
+
+/** Why no study was made, but for its name; null where that is not so. */
+const refusal = (error: Error | null): string | null => (error === null || isTaken(error) ? null : error.message);
+
+/**
+ * Create a study and open it; `taken` is told where another study has the name.
+ * @param told whether the page itself tells of every other refusal
+ */
+function useCreate(taken: (message: string) => void, created?: () => void, told = false) {
+  const navigate = useNavigate();
+  return useChange((body: Schemas["NewStudy"]) => unwrap(api.POST("/api/admin/studies", { body })), {
+    touches: [["studies"]],
+    done: "The study is created, as a draft.",
+    refused: (error) => {
+      if (!isTaken(error)) return told;
+      taken(error.message);
+      return true;
+    },
+    then: ({ summary }) => {
+      created?.();
+      void navigate({ to: `/studies/${summary.name}` });
+    },
+  });
+}
+
+function FromDefinition({ name, onTaken }: { name: string; onTaken: (message: string) => void }) {
+  const [toml, setToml] = useState("");
+  const sent = useUpload("new definition");
+  const upload = sent.received;
+  const [shipped, setShipped] = useState<string | null>(null);
+  const experiments = useQuery({ queryKey: ["experiments"], queryFn: () => unwrap(api.GET("/api/admin/experiments")) });
+  const create = useCreate(onTaken, sent.forget);
+  const [pattern, setPattern] = useState("");
+  const levels = upload?.has_manifest === true ? null : { pattern };
+  const hasClips = experiments.data?.some(({ name: value, clips_ready }) => value === shipped && clips_ready) === true;
+  const usable = useCheck(toml)?.design != null;
+  const needed = [
+    name === "" && "a short name (above)",
+    !usable && "a definition without problems",
+    playNeeded(sent),
+    upload === null && !hasClips && "clips built for it, or a shipped experiment whose clips are built to begin with",
+  ];
+  return (
+    <Stack>
+      <Select
+        label="Begin with"
+        placeholder="an empty page"
+        clearable
+        data={experiments.data?.map(({ name: value, title }) => ({ value, label: title })) ?? []}
+        value={shipped}
+        onChange={(chosen) => {
+          setShipped(chosen);
+          const definition = experiments.data?.find((experiment) => experiment.name === chosen);
+          if (definition !== undefined) setToml(definition.toml);
+        }}
+        maw={400}
+      />
+      <DefinitionEditor toml={toml} onChange={setToml} />
+      <UploadClips
+        upload={sent}
+        label="Clips built for it"
+        description={
+          <>
+            A zip of the folder that <code>stimuli build</code> or <code>stimuli manifest</code> wrote, or of clips alone. Not needed where
+            the clips of the experiment chosen above fit.
+          </>
+        }
+        accept=".zip"
+      />
+      {upload !== null && !upload.has_manifest && (
+        <TextInput
+          label="Pattern of the file names"
+          description="The zip holds no manifest.json, so the names say which levels each clip has."
+          placeholder="{character}_{speed}_{exemplar}.mp4"
+          value={pattern}
+          onChange={(event) => setPattern(event.currentTarget.value)}
+          maw={500}
+        />
+      )}
+      <StillNeeded parts={needed} />
+      <Button
+        style={{ alignSelf: "flex-start" }}
+        disabled={needed.some(Boolean)}
+        loading={create.isPending || sent.sending !== null || (sent.progress?.waiting ?? 0) > 0}
+        onClick={() => create.mutate(upload === null ? { name, toml, shipped } : { name, toml, upload: upload.id, levels })}
+      >
+        Create
+      </Button>
+    </Stack>
+  );
+}
+
+// What participants do with somebody's own clips: the templates to begin from.
+
+type Template = NonNullable<Schemas["OwnClips"]["template"]>;
+
+interface Words {
+  value: Template;
+  label: string;
+  about: string;
+  question: string;
+  /** Whether the two ends of a scale are asked for. */
+  ends: boolean;
+}
+
+const TEMPLATES: readonly [Words, ...Words[]] = [
+  {
+    value: "rating",
+    label: "Rating on seven points",
+    about: "One clip after the other, each rated from 1 to 7.",
+    question: "How natural was this clip?",
+    ends: true,
+  },
+  {
+    value: "slider",
+    label: "Rating on a slider",
+    about: "One clip after the other, each rated on a slider from 0 to 100.",
+    question: "How natural was this clip?",
+    ends: true,
+  },
+  {
+    value: "sliders",
+    label: "Several sliders",
+    about: "One clip after the other, with two sliders from 0 to 100 to begin with.",
+    question: "How natural was this clip?",
+    ends: true,
+  },
+  {
+    value: "acr",
+    label: "Mean opinion score (ACR)",
+    about: "Absolute category rating of ITU-T P.910: Bad, Poor, Fair, Good, Excellent.",
+    question: "How would you rate the quality of this clip?",
+    ends: false,
+  },
+  {
+    value: "dcr",
+    label: "Degradation (DCR)",
+    about: "ITU-T P.910: the reference, then the clip, from Very annoying to Imperceptible.",
+    question: "How impaired is the second clip, compared with the first?",
+    ends: false,
+  },
+  {
+    value: "pairs",
+    label: "Paired comparisons",
+    about: "Two clips side by side: which of them? Every clip meets every other of the same exemplar number.",
+    question: "Which clip looked more natural?",
+    ends: false,
+  },
+  {
+    value: "just_noticeable",
+    label: "Just-noticeable difference",
+    about:
+      "Two clips in turn, the standard and a stimulus, in adaptive series. One factor has numbers as its levels; the lowest is the standard.",
+    question: "In which of the two clips was the effect stronger?",
+    ends: false,
+  },
+];
+
+// A study from somebody's own clips: upload, say which levels each has, ask a question.
+
+const MAX_ROWS = 100;
+
+function FromOwnClips({ name, onTaken }: { name: string; onTaken: (message: string) => void }) {
+  const upload = useUpload("new study");
+  const { last, received } = upload;
+  return (
+    <Stack>
+      <UploadClips upload={upload} />
+      {last !== null && (
+        <Levels
+          key={last.id}
+          name={name}
+          upload={last}
+          isLooked={received !== null}
+          notPlayed={playNeeded(upload)}
+          onTaken={onTaken}
+          onCreated={upload.forget}
+        />
+      )}
+    </Stack>
+  );
+}
+
+const inWords = (levels: string[]) => `${levels.slice(0, 4).join(", ")}${levels.length > 4 ? " …" : ""}`;
+
+interface LevelsProps {
+  name: string;
+  upload: Schemas["UploadOut"];
+  /** Whether every file has been looked into. */
+  isLooked: boolean;
+  /** What is needed for every clip to play. */
+  notPlayed: string | false;
+  onTaken: (message: string) => void;
+  onCreated: () => void;
+}
+
+function Levels({ name, upload, isLooked, notPlayed, onTaken, onCreated }: LevelsProps) {
+  const [by, setBy] = useState("pattern");
+  // As the files suggest it, also after one was left out or came, until it is written.
+  const [written, setWritten] = useState<{ pattern?: string; csv?: string }>({});
+  const pattern = written.pattern ?? upload.suggested_pattern ?? "";
+  const csv = written.csv ?? `file,factor\n${upload.files.map((file) => `${file.name},`).join("\n")}`;
+  const [template, setTemplate] = useState(TEMPLATES[0]);
+  const [asked, setAsked] = useState({ title: "", question: template.question, low: "very unnatural", high: "very natural" });
+  const [names, setNames] = useState<Record<string, string>>({});
+  const files = upload.files.map((file) => file.name);
+  const create = useCreate(onTaken, onCreated, true);
+  const refused = refusal(create.error);
+  const needed = [
+    (!isLooked || files.length === 0) && "clips that have been looked into",
+    notPlayed,
+    by === "pattern" ? patternProblem(withNames(pattern, names), files) : reservedProblem(factorsOfTable(csv)),
+    name === "" && "a short name (above)",
+    asked.title.trim() === "" && "a title of the study",
+  ];
+  const field = (key: keyof typeof asked, label: string) => (
+    <TextInput label={label} value={asked[key]} onChange={(event) => setAsked({ ...asked, [key]: event.currentTarget.value })} />
+  );
+  return (
+    <Stack>
+      <SegmentedControl
+        aria-label="Where the levels come from"
+        value={by}
+        onChange={setBy}
+        data={[
+          { value: "pattern", label: "By file names" },
+          { value: "csv", label: "By a table" },
+        ]}
+      />
+      {by === "pattern" ? (
+        <>
+          <TextInput
+            label="Pattern"
+            description="Names of factors in braces; {exemplar} numbers the clips of a cell."
+            placeholder="{character}_{speed}_{exemplar}.mp4"
+            value={pattern}
+            onChange={(event) => setWritten({ ...written, pattern: event.currentTarget.value })}
+          />
+          {unnamedFactors(pattern, files).map(({ field, levels }) => (
+            <TextInput
+              key={field}
+              label={`What are ${inWords(levels)}?`}
+              description={`The name of this factor in tables and figures: what they are levels of, as slow and fast are of ‘speed’. Left open it is called ${field}.`}
+              value={names[field] ?? ""}
+              onChange={(event) => setNames({ ...names, [field]: event.currentTarget.value })}
+              maw={400}
+            />
+          ))}
+          <LevelsTable pattern={withNames(pattern, names)} files={files} />
+        </>
+      ) : (
+        <Textarea
+          className="editor"
+          label="Table (CSV)"
+          description="Column file, then one column a factor; exemplar is optional."
+          autosize
+          minRows={6}
+          maxRows={16}
+          value={csv}
+          onChange={(event) => setWritten({ ...written, csv: event.currentTarget.value })}
+        />
+      )}
+      <Select
+        label="What participants do"
+        description={template.about}
+        data={TEMPLATES.map(({ value, label }) => ({ value, label }))}
+        value={template.value}
+        allowDeselect={false}
+        onChange={(value) => {
+          const chosen = TEMPLATES.find((one) => one.value === value) ?? template;
+          // A question of the experimenter's own stays.
+          if (asked.question === template.question) setAsked({ ...asked, question: chosen.question });
+          setTemplate(chosen);
+        }}
+      />
+      {field("title", "Title of the study")}
+      {field("question", "Question")}
+      {template.ends && field("low", "Lowest answer means")}
+      {template.ends && field("high", "Highest answer means")}
+      <StillNeeded parts={needed} />
+      {refused !== null && (
+        <Alert color="red" variant="light" title="The study was not created" role="alert">
+          {refused}
+        </Alert>
+      )}
+      <Button
+        style={{ alignSelf: "flex-start" }}
+        disabled={needed.some(Boolean)}
+        loading={create.isPending}
+        onClick={() =>
+          create.mutate({
+            name,
+            upload: upload.id,
+            levels: by === "pattern" ? { pattern: withNames(pattern, names) } : { csv },
+            own_clips: { ...asked, template: template.value },
+          })
+        }
+      >
+        Create
+      </Button>
+    </Stack>
+  );
+}
+
+/** What the pattern reads from the names: all of a usual study, of thousands the first, those that do not fit before them. */
+function LevelsTable({ pattern, files }: { pattern: string; files: string[] }) {
+  const fields = fieldsOf(pattern);
+  if (fields.length === 0) return null;
+  const rows = levelsByPattern(pattern, files);
+  const strays = rows.filter(({ levels }) => levels === null).length;
+  return (
+    <div>
+      <Text size="sm" mb={4} role="status">
+        {strays === 0
+          ? `All ${files.length} file names fit the pattern.`
+          : `${strays} of ${files.length} file names do not fit the pattern.`}
+        {rows.length > MAX_ROWS && ` Shown are ${MAX_ROWS} of them.`}
+      </Text>
+      <div className="long-list levels" tabIndex={0} role="region" aria-label="Levels of the files">
+        <Table aria-label="What the pattern reads">
+          <Table.Thead>
+            <Table.Tr>
+              <Table.Th>file</Table.Th>
+              {fields.map((field) => (
+                <Table.Th key={field}>{field}</Table.Th>
+              ))}
+            </Table.Tr>
+          </Table.Thead>
+          <Table.Tbody>
+            {rows.slice(0, MAX_ROWS).map(({ file, levels }) => (
+              <Table.Tr key={file}>
+                <Table.Td className="wrap-anywhere">{file}</Table.Td>
+                {fields.map((field, index) => (
+                  <Table.Td key={field}>{levels?.[index] ?? "does not fit"}</Table.Td>
+                ))}
+              </Table.Tr>
+            ))}
+          </Table.Tbody>
+        </Table>
+      </div>
+    </div>
+  );
+}
+
+function FromShipped({ name, onTaken }: { name: string; onTaken: (message: string) => void }) {
+  const shipped = useQuery({ queryKey: ["experiments"], queryFn: () => unwrap(api.GET("/api/admin/experiments")) });
+  const create = useCreate(onTaken);
+  const present = new Set(useQuery(studiesQuery).data?.map((study) => study.name));
+  return (
+    <Answer of={shipped}>
+      {(experiments) => (
+        <Stack>
+          <Text size="sm">
+            The three experiments of the paper, and demonstrations whose clips are built here; you can change texts and settings afterwards.
+          </Text>
+          <SimpleGrid cols={{ base: 1, sm: 3 }}>
+            {experiments
+              .filter((one) => !isUnbuiltDemo(one))
+              .map((experiment) => (
+                <Card withBorder key={experiment.name}>
+                  <Title order={2} size="h4">
+                    {experiment.title}
+                  </Title>
+                  <Text size="sm" c="dimmed" mb="md">
+                    {experiment.name}
+                  </Text>
+                  {name === "" && present.has(experiment.name) ? (
+                    <Text size="sm" mt="auto">
+                      It is{" "}
+                      <Anchor component={Link} to={`/studies/${experiment.name}`} underline="always">
+                        there already
+                      </Anchor>
+                      . Give a short name above for another one of it.
+                    </Text>
+                  ) : experiment.clips_ready ? (
+                    <Group mt="auto">
+                      <Button
+                        loading={create.isPending && create.variables.shipped === experiment.name}
+                        onClick={() => create.mutate({ name: name || experiment.name, shipped: experiment.name })}
+                      >
+                        Create “{name || experiment.name}”
+                      </Button>
+                    </Group>
+                  ) : (
+                    <Alert color="yellow" className="wrap-anywhere">
+                      Its clips are not built on this server. Run <code>{experiment.build}</code> there, or upload them.
+                    </Alert>
+                  )}
+                </Card>
+              ))}
+          </SimpleGrid>
+          <Unbuilt demos={experiments.filter((one) => isUnbuiltDemo(one) && !present.has(one.name))} />
+        </Stack>
+      )}
+    </Answer>
+  );
+}
+
+type Shipped = Schemas["ShippedExperiment"];
+
+function isUnbuiltDemo({ demonstration, clips_ready }: Shipped): boolean {
+  return demonstration && !clips_ready;
+}
+
+function Unbuilt({ demos }: { demos: Shipped[] }) {
+  if (demos.length === 0) return null;
+  return (
+    <Text size="sm" component="div">
+      Demonstrations whose clips are not built yet, each with the command that builds them on the server:
+      <ul>
+        {demos.map(({ name, title, build }) => (
+          <li key={name}>
+            {title}: <code>{build}</code>
+          </li>
+        ))}
+      </ul>
+    </Text>
+  );
+}
 
 export function CreatePage() {
   const mayCreate = useOwnWorkspaces().length > 0;

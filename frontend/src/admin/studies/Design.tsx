@@ -1,9 +1,30 @@
-/** What a definition expands to: factors, cells, blocks, minutes. */
+/** What a definition expands to: factors, cells, blocks, minutes; and its text, with each problem at its line. */
 
-import { Badge, Group, List, Stack, Table, Title } from "@mantine/core";
+import { Card, SimpleGrid, Text, Badge, Group, List, Stack, Table, Title, Alert, Textarea } from "@mantine/core";
 import type { Schemas } from "../api";
-import { Figures } from "../ui/Figures";
 import { counted } from "../ui/format";
+import { useRef } from "react";
+
+// A row of figures, each with what it counts.
+
+export function Figures({ figures }: { figures: readonly [label: string, value: string | number][] }) {
+  return (
+    <SimpleGrid cols={{ base: 2, sm: figures.length }} spacing="sm">
+      {figures.map(([label, value]) => (
+        <Card withBorder key={label} padding="sm">
+          <Text size="xl" fw={600} lh={1.3} className="number">
+            {value}
+          </Text>
+          <Text size="sm" c="dimmed">
+            {label}
+          </Text>
+        </Card>
+      ))}
+    </SimpleGrid>
+  );
+}
+
+// What a definition expands to: factors, cells, blocks, minutes.
 
 export function Design({ design }: { design: Schemas["DesignOut"] }) {
   const figures: [string, string | number][] = [
@@ -57,5 +78,59 @@ export function Design({ design }: { design: Schemas["DesignOut"] }) {
         ))}
       </Group>
     </Stack>
+  );
+}
+
+// A declaration's text, and its problems, each at its line.
+
+interface Props {
+  toml: string;
+  onChange: (toml: string) => void;
+  problems: readonly Schemas["ProblemOut"][];
+  rows?: number;
+}
+
+export function TomlText({ toml, onChange, problems, rows = 28 }: Props) {
+  const area = useRef<HTMLTextAreaElement>(null);
+  const goTo = (line: number) => {
+    const start =
+      toml
+        .split("\n")
+        .slice(0, line - 1)
+        .join("\n").length + (line > 1 ? 1 : 0);
+    const end = toml.indexOf("\n", start);
+    area.current?.focus();
+    area.current?.setSelectionRange(start, end === -1 ? toml.length : end);
+  };
+  return (
+    <div>
+      <Textarea
+        ref={area}
+        className="editor"
+        aria-label="Definition"
+        autosize
+        minRows={12}
+        maxRows={rows}
+        spellCheck={false}
+        value={toml}
+        onChange={(event) => onChange(event.currentTarget.value)}
+      />
+      {problems.length > 0 && (
+        <Alert color="red" variant="light" title="Not usable yet" my="sm" role="status">
+          <List size="sm">
+            {problems.map((problem) => (
+              <List.Item key={`${String(problem.line)}${problem.path}${problem.message}`}>
+                {problem.line !== null && (
+                  <button type="button" className="line-link" onClick={() => goTo(problem.line ?? 1)}>
+                    Line {problem.line}
+                  </button>
+                )}{" "}
+                {problem.path}: {problem.message}
+              </List.Item>
+            ))}
+          </List>
+        </Alert>
+      )}
+    </div>
   );
 }

@@ -1,10 +1,10 @@
 import { Accordion, Code, Stack } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useParams } from "@tanstack/react-router";
-import { studyQuery } from "../queries";
+import { studyQuery } from "../api";
 import { Answer } from "../ui/Answer";
 import { Design } from "./Design";
-import { TurnedAway } from "./TurnedAway";
+import { TurnedAway } from "./StatusBadge";
 
 export function DesignTab() {
   const { study = "" } = useParams({ strict: false });

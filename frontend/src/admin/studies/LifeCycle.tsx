@@ -1,10 +1,8 @@
 /** A study copied, put into the archive, taken out, or (a draft that nobody took part in) deleted. */
-
 import { Button, Card, Group, Select, Stack, Text, TextInput, Title } from "@mantine/core";
 import { useNavigate } from "@tanstack/react-router";
 import { useState } from "react";
-import { api, type Schemas, unwrap } from "../api";
-import { useOwnWorkspaces } from "../queries";
+import { api, type Schemas, unwrap, useOwnWorkspaces } from "../api";
 import { ConfirmButton } from "../ui/ConfirmButton";
 import { useChange } from "../ui/useChange";
 

@@ -1,16 +1,13 @@
 import { Button, CopyButton, Group, Stack, Text } from "@mantine/core";
 import { useInfiniteQuery, useQuery } from "@tanstack/react-query";
 import { useParams } from "@tanstack/react-router";
-import { api, type Schemas, unwrap } from "../api";
-import { studyQuery } from "../queries";
+import { api, type Schemas, unwrap, studyQuery } from "../api";
 import { ConfirmButton } from "../ui/ConfirmButton";
 import { DataTable } from "../ui/DataTable";
-import { onDemand } from "../ui/onDemand";
-import { PagedAnswer } from "../ui/PagedAnswer";
+import { onDemand, PagedAnswer } from "../ui/Answer";
 import { useChange } from "../ui/useChange";
-import { addressFor } from "./recruit";
-import { SigningButton } from "./SigningButton";
-import { TurnedAway } from "./TurnedAway";
+import { addressFor, SigningButton } from "./recruiting";
+import { TurnedAway } from "./StatusBadge";
 
 const NewLinks = onDemand(async () => (await import("./NewLinks")).NewLinks);
 

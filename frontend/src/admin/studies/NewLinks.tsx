@@ -1,10 +1,8 @@
 /** Make links: one for everybody, one a person, or to look at the study oneself. */
-
 import { Button, Card, Group, NumberInput, SegmentedControl, Select, Stack, Text, Textarea, TextInput, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";
-import { api, type Schemas, unwrap } from "../api";
-import { studyQuery } from "../queries";
+import { api, type Schemas, unwrap, studyQuery } from "../api";
 import { useChange } from "../ui/useChange";
 
 const MEANS: Record<Schemas["NewLinks"]["kind"], string> = {

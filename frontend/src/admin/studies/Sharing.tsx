@@ -1,10 +1,8 @@
 /** For owners of a study: who else may do what with it, and the workspace it belongs to. */
-
 import { Button, Card, Checkbox, Group, Select, Stack, Text, TextInput, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";
-import { api, type Schemas, unwrap } from "../api";
-import { useOwnWorkspaces } from "../queries";
+import { api, type Schemas, unwrap, useOwnWorkspaces } from "../api";
 import { Answer } from "../ui/Answer";
 import { DataTable } from "../ui/DataTable";
 import { useChange } from "../ui/useChange";

@@ -2,8 +2,7 @@ import { Alert, Anchor, Badge, Button, Group, Paper, Stack, Switch, Text, Title 
 import { useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
 import { useState } from "react";
-import type { Schemas } from "../api";
-import { sessionQuery, studiesQuery, useOwnWorkspaces } from "../queries";
+import { type Schemas, sessionQuery, studiesQuery, useOwnWorkspaces } from "../api";
 import { Answer } from "../ui/Answer";
 import { type Column, DataTable } from "../ui/DataTable";
 import { StatusBadge } from "./StatusBadge";

@@ -1,15 +1,162 @@
-/** A study's heading and tabs. */
+/** The frame of a study's pages: its name, status and tabs, and the buttons that open and close it. */
 
-import { Alert, Group, Stack, Tabs, Text, Title } from "@mantine/core";
-import { useEffect, useRef } from "react";
+import { Button, Code, CopyButton, Group, Modal, Stack, Text, Alert, Tabs, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
-import { Outlet, useLocation, useNavigate, useParams } from "@tanstack/react-router";
-import type { Schemas } from "../api";
-import { studyQuery } from "../queries";
-import { Answer } from "../ui/Answer";
-import { onDemand } from "../ui/onDemand";
-import { StatusBadge } from "./StatusBadge";
-import { StatusButtons } from "./StatusButtons";
+import { Link, Outlet, useLocation, useNavigate, useParams } from "@tanstack/react-router";
+import { api, unwrap, studyQuery, type Schemas, launchChecksQuery } from "../api";
+import { Answer, onDemand } from "../ui/Answer";
+import { addressFor, RECRUITER_NAMES } from "./recruiting";
+import { TurnedAway, StatusBadge } from "./StatusBadge";
+import { useState, useEffect, useRef } from "react";
+import { keptWork, otherWork } from "../builder/kept";
+import { ConfirmButton } from "../ui/ConfirmButton";
+import { useChange } from "../ui/useChange";
+
+// After a study is opened: the link for participants, and what each recruiter needs.
+
+interface Props {
+  study: string;
+  onClose: () => void;
+}
+
+function OpenedDialog({ study, onClose }: Props) {
+  const link = useQuery({ queryKey: ["links", study, "general"], queryFn: () => generalLink(study) });
+  const detail = useQuery(studyQuery(study)).data;
+  const recruiter = detail?.recruiter;
+  const kind = typeof recruiter?.["kind"] === "string" ? recruiter["kind"] : null;
+  return (
+    <Modal opened onClose={onClose} title="Participants can begin" size="lg" closeButtonProps={{ "aria-label": "Close" }}>
+      <Answer of={link}>
+        {({ url }) => (
+          <Stack>
+            <Address label="Link for participants" url={url} />
+            {kind === null ? (
+              <Text size="sm">
+                To recruit through Prolific, SONA or MTurk, first choose the service under{" "}
+                <Link to="/studies/$study/settings" params={{ study }} onClick={onClose}>
+                  Settings
+                </Link>
+                . The link then appears here and under Links. Until then links of these services are refused, because participants would
+                have no id, get a random completion code, and could take part twice.
+              </Text>
+            ) : (
+              <Address
+                label={`For ${RECRUITER_NAMES[kind] ?? kind}, which fills in each participant's id`}
+                url={addressFor(url, recruiter)}
+              />
+            )}
+            <TurnedAway design={detail?.design} />
+            <Text size="sm" c="dimmed">
+              Personal links, quotas and completion codes are under{" "}
+              <Link to="/studies/$study/links" params={{ study }} onClick={onClose}>
+                Links
+              </Link>{" "}
+              and{" "}
+              <Link to="/studies/$study/settings" params={{ study }} onClick={onClose}>
+                Settings
+              </Link>
+              .
+            </Text>
+          </Stack>
+        )}
+      </Answer>
+    </Modal>
+  );
+}
+
+/** The first link for everybody; made where there is none. */
+async function generalLink(study: string): Promise<{ url: string }> {
+  const path = { params: { path: { study } } };
+  const { links } = await unwrap(api.GET("/api/admin/studies/{study}/links", path));
+  const known = links.find((one) => one.kind === "general" && one.recruiter === null);
+  if (known !== undefined) return known;
+  const body = { kind: "general" as const, label: "everybody", labels: [], count: 1 };
+  const [made] = await unwrap(api.POST("/api/admin/studies/{study}/links", { ...path, body }));
+  if (made === undefined) throw new Error("expected a new link, got none; make one under Links");
+  return made;
+}
+
+function Address({ label, url }: { label: string; url: string }) {
+  return (
+    <div>
+      <Text size="sm" fw={600}>
+        {label}
+      </Text>
+      <Group gap="xs" wrap="nowrap">
+        <Code className="wrap-anywhere">{url}</Code>
+        <CopyButton value={url}>
+          {({ copied, copy }) => (
+            <Button size="compact-xs" variant="default" flex="none" onClick={copy} aria-label={`Copy: ${label}`}>
+              {copied ? "Copied" : "Copy"}
+            </Button>
+          )}
+        </CopyButton>
+      </Group>
+    </div>
+  );
+}
+
+const BeforeOpening = onDemand(async () => (await import("./BeforeOpening")).BeforeOpening);
+
+type Status = Schemas["StudySummary"]["status"];
+const NEXT: Record<Status, Status[]> = { draft: ["pilot", "live"], pilot: ["draft", "live", "closed"], live: ["closed"], closed: ["live"] };
+const WORDS: Record<Status, [label: string, question: string]> = {
+  draft: ["Back to draft", "Participants can no longer begin; pilot data stay."],
+  pilot: ["Open as pilot", "Participants can begin; their data are marked as pilot."],
+  live: ["Set live", "Participants can begin and their data count. Changes from now on make new versions."],
+  closed: ["Close", "Nobody can begin any more; those under way may finish."],
+};
+
+const isOpen = (status: Status) => status === "live" || status === "pilot";
+
+function StatusButtons({ summary }: { summary: Schemas["StudySummary"] }) {
+  const [opened, setOpened] = useState(false);
+  const path = { params: { path: { study: summary.name } } };
+  const change = useChange(
+    (status: Status) => unwrap(api.PUT("/api/admin/studies/{study}/status", { ...path, body: { revision: summary.revision, status } })),
+    {
+      touches: [["study", summary.name], ["studies"]],
+      // The dialog with the link says so itself; a message in the corner would lie over it on a phone.
+      done: ({ summary: { status } }) => (isOpen(status) ? null : "The status is changed."),
+      then: (detail) => setOpened(isOpen(detail.summary.status)),
+    },
+  );
+  // Loaded by what the dialog shows; the server refuses for the same reasons.
+  const isBlocked = useQuery({ ...launchChecksQuery(summary.name), enabled: false }).data?.some(({ blocks }) => blocks) ?? false;
+  const preview = useChange(
+    () =>
+      unwrap(
+        api.POST("/api/admin/studies/{study}/links", {
+          ...path,
+          body: { kind: "preview", label: "preview", labels: [], count: 1, days: 1 },
+        }),
+      ),
+    { touches: [], then: ([link]) => link && window.open(link.url, "_blank", "noopener") },
+  );
+  return (
+    <Group gap="xs">
+      <Button variant="default" onClick={() => preview.mutate(undefined)} loading={preview.isPending}>
+        Preview as a participant
+      </Button>
+      {NEXT[summary.status].map((status) => (
+        <ConfirmButton
+          key={status}
+          label={WORDS[status][0]}
+          question={`${WORDS[status][1]}${keptWork(summary.name) === null && otherWork(summary.name).length === 0 ? "" : " The work in the builder is not saved and not part of it."}`}
+          confirm={WORDS[status][0]}
+          harmless={status !== "closed"}
+          blocked={status === "live" && isBlocked}
+          onConfirm={() => change.mutate(status)}
+        >
+          {isOpen(status) && <BeforeOpening study={summary.name} status={status} />}
+        </ConfirmButton>
+      ))}
+      {opened && <OpenedDialog study={summary.name} onClose={() => setOpened(false)} />}
+    </Group>
+  );
+}
+
+// A study's heading and tabs.
 
 const FailingClips = onDemand(async () => (await import("../monitor/FailingClips")).FailingClips);
 

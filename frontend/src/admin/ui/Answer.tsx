@@ -1,8 +1,11 @@
-/** What a page shows while it waits, and where the server refused. */
+/** What stands in a page's place while it waits, where the server refused, and where there is no page. */
 
-import { Alert, Button, Center, Loader } from "@mantine/core";
-import type { UseQueryResult } from "@tanstack/react-query";
-import type { ReactNode } from "react";
+import { Alert, Button, Center, Loader, Group, Text, Anchor, Container, Title } from "@mantine/core";
+import type { UseQueryResult, InfiniteData, UseInfiniteQueryResult } from "@tanstack/react-query";
+import { type ReactNode, type ComponentType, lazy, Suspense } from "react";
+import { Link } from "@tanstack/react-router";
+
+// What a page shows while it waits, and where the server refused.
 
 export function ErrorAlert({ error, retry }: { error: Error; retry?: () => void }) {
   return (
@@ -23,10 +26,74 @@ export function Answer<T>({ of, children }: { of: UseQueryResult<T>; children: (
   return <Waiting />;
 }
 
-export function Waiting() {
+function Waiting() {
   return (
     <Center py="xl">
       <Loader role="status" aria-label="Loading" />
     </Center>
   );
+}
+
+// A long list that the server gives a page at a time: what there is of it, how much that is, and the way to more.
+
+interface Props<Page> {
+  of: UseInfiniteQueryResult<InfiniteData<Page>>;
+  shown: number;
+  /** How many there are on all pages, where the server says so. */
+  total?: number | undefined;
+  /** What the button for the next page says. */
+  more: string;
+  children: ReactNode;
+}
+
+export function PagedAnswer<Page>({ of, shown, total, more, children }: Props<Page>) {
+  return (
+    <>
+      {of.error !== null && <ErrorAlert error={of.error} retry={() => void of.refetch()} />}
+      {of.isPending && (
+        <Center py="xl">
+          <Loader role="status" aria-label="Loading" />
+        </Center>
+      )}
+      {of.data !== undefined && children}
+      {of.hasNextPage && (
+        <Group>
+          <Button variant="default" loading={of.isFetchingNextPage} onClick={() => void of.fetchNextPage()}>
+            {more}
+          </Button>
+          {total !== undefined && (
+            <Text size="sm" c="dimmed">
+              {shown.toLocaleString("en")} of {total.toLocaleString("en")}
+            </Text>
+          )}
+        </Group>
+      )}
+    </>
+  );
+}
+
+export function NotFound() {
+  return (
+    <Container size="sm" py="xl">
+      <Title order={1}>Nothing is here</Title>
+      <Text my="md">The address may be mistyped, or the study was deleted.</Text>
+      <Anchor component={Link} to="/">
+        All studies
+      </Anchor>
+    </Container>
+  );
+}
+
+// Parts of a page whose code loads when they are first shown: charts, the builder's forms.
+
+/** `load`'s component; a loader stands in its place until its code is there. */
+export function onDemand<Props extends object>(load: () => Promise<ComponentType<Props>>): ComponentType<Props> {
+  const Loaded = lazy(async () => ({ default: await load() }));
+  return function OnDemand(props: Props) {
+    return (
+      <Suspense fallback={<Waiting />}>
+        <Loaded {...props} />
+      </Suspense>
+    );
+  };
 }

@@ -1,23 +1,25 @@
-/** An Observable Plot drawn into the page, in the page's colours and as wide as its place. */
+/** Charts: an Observable Plot drawn into the page, in the page's colours and as wide as its place. */
 
 import { Button, Group } from "@mantine/core";
 import { useElementSize } from "@mantine/hooks";
 import * as Plot from "@observablehq/plot";
-import { useEffect, useRef } from "react";
+import { useEffect, useRef, useMemo } from "react";
 import { allowStyles } from "../nonce";
-import { downloadText } from "./download";
+import { downloadText } from "./useChange";
 import { csvText, type Row, svgText } from "./figure-files";
+
+// An Observable Plot drawn into the page, in the page's colours and as wide as its place.
 
 const WIDEST_PX = 720;
 
-interface Props {
+interface PlotProps {
   options: Plot.PlotOptions;
   label: string;
   /** Where the figure can be saved: its numbers. */
   rows?: readonly Row[];
 }
 
-export function PlotFigure({ options, label, rows }: Props) {
+export function PlotFigure({ options, label, rows }: PlotProps) {
   const { ref: measured, width: room } = useElementSize();
   const figureBox = useRef<HTMLDivElement>(null);
   const width = Math.min(WIDEST_PX, Math.floor(room));
@@ -43,7 +45,7 @@ export function PlotFigure({ options, label, rows }: Props) {
   );
 }
 
-function Saving({ options, label, rows }: Required<Props>) {
+function Saving({ options, label, rows }: Required<PlotProps>) {
   const name = label.toLowerCase().replaceAll(/\W+/g, "-");
   const button = (kind: string, save: () => void) => (
     <Button size="compact-xs" variant="default" aria-label={`Save as ${kind}: ${label}`} onClick={save}>
@@ -56,4 +58,36 @@ function Saving({ options, label, rows }: Required<Props>) {
       {button("CSV", () => downloadText(`${name}.csv`, csvText(rows)))}
     </Group>
   );
+}
+
+/** Closure over time at 300 samples a second, shut below; `other` is the right eye where both were measured. */
+function closurePlot(closure: readonly number[], height = 110, other: readonly number[] = []): Plot.PlotOptions {
+  const line = { x: (_: number, frame: number) => (frame * 1000) / 300, y: (value: number) => value, strokeWidth: 1.5 };
+  return {
+    height,
+    marginBottom: 34,
+    marginLeft: 34,
+    x: { label: "time (ms)" },
+    y: { domain: [1, 0], ticks: 3, label: "closure" },
+    marks: [
+      Plot.ruleY([0, 1], { strokeOpacity: 0.2 }),
+      Plot.lineY(closure, line),
+      ...(other.length > 0 ? [Plot.lineY(other, { ...line, strokeDasharray: "4 3" })] : []),
+    ],
+  };
+}
+
+// Closure of an eye over time, as a chart.
+
+interface ClosureProps {
+  closure: readonly number[];
+  label: string;
+  height?: number;
+  /** The right eye's, where both were measured. */
+  other?: readonly number[];
+}
+
+export function ClosureFigure({ closure, label, height, other }: ClosureProps) {
+  const options = useMemo(() => closurePlot(closure, height, other), [closure, height, other]);
+  return <PlotFigure options={options} label={label} />;
 }

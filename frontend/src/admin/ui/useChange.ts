@@ -1,7 +1,17 @@
-/** A change on the server: what it touches is loaded again, and a refusal is told. */
+/** A change on the server and what comes of it: loaded again, told in the corner, saved as a file. */
 
+import type { NotificationData } from "@mantine/notifications";
 import { type QueryKey, useMutation, useQueryClient } from "@tanstack/react-query";
-import { notify } from "./notify";
+
+// Short messages in the corner of the page; their code loads after the page itself.
+
+export const loadNotifications = () => import("@mantine/notifications");
+
+export function notify(message: NotificationData): void {
+  void loadNotifications().then(({ notifications }) => notifications.show({ closeButtonProps: { "aria-label": "Dismiss" }, ...message }));
+}
+
+// A change on the server: what it touches is loaded again, and a refusal is told.
 
 interface Options<T> {
   touches: QueryKey[];
@@ -29,4 +39,14 @@ export function useChange<Input, T>(change: (input: Input) => Promise<T>, { touc
       if (!refused?.(error)) notify({ title: "That did not work", message: error.message, color: "red" });
     },
   });
+}
+
+/** Offer text as a file to save. */
+export function downloadText(name: string, text: string, type = "text/csv"): void {
+  const address = URL.createObjectURL(new Blob([text], { type }));
+  const link = document.createElement("a");
+  link.href = address;
+  link.download = name;
+  link.click();
+  URL.revokeObjectURL(address);
 }

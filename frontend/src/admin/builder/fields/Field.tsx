@@ -1,10 +1,412 @@
-/** The editor of one key of the declaration, chosen by its schema. */
+/** The editors of the declaration's keys, chosen by their schema: tables, lists of tables, and an element a line. */
 
-import { editorOf } from "../schema";
-import { Choice, Flag, Lists, Numeric, OneText, Raw, Translated, Words } from "./scalars";
-import { Dictionary, Numbers, Translations } from "./lines";
-import { ByLanguage, Elements, Table, Variants } from "./tables";
-import type { FieldProps } from "./useField";
+import { Stack, Textarea, Button, Group, TextInput, Alert, Fieldset, Menu, Select, Switch, Text } from "@mantine/core";
+import { useState } from "react";
+import { languageName } from "../../ui/format";
+import { type Data, isTable, textAt, freeName, listAt, type Path, withMoved, pathName, labelOf, singularOf, tableAt } from "../data";
+import { editorOf, type Editor, helpOf, mayBeNull, resolved, type Schema, starter, starterOf, withoutNull } from "../schema";
+import { type FieldProps, useField, Choice, Flag, Lists, Numeric, OneText, Raw, Translated, Words } from "./scalars";
+import { useBuilderHere } from "../useBuilder";
+
+// Editors that take an element a line.
+
+/** Texts in an order, each in every language: a line a text. */
+function Translations(props: FieldProps) {
+  const { value, label, help, problem, set, builder } = useField(props);
+  const texts = Array.isArray(value) ? (value as unknown[]) : [];
+  const change = (language: string, entered: string) => {
+    const lines = entered === "" ? [] : entered.split("\n");
+    const others = texts.map((text) => (isTable(text) ? text : {}));
+    const length = builder.languages.length === 1 ? lines.length : Math.max(lines.length, lines.length === 0 ? 0 : others.length);
+    const next: Data[] = Array.from({ length }, (_, index) => ({ ...others[index], [language]: lines[index] ?? "" }));
+    set(next.length === 0 ? undefined : next);
+  };
+  return (
+    <Stack gap={4}>
+      {builder.languages.map((language, index) => (
+        <Textarea
+          key={language}
+          label={builder.languages.length > 1 ? `${label}, ${languageName(language)}` : label}
+          description={index === 0 ? `${help} Here: one a line.` : undefined}
+          error={index === 0 ? problem : null}
+          autosize
+          minRows={2}
+          maxRows={12}
+          value={texts.map((text) => textAt(text, [language])).join("\n")}
+          onChange={(event) => change(language, event.currentTarget.value)}
+        />
+      ))}
+    </Stack>
+  );
+}
+
+/** Numbers in an order: one a line. What is no number stays out until it is one. */
+function Numbers(props: FieldProps) {
+  const { value, label, help, problem, set } = useField(props);
+  const [text, setText] = useState(() => (Array.isArray(value) ? value.map(String).join("\n") : ""));
+  return (
+    <Textarea
+      label={label}
+      description={`${help} Here: one a line.`}
+      error={problem}
+      autosize
+      minRows={2}
+      maxRows={12}
+      value={text}
+      onChange={(event) => {
+        setText(event.currentTarget.value);
+        const lines = event.currentTarget.value.split("\n").map((line) => line.trim());
+        const numbers = lines.filter((line) => line !== "").map(Number);
+        set(numbers.length === 0 ? undefined : numbers.filter((number) => Number.isFinite(number)));
+      }}
+    />
+  );
+}
+
+/** A number where the key holds numbers and it is one; what is none is said by the check. */
+function valueOf(entered: string, of: "text" | "number"): string | number {
+  return of === "number" && entered !== "" && Number.isFinite(Number(entered)) ? Number(entered) : entered;
+}
+
+/** Words that stand for words or numbers: `key = value`, one a line. */
+function Dictionary(props: FieldProps) {
+  const { value, label, help, problem, set } = useField(props);
+  const editor = editorOf(props.schema);
+  const of = editor.kind === "dictionary" ? editor.of : "text";
+  const [text, setText] = useState(() =>
+    Object.entries(isTable(value) ? value : {})
+      .map(([key, word]) => `${key} = ${String(word)}`)
+      .join("\n"),
+  );
+  return (
+    <Textarea
+      label={label}
+      description={`${help} Here: key = value, one a line.`}
+      error={problem}
+      autosize
+      minRows={2}
+      maxRows={12}
+      value={text}
+      onChange={(event) => {
+        setText(event.currentTarget.value);
+        const pairs = event.currentTarget.value.split("\n").map((line) => line.split("=").map((part) => part.trim()));
+        const full = pairs.filter(([key, ...rest]) => key !== undefined && key !== "" && rest.length > 0);
+        set(full.length === 0 ? undefined : Object.fromEntries(full.map(([key, ...rest]) => [key, valueOf(rest.join("="), of)])));
+      }}
+    />
+  );
+}
+
+// Names for elements that are added or copied, so that each has one of its own.
+
+/** `element` with a name (or stored value) that none of `others` has. */
+export function named(element: unknown, others: readonly unknown[], what = "name"): unknown {
+  if (!isTable(element)) return element;
+  const key = "name" in element ? "name" : "value" in element && "label" in element ? "value" : null;
+  if (key === null) return element;
+  const taken = others.map((other) => textAt(other, [key]));
+  const name = freeName(textAt(element, [key]) || what.replaceAll(" ", "_"), taken);
+  const label = element["label"];
+  return { ...element, [key]: name, ...(label === "" ? { label: name } : {}) };
+}
+
+// What can be done with one element of a list.
+
+interface ButtonsProps {
+  path: Path;
+  title: string;
+  count: number;
+}
+
+function ElementButtons({ path, title, count }: ButtonsProps) {
+  const builder = useBuilderHere();
+  const list = path.slice(0, -1);
+  const position = Number(path.at(-1));
+  const change = (to: (elements: unknown[]) => unknown[]) => builder.set(list, to(listAt(builder.data, list)));
+  const button = (word: string, does: () => void, disabled = false) => (
+    <Button size="compact-xs" variant="default" disabled={disabled} aria-label={`${word} ${title}`} onClick={does}>
+      {word}
+    </Button>
+  );
+  return (
+    <Group gap={4} wrap="nowrap">
+      {button("Up", () => change((elements) => withMoved(elements, position, position - 1)), position === 0)}
+      {button("Down", () => change((elements) => withMoved(elements, position, position + 1)), position === count - 1)}
+      {button("Copy", () => change((elements) => elements.toSpliced(position + 1, 0, named(elements[position], elements))))}
+      {button("Remove", () => change((elements) => elements.toSpliced(position, 1)))}
+    </Group>
+  );
+}
+
+// An element as small as a level or an option: its name and label on one line.
+
+type TableEditor = Extract<Editor, { kind: "table" }>;
+
+/** Whether elements are named and labelled, and little else. */
+function fitsRow({ keys }: TableEditor): boolean {
+  const names = keys.map(([name]) => name);
+  return keys.length <= 3 && names.includes("label") && (names.includes("name") || names.includes("value"));
+}
+
+interface RowProps {
+  path: Path;
+  editor: TableEditor;
+  element: unknown;
+  count: number;
+}
+
+function Row({ path, editor, element, count }: RowProps) {
+  const builder = useBuilderHere();
+  const [key = "name"] = editor.keys.map(([name]) => name).filter((name) => name !== "label");
+  const name = textAt(element, [key]);
+  const label = isTable(element) ? element["label"] : "";
+  const row = pathName(path);
+  const problem = builder.problems.find((one) => one.path === `${row}.${key}` || one.path === row)?.message ?? null;
+  // A label that says no more than the name follows it.
+  const rename = (text: string) =>
+    builder.set(path, { ...(isTable(element) ? element : {}), [key]: text, label: following(label, name, text) });
+  const more = editor.keys.filter(([inner]) => inner !== key && inner !== "label");
+  return (
+    <div className="element-row">
+      <Group gap="xs" align="end" wrap="wrap">
+        <TextInput
+          label={key === "value" ? "Stored value" : "Name"}
+          value={name}
+          error={problem}
+          w={150}
+          onChange={(event) => rename(event.currentTarget.value)}
+        />
+        {isTable(label) ? (
+          builder.languages.map((language) => (
+            <TextInput
+              key={language}
+              label={`Label, ${languageName(language)}`}
+              flex="1 1 150px"
+              value={textAt(label, [language])}
+              onChange={(event) => builder.set([...path, "label"], { ...label, [language]: event.currentTarget.value })}
+            />
+          ))
+        ) : (
+          <TextInput
+            label="Label"
+            flex="1 1 150px"
+            value={typeof label === "string" ? label : ""}
+            onChange={(event) => builder.set([...path, "label"], event.currentTarget.value)}
+          />
+        )}
+        <ElementButtons path={path} title={name} count={count} />
+      </Group>
+      {more.map(([inner, schema]) => (
+        <details key={inner}>
+          <summary className="small-summary">What it changes: {inner}</summary>
+          <Field path={[...path, inner]} schema={schema} />
+        </details>
+      ))}
+    </div>
+  );
+}
+
+function following(label: unknown, before: string, after: string): unknown {
+  if (typeof label === "string") return label === "" || label === before ? after : label;
+  if (!isTable(label)) return label;
+  return Object.fromEntries(Object.entries(label).map(([language, text]) => [language, text === "" || text === before ? after : text]));
+}
+
+// Editors of tables, of tables of several kinds, and of lists of tables.
+
+/** The keys of a table, one below the other. */
+function Keys({ path, editor, but = [] }: { path: Path; editor: TableEditor; but?: readonly string[] }) {
+  return (
+    <Stack gap="sm">
+      {editor.keys
+        .filter(([name]) => !but.includes(name))
+        .map(([name, schema]) => (
+          <Field key={name} path={[...path, name]} schema={schema} required={editor.required.includes(name)} />
+        ))}
+    </Stack>
+  );
+}
+
+function Table(props: FieldProps) {
+  const { value, label, help, set, builder } = useField(props);
+  const editor = editorOf(props.schema);
+  if (editor.kind !== "table") return null;
+  const optional = mayBeNull(props.schema);
+  return (
+    <Fieldset legend={label}>
+      <Text size="xs" c="dimmed" mb="xs">
+        {help}
+      </Text>
+      {optional && (
+        <Switch
+          label={`With ${label.toLowerCase()}`}
+          checked={isTable(value)}
+          onChange={(event) =>
+            set(event.currentTarget.checked ? starter(withoutNull(resolved(props.schema)), builder.languages) : undefined)
+          }
+          mb="xs"
+        />
+      )}
+      {(!optional || isTable(value)) && <Keys path={props.path} editor={editor} />}
+      <Problems path={props.path} />
+    </Fieldset>
+  );
+}
+
+/** One of several kinds of table, told apart by a key. */
+function Variants(props: FieldProps) {
+  const { value, label, help, set, builder } = useField(props);
+  const editor = editorOf(props.schema);
+  if (editor.kind !== "variants") return null;
+  const table = isTable(value) ? value : {};
+  const optional = mayBeNull(props.schema);
+  const [first = ""] = Object.keys(editor.variants);
+  const implied = builder.trialKind in editor.variants ? builder.trialKind : first;
+  const tagged = table[editor.tag];
+  const chosen = typeof tagged === "string" ? tagged : optional && !isTable(value) ? "" : implied;
+  const variant = editor.variants[chosen];
+  const keys = variant === undefined ? null : editorOf(variant);
+  return (
+    <Stack gap="sm">
+      <Select
+        label={typeof props.path.at(-1) === "number" ? labelOf(editor.tag) : `${label}: ${editor.tag.replaceAll("_", " ")}`}
+        description={variant === undefined ? help : helpOf(resolved(variant))}
+        maw={480}
+        allowDeselect={false}
+        clearable={optional}
+        data={Object.keys(editor.variants).map((tag) => ({ value: tag, label: tag.replaceAll("_", " ") }))}
+        value={variant === undefined ? null : chosen}
+        onChange={(tag) => set(tag === null ? undefined : starterOf(editor, tag, builder.languages, table))}
+      />
+      {keys?.kind === "table" && <Keys path={props.path} editor={keys} but={[editor.tag]} />}
+    </Stack>
+  );
+}
+
+/** Tables in an order of their own: added, moved, removed. */
+function Elements(props: FieldProps) {
+  const { value, label, help } = useField(props);
+  const editor = editorOf(props.schema);
+  if (editor.kind !== "elements") return null;
+  const elements = Array.isArray(value) ? (value as unknown[]) : [];
+  return (
+    <Fieldset legend={label}>
+      <Text size="xs" c="dimmed" mb="xs">
+        {help}
+      </Text>
+      <Stack gap="xs">
+        {elements.map((element, index) => (
+          <Element key={index} path={[...props.path, index]} schema={editor.of} element={element} count={elements.length} />
+        ))}
+        <Add path={props.path} of={editor.of} />
+        <Problems path={props.path} />
+      </Stack>
+    </Fieldset>
+  );
+}
+
+interface ElementProps {
+  path: Path;
+  schema: Schema;
+  element: unknown;
+  count: number;
+}
+
+function Element({ path, schema, element, count }: ElementProps) {
+  const builder = useBuilderHere();
+  const inner = editorOf(schema);
+  if (inner.kind === "table" && fitsRow(inner)) return <Row path={path} editor={inner} element={element} count={count} />;
+  const title = titleOf(element) || `${labelOf(String(path.at(-2) ?? "")).toLowerCase()} ${Number(path.at(-1)) + 1}`;
+  const wrong = builder.problems.some((problem) => `${problem.path}.`.startsWith(`${pathName(path)}.`));
+  return (
+    <details className="element" open={wrong || count <= 3 || undefined}>
+      <summary>
+        <Text span fw={600} size="sm">
+          {title}
+        </Text>
+        {wrong && (
+          <Text span size="xs" c="red" ml="xs">
+            needs a look
+          </Text>
+        )}
+      </summary>
+      <Stack gap="sm" mt="xs">
+        {inner.kind === "table" ? <Keys path={path} editor={inner} /> : <Field path={path} schema={schema} />}
+        <ElementButtons path={path} title={title} count={count} />
+      </Stack>
+    </details>
+  );
+}
+
+function titleOf(element: unknown): string {
+  const label = textAt(element, ["label"]) || textAt(element, ["label", "en"]) || Object.values(tableAt(element, ["label"])).map(String)[0];
+  const name = textAt(element, ["name"]) || textAt(element, ["value"]) || textAt(element, ["rule"]).replaceAll("_", " ");
+  return label && name && label !== name ? `${name}: ${label}` : name || label || "";
+}
+
+function Add({ path, of }: { path: Path; of: Schema }) {
+  const builder = useBuilderHere();
+  const editor = editorOf(of);
+  const list = listAt(builder.data, path);
+  const what = singularOf(labelOf(String(path.at(-1) ?? "")).toLowerCase());
+  const add = (fresh: unknown) => builder.set(path, [...list, named(fresh, list, what)]);
+  if (editor.kind !== "variants")
+    return (
+      <Button size="xs" variant="light" style={{ alignSelf: "flex-start" }} onClick={() => add(starter(of, builder.languages))}>
+        Add {what}
+      </Button>
+    );
+  return (
+    <Menu position="bottom-start">
+      <Menu.Target>
+        <Button size="xs" variant="light" style={{ alignSelf: "flex-start" }}>
+          Add {what} ▾
+        </Button>
+      </Menu.Target>
+      <Menu.Dropdown>
+        {Object.entries(editor.variants).map(([tag, schema]) => (
+          <Menu.Item key={tag} onClick={() => add(starterOf(editor, tag, builder.languages))}>
+            {tag.replaceAll("_", " ")}
+            <Text size="xs" c="dimmed" maw={380}>
+              {helpOf({ description: resolved(schema).description?.split("\n\n")[0] ?? "" })}
+            </Text>
+          </Menu.Item>
+        ))}
+      </Menu.Dropdown>
+    </Menu>
+  );
+}
+
+/** A table a language. */
+function ByLanguage(props: FieldProps) {
+  const { builder } = useField(props);
+  const editor = editorOf(props.schema);
+  if (editor.kind !== "languages") return null;
+  const inner = editorOf(editor.of);
+  return (
+    <Stack>
+      {builder.languages.map((language) => (
+        <Fieldset key={language} legend={languageName(language)}>
+          {inner.kind === "table" && <Keys path={[...props.path, language]} editor={inner} />}
+        </Fieldset>
+      ))}
+    </Stack>
+  );
+}
+
+/** What is wrong with a table as a whole. */
+function Problems({ path }: { path: Path }) {
+  const builder = useBuilderHere();
+  const wrong = builder.problems.filter((problem) => problem.path === pathName(path));
+  if (wrong.length === 0) return null;
+  return (
+    <Alert color="red" variant="light" mt="xs">
+      {wrong.map((problem) => problem.message).join("; ")}
+    </Alert>
+  );
+}
+
+// The editor of one key of the declaration, chosen by its schema.
 
 export function Field(props: FieldProps) {
   switch (editorOf(props.schema).kind) {

@@ -1,12 +1,36 @@
 /** Editors of keys that hold one value, or a list of words. */
 
+import { keyName, labelOf, type Path, pathName, valueAt, isTable, textAt, withValue, suggestionsFor } from "../data";
+import { helpOf, effectOf, resolved, type Schema, editorOf } from "../schema";
+import { useBuilderHere } from "../useBuilder";
 import { Autocomplete, JsonInput, NumberInput, Select, Stack, Switch, TagsInput, Textarea, TextInput } from "@mantine/core";
 import { useState } from "react";
 import { languageName } from "../../ui/format";
-import { isTable, textAt, withValue } from "../data";
-import { editorOf } from "../schema";
-import { suggestionsFor } from "../suggestions";
-import { type FieldProps, useField } from "./useField";
+
+// What every editor of a key needs: its value, its label and help, what is wrong with it, and the way to set it.
+
+export interface FieldProps {
+  path: Path;
+  schema: Schema;
+  required?: boolean;
+}
+
+export function useField({ path, schema, required = false }: FieldProps) {
+  const builder = useBuilderHere();
+  const name = String(path.at(-1) ?? "");
+  const measured = effectOf(keyName(path), builder.trialKind) === "measured";
+  const help = helpOf(resolved(schema));
+  return {
+    value: valueAt(builder.data, path),
+    fallback: resolved(schema).default,
+    label: labelOf(name),
+    help: `${help}${measured ? " A change begins a new data series." : ""}`.trim(),
+    problem: builder.problems.find((one) => one.path === pathName(path))?.message ?? null,
+    set: (value: unknown) => builder.set(path, value),
+    required,
+    builder,
+  };
+}
 
 function shown(fallback: unknown): string {
   return fallback === undefined || fallback === null || fallback === ""

@@ -1,6 +1,9 @@
-/** Keys of a page. They rest while a person types into a field, Space and Enter on a button too. */
+/** Keys of a page, and the question before unsaved work is left. */
 
 import { useEffect, useEffectEvent } from "react";
+import { useBlocker } from "@tanstack/react-router";
+
+// Keys of a page. They rest while a person types into a field, Space and Enter on a button too.
 
 export type Shortcuts = Readonly<Record<string, (event: KeyboardEvent) => void>>;
 
@@ -32,4 +35,18 @@ export function useShortcuts(shortcuts: Shortcuts): void {
     window.addEventListener("keydown", press);
     return () => window.removeEventListener("keydown", press);
   }, []);
+}
+
+// Asks before unsaved work is left: by a link of the site, or by closing the tab.
+
+/** Whether work may be replaced by other: saved, or given up by who is asked. */
+export function mayReplace(unsaved: boolean): boolean {
+  return !unsaved || window.confirm("There is work that is not saved. Open another file in its place all the same?");
+}
+
+export function useUnsaved(unsaved: boolean): void {
+  useBlocker({
+    shouldBlockFn: () => unsaved && !window.confirm("There is work that is not saved. Leave all the same?"),
+    enableBeforeUnload: () => unsaved,
+  });
 }
