@@ -228,7 +228,8 @@ class AnswerEvidence(Base):
     issued_at : datetime
         Of the ticket's batch, by the server's clock.
     clip_ms : float
-        How long the clips last, at once or in turn with what is between, over all views.
+        How long the clips last, at once or in turn with what is between, over all views; a second at most
+        where nothing was rated.
     digest_right : bool or None
         None where no digest was needed, or as long as the clip was not at hand to check it.
     late : bool

@@ -83,6 +83,13 @@ def clip_ms_since(connection: Connection, run: int, issued_at: datetime) -> floa
     return float(connection.scalar(query) or 0.0)
 
 
+def unfetched(connection: Connection, run: int) -> int:
+    """How many answers of a run to trials with clips have no digest of them."""
+    is_without = AnswerEvidence.digest.is_(None) & (AnswerEvidence.clip_ms > 0)
+    query = select(func.count()).where((AnswerEvidence.study_run_id == run) & is_without)
+    return int(connection.scalar(query) or 0)
+
+
 def add_evidence(connection: Connection, values: dict[str, Any]) -> None:
     """Store the evidence of one answer."""
     _INSERT.run(connection, values)

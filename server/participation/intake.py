@@ -127,6 +127,10 @@ def _code(key: bytes, message: str) -> str:
 SLACK_MS = 1_000.0
 SLACK_SHARE = 0.02
 """How much longer the clips may last than the time there was: no screen keeps quite the server's time."""
+TRIED_MS = 1_000.0
+"""What a play without a rating takes at least: the page says that a clip cannot be shown for as long."""
+UNFETCHED, UNFETCHED_SHARE = 3, 5
+"""Plays of a run without a rating and without the clip's digest: at most three, or one for five trials."""
 LATE = timedelta(seconds=60)
 _MILLISECOND = timedelta(milliseconds=1)
 FALSE_ANSWERS_PER_MINUTE = 60
@@ -158,8 +162,10 @@ class Answer:
     clips : tuple of (str, int)
         Hash and size of each clip of the trial, in order.
     clip_ms : float
-        How long they last, at once or in turn with what is between, over all views; 0 where nothing was
-        rated.
+        How long they last, at once or in turn with what is between, over all views; where nothing was rated
+        the time that trying to show them takes.
+    trials : int
+        Of the run.
     received_at : datetime
         By the server's clock.
     answered_at : datetime or None
@@ -174,6 +180,7 @@ class Answer:
     rated: bool
     clips: tuple[tuple[str, int], ...]
     clip_ms: float
+    trials: int
     received_at: datetime
     answered_at: datetime | None
     evidence: RatingEvidence | None
@@ -218,7 +225,7 @@ class Intake:
         try:
             batch, given = self._batch(answer, answer.evidence)
             late = _in_time(connection, answer, batch, before)
-            right = self._digest(answer, given)
+            right = self._digest(connection, answer, given)
         except ApiError as refusal:
             if enforced:
                 self.note(connection, answer, refusal, evidence_repository.ANSWER)
@@ -255,12 +262,36 @@ class Intake:
         given_at = min(answer.received_at, answer.answered_at or answer.received_at)
         return check_ticket(self.key, given.batch, given.ticket, *where, given_at), given
 
-    def _digest(self, answer: Answer, given: RatingEvidence) -> bool | None:
+    def _digest(self, connection: Connection, answer: Answer, given: RatingEvidence) -> bool | None:
         """True where the digest is right; None where none is needed, or the clip is not at hand."""
-        if not answer.clips or not answer.rated:
+        if not answer.clips:
             return None
+        if not answer.rated:
+            return self._digest_of_unrated(connection, answer, given)
         if given.digest is None:
             raise DigestMissing("Expected a digest of the clip with its rating, got none; nothing is stored.")
+        return self._is_right(answer, given)
+
+    def _digest_of_unrated(
+        self, connection: Connection, answer: Answer, given: RatingEvidence
+    ) -> bool | None:
+        """The same of a play that has no rating: a page that fetched its clip shows that it did.
+
+        A few may be without, since networks fail, and those of clips that this server does not have either.
+        """
+        if given.digest is not None:
+            return self._is_right(answer, given)
+        allowed = max(UNFETCHED, answer.trials // UNFETCHED_SHARE)
+        if evidence_repository.unfetched(connection, answer.run) < allowed:
+            return None
+        if any(self.clips.hash_at_once(sha256, size) is None for sha256, size in answer.clips):
+            return None
+        raise DigestMissing(
+            f"Expected the digest of the clip: more than {allowed} plays without a rating have none; nothing "
+            "is stored."
+        )
+
+    def _is_right(self, answer: Answer, given: RatingEvidence) -> bool | None:
         hashes = [self.clips.hash_at_once(sha256, size) for sha256, size in answer.clips]
         at_hand = [one for one in hashes if one is not None]
         if len(at_hand) < len(hashes):

@@ -15,7 +15,7 @@ from server.core.errors import Conflict, Invalid, NotFound
 from server.core.values import hash_token
 from server.participation import rating_repository, series, warnings
 from server.participation.answer_schemas import RatingEvidence, RatingIn, Receipt, RunStatus, ShownClips
-from server.participation.intake import Answer, Intake
+from server.participation.intake import TRIED_MS, Answer, Intake
 from server.participation.kinds import answer_of, served
 from server.participation.refusals import ConsentMissing, RunClosed, RunUnknown
 from server.participation.tallies import Counted, Play, Tally
@@ -174,6 +174,8 @@ def answer_to(
     clips = [loaded.clips[ident] for ident in trial.clips.values()]
     lengths = {role: loaded.lengths[loaded.clips[ident].sha256] for role, ident in trial.clips.items()}
     shown_ms = max(lengths.values(), default=0.0) if is_check else loaded.experiment.trial.shown_ms(lengths)
+    # A motion check that was passed over was not begun.
+    tried_ms = 0.0 if is_check else min(shown_ms, TRIED_MS)
     return Answer(
         run=run.id,
         run_id=run.public_id,
@@ -182,7 +184,8 @@ def answer_to(
         play=which[1],
         rated=rated,
         clips=tuple((clip.sha256, clip.bytes) for clip in clips),
-        clip_ms=shown_ms * rated,
+        clip_ms=shown_ms if rated else tried_ms,
+        trials=run.trials_total,
         received_at=received_at,
         answered_at=answered_at,
         evidence=evidence,
