@@ -22,6 +22,7 @@ from server.operations import endpoints as operations
 from server.operations.drill import weekly_drill
 from server.operations.metrics import Observer
 from server.operations.snapshots import snapshots_taken
+from server.operations.unnamed_proxies import ProxyWatch
 from server.participation import endpoints as participation
 from server.participation.judgement import digests_judged_later
 from server.privacy import endpoints as privacy
@@ -145,6 +146,7 @@ def create_app(settings: Settings | None = None, *, rehearses: bool = False) -> 
     app.add_middleware(RowSecurity)  # outside the door, which recognises accounts too
     app.add_middleware(SecurityHeaders, settings=services.settings, clips_from=services.clips.origin())
     app.add_middleware(Observer, settings=services.settings)
+    app.add_middleware(ProxyWatch, settings=services.settings)
     return app
 
 

@@ -27,6 +27,7 @@ from server.core.settings import KEY_LENGTH_MIN, Settings, open_to_others, own_f
 from server.core.values import now
 from server.operations import repository
 from server.operations.snapshots import changed_at, database_file, set_aside, snapshots_of
+from server.operations.unnamed_proxies import seen_proxy
 from server.operations.watched_backups import OLD_AFTER_S, WatchedBackups, watched_backups
 from server.participation.identity_repository import readable
 from server.participation.recruiter import refused_addresses
@@ -366,6 +367,23 @@ def public_address(services: Services) -> Iterator[Finding]:
         yield Finding("who can reach it", "warning", "this machine alone", advice)
 
 
+def proxy(services: Services) -> Iterator[Finding]:
+    """Sign-in limits count addresses of people, not that of a proxy."""
+    seen = seen_proxy(services.settings.data_folder)
+    if seen is None:
+        yield Finding("proxy", "ok", "none that FORWARDED_ALLOW_IPS does not name, within a day")
+        return
+    said = (
+        f"{seen.address} forwards requests and is not named: sign-in limits count everybody as that address "
+        f"(last seen {seen.seen_at:%Y-%m-%d %H:%M} UTC)"
+    )
+    advice = (
+        f"if that is your proxy, set FORWARDED_ALLOW_IPS={seen.address}, let it send X-Forwarded-For, and "
+        "start the server again"
+    )
+    yield Finding("proxy", "warning", said, advice)
+
+
 def people(services: Services) -> Iterator[Finding]:
     """Somebody can sign in; there is something to take part in."""
     with services.database.read() as session:
@@ -408,6 +426,7 @@ CHECKS: tuple[Callable[[Services], Iterator[Finding]], ...] = (
     clips,
     pages,
     public_address,
+    proxy,
     people,
     tokens,
     return_addresses,

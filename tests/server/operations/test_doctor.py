@@ -1,8 +1,15 @@
 import json
 import subprocess
+from collections.abc import Sequence
 from dataclasses import replace
+from datetime import datetime, timedelta
 from pathlib import Path
 
+import pytest
+from fastapi.testclient import TestClient
+from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
+
+from server.app import create_app
 from server.context import Services, open_services
 from server.core.settings import Settings, close_to_others
 from server.operations.doctor import CHECKS, Finding, examine, ledger
@@ -101,3 +108,57 @@ def test_the_advised_command_makes_a_ledger_that_only_the_server_reads(
     subprocess.run(["sh", "-c", finding.advice.partition("run: ")[2]], check=True)
     assert erasures.ledger(shared).stat().st_mode & 0o777 == 0o600
     assert erasures.noted(shared) == ["run-a"]
+
+
+class TestProxies:
+    """A proxy that FORWARDED_ALLOW_IPS does not name makes sign-in limits count everybody as one."""
+
+    @pytest.mark.parametrize("header", ["X-Forwarded-For", "Forwarded"])
+    def test_an_unnamed_proxy_is_reported_with_what_to_set(self, services: Services, header: str) -> None:
+        request_through(services, ("10.0.0.7", 41_000), {header: "198.51.100.4"})
+        found = by_subject(services)["proxy"]
+        assert found.verdict == "warning"
+        assert "FORWARDED_ALLOW_IPS=10.0.0.7" in found.advice
+
+    @pytest.mark.parametrize(
+        ("peer", "named", "headers"),
+        [
+            (("10.0.0.7", 41_000), ["10.0.0.7"], {"X-Forwarded-For": "198.51.100.4"}),
+            (("10.0.0.7", 41_000), ["10.0.0.7"], {"X-Forwarded-For": "192.168.1.4"}),
+            (("10.0.0.7", 41_000), [], {}),
+            (("8.8.8.8", 41_000), [], {"X-Forwarded-For": "10.0.0.7"}),
+        ],
+        ids=["named", "named, of a person within", "no proxy", "a stranger's header"],
+    )
+    def test_nothing_else_is(
+        self, services: Services, peer: tuple[str, int], named: list[str], headers: dict[str, str]
+    ) -> None:
+        request_through(services, peer, headers, named)
+        assert by_subject(services)["proxy"].verdict == "ok"
+
+    def test_one_that_was_set_right_is_reported_for_a_day(self, services: Services) -> None:
+        request_through(services, ("10.0.0.7", 41_000), {"X-Forwarded-For": "198.51.100.4"})
+        path = services.settings.data_folder / "unnamed-proxy.json"
+        seen = json.loads(path.read_text())
+        seen["seen_at"] = (datetime.fromisoformat(seen["seen_at"]) - timedelta(days=1)).isoformat()
+        path.write_text(json.dumps(seen))
+        assert by_subject(services)["proxy"].verdict == "ok"
+
+    def test_a_note_that_cannot_be_kept_hinders_no_request(self, services: Services) -> None:
+        (services.settings.data_folder / "unnamed-proxy.json").mkdir(parents=True)
+        request_through(services, ("10.0.0.7", 41_000), {"X-Forwarded-For": "198.51.100.4"})
+        assert by_subject(services)["proxy"].verdict == "ok"
+
+    def test_whatever_many_requests_say_one_small_file_is_kept(self, services: Services) -> None:
+        for number in range(5):
+            request_through(services, ("10.0.0.7", 41_000), {"X-Forwarded-For": f"198.51.100.{number}" * 50})
+        assert (services.settings.data_folder / "unnamed-proxy.json").stat().st_size < 200
+
+
+def request_through(
+    services: Services, peer: tuple[str, int], headers: dict[str, str], named: Sequence[str] = ()
+) -> None:
+    """A request of the machine `peer`, as uvicorn hands it on where the proxies `named` are believed."""
+    services.settings.data_folder.mkdir(exist_ok=True)
+    app = ProxyHeadersMiddleware(create_app(services.settings), list(named))
+    assert TestClient(app, client=peer).get("/healthz", headers=headers).status_code == 200
