@@ -159,13 +159,17 @@ class Signals:
 SIGNAL_NAMES = tuple(field.name for field in fields(Signals))
 
 
-def signals_of(answers: Sequence[JudgedAnswer], passed_over: Sequence[int] = ()) -> Signals:
+def signals_of(
+    answers: Sequence[JudgedAnswer], passed_over: Sequence[int] = (), unstored_checks: Sequence[int] = ()
+) -> Signals:
     """The signals of a run's answers, in any order.
 
     Parameters
     ----------
     passed_over : sequence of int, optional
         Choices of the checks without an answer.
+    unstored_checks : sequence of int, optional
+        Choices of the attention checks whose answer could not be stored: they count as wrong.
     """
     if not answers:
         return Signals()
@@ -197,7 +201,7 @@ def signals_of(answers: Sequence[JudgedAnswer], passed_over: Sequence[int] = ())
         rt_spread=statistics.stdev(map(math.log, times)) if spread else None,
         same_answer=_same(responses) if len(responses) >= MIN_FOR_SPREAD else None,
         cycle=_cycle(responses) if len(responses) >= 2 * MIN_FOR_SPREAD else None,
-        checks=_share([one.response == one.expected for one in checks]),
+        checks=_share([*(one.response == one.expected for one in checks), *(False for _ in unstored_checks)]),
         motion_checks=_share(right),
         motion_checks_asked=len(motion) or None,
         motion_checks_guessed=guessed(
@@ -205,16 +209,17 @@ def signals_of(answers: Sequence[JudgedAnswer], passed_over: Sequence[int] = ())
         ),
         motion_checks_other_way=sum(one.other_way for one in offered) if offered else None,
         motion_checks_void=len(asked) - len(motion) + len(passed_over) if offered or passed_over else None,
-        checks_guessed=_guessed_together([*checks, *motion]),
+        checks_guessed=_guessed_together([*checks, *motion], unstored_checks),
     )
 
 
-def _guessed_together(checks: Sequence[JudgedAnswer]) -> float | None:
+def _guessed_together(checks: Sequence[JudgedAnswer], wrong: Sequence[int]) -> float | None:
     weighed = [one for one in checks if one.choices > 1]
-    if not weighed:
+    choices = [*(one.choices for one in weighed), *(number for number in wrong if number > 1)]
+    if not choices:
         return None
     right = sum(one.response == one.expected for one in weighed)
-    return _at_least([1 / one.choices for one in weighed])[right]
+    return _at_least([1 / number for number in choices])[right]
 
 
 def checks_tell(answers: Sequence[JudgedAnswer], passed_over: Sequence[int] = ()) -> bool:
@@ -356,7 +361,11 @@ def points_of(name: str, value: float | None) -> float:
 
 
 def judge(
-    answers: Sequence[JudgedAnswer], *, refused: bool = False, passed_over: Sequence[int] = ()
+    answers: Sequence[JudgedAnswer],
+    *,
+    refused: bool = False,
+    passed_over: Sequence[int] = (),
+    unstored_checks: Sequence[int] = (),
 ) -> Judgement:
     """The verdict on a run whose page was asked for evidence.
 
@@ -370,8 +379,10 @@ def judge(
         Answers of the run were refused for their evidence, which happens to no page of this program.
     passed_over : sequence of int, optional
         Number of choices of each motion check that was left out.
+    unstored_checks : sequence of int, optional
+        Number of choices of each attention check whose answer could not be stored.
     """
-    signals = signals_of(answers, passed_over)
+    signals = signals_of(answers, passed_over, unstored_checks)
     tells = checks_tell(answers, passed_over)
     verdict, points = verdict_on(signals, answers=len(answers), refused=refused, tells=tells)
     return Judgement(verdict, points, signals)

@@ -20,7 +20,7 @@ from server.core.changes import Stopped, watched
 from server.core.db import Database
 from server.core.values import hash_token, now
 from server.models import StudyRun
-from server.participation import evidence_repository
+from server.participation import evidence_repository, rating_repository
 from server.participation.clip_bytes import ClipBytes, clip_digest
 from server.participation.evidence import NOT_JUDGED, JudgedAnswer, Judgement, comparable, judge
 from server.participation.evidence_repository import WaitingClip
@@ -35,12 +35,18 @@ def judge_run(session: Session, run: StudyRun) -> Judgement:
     if run.evidence != "asked" or run.erased_at is not None:
         return NOT_JUDGED
     rows = evidence_repository.answers(session, run)
-    offered = _offered(run) if any(row.trial.kind == "attention" for row in rows) else 0
+    unstored = rating_repository.refused_checks(session.connection(), run.id)
+    offered = _offered(run) if unstored or any(row.trial.kind == "attention" for row in rows) else 0
     answers = [_answer(row, offered) for row in rows]
     passed_over = [
         len(CHECK_KINDS[check].choices) for check in evidence_repository.checks_passed_over(session, run)
     ]
-    return judge(answers, refused=evidence_repository.has_refusals(session, run), passed_over=passed_over)
+    return judge(
+        answers,
+        refused=evidence_repository.has_refusals(session, run),
+        passed_over=passed_over,
+        unstored_checks=[offered] * unstored,
+    )
 
 
 def guessed_throughout(experiment: Experiment) -> float:

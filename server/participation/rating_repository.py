@@ -220,9 +220,12 @@ def refused_trials(connection: Connection, run: int) -> set[int]:
 
 
 def refused_checks(connection: Connection, run: int) -> int:
-    """How many attention checks of a run have an answer that was refused for good."""
+    """Attention checks of a run whose answer was refused for good, with none stored: how many."""
     refused = refused_trials(connection, run)
-    return len(refused & set(connection.scalars(_CHECK_INDICES, {"run": run}))) if refused else 0
+    if not refused:
+        return 0
+    stored = set(connection.scalars(select(Rating.trial_index).where(Rating.study_run_id == run)))
+    return len(refused & set(connection.scalars(_CHECK_INDICES, {"run": run})) - stored)
 
 
 def is_refused(connection: Connection, run: int, record_id: str) -> bool:

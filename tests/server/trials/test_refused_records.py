@@ -14,6 +14,7 @@ from server.context import Services, open_services
 from server.core.settings import Settings
 from server.models import Rating, RunEvent, StudyRun
 from server.participation.answer_schemas import RatingIn, ViewsIn
+from server.participation.judgement import judge_run
 from server.participation.warnings import failed_checks
 from tests.helpers.admins import Admin
 from tests.helpers.evidence import Watcher
@@ -273,6 +274,24 @@ def test_a_refused_attention_check_counts_as_failed(participant: Participant, se
         assert failed_checks(session.connection(), run.id, experiment) == 1
 
 
+def test_a_check_that_is_answered_after_a_refusal_counts_by_its_answer(
+    participant: Participant, services: Services
+) -> None:
+    """Once, and not as failed where it was answered as asked."""
+    trials = participant.agree().state()["trials"]
+    check = next(trial for trial in trials if trial["kind"] == "attention")
+    assert report(participant, unstorable(check)).status_code == 202
+    assert participant.rate(check, *asked_for(check)).status_code == 201
+    with services.database.read() as session:
+        run = session.query(StudyRun).one()
+        experiment = services.versions.get(session, run.version_id).experiment
+        assert failed_checks(session.connection(), run.id, experiment) == 0
+
+
+def asked_for(check: Any) -> list[int]:
+    return [int(word) for word in check["prompt"].replace("*", " ").split() if word.isdigit()][:1]
+
+
 def test_refused_attention_checks_end_a_run_as_wrong_ones_do(
     client: Any, services: Services, tmp_path: Any
 ) -> None:
@@ -328,6 +347,25 @@ class TestEvidence:
         assert report(watcher, bare | {"evidence": watcher.evidence(trial)}).status_code == 202
         with services.database.read() as session:
             assert session.query(RunEvent).filter_by(type="record_refused").count() == 1
+
+    def test_the_verdict_counts_a_refused_attention_check_as_wrong(
+        self, client: Any, study: StudyInDatabase, services: Services
+    ) -> None:
+        """Else a script that cannot read the question would leave it out of its verdict."""
+        watcher = Watcher(client, study.link_token).begin()
+        first, second = [one for one in watcher.state()["trials"] if one["kind"] == "attention"]
+        for trial in main_trials(watcher):
+            watcher.wait(10)
+            watcher.answer(trial)
+        watcher.answer(first, response=asked_for(first)[0])
+        with services.database.read() as session:
+            assert judge_run(session, session.query(StudyRun).one()).signals.checks == 1
+        sent = unstorable(second) | {"evidence": watcher.evidence(second)}
+        assert report(watcher, sent).status_code == 202
+        with services.database.read() as session:
+            signals = judge_run(session, session.query(StudyRun).one()).signals
+        assert signals.checks == 0.5
+        assert signals.checks_guessed == pytest.approx(1 - (6 / 7) ** 2)
 
     def test_an_answer_after_a_refused_one_of_the_same_play_is_stored(
         self, client: Any, study: StudyInDatabase, services: Services
