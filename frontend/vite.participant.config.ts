@@ -9,7 +9,7 @@ const NAMED = "[name]-[hash:6].js";
 const LATER = "[hash:6].js";
 /** What every kind of trial and the pages beside them need. */
 const SHARED =
-  /src\/ui\/|participant\/(session|request|screens\/(support|notice)|jspsych|playback\/(protocol|record)|views\/|trials\/(rating|save-rating|shared\/(stage|already-seen|parameters|prepare|showing|feedback|broken)))/;
+  /src\/ui\/|participant\/(session|request|screens\/support|jspsych|playback\/(protocol|record)|views\/|trials\/(rating|showing|trial)\.)/;
 
 /** Tells the service worker the names of the built files, which it keeps. */
 function listFiles(): Plugin {

@@ -47,7 +47,7 @@ function participant(manifest) {
     return Math.max(0, largest(parts, /^trials\/scales\//, filesOf(manifest, kind, new Set(first))));
   };
   const language = largest(pages, /\/languages\//, first);
-  const kind = largest(pages, /^trials\/[^/]+\/index\.ts$/, first, scale);
+  const kind = largest(pages, /^kinds\/[^/]+\/screen\.ts$/, first, scale);
   if (beside.length !== 4 || !Number.isFinite(language + kind)) {
     console.error("error: expected page, worker, service worker, languages and kinds in dist/participant; build the page again");
     process.exitCode = 1;

@@ -1,6 +1,6 @@
 /** Living eyelids for avatars: the twin of the Python package `blink_engine`. */
 export { BlinkEngine, type EngineOptions, type LidFrame } from "./engine";
-export type { Law } from "./laws";
+export type { Law } from "./parameters";
 export {
   type BlinkEvent,
   DEFAULT_PARAMETERS,

@@ -2,7 +2,7 @@
 
 import type { EyesOfVideo } from "./eyes";
 import type { Grey } from "./grey";
-import { seeEyes } from "./see-eyes";
+import { seeEyes } from "./follow-eyes";
 
 export interface ToEyes {
   readonly pictures: readonly Grey[];

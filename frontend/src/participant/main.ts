@@ -1,38 +1,24 @@
 /** Where the participant's page begins: link, gates, one tab, the run. */
-import "./style/index.css";
-import type { LinkState, RunStarted } from "../api/schema";
-import { Refused } from "./request";
+import type { RunStarted } from "../api/schema";
+import { Refused, withinTime } from "./request";
 import { loadMessages, type MessageKey, preferred, SHIPPED, translator, type Translate } from "../i18n";
-import { setLanguage, setSurround } from "./flow/appearance";
+import { setLanguage, setSurround, type Beginning, startPage, titleOf } from "./flow/start-page";
 import { enter, RETURNED } from "./flow/enter";
 import { abilities, findings, type GateFinding, lackOfRoom, measures } from "./flow/gates";
 import { Identity, recruiterQuery, storageKey, storageOf } from "./flow/identity";
-import { type Kept, KeptVisit } from "./flow/kept-visit";
-import { persistently, reach, startRun, wayBack } from "./flow/link";
-import { asksForCode, type Claim } from "./flow/resume-code";
-import { type Beginning, startPage, titleOf } from "./flow/start-page";
-import { IndexedDbStore } from "./outbox/indexed-db";
-import { MemoryStore, type OutboxStore } from "./outbox/store";
+import { KeptVisit } from "./flow/kept-visit";
+import { type Entry, persistently, reach, startRun, wayBack, asksForCode, type Claim } from "./flow/link";
+import { IndexedDbStore, MemoryStore, type OutboxStore } from "./outbox/store";
 import { loadModule } from "../ui/load-module";
-import { withinTime } from "./time-limit";
-import { claimTab } from "./screen/one-tab";
+import { claimTab } from "./screen/window";
 import { AnswersMissing } from "./screens/finish";
-import { showNotice } from "./screens/notice";
+import { showNotice } from "./screens/support";
+import "./style/index.css";
 
 /** How often the end may lead back to what is missing, before the page says that something is wrong. */
 const RETURNS = 3;
 /** A database that takes longer is blocked: answers then go to the server one by one. */
 const OPEN_LIMIT_MS = 5_000;
-/** What is known when the link has answered, or an earlier visit answers for it. */
-export interface Entry {
-  root: HTMLElement;
-  t: Translate;
-  link_token: string;
-  link: LinkState;
-  language: string;
-  keeping: KeptVisit;
-  kept: Kept | null;
-}
 
 const loadRefusal = (): Promise<typeof import("./flow/refusal")> => loadModule(() => import("./flow/refusal"));
 
@@ -76,7 +62,7 @@ async function visit(entry: Entry): Promise<void> {
   if (list[0]?.closed) return turned(list[0]);
   if (list.length > 0) await (await loadRefusal()).passGates(root, t, list);
   const lack = returns ? null : lackOfRoom(link.gates, measures(link.gates));
-  if (lack && !(await (await loadModule(() => import("./flow/room-page"))).waitForRoom(root, t, link))) return turned(lack);
+  if (lack && !(await (await loadRefusal()).waitForRoom(root, t, link))) return turned(lack);
   const tab = await oneTab(root, t, link_token);
   if (tab === "left") return;
   if (tab === "first" && !(await goesOn(entry, identity))) {

@@ -1,11 +1,271 @@
 /** The blink engine live: every parameter under a slider, both characters at once, beside a uniform timer. */
-import { BlinkEngine, DEFAULT_PARAMETERS, type EventKind, type Parameters, SOURCES, STATE_NAMES, type StateName } from "../blink-engine";
-import { type Control, CONTROLS, valueAt, withValue } from "./controls";
-import { curveCsv } from "./curve-file";
-import { button, chooser, element, labelled, slider } from "./elements";
+import {
+  DEFAULT_PARAMETERS,
+  type Parameters,
+  STATE_NAMES,
+  BlinkEngine,
+  type EngineOptions,
+  type EventKind,
+  SOURCES,
+  type StateName,
+} from "../blink-engine";
 import { Face, type Strips } from "./faces";
-import { Trace } from "./trace";
-import { UniformTimer } from "./uniform-timer";
+
+// One control for each number the engine draws by.
+
+interface Control {
+  /** Where the number stands in `Parameters`, such as `profile.closing_s.median`. */
+  path: string;
+  label: string;
+  group: string;
+  min: number;
+  max: number;
+  step: number;
+}
+
+interface Range {
+  min: number;
+  max: number;
+  step: number;
+}
+
+const SHARE: Range = { min: 0, max: 1, step: 0.01 };
+const GROUPS: Readonly<Record<string, string>> = {
+  intervals: "Time between blinks",
+  drift: "Time between blinks",
+  slow_drift: "Time between blinks",
+  responses: "Answers to events",
+  profile: "One blink",
+};
+/** Gamma shapes of intervals: 1 is a Poisson process, a great one a clock. */
+const SHAPE: Range = { min: 0.3, max: 30, step: 0.1 };
+/** By the last part of the path, or the last two where one is not enough. */
+const RANGES: Readonly<Record<string, Range>> = {
+  ...Object.fromEntries(STATE_NAMES.map((state) => [`${state}.spread`, SHAPE])),
+  "closing_s.median": { min: 0.03, max: 0.5, step: 0.005 },
+  "opening_s.median": { min: 0.05, max: 1, step: 0.005 },
+  "closed_s.median": { min: 0, max: 0.5, step: 0.005 },
+  "long_closed_s.median": { min: 0.1, max: 2, step: 0.01 },
+  median: { min: 0.3, max: 60, step: 0.1 },
+  spread: { min: 0, max: 2, step: 0.01 },
+  kept: { min: 0, max: 0.999, step: 0.001 },
+  probability: SHARE,
+  earliest_s: { min: 0, max: 2, step: 0.005 },
+  latest_s: { min: 0, max: 2, step: 0.005 },
+  midpoint_deg: { min: 0, max: 60, step: 0.5 },
+  slope_deg: { min: 0.5, max: 20, step: 0.1 },
+  closing_power: { min: 0.4, max: 3, step: 0.01 },
+  opening_power: { min: 0.4, max: 3, step: 0.01 },
+  complete_share: SHARE,
+  long_share: SHARE,
+  double_share: SHARE,
+  partial_logit_median: { min: -3, max: 6, step: 0.05 },
+  partial_logit_spread: { min: 0, max: 3, step: 0.05 },
+  asymmetry: { min: 0, max: 0.5, step: 0.005 },
+  delay_s: { min: 0, max: 0.1, step: 0.001 },
+  lower_up: SHARE,
+  lower_in: SHARE,
+  least_interval_s: { min: 0, max: 3, step: 0.05 },
+  gaze_closure_per_deg: { min: 0, max: 0.05, step: 0.001 },
+  squint_closure: SHARE,
+};
+
+/** Paths of all numbers in a tree of objects. */
+export function numberPaths(tree: object, before = ""): string[] {
+  return Object.entries(tree).flatMap(([key, value]: [string, unknown]) => {
+    const path = before + key;
+    if (typeof value === "number") return [path];
+    return typeof value === "object" && value !== null ? numberPaths(value, `${path}.`) : [];
+  });
+}
+
+function controlOf(path: string): Control {
+  const parts = path.split(".");
+  const range = RANGES[parts.slice(-2).join(".")] ?? RANGES[parts.at(-1) ?? ""];
+  if (range === undefined) throw new Error(`expected a range for ${path}; add one to RANGES`);
+  const [first = "", ...rest] = parts;
+  const named = first === "intervals" ? [...rest.slice(0, -1), range === SHAPE ? "shape" : "median_s"] : rest;
+  const label = (rest.length > 0 && !first.endsWith("drift") ? named : parts)
+    .join(" ")
+    .replaceAll("_s", " (s)")
+    .replaceAll("_deg", " (°)")
+    .replaceAll("_", " ");
+  return { path, label, group: GROUPS[first] ?? "Lid and gaze", ...range };
+}
+
+export const CONTROLS: readonly Control[] = numberPaths(DEFAULT_PARAMETERS)
+  .filter((path) => !path.startsWith("responses.blink."))
+  .map(controlOf);
+
+export function valueAt(parameters: Parameters, path: string): number {
+  let value: unknown = parameters;
+  for (const key of path.split(".")) value = (value as Record<string, unknown>)[key];
+  return value as number;
+}
+
+/** The same with one number changed; what lies beside the path is shared. */
+export function withValue(parameters: Parameters, path: string, value: number): Parameters {
+  const changed = (tree: object, [key = "", ...rest]: readonly string[]): object => ({
+    ...tree,
+    [key]: rest.length === 0 ? value : changed((tree as Record<string, object>)[key] ?? {}, rest),
+  });
+  return changed(parameters, path.split(".")) as Parameters;
+}
+
+// A performance of the playground as a file, in the columns of `stimuli performance --format csv`.
+
+const LOWER_UP_MM = 0.75;
+const LOWER_IN_MM = 2.6;
+
+/** Seconds and frames per second of what is saved. */
+export interface Length {
+  seconds: number;
+  fps: number;
+}
+
+export function curveCsv(options: EngineOptions, { seconds, fps }: Length): string {
+  const engine = new BlinkEngine(options);
+  const rows = Array.from({ length: Math.round(seconds * fps) }, (_, frame) => {
+    const lids = engine.frame(frame / fps);
+    const up = (LOWER_UP_MM * (lids.left_lower_up + lids.right_lower_up)) / 2;
+    const nasal = (LOWER_IN_MM * (lids.left_lower_in + lids.right_lower_in)) / 2;
+    return [
+      frame,
+      (frame / fps).toFixed(6),
+      ...[lids.left, lids.right, up, nasal].map((value) => String(Math.round(value * 1e6) / 1e6)),
+    ].join();
+  });
+  return ["frame,time_s,closure_left,closure_right,lower_up_mm,lower_nasal_mm", ...rows, ""].join("\n");
+}
+
+// The few elements that the playground is made of.
+
+interface RangeOptions {
+  min: number;
+  max: number;
+  step: number;
+}
+
+function element<Name extends keyof HTMLElementTagNameMap>(name: Name, className: string, text = ""): HTMLElementTagNameMap[Name] {
+  const made = document.createElement(name);
+  if (className !== "") made.className = className;
+  made.textContent = text;
+  return made;
+}
+
+function button(label: string, press: () => void): HTMLButtonElement {
+  const made = element("button", "", label);
+  made.type = "button";
+  made.addEventListener("click", press);
+  return made;
+}
+
+/** A control with its name before it. */
+function labelled(name: string, control: HTMLElement): HTMLLabelElement {
+  const label = element("label", "playground-labelled");
+  label.append(element("span", "", name), control);
+  return label;
+}
+
+function chooser<Choice extends string>(name: string, choices: readonly Choice[], take: (choice: Choice) => void): HTMLElement {
+  const select = element("select", "");
+  select.append(...choices.map((choice) => new Option(choice, choice)));
+  select.addEventListener("change", () => {
+    const chosen = choices[select.selectedIndex];
+    if (chosen !== undefined) take(chosen);
+  });
+  return labelled(name, select);
+}
+
+/** A slider with its value beside it, and a way to set it from outside. */
+function slider(
+  name: string,
+  { min, max, step }: RangeOptions,
+  value: number,
+  take: (value: number) => void,
+): { row: HTMLElement; set: (value: number) => void } {
+  const input = element("input", "");
+  const output = element("output", "");
+  Object.assign(input, { type: "range", min: String(min), max: String(max), step: String(step) });
+  const set = (now: number): void => {
+    input.value = String(now);
+    output.textContent = String(Math.round(now * 1000) / 1000);
+  };
+  set(value);
+  input.addEventListener("input", () => {
+    output.textContent = input.value;
+    take(input.valueAsNumber);
+  });
+  const row = labelled(name, input);
+  row.append(output);
+  return { row, set };
+}
+
+// The closure of the last seconds, drawn as a moving line.
+
+const SECONDS = 8;
+
+class Trace {
+  readonly canvas = document.createElement("canvas");
+  private readonly points: [time_s: number, closure: number][] = [];
+
+  constructor(name: string) {
+    this.canvas.width = 480;
+    this.canvas.height = 60;
+    this.canvas.className = "playground-trace";
+    this.canvas.setAttribute("role", "img");
+    this.canvas.setAttribute("aria-label", `Closure over the last ${SECONDS} seconds: ${name}`);
+  }
+
+  add(time_s: number, closure: number): void {
+    this.points.push([time_s, closure]);
+    while ((this.points[0]?.[0] ?? time_s) < time_s - SECONDS) this.points.shift();
+    const drawing = this.canvas.getContext("2d");
+    if (drawing === null) return;
+    const { width, height } = this.canvas;
+    drawing.clearRect(0, 0, width, height);
+    drawing.strokeStyle = getComputedStyle(this.canvas).color;
+    drawing.lineWidth = 2;
+    drawing.beginPath();
+    for (const [at, value] of this.points) drawing.lineTo(width - ((time_s - at) / SECONDS) * width, 2 + value * (height - 4));
+    drawing.stroke();
+  }
+
+  clear(): void {
+    this.points.length = 0;
+  }
+}
+
+// What most programs do today: one fixed blink after another, evenly spread waits between.
+
+const CLOSING_S = 0.1;
+const CLOSED_S = 0.05;
+const OPENING_S = 0.15;
+const MIN_WAIT_S = 2;
+const MAX_WAIT_S = 6;
+
+export class UniformTimer {
+  private onset_s: number;
+  private readonly random: () => number;
+
+  constructor(random: () => number = Math.random) {
+    this.random = random;
+    this.onset_s = this.wait();
+  }
+
+  /** Closure of both eyes at a moment that must not run backwards. */
+  closure(time_s: number): number {
+    while (time_s > this.onset_s + CLOSING_S + CLOSED_S + OPENING_S) this.onset_s += this.wait();
+    const since = time_s - this.onset_s;
+    if (since <= 0) return 0;
+    if (since < CLOSING_S) return since / CLOSING_S;
+    return Math.max(0, Math.min(1, 1 - (since - CLOSING_S - CLOSED_S) / OPENING_S));
+  }
+
+  private wait(): number {
+    return MIN_WAIT_S + (MAX_WAIT_S - MIN_WAIT_S) * this.random();
+  }
+}
 
 export interface Given {
   strips: Strips;

@@ -1,6 +1,34 @@
-/** Keys pressed anywhere on the page, without repeats, modifiers, and what belongs to a field being typed in. */
+/** Keys and presses: which one was meant, and what it stands for on a scale. */
+import type { Points } from "../api/schema";
 
-import { digitValue } from "./digits";
+// Digits as people write them: of every script, full-width ones, with marks of direction between.
+
+const DIGIT = /\p{Nd}/u;
+const ONE_DIGIT = /^\p{Nd}$/u;
+const DIGITS = /\p{Nd}/gu;
+/** Blanks, and marks that say in which direction text runs. */
+const INVISIBLE = /[\s\u200e\u200f\u061c\u2066-\u2069]/g;
+const MINUS = /[\u2212\ufe63\uff0d\u2010\u2011]/g;
+const PLUS = /[\ufe62\uff0b]/g;
+const POINT = /[\u066b\uff0e]/g;
+
+/** The digit's value; null where the character is none. */
+export function digitValue(character: string): number | null {
+  if (!ONE_DIGIT.test(character)) return null;
+  // Unicode has the digits of each script in order, ten after ten: the number of digits before it, in tens.
+  const code = character.codePointAt(0) ?? 0;
+  let before = 0;
+  while (before < code && DIGIT.test(String.fromCodePoint(code - before - 1))) before += 1;
+  return before % 10;
+}
+
+/** The same text with the digits 0 to 9, without what only sets it. */
+export function plainNumber(text: string): string {
+  const plain = text.replace(INVISIBLE, "").replace(MINUS, "-").replace(PLUS, "+").replace(POINT, ".");
+  return plain.replace(DIGITS, (digit) => String(digitValue(digit)));
+}
+
+// Keys pressed anywhere on the page, without repeats, modifiers, and what belongs to a field being typed in.
 
 const TYPING = "input, textarea, select, [contenteditable]";
 const PRESSABLE = "button, a[href], summary, [role=button]";
@@ -58,4 +86,60 @@ export function clickNothing(press: KeyboardEvent): void {
     if (event.type === "keyup" || event.repeat) event.preventDefault();
   };
   for (const type of ["keydown", "keyup"] as const) window.addEventListener(type, later, { signal: held.signal, capture: true });
+}
+
+// Whether a press was meant for what is on the screen. A mouse that still lies where it pressed last chooses nothing:
+// it must have moved since, or the declared delay must have passed. Keys, touch and pens aim anew each time.
+
+const MOVED_PX = 3;
+
+export class MeantPress {
+  private readonly from_ms = performance.now();
+  private travelled_px = 0;
+  private last: { x: number; y: number } | null = null;
+
+  constructor(
+    private readonly delay_ms: number,
+    signal: AbortSignal,
+  ) {
+    document.addEventListener("pointermove", (event) => this.moved(event), { signal, capture: true, passive: true });
+  }
+
+  allows(event: Event): boolean {
+    if (!(event instanceof PointerEvent) || event.pointerType !== "mouse") return true;
+    return this.travelled_px >= MOVED_PX || performance.now() - this.from_ms >= this.delay_ms;
+  }
+
+  /** Browsers also tell of a move where the page has moved under a resting pointer: its place then stays the same. */
+  private moved({ pointerType, screenX: x, screenY: y, movementX, movementY }: PointerEvent): void {
+    if (pointerType !== "mouse") return;
+    const step = this.last ? Math.hypot(x - this.last.x, y - this.last.y) : Math.hypot(movementX, movementY);
+    this.travelled_px += step;
+    this.last = { x, y };
+  }
+}
+
+/** Which way scales run on this page: as it is read, unless the study keeps them as in languages read from left to right. */
+export function scaleDirection(): string {
+  return document.documentElement.dataset["scales"] === "same" ? "ltr" : document.dir;
+}
+
+// Which keys mean what on the scale.
+
+type Range = Pick<Points, "minimum" | "maximum">;
+
+/** The value a key stands for, or null. 0 means ten on a scale that ends there and does not begin at zero. */
+export function valueOf(key: string, { minimum, maximum }: Range): number | null {
+  const digit = digitValue(key);
+  if (digit === null) return null;
+  if (digit >= minimum && digit <= maximum) return digit;
+  return digit === 0 && minimum > 0 && maximum === 10 ? 10 : null;
+}
+
+/** Step along the scale for an arrow key, in the direction of reading. */
+export function keyFor(key: string, right_to_left: boolean): -1 | 0 | 1 {
+  const forward = right_to_left ? "ArrowLeft" : "ArrowRight";
+  const backward = right_to_left ? "ArrowRight" : "ArrowLeft";
+  if (key === forward || key === "ArrowUp") return 1;
+  return key === backward || key === "ArrowDown" ? -1 : 0;
 }

@@ -9,10 +9,9 @@
 import { IDBFactory } from "fake-indexeddb";
 import { isTemporary, NetworkError, request, type Answer } from "../../src/participant/request";
 import type { RunStarted, RunState } from "../../src/api/schema";
-import type { RatingBody } from "../../src/participant/trials/rating";
-import { backoff } from "../../src/participant/outbox/backoff";
-import { IndexedDbStore } from "../../src/participant/outbox/indexed-db";
-import { Outbox } from "../../src/participant/outbox/outbox";
+import type { RatingBody } from "../../src/participant/session";
+import { backoff, Outbox } from "../../src/participant/outbox/outbox";
+import { IndexedDbStore } from "../../src/participant/outbox/store";
 import { flush } from "../../src/participant/flow/open-session";
 import { playbackRecord } from "../../src/participant/playback/record";
 

@@ -1,7 +1,6 @@
 /** Digits of every script, on every keyboard and in every field. */
 import { describe, expect, it } from "vitest";
-import { digitValue, plainNumber } from "../../src/ui/digits";
-import { isStartKey, keyOf } from "../../src/ui/keys";
+import { digitValue, plainNumber, isStartKey, keyOf } from "../../src/ui/keys";
 
 /** The digit 0 of scripts, by hand from the Unicode charts. */
 const ZEROS: Record<string, number> = {

@@ -1,6 +1,6 @@
 import { createHash, createHmac } from "node:crypto";
 import { describe, expect, it } from "vitest";
-import { clipDigest } from "../../src/participant/evidence/digest";
+import { clipDigest } from "../../src/participant/evidence/evidence";
 
 describe("the digest of a clip", () => {
   it("is HMAC-SHA-256 of the SHA-512 of each, with the ticket as the key", async () => {

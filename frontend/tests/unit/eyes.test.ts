@@ -1,12 +1,11 @@
 import { describe, expect, it } from "vitest";
 import { eyesFor, type EyesOfVideo, type FoundEyes, NO_EYES, noticeOf, placesOn, shapeOn } from "../../src/labelling/eyes";
-import { type Grey, thumbnailOf } from "../../src/labelling/grey";
+import { type Grey, thumbnailOf, cut } from "../../src/labelling/grey";
 import { checkShape } from "../../src/labelling/label-file";
 import { chooseFrames } from "../../src/labelling/labelled-frames";
-import { cut } from "../../src/labelling/patches";
 import { at, eyeOf, eyeWidth, type Point } from "../../src/labelling/points";
-import { seeEyes } from "../../src/labelling/see-eyes";
-import { startShape } from "../../src/labelling/start-shape";
+import { seeEyes } from "../../src/labelling/follow-eyes";
+import { startShape } from "../../src/labelling/propose";
 
 const [WIDTH, HEIGHT, COUNT, SECONDS] = [200, 120, 130, 0.1];
 const BLINKS = [20, 47, 48, 75, 110];

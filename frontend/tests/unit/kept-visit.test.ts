@@ -2,7 +2,7 @@ import { describe, expect, it } from "vitest";
 import type { LinkState, RunStarted, RunState } from "../../src/api/schema";
 import { aTrial } from "./a-trial";
 import { applyWrite, type Kept, KeptVisit } from "../../src/participant/flow/kept-visit";
-import { owed } from "../../src/participant/flow/replays";
+import { owed } from "../../src/participant/session";
 
 const NOW = Date.parse("2026-11-21T12:00:00Z");
 

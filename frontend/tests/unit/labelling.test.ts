@@ -1,26 +1,12 @@
 import { describe, expect, it } from "vitest";
-import { briefChanges, candidateFrames, farthestPictures } from "../../src/labelling/choose-frames";
+import { briefChanges, candidateFrames, farthestPictures, chooseFrames } from "../../src/labelling/labelled-frames";
 import { NO_EYES } from "../../src/labelling/eyes";
 import type { Grey } from "../../src/labelling/grey";
-import { begun, changed, redone, undone } from "../../src/labelling/history";
-import { checkShape, labelsText, parseLabels } from "../../src/labelling/label-file";
-import { chooseFrames } from "../../src/labelling/labelled-frames";
-import { at, nearestPoint, type Point, type Shape, templateShape, withEyeStretched, withPoint } from "../../src/labelling/points";
-import { proposeShape } from "../../src/labelling/propose";
 import {
-  decide,
-  decisionOn,
-  edgeLimits,
-  edgesOf,
-  parseBlinks,
-  parseReview,
-  reviewText,
-  withDecision,
-  withEdge,
-} from "../../src/labelling/review";
-import { parseTable } from "../../src/labelling/csv";
-import { traceOf, tracePath, zoomedWindow } from "../../src/labelling/trace";
-import {
+  begun,
+  changed,
+  redone,
+  undone,
   atFrame,
   atNeighbour,
   labelFileOf,
@@ -35,6 +21,24 @@ import {
   withVideo,
   type Work,
 } from "../../src/labelling/work";
+import { checkShape, labelsText, parseLabels } from "../../src/labelling/label-file";
+import { at, nearestPoint, type Point, type Shape, templateShape, withEyeStretched, withPoint } from "../../src/labelling/points";
+import { proposeShape } from "../../src/labelling/propose";
+import {
+  decide,
+  decisionOn,
+  edgeLimits,
+  edgesOf,
+  parseBlinks,
+  parseReview,
+  reviewText,
+  withDecision,
+  withEdge,
+  traceOf,
+  tracePath,
+  zoomedWindow,
+} from "../../src/labelling/review";
+import { parseTable } from "../../src/labelling/csv";
 
 const SIZE = [640, 480] as const;
 const flat = (value: number): Grey => ({ width: 4, height: 4, values: new Uint8ClampedArray(16).fill(value) });

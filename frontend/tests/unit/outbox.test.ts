@@ -1,11 +1,8 @@
 import { IDBFactory } from "fake-indexeddb";
 import { describe, expect, it, vi } from "vitest";
 import { NetworkError, type Answer } from "../../src/participant/request";
-import { backoff } from "../../src/participant/outbox/backoff";
-import { nextBatch } from "../../src/participant/outbox/batch";
-import { IndexedDbStore } from "../../src/participant/outbox/indexed-db";
-import { Outbox } from "../../src/participant/outbox/outbox";
-import type { OutboxItem } from "../../src/participant/outbox/store";
+import { backoff, nextBatch, Outbox } from "../../src/participant/outbox/outbox";
+import { IndexedDbStore, type OutboxItem } from "../../src/participant/outbox/store";
 
 type Reply = number | "silence";
 

@@ -1,18 +1,18 @@
 import { afterEach, describe, expect, it, vi } from "vitest";
-
 import type { TrialInfo } from "../../src/api/schema";
 import { composition, drawFrame, framesOf } from "../../src/participant/playback/compose";
 import type { DecodedClip } from "../../src/participant/playback/decode";
-import { winnerOf } from "../../src/participant/trials/paired_comparison/answer-keys";
-import { clipsOf } from "../../src/participant/trials/shared/roles";
-import { layoutOf, roomNeeded } from "../../src/participant/trials/paired_comparison/layout";
-import { stageFor } from "../../src/participant/trials/paired_comparison/pair-stage";
+import { winnerOf } from "../../src/participant/kinds/paired_comparison/answer";
+import { clipsOf } from "../../src/participant/trials/in-turn";
+import { layoutOf, roomNeeded } from "../../src/participant/kinds/paired_comparison/layout";
+import { stageFor } from "../../src/participant/kinds/paired_comparison/screen";
 import type { Session } from "../../src/participant/session";
-import { showStage, type Stage } from "../../src/participant/trials/shared/stage";
+import { showStage, type Stage } from "../../src/participant/trials/showing";
 import { aTrial } from "./a-trial";
 
+vi.mock("jspsych", () => ({ initJsPsych: vi.fn(), ParameterType: {} }));
 vi.mock("../../src/participant/screens/screen-setup", () => ({ askRoom: vi.fn() }));
-vi.mock(import("../../src/participant/trials/shared/stage"), async (load) => ({ ...(await load()), showStage: vi.fn() }));
+vi.mock(import("../../src/participant/trials/showing"), async (load) => ({ ...(await load()), showStage: vi.fn() }));
 
 const BESIDE = { arrangement: "side_by_side", gap_mm: 10, if_too_narrow: "stack" } as const;
 const PIXELS = { width: 960, height: 360 };

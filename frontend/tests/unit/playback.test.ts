@@ -1,6 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { playbackRecord, type Showing } from "../../src/participant/playback/record";
-import { FrameSchedule } from "../../src/participant/playback/schedule";
+import { playbackRecord, type Showing, FrameSchedule } from "../../src/participant/playback/record";
 
 const PERIOD = 1000 / 30;
 

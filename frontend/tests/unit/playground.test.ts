@@ -1,8 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { BlinkEngine, DEFAULT_PARAMETERS } from "../../src/blink-engine";
-import { CONTROLS, numberPaths, valueAt, withValue } from "../../src/playground/controls";
-import { curveCsv } from "../../src/playground/curve-file";
-import { UniformTimer } from "../../src/playground/uniform-timer";
+import { CONTROLS, numberPaths, valueAt, withValue, curveCsv, UniformTimer } from "../../src/playground/playground";
 
 describe("the playground's controls", () => {
   it("are one for every number the engine draws by", () => {

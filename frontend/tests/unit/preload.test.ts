@@ -1,6 +1,5 @@
 import { describe, expect, it, vi } from "vitest";
-import { ClipCache } from "../../src/participant/preload/clip-cache";
-import { ClipUnavailable, fetchClip, sha256 } from "../../src/participant/preload/fetch-clip";
+import { ClipCache, ClipUnavailable, fetchClip, sha256 } from "../../src/participant/preload/clip-cache";
 
 const bytes = new TextEncoder().encode("a clip").buffer;
 const pause = (): Promise<void> => Promise.resolve();

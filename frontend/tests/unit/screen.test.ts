@@ -1,16 +1,14 @@
 import { afterEach, describe, expect, it, vi } from "vitest";
 import type { Gates } from "../../src/api/schema";
 import { aTrial } from "./a-trial";
-import { luminance } from "../../src/participant/flow/appearance";
+import { luminance } from "../../src/participant/flow/start-page";
 import { findings, lackOfRoom, type Abilities, type Measures } from "../../src/participant/flow/gates";
-import { owed, Replays } from "../../src/participant/flow/replays";
-import { refreshRate, untilMeasured } from "../../src/participant/screen/refresh-rate";
+import { owed, Replays, done, type Session } from "../../src/participant/session";
+import { refreshRate, untilMeasured } from "../../src/participant/screen/window";
 import { clipHeight, clipWidth, screenChange, zoomed, isPlausible, type ScreenShape } from "../../src/participant/screen/size";
-import { deviation, randomStart, settled, spreadPercent } from "../../src/participant/calibration/spread";
-import { distanceFrom } from "../../src/participant/calibration/distance";
-import { done, type Session } from "../../src/participant/session";
-import { keyFor, valueOf } from "../../src/participant/trials/shared/scale-keys";
-import { clipSize } from "../../src/participant/trials/shared/stage";
+import { deviation, randomStart, settled, spreadPercent, distanceFrom } from "../../src/participant/calibration/distance";
+import { keyFor, valueOf } from "../../src/ui/keys";
+import { clipSize } from "../../src/participant/trials/showing";
 
 describe("actual size", () => {
   it("shows the inter-ocular distance as declared", () => {

@@ -2,8 +2,8 @@ import { expect, it, vi } from "vitest";
 
 import type { RatingIn, ShownClipRating } from "../../src/api/schema";
 import type { Session } from "../../src/participant/session";
-import { simulatedRating } from "../../src/participant/trials/clip_rating/simulate";
-import { actWhileShown } from "../../src/participant/trials/shared/act-while-shown";
+import { simulatedRating } from "../../src/participant/kinds/clip_rating/simulate";
+import { actWhileShown } from "../../src/participant/trials/answers";
 import { aTrial } from "./a-trial";
 
 // It asks for a window when it is loaded.

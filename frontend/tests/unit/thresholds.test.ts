@@ -1,9 +1,9 @@
 /** Adaptive series on the page: keys, choices that come late, trials of ended series. */
-import { describe, expect, test } from "vitest";
+import { describe, expect, test, vi } from "vitest";
 import type { TrialInfo } from "../../src/api/schema";
-import { responseOf } from "../../src/participant/trials/threshold/answers";
-import { behind } from "../../src/participant/trials/threshold/await-choice";
-import { applyNext, begin } from "../../src/participant/trials/shared/next-trials";
+import { responseOf, behind } from "../../src/participant/kinds/threshold/answer";
+import { applyNext, begin } from "../../src/participant/session";
+vi.mock("jspsych", () => ({ initJsPsych: vi.fn(), ParameterType: {} }));
 
 function trial(trial_index: number, known: number, clip = "a"): TrialInfo {
   const clips = [{ role: "shown", clip_sha256: clip }];

@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 
-import { begins, stepFrames, traceOf } from "../../src/participant/trials/continuous_rating/trace";
+import { begins, stepFrames, traceOf } from "../../src/participant/kinds/continuous_rating/track";
 
 const drawn = (frames: number, except: number[] = []): [number, number][] =>
   Array.from({ length: frames }, (_, index): [number, number] => [index, 1_000 + index * 100]).filter(([index]) => !except.includes(index));

@@ -3,7 +3,7 @@ import type { TrialInfo, ViewIn } from "../../src/api/schema";
 import { Outbox } from "../../src/participant/outbox/outbox";
 import { MemoryStore, type OutboxItem, type OutboxStore } from "../../src/participant/outbox/store";
 import type { Session } from "../../src/participant/session";
-import type { Shown } from "../../src/participant/trials/shared/showing";
+import type { Shown } from "../../src/participant/trials/showing";
 import { layout, refreshDropped, visibleShare, watchDisturbances } from "../../src/participant/views/disturbances";
 import { applyViews, beginView, isFromBefore, settleInterrupted, viewsBefore } from "../../src/participant/views/ledger";
 

@@ -1,11 +1,9 @@
 /** A second look at labelled blinks, for `stimuli blinks --review`. The files stay on this computer. */
-
 import { Button, Card, Group, Table, Text, TextInput, Alert, SegmentedControl, Stack, Title } from "@mantine/core";
 import { useState } from "react";
-import { type Blink, blinkKey, decisionOn, edgesOf } from "../../labelling/review";
+import { type Blink, blinkKey, decisionOn, edgesOf, zoomedWindow } from "../../labelling/review";
 import { fixed } from "../ui/format";
 import { type BlinkReview, useBlinkReview } from "./useBlinkReview";
-import { zoomedWindow } from "../../labelling/trace";
 import { OpenFile } from "./OpenFile";
 import { TraceView } from "./TraceView";
 import { useShortcuts, useUnsaved } from "../ui/page-events";

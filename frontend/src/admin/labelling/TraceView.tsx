@@ -1,9 +1,20 @@
 /** A trace with its blinks: zoom, pan, choose a blink, move its start and end by dragging or by keyboard. */
-
 import { useElementSize } from "@mantine/hooks";
 import { type KeyboardEvent, type PointerEvent, useEffect, useMemo, useRef } from "react";
-import { type Blink, blinkKey, decisionOn, type Decisions, type Edge, edgeLimits, edgesOf } from "../../labelling/review";
-import { extent, movedWindow, tracePath, type Window, zoomedWindow } from "../../labelling/trace";
+import {
+  type Blink,
+  blinkKey,
+  decisionOn,
+  type Decisions,
+  type Edge,
+  edgeLimits,
+  edgesOf,
+  extent,
+  movedWindow,
+  tracePath,
+  type Window,
+  zoomedWindow,
+} from "../../labelling/review";
 
 const HEIGHT = 320;
 const BOTTOM = 22;

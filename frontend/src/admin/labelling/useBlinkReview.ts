@@ -1,8 +1,7 @@
 /** The work of the blink review page: a series, its blinks, and the decisions about them with undo. */
-
 import { useMemo, useState } from "react";
 import { parseTable, type Table, TableProblem } from "../../labelling/csv";
-import { begun, changed, type History, redone, undone } from "../../labelling/history";
+import { begun, changed, type History, redone, undone } from "../../labelling/work";
 import {
   type Blink,
   blinkKey,
@@ -18,8 +17,9 @@ import {
   type ReviewRow,
   withDecision,
   withEdge,
+  traceOf,
+  type Window,
 } from "../../labelling/review";
-import { traceOf, type Window } from "../../labelling/trace";
 import { downloadText } from "../ui/useChange";
 
 const NONE: Decisions = new Map();

@@ -1,10 +1,9 @@
 /** The work of the labelling page: a video, its labels with undo, and the start shape of each new frame. */
-
 import { useEffect, useState, useEffectEvent, useCallback } from "react";
 import type { OpenedVideo } from "../../labelling/video";
 import type { Grey } from "../../labelling/grey";
-import { acceptedOf } from "../../labelling/labelled-frames";
-import { type Start, startShape } from "../../labelling/start-shape";
+import { acceptedOf, openForLabelling } from "../../labelling/labelled-frames";
+import { type Start, startShape } from "../../labelling/propose";
 import {
   type Work,
   atFrame,
@@ -23,7 +22,6 @@ import {
 } from "../../labelling/work";
 import { labelsText, parseLabels } from "../../labelling/label-file";
 import { noticeOf } from "../../labelling/eyes";
-import { openForLabelling } from "../../labelling/open";
 import type { Point, Shape } from "../../labelling/points";
 import { downloadText } from "../ui/useChange";
 import { mayReplace } from "../ui/page-events";

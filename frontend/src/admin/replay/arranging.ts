@@ -1,6 +1,6 @@
 /** Where a trial's clips stood and how large: by the functions that the participant's page lays them out with. */
 import type { RunState, TrialInfo } from "../../api/schema";
-import { type Layout, layoutOf } from "../../participant/trials/paired_comparison/layout";
+import { type Layout, layoutOf } from "../../participant/kinds/paired_comparison/layout";
 import { clipHeight, clipWidth } from "../../participant/screen/size";
 import type { Schemas } from "../api";
 import type { Clip, Play } from "./shown";

@@ -1,17 +1,186 @@
 /** How many pixels a millimetre has here: by card or ruler, more than once, checked, and large enough for the clip. */
+import type { Translate } from "../../i18n";
+import { h, uniqueId, button, showPage, statusLine, alertLine } from "../../ui/element";
+import { randomStart, asTyped, measureDistance, mean, settled, spreadPercent, SPREAD_MAX_PERCENT } from "./distance";
+import { plainNumber } from "../../ui/keys";
 import type { CalibrationState, TrialInfo } from "../../api/schema";
-import { h } from "../../ui/element";
-import { showPage, statusLine, alertLine } from "../../ui/page";
-import { untilMeasured } from "../screen/refresh-rate";
+import { untilMeasured } from "../screen/window";
 import { calibrationBody, clipWidth, type Distance, isPlausible, type Measured, NO_DISTANCE } from "../screen/size";
 import { choose, noDevice, saveShown, screenOut, stopButton } from "../screens/support";
 import type { Session } from "../session";
-import { cardView, USUAL_PX } from "./card";
 import "./calibration.css";
-import { asTyped, measureDistance } from "./distance";
-import { handWithCard } from "./hand";
-import { CHECK_LINE_MM, lengthField, measuredLinePx, rulerLine } from "./ruler";
-import { mean, settled, spreadPercent, SPREAD_MAX_PERCENT } from "./spread";
+
+// A bank card drawn on the screen, to be made as large as a real one: gives CSS pixels per millimetre.
+
+/** ISO/IEC 7810 ID-1. */
+const CARD_WIDTH_MM = 85.6;
+const CARD_HEIGHT_MM = 53.98;
+const SHAPE = CARD_HEIGHT_MM / CARD_WIDTH_MM;
+const SMALLEST_PX = 120;
+const LARGEST_PX = 1_600;
+/** Shown lengths begin between these: a card on screens of 54 to 152 pixels an inch. */
+const START_PX = [180, 510] as const;
+/** What a screen of 96 pixels an inch needs. */
+const USUAL_PX = (CARD_WIDTH_MM * 96) / 25.4;
+/** A narrower window (a phone) cannot hold a card lying down, so there it stands upright. */
+const UPRIGHT_BELOW_PX = 600;
+
+export interface CardView {
+  element: HTMLElement;
+  px_per_mm: () => number;
+  /** False while it has the size that it was first shown in: nobody has held a card against it. */
+  touched: () => boolean;
+}
+
+/** The card of measurement `round`, in a size of its own: what an earlier one (`last`, px a mm) ended with is not shown again. */
+function cardView(t: Translate, round: number, last: number | null): CardView {
+  const upright = window.innerWidth < UPRIGHT_BELOW_PX;
+  const largest = upright ? (window.innerWidth - 60) / SHAPE : Math.min(LARGEST_PX, window.innerWidth - 110);
+  /** Of the long side. */
+  let length = randomStart(START_PX[0], Math.min(START_PX[1], largest), last === null ? null : last * CARD_WIDTH_MM);
+  let touched = false;
+  const id = uniqueId("card");
+  const slider = h("input", { type: "range", id, min: SMALLEST_PX, max: Math.round(largest), step: 1 });
+  const corner = h("span", { class: "card-corner", "aria-hidden": "true" });
+  const card = h(
+    "div",
+    { class: upright ? "card card-upright" : "card" },
+    h("span", { class: "card-chip" }),
+    h("span", { class: "card-lines" }),
+    corner,
+  );
+  const set = (next: number): void => {
+    length = Math.min(largest, Math.max(SMALLEST_PX, next));
+    const sides = [length, length * SHAPE];
+    const [width = 0, height = 0] = upright ? sides.reverse() : sides;
+    Object.assign(card.style, { width: `${width}px`, height: `${height}px` });
+    slider.value = String(Math.round(length));
+  };
+  const change = (next: number): void => {
+    touched = true;
+    set(next);
+  };
+  slider.addEventListener("input", () => change(Number(slider.value)));
+  dragCorner(corner, card, (width) => change(upright ? width / SHAPE : width));
+  set(length);
+  const row = h(
+    "div",
+    { class: "row" },
+    button(t("card_smaller"), () => change(length - 1), "quiet"),
+    slider,
+    button(t("card_larger"), () => change(length + 1), "quiet"),
+  );
+  const element = h(
+    "div",
+    { class: "card-area", "data-round": round },
+    h("div", { class: "card-space" }, card),
+    h("label", { for: id, class: "help" }, t("card_slider")),
+    row,
+    h("p", { class: "help" }, t("card_hint")),
+  );
+  return { element, px_per_mm: () => length / CARD_WIDTH_MM, touched: () => touched };
+}
+
+function dragCorner(corner: HTMLElement, card: HTMLElement, set: (width: number) => void): void {
+  corner.addEventListener("pointerdown", (event) => {
+    corner.setPointerCapture(event.pointerId);
+    event.preventDefault();
+  });
+  corner.addEventListener("pointermove", (event) => {
+    if (!corner.hasPointerCapture(event.pointerId)) return;
+    const box = card.getBoundingClientRect();
+    const from = getComputedStyle(card).direction === "rtl" ? box.right - event.clientX : event.clientX - box.left;
+    set(from);
+  });
+}
+
+// A hand that holds a card flat against a screen: line art in the page's own ink, so that it reads on any surround.
+
+const SVG = "http://www.w3.org/2000/svg";
+
+function shape(tag: string, attributes: Record<string, string | number>): SVGElement {
+  const element = document.createElementNS(SVG, tag);
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, String(value));
+  return element;
+}
+
+/** The four fingers lie behind the card's lower edge, the thumb in front of it. */
+const FINGERS = [
+  "M118 158 C112 140 108 126 108 112 a7 7 0 0 1 14 -2 l5 22",
+  "M127 132 l-3 -28 a7 7 0 0 1 14 -1 l5 27",
+  "M143 130 l-1 -24 a7 7 0 0 1 14 0 l2 26",
+  "M158 132 l1 -18 a6.5 6.5 0 0 1 13 1 l-1 27",
+];
+const PALM = "M118 158 C122 170 126 178 132 186 L132 196 M171 142 C173 160 170 176 164 186 L164 196";
+const THUMB = "M118 158 C108 150 96 142 86 138 a7 7 0 0 1 5 -13 C102 128 112 134 120 141";
+
+function handWithCard(label: string): SVGElement {
+  const picture = shape("svg", { class: "hand", viewBox: "0 0 200 200", role: "img", "aria-label": label });
+  const line = { fill: "none", stroke: "currentColor", "stroke-width": 2.5, "stroke-linecap": "round", "stroke-linejoin": "round" };
+  const skin = { ...line, fill: "var(--panel)" };
+  picture.append(
+    shape("rect", { ...line, x: 8, y: 8, width: 184, height: 122, rx: 5 }),
+    shape("path", { ...line, d: "M84 130 v18 M70 150 h28" }),
+    // The drawn card, dashed, and the real one laid on it.
+    shape("rect", { ...line, x: 40, y: 34, width: 96, height: 61, rx: 5, "stroke-dasharray": "5 5" }),
+    ...FINGERS.map((d) => shape("path", { ...skin, d })),
+    shape("rect", { ...skin, class: "hand-card", x: 46, y: 40, width: 96, height: 61, rx: 5 }),
+    shape("rect", { ...line, x: 56, y: 58, width: 15, height: 11, rx: 2 }),
+    shape("path", { ...line, d: "M56 86 h46" }),
+    shape("path", { ...skin, d: PALM }),
+    shape("path", { ...skin, d: THUMB }),
+  );
+  return picture;
+}
+
+// A line of known pixels to be measured, or of known millimetres to be checked.
+
+const MEASURED_LINE_PX = 378;
+const CHECK_LINE_MM = 100;
+const SHORTEST_SHARE = 0.6;
+const SHORTEST_MM = 20;
+const LONGEST_MM = 400;
+
+/** Length of a line to be measured, another one each time: with its end marks inside the window, also on a phone. */
+function measuredLinePx(last: number | null): number {
+  const longest = Math.min(MEASURED_LINE_PX, window.innerWidth - 80);
+  return Math.round(randomStart(SHORTEST_SHARE * longest, longest, last));
+}
+
+function rulerLine(length_px: number): HTMLElement {
+  const line = h("div", { class: "ruler-line", role: "img", "aria-label": "|—|" });
+  line.style.width = `${length_px}px`;
+  return h("div", { class: "ruler-space" }, line);
+}
+
+export interface LengthField {
+  element: HTMLElement;
+  value: () => number | null;
+}
+
+/** A field for a length in mm; `value` is null, and the reason is shown, where it cannot be one. */
+function lengthField(t: Translate): LengthField {
+  const id = uniqueId("length");
+  const fault = h("p", { class: "fault", id: `${id}-fault`, role: "alert" });
+  const input = h("input", {
+    id,
+    type: "text",
+    inputmode: "decimal",
+    class: "short",
+    autocomplete: "off",
+    "aria-describedby": `${id}-fault`,
+  });
+  const element = h("div", { class: "field" }, h("label", { for: id }, t("ruler_length")), input, fault);
+  return {
+    element,
+    value() {
+      const length = Number(plainNumber(input.value).replace(",", "."));
+      const good = length >= SHORTEST_MM && length <= LONGEST_MM;
+      fault.textContent = good ? "" : t("ruler_bad", { minimum: SHORTEST_MM, maximum: LONGEST_MM });
+      return good ? length : null;
+    },
+  };
+}
 
 type Occasion = CalibrationState["occasion"];
 type Method = CalibrationState["method"];

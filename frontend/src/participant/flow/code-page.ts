@@ -1,13 +1,11 @@
 /** The page that asks for a resume code; loaded where one is needed. */
 import type { RunStarted } from "../../api/schema";
 import type { MessageKey, Translate } from "../../i18n";
-import { h, uniqueId } from "../../ui/element";
-import { alertLine, button, showPage } from "../../ui/page";
+import { h, uniqueId, alertLine, button, showPage } from "../../ui/element";
 import { Refused } from "../request";
-import { emptied } from "../screens/notice";
+import { emptied } from "../screens/support";
 import type { Identity } from "./identity";
-import { isNoAnswer } from "./link";
-import type { Claim, Start } from "./resume-code";
+import { isNoAnswer, type Claim, type Start } from "./link";
 
 const WRONG: Record<string, MessageKey> = { resume_code_wrong: "code_wrong", too_many_requests: "code_wait" };
 

@@ -1,27 +1,65 @@
 /** The run of a visit: from its start by its timeline to the last page. */
+import type { Session } from "../session";
 import type { RunStarted, RunState } from "../../api/schema";
 import { loadMessages } from "../../i18n";
 import { loadModule } from "../../ui/load-module";
 import { runTimeline, type SimulationMode } from "../jspsych";
-import type { Entry } from "../main";
 import { Outbox } from "../outbox/outbox";
 import type { OutboxStore } from "../outbox/store";
-import { choosePlayer, hasWebCodecs } from "../playback/choose";
-import { emptied, showNotice } from "../screens/notice";
-import type { Session } from "../session";
-import { loadKind } from "../trials";
-import { saveInterrupted } from "../trials/save-rating";
+import { choosePlayer, hasWebCodecs } from "../playback/worker-player";
+import { emptied, showNotice } from "../screens/support";
+import { loadChecks, loadKind } from "../kinds";
+import { saveInterrupted } from "../trials/rating";
 import { settleInterrupted } from "../views/ledger";
-import { setLanguage, setScales } from "./appearance";
-import { fetchFirst } from "./blocks";
+import { setLanguage, setScales } from "./start-page";
+import { fetchFirst, timeline } from "./timeline";
 import type { GateFinding } from "./gates";
 import { type Identity, storageOf } from "./identity";
 import type { KeptVisit } from "./kept-visit";
-import { fetchRun, persistently, wayBack } from "./link";
+import { type Entry, fetchRun, persistently, wayBack } from "./link";
 import { describeDevice, flush, openSession } from "./open-session";
-import { serveOffline } from "./serve-offline";
-import { timeline } from "./timeline";
-import { watch } from "./watchers";
+
+// Lets a reload without a connection find the page: see service-worker.ts.
+
+function serveOffline(): void {
+  // Private windows and some settings have none: a reload then needs the server.
+  try {
+    if (!("serviceWorker" in navigator)) return;
+    void Promise.resolve(navigator.serviceWorker.register("/service-worker.js", { scope: "/run/" })).catch(() => {});
+  } catch {
+    // Denied with the cookies.
+  }
+}
+
+// What is noted all the time: full screen left, the connection lost and back, and that the page is alive.
+
+const HEARTBEAT_MS = 20_000;
+
+function watch(session: Session): void {
+  const { events, outbox, over } = session;
+  const { signal } = over;
+  document.addEventListener(
+    "fullscreenchange",
+    () => {
+      if (!document.fullscreenElement && !signal.aborted) events.add("fullscreen_left");
+    },
+    { signal },
+  );
+  window.addEventListener("offline", () => events.add("offline"), { signal });
+  window.addEventListener(
+    "online",
+    () => {
+      events.add("online");
+      outbox.nudge();
+    },
+    { signal },
+  );
+  const beat = setInterval(() => {
+    // While answers are waiting a sign of life is of no use; it would only fill the outbox.
+    if (outbox.state.failures === 0 && !document.hidden) events.add("heartbeat", { stage: session.run.stage });
+  }, HEARTBEAT_MS);
+  signal.addEventListener("abort", () => clearInterval(beat));
+}
 
 /** Under this name the tab counts how often the end led back to what was missing. */
 const SEEN_MS = 1_500;
@@ -44,7 +82,7 @@ export async function enter(
   if (!kept) keeping.begin({ link, started, run });
   const kind = known ?? (await loadKind(run.trial.kind));
   identity.keepTab();
-  const checks = run.checks ? await loadKind("motion_check") : kind;
+  const checks = run.checks ? await loadChecks() : kind;
   await loadMessages(run.language);
   // A worker that is blocked says nothing for a while: the page says what it waits for.
   const wait = setTimeout(() => showNotice(root, { title: t("preload_title"), text: t("saving_wait") }), SEEN_MS);
@@ -55,7 +93,7 @@ export async function enter(
   const over = (): Promise<void> => {
     keeping.forget();
     return persistently(root, session.t, () => fetchRun(started.run_token)).then(async (now) =>
-      (await loadModule(() => import("./ended"))).ended(root, session.t, now, started, identity, wayBack(session.t, link)),
+      (await loadModule(() => import("../screens/completion"))).ended(root, session.t, now, started, identity, wayBack(session.t, link)),
     );
   };
   if (run.status !== "active") return over();

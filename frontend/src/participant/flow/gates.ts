@@ -1,7 +1,7 @@
 /** Can this browser, on this device, show the study? Reasons are message keys, worst first. */
 import type { Gates } from "../../api/schema";
 import type { MessageKey } from "../../i18n";
-import { hasVideo, hasWebCodecs, playsH264 } from "../playback/choose";
+import { hasVideo, hasWebCodecs, playsH264 } from "../playback/worker-player";
 
 export interface GateFinding {
   reason: MessageKey;

@@ -4,8 +4,7 @@
  */
 import type { CalibrationState, Consent, LinkState, Receipt, RunStarted, RunState, TrialInfo, ViewsIn } from "../../api/schema";
 import { applyViews } from "../views/ledger";
-import type { RatingBody } from "../trials/rating";
-import { applyNext, nextOf } from "../trials/shared/next-trials";
+import { type RatingBody, applyNext, nextOf } from "../session";
 import type { SafeStorage } from "./identity";
 import type { OutboxItem } from "../outbox/store";
 

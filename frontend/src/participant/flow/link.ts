@@ -1,12 +1,23 @@
 /** From the link to a run: is it open, can this browser show it, and which visit is it? */
 import type { LinkState, RunStarted, RunState } from "../../api/schema";
 import { BUSY, call, NetworkError, Refused, isTemporary } from "../request";
-import type { Translate } from "../../i18n";
-import { backoff } from "../outbox/backoff";
-import { type Back, showNotice } from "../screens/notice";
+import type { Translate, MessageKey } from "../../i18n";
+import { backoff } from "../outbox/outbox";
+import { type Back, showNotice } from "../screens/support";
 import { filledIn } from "./identity";
-import type { Kept } from "./kept-visit";
-import { withoutPractice } from "./placed";
+import type { Kept, KeptVisit } from "./kept-visit";
+import { withoutPractice } from "../session";
+
+/** What is known when the link has answered, or an earlier visit answers for it. */
+export interface Entry {
+  root: HTMLElement;
+  t: Translate;
+  link_token: string;
+  link: LinkState;
+  language: string;
+  keeping: KeptVisit;
+  kept: Kept | null;
+}
 
 /** Who has begun need not wait long for a server that does not answer. */
 const KEPT_WAIT_MS = 4_000;
@@ -60,4 +71,20 @@ export async function reach(
     if (!isNoAnswer(error)) throw error;
     return { link: kept.link, kept };
   }
+}
+
+// Taking up a visit by its resume code, where the browser and the link do not say whose it is.
+
+/** What a start says beside what every start says. */
+export type Claim = { resume_code: string } | { anew: true } | Record<string, never>;
+export type Start = (claim: Claim) => Promise<RunStarted>;
+
+const ASKED_FOR: Record<string, MessageKey> = {
+  resume_code_needed: "code_needed",
+  taken_part_already: "code_over",
+  resume_code_wrong: "code_enter",
+};
+/** Why a code must be entered; null where the refusal is another. */
+export function asksForCode(error: unknown): MessageKey | null {
+  return error instanceof Refused ? (ASKED_FOR[error.code] ?? null) : null;
 }

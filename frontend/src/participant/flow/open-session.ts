@@ -2,21 +2,16 @@
 import type { LinkState, RunStarted, RunState } from "../../api/schema";
 import { translator } from "../../i18n";
 import { InteractionLog } from "../evidence/interaction";
-import { EventLog } from "../outbox/events";
-import type { Outbox } from "../outbox/outbox";
+import { EventLog, type Outbox } from "../outbox/outbox";
 import type { OutboxItem } from "../outbox/store";
-import { hasWebCodecs } from "../playback/choose";
-import type { ClipPlayer } from "../playback/player";
+import { hasWebCodecs } from "../playback/worker-player";
+import type { ClipPlayer } from "../playback/protocol";
 import { pixelRatio } from "../measured";
 import { ClipCache } from "../preload/clip-cache";
-import { untilMeasured } from "../screen/refresh-rate";
-import { RunClock } from "../screen/run-clock";
-import { ScreenState } from "../screen/screen-state";
-import { screenShape } from "../screen/size";
-import { RunApi, type Session } from "../session";
-import type { TrialKind } from "../trials/kind";
+import { untilMeasured, RunClock } from "../screen/window";
+import { ScreenState, screenShape } from "../screen/size";
+import { RunApi, type Session, type TrialKind, owed, Replays } from "../session";
 import { applyWrite } from "./kept-visit";
-import { owed, Replays } from "./replays";
 
 const LONGEST_AGENT = 1_000;
 const SEND_FIRST_MS = 8_000;

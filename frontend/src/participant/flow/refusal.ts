@@ -1,13 +1,12 @@
 /** What stands in a visit's way before it has begun: a link that leads nowhere, a browser that cannot, or can only nearly, show the study. */
 import { call, Refused, request } from "../request";
 import type { MessageKey, Translate } from "../../i18n";
-import { type Back, showNotice } from "../screens/notice";
+import { type Back, showNotice } from "../screens/support";
 import { loadModule } from "../../ui/load-module";
-import type { Entry } from "../main";
-import type { RunStarted } from "../../api/schema";
-import type { Abilities, GateFinding } from "./gates";
+import type { RunStarted, LinkState } from "../../api/schema";
+import { type Abilities, type GateFinding, lackOfRoom, measures } from "./gates";
 import type { Identity } from "./identity";
-import { fetchRun, persistently, wayBack } from "./link";
+import { type Entry, fetchRun, persistently, wayBack } from "./link";
 
 const REFUSALS: Record<string, MessageKey> = {
   link_unknown: "link_unknown",
@@ -80,6 +79,30 @@ export async function turnedAway(
   }
   if (before.status === "active") await persistently(root, t, () => screenOutDevice(started.run_token, closed, device));
   const run = await persistently(root, t, () => fetchRun(started.run_token));
-  const { ended } = await loadModule(() => import("./ended"));
+  const { ended } = await loadModule(() => import("../screens/completion"));
   await ended(root, t, run, started, identity, wayBack(t, link), t(closed.reason, closed.values));
+}
+
+// The page that asks for a larger window or a smaller zoom, before anything has begun; loaded where it is needed.
+
+/**
+ * Wait until the window has room for the clips, before anything has begun. True as soon as it has; false where the
+ * study screens devices and the participant has no other one.
+ */
+export function waitForRoom(root: HTMLElement, t: Translate, link: LinkState): Promise<boolean> {
+  return new Promise((resolve) => {
+    const look = (): void => {
+      const lack = lackOfRoom(link.gates, measures(link.gates));
+      if (lack) return draw(lack);
+      window.removeEventListener("resize", look);
+      resolve(true);
+    };
+    const draw = ({ reason, values }: GateFinding): void => {
+      const actions = [{ label: t("try_again"), press: look }];
+      if (link.screens_devices) actions.push({ label: t("no_device"), press: () => resolve(false) });
+      showNotice(root, { title: t("window_small_title"), text: t(reason, values), actions, back: wayBack(t, link) });
+    };
+    window.addEventListener("resize", look);
+    look();
+  });
 }

@@ -4,11 +4,42 @@
  * `put` resolves when the item is kept. `receipt` resolves when the server has answered for good. Requests may
  * be repeated without harm, because the server stores each id once.
  */
-import { BUSY, isTemporary, NetworkError, refusalOf, request, type Answer, type Refused } from "../request";
-import { withinTime } from "../time-limit";
-import { backoff } from "./backoff";
-import { events, type Batch, nextBatch } from "./batch";
 import type { OutboxItem, OutboxStore } from "./store";
+import { BUSY, isTemporary, NetworkError, refusalOf, request, type Answer, type Refused, withinTime } from "../request";
+import type { Event as RunEvent } from "../../api/schema";
+import { clockTime } from "../measured";
+
+// How long to wait before the next try: doubling from half a second to 15 s, spread by a random quarter.
+
+const FIRST_MS = 500;
+const LONGEST_MS = 15_000;
+
+export function backoff(failures: number, random: () => number = Math.random): number {
+  const full = Math.min(LONGEST_MS, FIRST_MS * 2 ** Math.max(0, failures - 1));
+  return full * (0.75 + 0.5 * random());
+}
+
+// What is sent next: the oldest write by itself; where there is none, events of one run together.
+
+const events = "/api/run/events";
+const EVENTS_A_CALL = 100;
+
+interface Batch {
+  method: "PUT" | "POST";
+  path: string;
+  token: string;
+  body: unknown;
+  items: OutboxItem[];
+}
+
+export function nextBatch(queue: readonly OutboxItem[]): Batch | null {
+  const write = queue.find((item) => item.kind === "write");
+  if (write) return { method: write.method, path: write.path, token: write.token, body: write.body, items: [write] };
+  const first = queue[0];
+  if (!first) return null;
+  const items = queue.filter((item) => item.token === first.token).slice(0, EVENTS_A_CALL);
+  return { method: "POST", path: events, token: first.token, body: { events: items.map((item) => item.body) }, items };
+}
 
 export type Outcome = { accepted: true; body: unknown } | { accepted: false; refused: Refused };
 export interface Sent {
@@ -217,5 +248,32 @@ export class Outbox {
 
   private changed(): void {
     this.options.onChange?.(this.state);
+  }
+}
+
+// What happened on the page beside the answers: kept and sent like them, after them.
+
+/** What the page reports; the server takes any word, so that an older page is still heard. */
+export type EventType =
+  | "heartbeat"
+  | "focus_lost"
+  | "fullscreen_left"
+  | "clip_unavailable"
+  | "unsupported"
+  | "storage_blocked"
+  | "offline"
+  | "online"
+  | "stage"
+  | "clock_changed"
+  | "second_tab"
+  | "warning_shown";
+
+export class EventLog {
+  constructor(private readonly outbox: Outbox) {}
+
+  add(type: EventType, data: Record<string, unknown> = {}): void {
+    const event: RunEvent & { type: EventType } = { id: crypto.randomUUID(), type, at: clockTime(), data };
+    // An event that cannot be kept must not stop the participant.
+    this.outbox.putEvent(event).catch((error: unknown) => console.warn("an event could not be kept", type, error));
   }
 }

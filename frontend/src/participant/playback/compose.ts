@@ -1,6 +1,6 @@
 /** Several decoded clips on one canvas, drawn as one: frame k of each in the same refresh. */
 import type { DecodedClip } from "./decode";
-import type { Part } from "./player";
+import type { Part } from "./protocol";
 import type { StreamedClip } from "./streamed-clip";
 
 /** One clip, all its frames decoded or those next to be shown. */

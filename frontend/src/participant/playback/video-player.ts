@@ -2,9 +2,8 @@
  * The fallback where WebCodecs is missing: a video element and its frame callbacks. Flagged in the data,
  * because the callbacks miss frames that were shown and say little about when.
  */
-import { absoluteNow } from "./protocol";
+import { absoluteNow, ClipBroken, type ClipPlayer, type PlayOptions, type Prepared, type ShownClip } from "./protocol";
 import { count } from "../measured";
-import { ClipBroken, type ClipPlayer, type PlayOptions, type Prepared, type ShownClip } from "./player";
 
 const ASSUMED_FPS = 30;
 const LOAD_LIMIT_MS = 20_000;

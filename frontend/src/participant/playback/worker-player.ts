@@ -1,7 +1,20 @@
-/** The page's side of the worker: asks, and turns its messages into promises. */
-import { backoff } from "../outbox/backoff";
-import { ClipBroken, type ClipPlayer, type Part, type PlayOptions, type Prepared, type ShownClip } from "./player";
-import type { FromWorker, Request, ToWorker } from "./protocol";
+/** The player: chosen by what the browser can do, and shown by a worker where it can. */
+import { backoff } from "../outbox/outbox";
+import {
+  ClipBroken,
+  type ClipPlayer,
+  type Part,
+  type PlayOptions,
+  type Prepared,
+  type ShownClip,
+  type FromWorker,
+  type Request,
+  type ToWorker,
+} from "./protocol";
+import type { RunState } from "../../api/schema";
+import { loadModule } from "../../ui/load-module";
+
+// The page's side of the worker: asks, and turns its messages into promises.
 
 const DECODE_LIMIT_MS = 20_000;
 const START_LIMIT_MS = 10_000;
@@ -19,7 +32,7 @@ function layoutShown(): Promise<void> {
 }
 
 /** A worker whose script has run: it is fetched anew where it was lost on the way. Rejects where it never comes. */
-export async function startedWorker(): Promise<Worker> {
+async function startedWorker(): Promise<Worker> {
   for (let failures = 1; failures <= MAX_STARTS; failures++) {
     const worker = new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
     const outcome = await new Promise<"started" | "lost" | "silent">((resolve) => {
@@ -129,4 +142,42 @@ export class WorkerPlayer implements ClipPlayer {
   private tell(message: ToWorker, transfer: Transferable[] = []): void {
     this.worker.postMessage(message, transfer);
   }
+}
+
+// Frame by frame in the worker where that is possible, else the video element.
+
+export function hasWebCodecs(): boolean {
+  return "VideoDecoder" in globalThis && "OffscreenCanvas" in globalThis && "transferControlToOffscreen" in HTMLCanvasElement.prototype;
+}
+
+/** Most clips are H.264, High profile; a browser built without licensed codecs lacks it. */
+const H264 = "avc1.640028";
+
+/** True where the browser decodes H.264 the way its clips will be played. */
+export async function playsH264(): Promise<boolean> {
+  if (!hasWebCodecs()) return document.createElement("video").canPlayType(`video/mp4; codecs="${H264}"`) !== "";
+  return VideoDecoder.isConfigSupported({ codec: H264, codedWidth: 960, codedHeight: 360 }).then(
+    ({ supported }) => supported === true,
+    () => false,
+  );
+}
+
+/** True where any way to show clips exists. */
+export function hasVideo(): boolean {
+  return hasWebCodecs() || typeof document.createElement("video").play === "function";
+}
+
+type Display = Pick<RunState["display"], "background" | "sync_patch">;
+
+/** The fallback is fetched only where it is needed: by a browser without a decoder, or one to which the worker never comes. */
+export async function choosePlayer({ background, sync_patch }: Display): Promise<ClipPlayer> {
+  const worker = hasWebCodecs() ? await startedWorker().catch(() => null) : null;
+  try {
+    if (worker) return new WorkerPlayer(worker, background, sync_patch);
+  } catch (error) {
+    // A canvas that cannot be handed over, as where an extension guards canvases.
+    console.warn("clips are played by the video element", error);
+  }
+  const { VideoPlayer } = await loadModule(() => import("./video-player"));
+  return new VideoPlayer();
 }

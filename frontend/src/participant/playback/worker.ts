@@ -4,10 +4,8 @@
  */
 import { type Composed, composition, drawFrame, framesOf, type SingleClip, streamsOf } from "./compose";
 import { decodeClip } from "./decode";
-import type { Part } from "./player";
-import { absoluteNow, type FromWorker, type Started, type ToWorker } from "./protocol";
-import { EvennessMeter, type Job, RefreshClock } from "./refresh-clock";
-import { FrameSchedule, trueRefresh } from "./schedule";
+import { type Part, absoluteNow, type FromWorker, type Started, type ToWorker, EvennessMeter, type Job, RefreshClock } from "./protocol";
+import { FrameSchedule, trueRefresh } from "./record";
 import type { drawSyncPatch } from "./sync-patch";
 
 interface Scope {

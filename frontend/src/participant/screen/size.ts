@@ -1,6 +1,8 @@
-/** From calibration to the clip's size on this screen, and what a zoom or another screen does to it. */
+/** The screen as it was measured, and how large a clip stands on it. */
 import { pixelRatio, pixels, within } from "../measured";
 import type { CalibrationState, TrialInfo } from "../../api/schema";
+
+// From calibration to the clip's size on this screen, and what a zoom or another screen does to it.
 
 export interface ScreenShape {
   device_pixel_ratio: number;
@@ -8,7 +10,7 @@ export interface ScreenShape {
   screen_height_px: number;
 }
 
-export type ScreenChange = "none" | "zoom" | "screen";
+type ScreenChange = "none" | "zoom" | "screen";
 
 const SAME_SHARE = 0.01;
 
@@ -89,4 +91,37 @@ const WIDEST_MM = [1_000, 1_300] as const;
 export function isPlausible(px_per_mm: number, { screen_width_px: width, screen_height_px: height } = screenShape()): boolean {
   const widest = WIDEST_MM[width >= 2 * height ? 1 : 0];
   return px_per_mm >= PLAUSIBLE_PX_PER_MM[0] && px_per_mm <= PLAUSIBLE_PX_PER_MM[1] && width / px_per_mm <= widest;
+}
+
+// What is known about this participant's screen, and whether it still holds.
+
+export class ScreenState {
+  calibration: CalibrationState | null = null;
+  refresh_rate_hz: number | null = null;
+
+  /** Take over a stored calibration where it was made on a screen like this one. */
+  restore(stored: CalibrationState | null): void {
+    if (stored && screenChange(stored, screenShape()) === "none") this.calibration = stored;
+  }
+
+  get px_per_mm(): number | null {
+    return this.calibration?.px_per_mm ?? null;
+  }
+
+  change(now: ScreenShape = screenShape()): ScreenChange {
+    return this.calibration ? screenChange(this.calibration, now) : "none";
+  }
+
+  /** The calibration as it is after a zoom, to be stored as a new one. */
+  afterZoom(now: ScreenShape = screenShape()): CalibrationState | null {
+    if (!this.calibration) return null;
+    const px_per_mm = zoomed(this.calibration.px_per_mm, this.calibration, now);
+    const window_size = { window_width_px: pixels(window.innerWidth), window_height_px: pixels(window.innerHeight) };
+    this.calibration = { ...this.calibration, ...now, ...window_size, px_per_mm, occasion: "zoom", recheck_percent: null };
+    return this.calibration;
+  }
+
+  record(): { refresh_rate_hz: number | null; device_pixel_ratio: number | null } {
+    return { refresh_rate_hz: within(this.refresh_rate_hz, 0, 10_000), device_pixel_ratio: pixelRatio(window.devicePixelRatio) };
+  }
 }

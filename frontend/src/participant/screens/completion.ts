@@ -1,11 +1,15 @@
-/** The last page: thanks, the code, and the way back. */
-import type { Completion } from "../../api/schema";
-import { h } from "../../ui/element";
+/** The last page of a visit, whether it has just ended or was over before. */
+import type { Completion, RunStarted, RunState } from "../../api/schema";
+import { h, button, showPage } from "../../ui/element";
 import { markdown } from "../../ui/markdown";
-import { button, showPage } from "../../ui/page";
 import type { Translate } from "../../i18n";
 import type { Identity } from "../flow/identity";
 import type { Session } from "../session";
+import { completed } from "./finish";
+import { emptied, type Back, showNotice } from "./support";
+import { persistently } from "../flow/link";
+
+// The last page: thanks, the code, and the way back.
 
 /** Begin as another person: on a laboratory's computer she comes by the same link. */
 export function beginAnew(identity: Identity): void {
@@ -61,4 +65,24 @@ function codeRow(copy: string, copied: string, code: string): HTMLElement {
   const press = button(copy, () => void write().catch(() => {}), "quiet");
   row.append(press);
   return row;
+}
+
+// A run that is over: withdrawn, screened out or complete, with its code as often as it is asked for.
+
+/** `why` is said first where the participant does not know yet what ended the run. */
+export async function ended(
+  root: HTMLElement,
+  t: Translate,
+  run: RunState,
+  started: RunStarted,
+  identity: Identity,
+  back: Back,
+  why = "",
+): Promise<void> {
+  if (run.status === "withdrawn") {
+    const actions = identity.isNamed ? [] : [{ label: t("new_visit"), press: () => beginAnew(identity) }];
+    return void showNotice(root, { title: t("withdrawn_title"), text: t("withdrawn"), actions, back });
+  }
+  const done = await persistently(root, t, () => completed(started.run_token));
+  showCompletion({ t, run }, emptied(root), done, nextPerson(t, identity), why);
 }

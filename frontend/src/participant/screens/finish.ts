@@ -1,12 +1,11 @@
 /** The end: the completion code appears only when the server has every answer. */
 import type { Completion } from "../../api/schema";
 import { call, Refused } from "../request";
-import { h } from "../../ui/element";
-import { showPage } from "../../ui/page";
+import { h, showPage } from "../../ui/element";
 import { isNoAnswer } from "../flow/link";
-import { backoff } from "../outbox/backoff";
+import { backoff } from "../outbox/outbox";
 import { STRING, plugin, type PluginClass } from "../jspsych";
-import { leaveFullScreen } from "../screen/full-screen";
+import { leaveFullScreen } from "../screen/window";
 import type { Session } from "../session";
 import { trouble } from "./support";
 

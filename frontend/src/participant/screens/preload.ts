@@ -1,13 +1,10 @@
 /** Waits until a block's clips are here, with progress, another try, and a way out. */
 import type { TrialInfo } from "../../api/schema";
-import { h } from "../../ui/element";
-import { showPage } from "../../ui/page";
-import { progressBar } from "../../ui/progress";
-import { plugin, INT, OBJECT, STRING, type PluginClass } from "../jspsych";
-import type { ClipUnavailable } from "../preload/fetch-clip";
-import type { ClipSource } from "../preload/fetch-clip";
+import { h, showPage, progressBar } from "../../ui/element";
+import { plugin, INT, OBJECT, STRING, type PluginClass, BOOL } from "../jspsych";
+import type { ClipUnavailable, ClipSource } from "../preload/clip-cache";
 import type { Session } from "../session";
-import { choose, stopButton } from "./support";
+import { choose, stopButton, trouble } from "./support";
 
 interface Parameters {
   eyebrow: string;
@@ -82,4 +79,37 @@ async function askAgain(session: Session, display: HTMLElement, failed: ClipUnav
   const gone = failed.every(({ fault }) => fault !== "offline");
   const without = gone ? [{ label: t("preload_without"), value: false }] : [];
   return choose(session, footer, [{ label: t("try_again"), value: true }, ...without]);
+}
+
+// At the end of a block: wait a little for receipts, because they say which clips are shown again.
+
+interface SettleParameters {
+  limit_ms: number;
+}
+interface SettleData {
+  settled: boolean;
+}
+const SEEN_MS = 250;
+
+export function settle(session: Session): PluginClass<SettleParameters> {
+  return plugin<SettleParameters, SettleData>({
+    name: "settle",
+    parameters: { limit_ms: INT }, // longest wait in ms; what comes later joins the next block
+    data: { settled: BOOL }, // true where the server had everything
+    async show(display, { limit_ms }) {
+      let said: string | null = null;
+      const tell = (): void => {
+        const why = trouble(session);
+        // What is written again may be spoken again.
+        if (why !== said) showPage(display, { title: session.t("saving"), body: [h("p", { role: "status" }, why)] });
+        said = why;
+      };
+      const say = setInterval(tell, SEEN_MS * (session.outbox.state.failures > 0 ? 1 : 8));
+      const settled = await session.outbox.drained(limit_ms);
+      clearInterval(say);
+      return { settled };
+    },
+    simulate: async ({ limit_ms }) => ({ settled: await session.outbox.drained(limit_ms) }),
+    act: () => {},
+  });
 }

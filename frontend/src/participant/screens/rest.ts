@@ -1,13 +1,19 @@
 /** The rest between blocks: where one stands, and at least as long as declared. */
-import { h } from "../../ui/element";
+import { h, button, showPage, progressBar } from "../../ui/element";
 import { markdown } from "../../ui/markdown";
-import { button, showPage } from "../../ui/page";
-import { progressBar } from "../../ui/progress";
 import { counted, done, type Session } from "../session";
-import type { Data, Parameters } from "./block-break";
 import { choose, codeNote, stopButton } from "./support";
 
-export async function rest(session: Session, display: HTMLElement, { block, blocks, seconds_min }: Parameters): Promise<Data> {
+export interface RestParameters {
+  block: number;
+  blocks: number;
+  seconds_min: number;
+}
+export interface RestData {
+  rested_ms: number;
+}
+
+export async function rest(session: Session, display: HTMLElement, { block, blocks, seconds_min }: RestParameters): Promise<RestData> {
   const { t, run } = session;
   const started = performance.now();
   const total = counted(run).length;

@@ -1,10 +1,11 @@
 /** Full screen and a window that is large enough: before the size is measured, and whenever it is lost. */
-import { h } from "../../ui/element";
-import { showPage, statusLine } from "../../ui/page";
-import { plugin, BOOL, STRING, type PluginClass } from "../jspsych";
-import { canFullScreen, enterFullScreen, isFullScreen } from "../screen/full-screen";
+import { h, showPage, statusLine } from "../../ui/element";
+import { plugin, BOOL, STRING, type PluginClass, FLOAT } from "../jspsych";
+import { canFullScreen, enterFullScreen, isFullScreen } from "../screen/window";
 import type { Session } from "../session";
 import { choose, noDevice, screenOut, stopButton } from "./support";
+import type { CalibrationState } from "../../api/schema";
+import { loadModule } from "../../ui/load-module";
 
 interface Parameters {
   eyebrow: string;
@@ -88,4 +89,37 @@ export async function askRoom(
   );
   const choices = [{ label: t("try_again"), value: true }, ...noDevice(session, false)];
   if (!(await choose(session, footer, choices))) await screenOut(session, "window_small", values);
+}
+
+// The size of the screen, measured: what does it is loaded where a study asks for it.
+
+interface CalibrationParameters {
+  eyebrow: string;
+  occasion: CalibrationState["occasion"];
+}
+interface CalibrationData {
+  px_per_mm: number | null;
+  method: string;
+  checked: boolean;
+}
+
+/** Fetched with the page's first clips, so that it is here when its turn comes, also without a connection. */
+export const loadCalibration = (): Promise<typeof import("../calibration/measure")> => loadModule(() => import("../calibration/measure"));
+
+export function calibration(session: Session): PluginClass<CalibrationParameters> {
+  return plugin<CalibrationParameters, CalibrationData>({
+    name: "calibration",
+    parameters: {
+      eyebrow: STRING, // small line above the title
+      occasion: STRING, // first, screen_changed or recheck
+    },
+    data: {
+      px_per_mm: FLOAT, // CSS pixels per millimetre, null where skipped
+      method: STRING, // card or ruler
+      checked: BOOL, // true where an earlier size was looked at once more and holds
+    },
+    show: async (display, { eyebrow, occasion }) => (await loadCalibration()).calibrate(session, display, eyebrow, occasion),
+    simulate: async () => (await loadCalibration()).simulate(session),
+    act: async (display) => (await loadCalibration()).act(display),
+  });
 }

@@ -1,9 +1,7 @@
 /** Pausing or withdrawing, asked for once more. */
-import { h } from "../../ui/element";
-import { button } from "../../ui/page";
+import { h, button } from "../../ui/element";
 import { wayBack } from "../flow/link";
-import { showNotice } from "./notice";
-import { codeNote } from "./support";
+import { showNotice, codeNote } from "./support";
 import type { Session } from "../session";
 
 export function openStopDialog(session: Session): void {

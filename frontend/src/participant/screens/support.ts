@@ -1,9 +1,10 @@
-/** What several screens need: a way to wait for one press, to save with a word about it, and to stop. */
-import { h } from "../../ui/element";
+/** What screens share: notices, choices, saving with what is shown meanwhile, and the button to stop. */
+import { h, button, type Child, showPage } from "../../ui/element";
 import { clickNothing, isStartKey, listenKeys } from "../../ui/keys";
-import { button } from "../../ui/page";
 import type { Outcome } from "../outbox/outbox";
 import type { Session } from "../session";
+
+// What several screens need: a way to wait for one press, to save with a word about it, and to stop.
 
 const SLOW_MS = 400;
 const OFFLINE_MS = 4_000;
@@ -128,4 +129,37 @@ export function stopButton(session: Session): HTMLElement {
     { class: "corner" },
     button(session.t("stop"), () => void session.root.dispatchEvent(new CustomEvent("stop")), "plain"),
   );
+}
+
+// A page outside the timeline: gates, links that lead nowhere, another tab, trouble. It replaces everything.
+
+/** Where the recruiter wants those who take no part, and what leads there. */
+export type Back = { label: string; href: string } | null;
+
+export interface Notice {
+  title: string;
+  text: string;
+  more?: Child[];
+  back?: Back;
+  actions?: { label: string; press: () => void }[];
+}
+
+/** A fresh place in the root. jsPsych's own element goes, and with it whatever its timeline still shows. */
+export function emptied(root: HTMLElement): HTMLElement {
+  const display = h("div", { class: "notice" });
+  root.replaceChildren(display);
+  return display;
+}
+
+export function showNotice(root: HTMLElement, notice: Notice): HTMLElement {
+  const display = emptied(root);
+  const { back } = notice;
+  const leads = back ? h("a", { class: "button quiet", href: back.href, rel: "noreferrer" }, back.label) : null;
+  const buttons = (notice.actions ?? []).map(({ label, press }, index) => button(label, press, index ? "quiet" : "primary"));
+  showPage(display, {
+    title: notice.title,
+    body: [h("p", { role: "alert" }, notice.text), ...(notice.more ?? [])],
+    actions: [...buttons, leads],
+  });
+  return display;
 }

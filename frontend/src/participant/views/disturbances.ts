@@ -1,5 +1,5 @@
 /** What disturbs a view, named as [playback.disturbances] names it; the server knows what each does to the play. */
-import { watchFocus } from "../screen/attention";
+import { watchFocus } from "../screen/window";
 
 export interface Disturbed {
   /** How often each disturbed; a name that is missing did not. */

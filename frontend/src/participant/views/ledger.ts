@@ -7,7 +7,7 @@ import type { TrialInfo, ViewIn, ViewState } from "../../api/schema";
 import { clockTime, count, duration, frameLog, offset, pixels, within } from "../measured";
 import { ticketOf } from "../evidence/evidence";
 import { disturbancesOf } from "../playback/record";
-import type { Shown } from "../trials/shared/showing";
+import type { Shown } from "../trials/showing";
 import type { Session } from "../session";
 
 /** A showing and the roles of the clips that were in it: one clock has drawn them all. */

@@ -1,6 +1,6 @@
 /** A whole number within limits. */
 import { h } from "../../../ui/element";
-import { plainNumber } from "../../../ui/digits";
+import { plainNumber } from "../../../ui/keys";
 import type { TypeOfField } from "./field";
 
 export const type: TypeOfField<"number"> = {

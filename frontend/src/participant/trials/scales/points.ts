@@ -1,9 +1,8 @@
 /** Points side by side: a press, a digit or the arrow keys; the two ends labelled, or every point. */
 import { pick } from "../../../i18n";
 import { h } from "../../../ui/element";
-import { scaleDirection } from "../../../ui/scale-direction";
-import { keyFor, valueOf } from "../shared/scale-keys";
-import type { Ask, Widget } from "../clip_rating/widget";
+import { scaleDirection, keyFor, valueOf } from "../../../ui/keys";
+import type { Ask, Widget } from "../../kinds/clip_rating/scale";
 import "./points.css";
 
 export function widget({ scale, language, t, meant, choose }: Ask): Widget {

@@ -1,8 +1,8 @@
 /** A line between two labels: the browser's own slider, whose handle appears when it is first touched. */
 import { pick } from "../../../i18n";
 import { h } from "../../../ui/element";
-import { scaleDirection } from "../../../ui/scale-direction";
-import type { Ask, Widget } from "../clip_rating/widget";
+import { scaleDirection } from "../../../ui/keys";
+import type { Ask, Widget } from "../../kinds/clip_rating/scale";
 import "./slider.css";
 
 export function widget({ scale, question, language, t, meant, choose, enter }: Ask): Widget {
