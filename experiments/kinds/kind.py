@@ -2,14 +2,44 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from experiments.assignment.trial import Compared, Trial
 from experiments.columns.view import View
 from experiments.declaration.base import Declaration
 from experiments.declaration.experiment import Experiment
 from experiments.declaration.trial import Answer, BlockSpec, TrialDeclaration
+from experiments.errors import InputError
 from experiments.schema.effects import Effect
+
+
+class PlanCommand(NamedTuple):
+    """Arguments behind `analysis`, and in words what they assume."""
+
+    arguments: list[str]
+    assumed: str
+
+
+MEDIUM_F = 0.25
+"""Cohen's f that is called medium."""
+
+
+def power_of_means(experiment: Experiment) -> PlanCommand:
+    """Power of tests of means: each factor by itself with a medium effect."""
+    factors = [factor for factor in experiment.factors if len(factor.levels) > 1 and not factor.random]
+    if not factors:
+        raise InputError("there is no factor whose levels are compared, so there is no power to reckon")
+    arguments = ["plan", "anova"]
+    for option, between in (("--within", False), ("--between", True)):
+        named = [f"{one.name}:{len(one.levels)}" for one in factors if one.between is between]
+        arguments += [option, ",".join(named)] if named else []
+    for factor in factors:
+        arguments += ["--effect", f"{factor.name}={MEDIUM_F}"]
+    alone = all(factor.between for factor in factors)
+    means = "each participant gives one mean" if alone else "two means of a participant correlate by 0.5"
+    return PlanCommand(
+        arguments, f"each factor by itself has a medium effect (Cohen's f = {MEDIUM_F}), {means}"
+    )
 
 
 def nothing_wrong(experiment: Experiment) -> str | None:
@@ -76,6 +106,9 @@ class Kind:
         Whether answers decide what is shown next: the server then follows its series.
     fault : callable
         What in the declared [trial] does not fit the rest of the experiment: `path: what to do`, or None.
+    power : callable
+        The `analysis plan` that gives the power of the declared design; InputError where it cannot be
+        computed.
     chooses : callable
         Whether a run's trials are chosen by the comparisons stored before it.
     assign_by : callable or None
@@ -99,6 +132,7 @@ class Kind:
     further_examples: tuple[str, ...] = ()
     plan: Callable[[Experiment], tuple[str, ...]] = nothing_more
     fault: Callable[[Experiment], str | None] = nothing_wrong
+    power: Callable[[Experiment], PlanCommand] = power_of_means
     check_response: Callable[[Mapping[str, Any]], int | None] = lambda _: None
     check_choices: Callable[[Experiment], int] = two_choices
     shares_clips: bool = False

@@ -27,7 +27,7 @@ from experiments.declaration.paired_comparison import (
 )
 from experiments.declaration.trial import BlockSpec, ClipSpec
 from experiments.errors import InputError
-from experiments.kinds.kind import Kind
+from experiments.kinds.kind import Kind, PlanCommand
 from experiments.kinds.pair_choice import chosen_pairs
 from experiments.kinds.pairs import BlockDeal, Deal, Pair, check_connected, every_pair, fault, item_of
 from experiments.schema.effects import Effect
@@ -380,6 +380,44 @@ dealing = { by = "turn" }
 """,
 )
 
+STEP = 0.3
+"""Log odds between neighbouring items in a planned study: the better one wins 57 of 100."""
+MAX_ITEMS = 12
+"""Items for which power is simulated."""
+
+
+def power_of_pairs(experiment: Experiment) -> PlanCommand:
+    """Power where a participant compares every two items."""
+    if any(factor.between for factor in experiment.factors):
+        raise InputError("groups of participants compare different items, so no one power holds for all")
+    if chooses(experiment):
+        raise InputError("pairs are chosen by the answers so far, so no power is reckoned before the data")
+    pairs = every_pair(experiment)
+    named = [(item_of(experiment, pair.left), item_of(experiment, pair.right)) for pair in pairs]
+    items = len({item for both in named for item in both})
+    if not 2 <= items <= MAX_ITEMS:
+        raise InputError(f"power of pairs is reckoned for 2 to {MAX_ITEMS} items, and there are {items}")
+    of_items = items * (items - 1) // 2
+    if len({frozenset(both) for both in named}) < of_items:
+        raise InputError("power of pairs is reckoned where every two items are compared; here some are not")
+    shown = sum(trial.kind == "main" for trial in assign(experiment, seed=0, slot=0))
+    if shown < of_items:
+        raise InputError(
+            f"power of pairs is reckoned where a participant compares every two items; here it is {shown} of "
+            f"{of_items} pairs"
+        )
+    abilities = ",".join(f"{STEP * item:.1f}" for item in range(items))
+    arguments = ["plan", "pairs", "--abilities", abilities]
+    if (repeats := shown // of_items) > 1:
+        arguments += ["--repeats", str(repeats)]
+    often = {1: "once", 2: "twice"}.get(repeats, f"{repeats} times")
+    return PlanCommand(
+        arguments,
+        f"neighbouring items differ by {STEP} in log odds, each participant compares every two items "
+        f"{often}, all by the same abilities",
+    )
+
+
 PAIRED_COMPARISON = Kind(
     declaration=PairedComparison,
     answer=ComparisonAnswer,
@@ -394,6 +432,7 @@ PAIRED_COMPARISON = Kind(
     further_examples=FURTHER_EXAMPLES,
     plan=plan,
     fault=fault,
+    power=power_of_pairs,
     check_response=check_response,
     check_choices=check_choices,
     groups=True,

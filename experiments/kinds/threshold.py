@@ -23,7 +23,8 @@ from experiments.declaration.threshold import (
     threshold_of,
 )
 from experiments.declaration.trial import BlockSpec
-from experiments.kinds.kind import Kind
+from experiments.errors import InputError
+from experiments.kinds.kind import Kind, PlanCommand
 from experiments.kinds.threshold_grid import (
     clip_of,
     exemplar_at,
@@ -34,6 +35,7 @@ from experiments.kinds.threshold_grid import (
     series_of,
     standard_beside,
     standard_of,
+    stimuli,
 )
 from experiments.schema.effects import Effect
 
@@ -411,6 +413,41 @@ second = { en = "The second" }
 """,
 )
 
+
+def power_of_thresholds(experiment: Experiment) -> PlanCommand:
+    """Power of a difference between the thresholds of two conditions."""
+    trial = threshold_of(experiment)
+    conditions = [
+        one for one in experiment.factors if one.name not in trial.stimulus.factors and not one.random
+    ]
+    if all(len(one.levels) < 2 for one in conditions):
+        raise InputError(
+            "the stimulus is the only factor, so there are no conditions whose thresholds could differ"
+        )
+    if any(one.between and len(one.levels) > 1 for one in conditions):
+        raise InputError("power of thresholds is reckoned for conditions that each participant sees all of")
+    if len(series_of(experiment)) < 2:
+        raise InputError(
+            "there is one series, so there are no two thresholds to compare and no power to reckon"
+        )
+    numbers = sorted(stimuli(experiment))
+    if len(numbers) < 3:
+        raise InputError(f"power of thresholds takes three stimuli or more, and there are {len(numbers)}")
+    step = (numbers[-1] - numbers[0]) / (len(numbers) - 1)
+    middle = numbers[len(numbers) // 2]
+    times = max(1, round((trial.stop.trials or 0) / len(numbers)))
+    arguments = ["plan", "thresholds", "--levels", ",".join(f"{number:g}" for number in numbers)]
+    arguments += ["--threshold", f"{middle:g}", "--difference", f"{step / 2:g}", "--spread", f"{step:g}"]
+    arguments += ["--sd-people", f"{step / 2:g}", "--sd-difference", f"{step / 4:g}"]
+    arguments += ["--guess", f"{trial.task.guess:g}", "--trials", str(times)]
+    return PlanCommand(
+        arguments,
+        f"thresholds near {middle:g} that differ by {step / 2:g} between two conditions, a function as wide "
+        f"as the step of {step:g} between stimuli, a series of {trial.stop.trials} trials in each condition, "
+        f"as if each stimulus came {times} times: a series that looks for the threshold tells more",
+    )
+
+
 THRESHOLD = Kind(
     declaration=Threshold,
     answer=ThresholdAnswer,
@@ -425,6 +462,7 @@ THRESHOLD = Kind(
     further_examples=FURTHER_EXAMPLES,
     plan=plan,
     fault=fault,
+    power=power_of_thresholds,
     check_response=check_response,
     adapts=True,
     groups=True,

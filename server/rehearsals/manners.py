@@ -269,7 +269,7 @@ class Actor(Person):
         if manner.waits:
             self.moment += timedelta(seconds=clips_s + rt / 1000 + READY_S)
         body = self.rating(trial, declared) | {"rt": round(rt, 2)}
-        if body["answer"]["kind"] == "clip_rating":  # other kinds are answered as the rater model does
+        if "answers" in body["answer"]:  # on scales; other answers are given as the rater model does
             self._answer_in_manner(body["answer"]["answers"], trial, declared)
         if body["answer"]["kind"] == "check":
             body |= self._checked(trial)

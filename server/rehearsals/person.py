@@ -13,8 +13,8 @@ from pydantic import TypeAdapter
 from experiments.checks import CHECK_KINDS, CheckName
 from experiments.declaration.experiment import Experiment
 from experiments.declaration.forms import FormField
-from experiments.declaration.threshold import Threshold
 from experiments.errors import InputError, did_you_mean
+from experiments.kinds import KINDS
 from experiments.kinds.threshold_grid import Point, model, points_of
 from server.accounts.identity import OPERATOR
 from server.context import Services
@@ -442,7 +442,7 @@ def link_and_raters(
             group_name=group,
         )
         experiment, observer = services.versions.get(session, version.id).experiment, None
-        if isinstance(experiment.trial, Threshold):
+        if KINDS[experiment.trial.kind].adapts:
             observer = observer_of(experiment, levels, observed)
         elif observed:
             raise InputError(f"--observer: expected a study of thresholds, got {experiment.trial.kind}")

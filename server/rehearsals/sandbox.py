@@ -1,4 +1,4 @@
-"""The rehearsal itself, in a process and a database of its own, and the power of the declared plan."""
+"""The rehearsal itself, in a process and a database of its own, with the power of the declared plan."""
 
 import json
 import secrets
@@ -6,19 +6,15 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from sqlalchemy.orm import Session
 
 from experiments.assignment.groups import names
 from experiments.declaration.experiment import Experiment
-from experiments.declaration.paired_comparison import PairedComparison
-from experiments.declaration.threshold import Threshold
 from experiments.errors import InputError
-from experiments.kinds.paired_comparison import assign, chooses
-from experiments.kinds.pairs import every_pair, item_of
+from experiments.kinds import KINDS
 from experiments.kinds.scales import expected_minutes
-from experiments.kinds.threshold_grid import series_of, stimuli
 from experiments.manifest import Manifest
 from server.accounts.identity import OPERATOR
 from server.app import create_app
@@ -53,115 +49,10 @@ from server.results.jobs import run_analysis
 from server.studies.creation import add_version, create_study, planned_experiment
 from server.studies.lookup import find_study
 
-# The power of a declared plan: which `analysis plan` a declaration asks for, and what has to be assumed.
-
-MEDIUM_F = 0.25
-"""Cohen's f that is called medium."""
-STEP = 0.3
-"""Log odds between neighbouring items: the better one wins 57 of 100."""
-MAX_ITEMS = 12
-SIMULATIONS = 200
-
-
-class PlanCommand(NamedTuple):
-    """Arguments behind `analysis`, and in words what they assume."""
-
-    arguments: list[str]
-    assumed: str
-
-
-def plan_command(experiment: Experiment) -> PlanCommand:
-    """How the power of this plan is reckoned; InputError where it cannot be."""
-    trial = experiment.trial
-    if isinstance(trial, PairedComparison):
-        return _of_pairs(experiment)
-    if isinstance(trial, Threshold):
-        return _of_thresholds(experiment, trial)
-    return _of_means(experiment)
-
-
-def _of_means(experiment: Experiment) -> PlanCommand:
-    factors = [factor for factor in experiment.factors if len(factor.levels) > 1 and not factor.random]
-    if not factors:
-        raise InputError("there is no factor whose levels are compared, so there is no power to reckon")
-    arguments = ["plan", "anova"]
-    for option, between in (("--within", False), ("--between", True)):
-        named = [f"{one.name}:{len(one.levels)}" for one in factors if one.between is between]
-        arguments += [option, ",".join(named)] if named else []
-    for factor in factors:
-        arguments += ["--effect", f"{factor.name}={MEDIUM_F}"]
-    alone = all(factor.between for factor in factors)
-    means = "each participant gives one mean" if alone else "two means of a participant correlate by 0.5"
-    return PlanCommand(
-        arguments, f"each factor by itself has a medium effect (Cohen's f = {MEDIUM_F}), {means}"
-    )
-
-
-def _of_pairs(experiment: Experiment) -> PlanCommand:
-    if any(factor.between for factor in experiment.factors):
-        raise InputError("groups of participants compare different items, so no one power holds for all")
-    if chooses(experiment):
-        raise InputError("pairs are chosen by the answers so far, so no power is reckoned before the data")
-    pairs = every_pair(experiment)
-    named = [(item_of(experiment, pair.left), item_of(experiment, pair.right)) for pair in pairs]
-    items = len({item for both in named for item in both})
-    if not 2 <= items <= MAX_ITEMS:
-        raise InputError(f"power of pairs is reckoned for 2 to {MAX_ITEMS} items, and there are {items}")
-    of_items = items * (items - 1) // 2
-    if len({frozenset(both) for both in named}) < of_items:
-        raise InputError("power of pairs is reckoned where every two items are compared; here some are not")
-    shown = sum(trial.kind == "main" for trial in assign(experiment, seed=0, slot=0))
-    if shown < of_items:
-        raise InputError(
-            f"power of pairs is reckoned where a participant compares every two items; here it is {shown} of "
-            f"{of_items} pairs"
-        )
-    abilities = ",".join(f"{STEP * item:.1f}" for item in range(items))
-    arguments = ["plan", "pairs", "--abilities", abilities]
-    if (repeats := shown // of_items) > 1:
-        arguments += ["--repeats", str(repeats)]
-    often = {1: "once", 2: "twice"}.get(repeats, f"{repeats} times")
-    return PlanCommand(
-        arguments,
-        f"neighbouring items differ by {STEP} in log odds, each participant compares every two items "
-        f"{often}, all by the same abilities",
-    )
-
-
-def _of_thresholds(experiment: Experiment, trial: Threshold) -> PlanCommand:
-    conditions = [
-        one for one in experiment.factors if one.name not in trial.stimulus.factors and not one.random
-    ]
-    if all(len(one.levels) < 2 for one in conditions):
-        raise InputError(
-            "the stimulus is the only factor, so there are no conditions whose thresholds could differ"
-        )
-    if any(one.between and len(one.levels) > 1 for one in conditions):
-        raise InputError("power of thresholds is reckoned for conditions that each participant sees all of")
-    if len(series_of(experiment)) < 2:
-        raise InputError(
-            "there is one series, so there are no two thresholds to compare and no power to reckon"
-        )
-    numbers = sorted(stimuli(experiment))
-    if len(numbers) < 3:
-        raise InputError(f"power of thresholds takes three stimuli or more, and there are {len(numbers)}")
-    step = (numbers[-1] - numbers[0]) / (len(numbers) - 1)
-    middle = numbers[len(numbers) // 2]
-    times = max(1, round((trial.stop.trials or 0) / len(numbers)))
-    arguments = ["plan", "thresholds", "--levels", ",".join(f"{number:g}" for number in numbers)]
-    arguments += ["--threshold", f"{middle:g}", "--difference", f"{step / 2:g}", "--spread", f"{step:g}"]
-    arguments += ["--sd-people", f"{step / 2:g}", "--sd-difference", f"{step / 4:g}"]
-    arguments += ["--guess", f"{trial.task.guess:g}", "--trials", str(times)]
-    return PlanCommand(
-        arguments,
-        f"thresholds near {middle:g} that differ by {step / 2:g} between two conditions, a function as wide "
-        f"as the step of {step:g} between stimuli, a series of {trial.stop.trials} trials in each condition, "
-        f"as if each stimulus came {times} times: a series that looks for the threshold tells more",
-    )
-
-
 # The rehearsal itself, in a process and a database of its own: it is not told where people's data are.
 
+SIMULATIONS = 200
+"""Data sets that a plan of power draws."""
 SHOWN_PEOPLE = 5
 Say = Callable[[float, str], None]
 
@@ -299,7 +190,7 @@ def _export(session: Session, study: Study, folder: Path) -> None:
 def _power(experiment: Experiment, folder: Path, seed: int) -> tuple[Power | None, str]:
     """What `analysis plan` says; or why it says nothing."""
     try:
-        arguments, assumed = plan_command(experiment)
+        arguments, assumed = KINDS[experiment.trial.kind].power(experiment)
     except InputError as error:
         return None, str(error)
     out = folder / "power.json"

@@ -139,8 +139,8 @@ def latest_estimates(session: Session, of: Pool) -> list[LatestEstimate]:
     return [LatestEstimate(*row) for row in session.execute(query.order_by(SeriesAnswer.threshold))]
 
 
-def traces_of(session: Session, of: Pool) -> list[Trace]:
-    """The traces of main trials that did not fail, of runs that are not excluded."""
+def traces_of(session: Session, of: Pool, kind: str) -> list[Trace]:
+    """The traces in answers of a kind: of main trials that did not fail and runs that are not excluded."""
     on_trial = and_(
         AssignedTrial.study_run_id == Rating.study_run_id, AssignedTrial.trial_index == Rating.trial_index
     )
@@ -158,7 +158,7 @@ def traces_of(session: Session, of: Pool) -> list[Trace]:
         .join(VersionClip, VersionClip.id == TrialClip.version_clip_id)
         .join(Clip, Clip.sha256 == VersionClip.clip_sha256)
         .where(of.runs(), StudyRun.excluded.is_(False), AssignedTrial.kind == "main")
-        .where(Rating.kind == "continuous_rating", Rating.verdict != "failed")
+        .where(Rating.kind == kind, Rating.verdict != "failed")
         .order_by(Rating.id)
     )
     return [

@@ -25,7 +25,7 @@ def summarise(session: Session, study: Study, version: StudyVersion, of: Pool) -
         ratings=tally.answers.total(),
         minimum=declared.minimum,
         maximum=declared.maximum,
-        cells=trace_cells(order, traces_of(session, of), blinks_of_cells(session, of)),
+        cells=trace_cells(order, traces_of(session, of, "continuous_rating"), blinks_of_cells(session, of)),
     )
 
 

@@ -5,11 +5,13 @@ from typing import Any
 
 import pytest
 
+from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError
+from experiments.kinds import KINDS
+from experiments.kinds.kind import PlanCommand
 from experiments.load import load_experiment, locate, parse_experiment
 from server.context import Services
 from server.models import Link, Rating, StudyRun
-from server.rehearsals.sandbox import plan_command
 from tests.helpers.admins import Admin
 from tests.helpers.studies import SHORT, Participant
 
@@ -23,6 +25,11 @@ FOUR_PAIRS = """{ among = "declared", cells = [
 ASYMMETRIC = """    { name = "asymmetric", levels = { asymmetry = "asymmetric" } },
 """
 LIMIT_S = 300
+
+
+def plan_command(experiment: Experiment) -> PlanCommand:
+    """The plan of power that a study's kind of trial asks for."""
+    return KINDS[experiment.trial.kind].power(experiment)
 
 
 def counts(services: Services) -> list[int]:
