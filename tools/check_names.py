@@ -19,6 +19,7 @@ FOLDERS = (
     "blink_engine",
     "experiments",
     "server",
+    "packages/face_baking/face_baking",
     "stimuli_builder",
     "tools",
     "video_conversion",
@@ -31,7 +32,7 @@ KNOWN = {"NotFound", "plays_wanted"}
 """HTTP's own name of status 404; a key by which pages that are open over an update know their trials."""
 OTHERWISE = {"most": "max", "film": "clip"}
 # A film is what a camera took of a screen, or lies on an eye; the rest of the project shows clips.
-FILMS = ("stimuli_builder/sync_patch/", "stimuli_builder/characters/facekit/")
+FILMS = ("stimuli_builder/sync_patch/", "packages/face_baking/face_baking/")
 
 
 def names(tree: ast.AST) -> Iterator[tuple[int, str]]:

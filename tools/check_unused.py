@@ -18,6 +18,7 @@ OWN = (
     "blink_engine",
     "experiments",
     "server",
+    "packages/face_baking/face_baking",
     "stimuli_builder",
     "tools",
     "video_conversion",
@@ -48,6 +49,8 @@ CALLED_FROM_OUTSIDE = {
     "Sent": "a protocol that annotations name in quotes",
     "data_url": "a template of the report",
     "create_lasting_app": "uvicorn",
+    "bake_face": "an entry point of packages/face_baking",
+    "bake_samples": "an entry point of packages/face_baking",
     "editor_schema": "frontend/scripts/api_types.mjs",
 }
 

@@ -45,6 +45,10 @@ STARTED = (
 )
 
 
+WORKSPACE = ("packages/face_baking",)
+"""Packages of the workspace: they use the main one, which imports none of them."""
+
+
 def say(text: str) -> None:
     print(f"[setup] {text}", flush=True)
 
@@ -96,18 +100,19 @@ def make_environment() -> None:
 
 def install_python(locks: Sequence[str]) -> None:
     say(f"installing Python packages from {' and '.join(locks)}")
+    editable = [part for project in (".", *WORKSPACE) for part in ("-e", project)]
     if not (BIN / "uv").exists():
         subprocess.run(
             [BIN / "python", "-m", "pip", "install", "-q", "--disable-pip-version-check", "uv"], check=False
         )
     if (BIN / "uv").exists():
         call(BIN / "uv", "pip", "sync", "-q", "--require-hashes", *locks)
-        call(BIN / "uv", "pip", "install", "-q", "--no-deps", "-e", ".")
+        call(BIN / "uv", "pip", "install", "-q", "--no-deps", *editable)
     else:  # platforms without a wheel of uv
         call(
             BIN / "python", "-m", "pip", "install", "-q", "--require-hashes", *(f"-r{lock}" for lock in locks)
         )
-        call(BIN / "python", "-m", "pip", "install", "-q", "--no-deps", "-e", ".")
+        call(BIN / "python", "-m", "pip", "install", "-q", "--no-deps", *editable)
 
 
 def keep_bytecode() -> None:
@@ -200,7 +205,7 @@ def main() -> None:
     # Once the test packages are in, `run` keeps them.
     with_tests = purpose == "test" or (STAMPS / "python-test").is_file()
     name, locks = ("python-test", [RUN_LOCK, TEST_LOCK]) if with_tests else ("python", [RUN_LOCK])
-    inputs = [*locks, ROOT / "pyproject.toml"]
+    inputs = [*locks, ROOT / "pyproject.toml", *(ROOT / name / "pyproject.toml" for name in WORKSPACE)]
     step(name, inputs, lambda: install_python([lock.name for lock in locks]), BIN / "server")
     step("bytecode", inputs, keep_bytecode)
     provide_node()

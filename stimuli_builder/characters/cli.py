@@ -1,15 +1,23 @@
 """`stimuli bake` and `stimuli character`: render one, list those that are here, bring back an old one."""
 
+from collections.abc import Callable
+from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from experiments.command_line import command_group
-from stimuli_builder.characters.cli_face import bake_face
-from stimuli_builder.characters.cli_samples import bake_samples
+from experiments.errors import InputError
 from stimuli_builder.characters.retired import load_retired, restore
 from stimuli_builder.clips.characters import SHIPPED_FOLDER, geometry, shipped_names
+
+BAKERS = "palpebra.bakers"
+"""Entry points by which a package of its own adds a command to `stimuli bake`."""
+KNOWN_BAKERS = {
+    "face": "A character on face-kit geometry.",
+    "samples": "Synthetic training data for whatever finds eyelids in pictures.",
+}
 
 bake_app = command_group("Render a character's atlas of baked pictures.")
 character_app = command_group("List the characters that are here, and bring back one of an earlier release.")
@@ -68,9 +76,29 @@ def fetch_character(
     typer.echo(f"'{name}' is in {restore(name, source, target)}")
 
 
+ANY_OPTIONS: dict[str, Any] = {"ignore_unknown_options": True, "allow_extra_args": True}
+
+
+def _not_installed(name: str) -> Callable[[typer.Context], None]:
+    """A command that says how to install what it needs."""
+
+    def command(context: typer.Context) -> None:
+        del context
+        raise InputError(
+            f"`stimuli bake {name}` needs the package palpebra-face-baking, which is not installed; "
+            "in a clone of the repository run: python -m pip install --no-deps -e packages/face_baking"
+        )
+
+    return command
+
+
 def register(app: typer.Typer) -> None:
     """Add `bake` and `character` to the command line."""
-    bake_app.command("face")(bake_face)
-    bake_app.command("samples")(bake_samples)
+    installed = {baker.name: baker for baker in entry_points(group=BAKERS)}
+    for name, summary in KNOWN_BAKERS.items():
+        if name in installed:
+            bake_app.command(name)(installed[name].load())
+        else:
+            bake_app.command(name, help=summary, context_settings=ANY_OPTIONS)(_not_installed(name))
     app.add_typer(bake_app, name="bake")
     app.add_typer(character_app, name="character")

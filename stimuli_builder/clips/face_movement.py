@@ -10,11 +10,18 @@ from numpy.typing import NDArray
 
 from experiments.declaration.rendering import RenderSettings
 from experiments.errors import InputError
-from stimuli_builder.characters.facekit.kit import Array
-from stimuli_builder.characters.facekit.sphere import smooth
 from stimuli_builder.clips.characters import DRAWN, Geometry
 from stimuli_builder.clips.kernels import GAMMA
 from stimuli_builder.clips.levels import LevelSet, Light, LowerLid, Window, window_inside
+
+Array = NDArray[np.float64]
+
+
+def smooth(low: float, high: float, x: Array | float) -> Array:
+    """Smoothstep from 0 at `low` to 1 at `high`; falling where `low` is above `high`."""
+    t = np.clip((np.asarray(x, np.float64) - low) / (high - low), 0, 1)
+    return np.asarray(t * t * (3 - 2 * t))
+
 
 # How far brow, cheek, the skin of a squint and the eyeball move in a whole closure, in mm.
 

@@ -20,12 +20,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 from bench_iris import FACES, AtlasScene
+from face_baking.kit import load_facekit
+from face_baking.training.draw import SamplePose
+from face_baking.training.labels import labels_of
 
 from stimuli_builder.characters.atlas import SHIPPED, load_atlas
 from stimuli_builder.characters.colour import linear_to_srgb
-from stimuli_builder.characters.facekit.kit import load_facekit
-from stimuli_builder.characters.facekit.training.draw import SamplePose
-from stimuli_builder.characters.facekit.training.labels import labels_of
 from stimuli_builder.tracking.certainty import lid_offsets
 from stimuli_builder.tracking.detector.detection import eye_points
 from stimuli_builder.tracking.detector.mesh import open_detector

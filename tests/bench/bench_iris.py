@@ -12,15 +12,15 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from face_baking.identity import load_identity
+from face_baking.kit import load_facekit
+from face_baking.scene import FaceScene
+from face_baking.training.draw import SamplePose
+from face_baking.training.labels import labels_of
+from face_baking.training.scene import SampleScene
 
 from stimuli_builder.characters.atlas import SHIPPED, load_atlas
 from stimuli_builder.characters.colour import linear_to_srgb
-from stimuli_builder.characters.facekit.identity import load_identity
-from stimuli_builder.characters.facekit.kit import load_facekit
-from stimuli_builder.characters.facekit.scene import FaceScene
-from stimuli_builder.characters.facekit.training.draw import SamplePose
-from stimuli_builder.characters.facekit.training.labels import labels_of
-from stimuli_builder.characters.facekit.training.scene import SampleScene
 from stimuli_builder.tracking.detector.detection import eye_points
 from stimuli_builder.tracking.iris import measure_iris
 

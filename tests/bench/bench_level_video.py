@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from face_baking.development import psnr_db
 from numpy.typing import NDArray
 
 from stimuli_builder.characters import level_video
 from stimuli_builder.characters.atlas import SHIPPED, decode_picture, load_atlas
-from stimuli_builder.characters.facekit.development import psnr_db
 from stimuli_builder.characters.writing import write_picture
 
 

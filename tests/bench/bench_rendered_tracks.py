@@ -18,10 +18,10 @@ from pathlib import Path
 import numpy as np
 from bench_label_free import tell as tell_lids
 from bench_stated_error import RUN, SPOILT, Compared, binned, compared, spoilt, tell, tracked_rows
+from face_baking.kit import load_facekit
 from matplotlib.figure import Figure
 from rendered_recordings import recordings
 
-from stimuli_builder.characters.facekit.kit import load_facekit
 from stimuli_builder.tracking.labelfree import label_free_lesson
 from stimuli_builder.tracking.model import TrainingOptions
 from stimuli_builder.tracking.shapes import Points, default_markers

@@ -18,24 +18,24 @@ import sys
 from pathlib import Path
 
 import numpy as np
-
-from stimuli_builder.characters.atlas import SHIPPED, Atlas, load_atlas
-from stimuli_builder.characters.colour import level_weights, linear_to_srgb, srgb_to_linear
-from stimuli_builder.characters.facekit.assembly import STUDIO_EV
-from stimuli_builder.characters.facekit.bake import RECIPES
-from stimuli_builder.characters.facekit.development import (
+from face_baking.assembly import STUDIO_EV
+from face_baking.bake import RECIPES
+from face_baking.development import (
     error_and_noise,
     error_db,
     photographed,
     psnr_db,
     to_8_bit,
 )
-from stimuli_builder.characters.facekit.environment import ensure_blender
-from stimuli_builder.characters.facekit.identity import Identity
-from stimuli_builder.characters.facekit.kit import load_facekit
-from stimuli_builder.characters.facekit.lid_pose import HORIZONTAL_MM, VERTICAL_MM, LidPose
-from stimuli_builder.characters.facekit.renderer import Renderer, Setup, Shot
-from stimuli_builder.characters.facekit.scene import FaceScene
+from face_baking.environment import ensure_blender
+from face_baking.identity import Identity
+from face_baking.kit import load_facekit
+from face_baking.lid_pose import HORIZONTAL_MM, VERTICAL_MM, LidPose
+from face_baking.renderer import Renderer, Setup, Shot
+from face_baking.scene import FaceScene
+
+from stimuli_builder.characters.atlas import SHIPPED, Atlas, load_atlas
+from stimuli_builder.characters.colour import level_weights, linear_to_srgb, srgb_to_linear
 from tests.helpers.lower_lid_change import lower_lid_change
 
 # The last one is where the lids almost meet.

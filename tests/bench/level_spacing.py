@@ -16,12 +16,12 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from face_baking.assembly import STUDIO_EV
+from face_baking.development import develop, to_8_bit
+from face_baking.inbetween import flow_mix
 from numpy.typing import NDArray
 
 from stimuli_builder.characters.colour import linear_to_srgb, srgb_to_linear
-from stimuli_builder.characters.facekit.assembly import STUDIO_EV
-from stimuli_builder.characters.facekit.development import develop, to_8_bit
-from stimuli_builder.characters.facekit.inbetween import flow_mix
 
 Picture = NDArray[np.uint8]
 

@@ -10,16 +10,16 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from face_baking.development import psnr_db
+from face_baking.identity import Identity
+from face_baking.inbetween import flow_mix
+from face_baking.kit import load_facekit
+from face_baking.lid_pose import LidPose
+from face_baking.pose_motion import pose_between
+from face_baking.scene import FaceScene
 
 from stimuli_builder.characters.atlas import SHIPPED, Atlas, load_atlas
 from stimuli_builder.characters.colour import linear_to_srgb, srgb_to_linear
-from stimuli_builder.characters.facekit.development import psnr_db
-from stimuli_builder.characters.facekit.identity import Identity
-from stimuli_builder.characters.facekit.inbetween import flow_mix
-from stimuli_builder.characters.facekit.kit import load_facekit
-from stimuli_builder.characters.facekit.lid_pose import LidPose
-from stimuli_builder.characters.facekit.pose_motion import pose_between
-from stimuli_builder.characters.facekit.scene import FaceScene
 
 Place = tuple[float, float]
 """mm up and mm nasal."""

@@ -15,12 +15,12 @@ import cv2
 import numpy as np
 from bench_close_up import MIRRORED, from_left
 from bench_iris import AtlasScene
+from face_baking.training.draw import SamplePose
+from face_baking.training.labels import labels_of
 
 from stimuli_builder.actor.recording import Blink, Course, course, plan_blinks
 from stimuli_builder.characters.atlas import SHIPPED, Atlas, load_atlas
 from stimuli_builder.characters.colour import linear_to_srgb
-from stimuli_builder.characters.facekit.training.draw import SamplePose
-from stimuli_builder.characters.facekit.training.labels import labels_of
 from stimuli_builder.tracking.detector.detection import eye_points
 from stimuli_builder.tracking.shapes import Points, widths
 from stimuli_builder.video import Picture

@@ -16,6 +16,12 @@ from typing import Any
 
 import cv2
 import numpy as np
+from face_baking.identity import load_identity
+from face_baking.kit import FaceKit, load_facekit
+from face_baking.scene import FaceScene
+from face_baking.training.draw import SamplePose
+from face_baking.training.labels import labels_of
+from face_baking.training.scene import SampleScene
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -30,12 +36,6 @@ from stimuli_builder.actor.recording import Actor, ActorOptions
 from stimuli_builder.actor.renderer import IRIS_RADIUS
 from stimuli_builder.characters.atlas import SHIPPED, load_atlas
 from stimuli_builder.characters.colour import linear_to_srgb
-from stimuli_builder.characters.facekit.identity import load_identity
-from stimuli_builder.characters.facekit.kit import FaceKit, load_facekit
-from stimuli_builder.characters.facekit.scene import FaceScene
-from stimuli_builder.characters.facekit.training.draw import SamplePose
-from stimuli_builder.characters.facekit.training.labels import labels_of
-from stimuli_builder.characters.facekit.training.scene import SampleScene
 from stimuli_builder.tracking.detector.detection import along
 
 EYE_PX, CUT = 96.0, (192, 160)

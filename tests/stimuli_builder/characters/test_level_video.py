@@ -4,12 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from face_baking.development import psnr_db
 
 from experiments.errors import InputError
 from stimuli_builder.characters.atlas import load_atlas
 from stimuli_builder.characters.colour import linear_to_srgb, srgb_to_linear
 from stimuli_builder.characters.declaration import Declaration, Level, read_declaration
-from stimuli_builder.characters.facekit.development import psnr_db
 from stimuli_builder.characters.level_video import decode_level_video, write_level_video
 from stimuli_builder.characters.writing import CLOSURES, CROP, draw_crop, write_declaration
 from stimuli_builder.clips.characters import find_character

@@ -1,0 +1,65 @@
+"""Loops of the kit's vertices round each eye: 0 hidden rim, 2 wet edge, 4 lashes, 8 about the fold."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from face_baking.kit import EYEBALLS, Array, FaceKit, Index
+
+SIDES = (1, -1)
+"""1 is the person's left eye (+x), -1 the right one."""
+LOOPS = 14
+EDGE_LOOP, LASH_LOOP = 2, 4
+"""The lid's margin lies between both, about 1 mm as it is seen; with lashes on loop 3 it had no thickness."""
+
+
+@dataclass(frozen=True, eq=False)
+class Globe:
+    """An eyeball: centre (3,) and radius without the cornea, cm."""
+
+    centre: Array
+    radius: float
+
+
+def lid_loops(kit: FaceKit, side: int) -> list[Index]:
+    """The first `LOOPS` loops of vertices from the hidden rim outwards."""
+    p = kit.neutral[kit.rim] * np.array([side, 1, 1])
+    here = (p[:, 0] > 0.5) & (p[:, 0] < 5) & (p[:, 2] > 8) & (p[:, 1] > 2.5) & (p[:, 1] < 4.7)
+    current, seen = kit.rim[here], np.zeros(len(kit.neutral), bool)
+    loops = []
+    for _ in range(LOOPS):
+        seen[current] = True
+        loops.append(np.sort(current))
+        touching = np.isin(kit.edges, current)
+        reached = np.unique(kit.edges[touching.any(axis=1)])
+        current = reached[~seen[reached]]
+    return loops
+
+
+def chains(kit: FaceKit, loop: Index, side: int) -> tuple[Index, Index]:
+    """Upper and lower half of a loop from nose to temple; both hold the corners."""
+    p = kit.neutral[loop]
+    x = p[:, 0] * side
+    nasal, temporal = p[np.argmin(x)], p[np.argmax(x)]
+    line = nasal[1] + (temporal[1] - nasal[1]) * (x - x.min()) / (np.ptp(x) + 1e-9)
+    order = np.argsort(x)
+    upper = order[p[order, 1] >= line[order] - 1e-6]
+    lower = order[p[order, 1] <= line[order] + 1e-6]
+    return loop[upper], loop[lower]
+
+
+def globe_of(kit: FaceKit, vertices: Array, side: int) -> Globe:
+    """The globe of a face: the kit's own, moved and scaled with its vertices."""
+    first, last = EYEBALLS[side]
+    neutral, here = kit.neutral[first:last], vertices[first:last]
+    centre = np.array([3.11645 * side, 3.60158, 7.98230])
+
+    def size(points: Array) -> float:
+        return float(np.linalg.norm(points - points.mean(0), axis=1).mean())
+
+    scale = size(here) / size(neutral)
+    away = neutral - centre
+    distance = np.linalg.norm(away, axis=1)
+    angle = np.arccos(np.clip(away[:, 2] / distance, -1, 1))
+    radius = float(np.median(distance[(angle > 0.7) & (angle < 1.4)]))
+    return Globe(here.mean(0) + (centre - neutral.mean(0)) * scale, radius * scale)
