@@ -3,20 +3,21 @@
 Pure numpy; the same core in TypeScript gives the same curves (docs/blink-engine.md).
 """
 
-from blink_engine.engine import BlinkEngine, LidFrame
-from blink_engine.events import EVENT_KINDS, Event, EventKind, Response
 from blink_engine.laws import Law
 from blink_engine.parameters import (
+    EVENT_KINDS,
     STATE_NAMES,
     Drift,
+    Event,
+    EventKind,
     Parameters,
     ProfileModel,
+    Response,
     StateName,
     default_parameters,
 )
-from blink_engine.performance import Performance, StateChange, perform
-from blink_engine.plan import Blink
-from blink_engine.profile import BlinkShape
+from blink_engine.performance import BlinkEngine, LidFrame, Performance, StateChange, perform
+from blink_engine.plan import Blink, BlinkShape
 
 __all__ = [
     "EVENT_KINDS",

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from zlib import crc32
 
-from blink_engine.events import Event
-from blink_engine.parameters import StateName
+from blink_engine.parameters import Event, StateName
 from blink_engine.performance import StateChange
 
 PAUSE_MIN_S = 0.18

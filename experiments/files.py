@@ -133,3 +133,22 @@ def _finite(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_finite(inner) for inner in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+# The address of a database as its owner writes it, and as SQLAlchemy needs it.
+
+DRIVER = "postgresql+psycopg://"
+
+
+def with_driver(url: str) -> str:
+    """The address with the driver that this project uses, where it names PostgreSQL and no driver.
+
+    Examples
+    --------
+    >>> with_driver("postgres://host/name")
+    'postgresql+psycopg://host/name'
+    """
+    for prefix in ("postgres://", "postgresql://"):
+        if url.startswith(prefix):
+            return DRIVER + url.removeprefix(prefix)
+    return url

@@ -18,7 +18,7 @@ from blink_engine import (
     default_parameters,
     perform,
 )
-from blink_engine.random_numbers import RandomNumbers
+from blink_engine.laws import RandomNumbers
 
 VECTORS = Path(__file__).resolve().parent.parent / "tests/golden/blink_engine/vectors.json"
 EVENTS = (

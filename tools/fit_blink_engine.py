@@ -19,7 +19,7 @@ import pandas as pd
 from scipy import optimize
 
 from blink_engine.laws import Law
-from blink_engine.profile import BlinkShape
+from blink_engine.plan import BlinkShape
 from stimuli_builder.blinks.library import load_library
 from stimuli_builder.blinks.profile import BlinkProfile
 from tools.blink_drift import IntervalFit, fit_intervals, held_out_p, with_slow_drift

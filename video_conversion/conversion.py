@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 from fractions import Fraction
 
-from video_conversion.frame_times import frame_map
 from video_conversion.prepared import QUICKTIME
-from video_conversion.video_file import MAX_PX, NotAClip, VideoFile, check_amount
+from video_conversion.video_file import MAX_PX, NotAClip, VideoFile, check_amount, frame_map
 
 PLAYED_PROFILES = ("Constrained Baseline", "Baseline", "Main", "High", "Progressive High", "Constrained High")
 MIN_FPS, MAX_FPS = 1, 240

@@ -136,8 +136,7 @@ def verify(
 
       analysis verify exp3-capsule.zip --no-report
     """
-    from experiments.capsule import REPORT_FOLDER, open_capsule
-    from experiments.software import differences, present_software
+    from experiments.capsule import REPORT_FOLDER, differences, open_capsule, present_software
 
     with TemporaryDirectory(prefix="capsule-") as temporary, saying("verifying") as say:
         files, work = Path(temporary) / "files", Path(temporary) / "work"

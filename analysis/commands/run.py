@@ -117,10 +117,10 @@ def run(
 
       analysis run exp3 --csv ratings.csv --runs runs.csv --seal exp3-seal.json
     """
-    from analysis.errors import NoRatingsError
     from analysis.plans.plan import plan_of, study_contents
     from analysis.read.pool import Origin as PoolOrigin
     from analysis.read.pool import Pool
+    from analysis.read.reading import NoRatingsError
     from analysis.read.study_answers import load_csv, load_database, read_runs, stored_at
     from analysis.report.contents import held_against
     from experiments.seal import read_clips_sha256, read_seal

@@ -8,11 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from analysis.errors import NoRatingsError
 from analysis.plans.plan import Plan, Prepared, prepare, refuse_unknown, where
 from analysis.plans.result import Analysis, analyse_cells, labels_of
 from analysis.read.pool import Pool
-from analysis.read.reading import Reading
+from analysis.read.reading import NoRatingsError, Reading
 from analysis.read.study_answers import StudyAnswers
 from analysis.report.contents import Contents, Part, Progress, Section, caption, in_words
 from analysis.report.formats import Table

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from analysis.errors import NoRatingsError
 from analysis.plans.exclusions import Exclusions, apply_exclusions
 from analysis.read.pool import Pool, origins, pooled
-from analysis.read.reading import Reading
+from analysis.read.reading import NoRatingsError, Reading
 from analysis.read.study_answers import RunEvidence, StudyAnswers, with_verdicts
 from analysis.report.contents import Contents, evidence_section
 from experiments.declaration.experiment import Experiment

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from experiments.columns import View, names_of
 from experiments.columns.base import EVIDENCE, EXCLUSION, LEVELS, ORIGIN, RUN, STUDY
+from experiments.errors import InputError
 
 # Which columns the analysis reads of the rows of a kind of trial.
 
@@ -87,3 +88,10 @@ def rows_that_count(rows: pd.DataFrame, keep: NDArray[np.bool_]) -> tuple[NDArra
             decisions.append(f"{out.sum()} {why} left out")
         keep = keep & ~out
     return keep, decisions
+
+
+# Failures of the analysis that are nobody's fault.
+
+
+class NoRatingsError(InputError):
+    """There is nothing to analyse (yet): an empty study, not a fault. Commands end with exit code 1."""

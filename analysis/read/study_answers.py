@@ -14,14 +14,13 @@ from sqlalchemy import Connection, create_engine, inspect, text
 from sqlalchemy.engine import make_url
 from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError
 
-from analysis.errors import NoRatingsError
 from analysis.read.number_columns import MISSING_MARKS, numbers
-from analysis.read.reading import RUN_FLAGS, RUN_TEXTS, TRIAL_PLACES, Reading
+from analysis.read.reading import RUN_FLAGS, RUN_TEXTS, TRIAL_PLACES, NoRatingsError, Reading
 from analysis.read.text_table import categorical, read_text_table
 from experiments.columns.runs import EVIDENCE_COLUMNS
-from experiments.database_url import with_driver
 from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError
+from experiments.files import with_driver
 
 
 @dataclass(frozen=True)

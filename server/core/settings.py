@@ -23,8 +23,8 @@ from pydantic import (
 )
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
-from experiments.database_url import with_driver
 from experiments.errors import InputError
+from experiments.files import with_driver
 from server.models.accounts import Role
 
 # The file that keeps the secret key in the data folder: for its owner alone, made once for all workers.

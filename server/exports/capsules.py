@@ -19,20 +19,22 @@ from sqlalchemy.orm import Session
 from experiments.capsule import (
     CAPSULE_FILE,
     MANIFEST,
+    PROGRAM,
     REPORT_FOLDER,
     SOFTWARE_FILE,
     Capsule,
     CapsuleFile,
     ReportSource,
+    Software,
     listed_files,
     pack,
+    present_software,
     report_input,
 )
 from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError
 from experiments.files import json_text, whole_file
 from experiments.manifest import Manifest
-from experiments.software import PROGRAM, Software, present_software
 from server.accounts.audit import record
 from server.accounts.identity import OPERATOR, Identity
 from server.context import Services

@@ -15,7 +15,7 @@ from experiments.columns import View
 from experiments.columns.view import Dialect, Stretch, Stretches, levels_at, with_levels
 from experiments.errors import InputError
 from experiments.kinds import KINDS
-from experiments.spreadsheet import csv_lines, csv_text
+from experiments.text_tables import csv_lines, csv_text
 from server.core.values import encoded
 from server.exports import repository
 from server.exports.extract import Extract

@@ -15,7 +15,7 @@ from sqlalchemy.orm import Session
 from experiments.columns import Column
 from experiments.columns.runs import IDENTITY_COLUMNS
 from experiments.errors import InputError
-from experiments.spreadsheet import guarded_csv
+from experiments.text_tables import guarded_csv
 from server.core.values import encoded, now
 from server.exports import psych_ds, repository, tables
 from server.exports.csv_lines import csv_pieces, rating_count, rating_pieces, whole

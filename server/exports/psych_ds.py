@@ -16,7 +16,7 @@ from experiments.design import rated_levels
 from experiments.kinds import KINDS
 from experiments.kinds.scales import scales_of
 from experiments.rules import DropFailedPlays, DropSlowTrials, ExcludeIncomplete
-from experiments.spreadsheet import guarded_csv
+from experiments.text_tables import guarded_csv
 from server.core.values import encoded, iso
 from server.exports.csv_lines import csv_pieces, zip_pieces
 from server.exports.extract import Extract

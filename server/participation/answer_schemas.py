@@ -20,7 +20,7 @@ from pydantic import (
 
 from experiments.checks import CheckName
 from experiments.declaration.clip_rating import MAX_FRAMES_LOGGED, SCALE_NAME
-from experiments.kinds.union import AnyAnswer
+from experiments.kinds import AnyAnswer
 
 # What pages measure of clips and views: bounded numbers and names.
 

@@ -9,7 +9,7 @@ from pydantic import BaseModel, Field, StringConstraints
 from experiments.checks import CheckName
 from experiments.declaration.forms import Form
 from experiments.declaration.tables import Display, Texts
-from experiments.kinds.union import AnyPage
+from experiments.kinds import AnyPage
 from experiments.rules import PlaybackRules
 from server.models import STAGES
 from server.participation.answer_schemas import RunStatus, Tickets, TrialInfo, WarningShown

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 from experiments.declaration.tables import Display
-from experiments.kinds.union import AnyPage
+from experiments.kinds import AnyPage
 from server.core.values import VisibleObject
 from server.participation.answer_schemas import Outcome, Role, ViewShowing
 from server.participation.evidence import Verdict

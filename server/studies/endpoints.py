@@ -6,7 +6,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query, Response
 from fastapi.responses import PlainTextResponse
 
-from experiments.spreadsheet import guarded_table
+from experiments.text_tables import guarded_table
 from server.accounts.audit import record
 from server.accounts.identity import Myself, Viewer, Writer
 from server.accounts.workspaces import Uploader

@@ -9,8 +9,14 @@ from typing import Any
 import pandas as pd
 
 from experiments.errors import InputError, counted
-from experiments.spreadsheet import guarded_cell, guarded_row, unguarded_cell
-from experiments.text_tables import HEAD_BYTES, separator_of, utf8_stream
+from experiments.text_tables import (
+    HEAD_BYTES,
+    guarded_cell,
+    guarded_row,
+    separator_of,
+    unguarded_cell,
+    utf8_stream,
+)
 
 NOTE = "note"
 """Key of `DataFrame.attrs` under which a table says how it was read; absent where that is plain."""

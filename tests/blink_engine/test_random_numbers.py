@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from blink_engine import Law
-from blink_engine.normal import normal_quantile
-from blink_engine.random_numbers import MASK, RandomNumbers, SplitMix32
+from blink_engine.laws import MASK, RandomNumbers, SplitMix32, normal_quantile
 
 
 def test_xoshiro_equals_its_published_code() -> None:

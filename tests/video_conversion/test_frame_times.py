@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from video_conversion.frame_times import STANDARD_RATES, constant_rate, frame_map, typical_rate
+from video_conversion.video_file import STANDARD_RATES, constant_rate, frame_map, typical_rate
 
 RATES = st.sampled_from(STANDARD_RATES)
 

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from analysis.read.files.cells import Cells
 from experiments.errors import InputError
-from experiments.spreadsheet import unguarded_cell
-from experiments.text_tables import separator_of, utf8_stream
+from experiments.text_tables import separator_of, unguarded_cell, utf8_stream
 
 # Double quotes of a CSV file that do not enclose whole cells: what is said of them.
 

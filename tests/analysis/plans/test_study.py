@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.errors import NoRatingsError
 from analysis.plans.clip_rating import READING, analyse_study
 from analysis.read.pool import Origin, Pool
+from analysis.read.reading import NoRatingsError
 from analysis.read.study_answers import load_csv, load_database
 from analysis.report.json_output import as_data, left_out
 from experiments import rules

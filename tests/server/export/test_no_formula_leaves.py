@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from experiments.spreadsheet import unguarded_cell
+from experiments.text_tables import unguarded_cell
 from server.context import Services
 from tests.helpers.admins import Admin
 from tests.helpers.studies import SHORT, Participant, add_study

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from experiments.errors import InputError
-from experiments.spreadsheet import guarded_cell
+from experiments.text_tables import guarded_cell
 from stimuli_builder.blinks.csv_table import NOTE, line_of, read_table, write_table
 from stimuli_builder.blinks.series import read_series
 

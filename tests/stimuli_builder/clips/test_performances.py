@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from blink_engine import STATE_NAMES
-from blink_engine.events import EVENT_KINDS
+from blink_engine.parameters import EVENT_KINDS
 from experiments.declaration.rendering import EventKind, RenderOverrides, RenderSettings, State
 from experiments.errors import InputError
 from experiments.load import load_experiment, parse_experiment
