@@ -12,7 +12,7 @@ import {
 } from "./parameters";
 import { RandomNumbers } from "./random-numbers";
 
-// The course of one blink, as in blink_engine/profile.py (equations 1 to 3 there).
+// The course of one blink, as in blink_engine/plan.py (equations 1 to 3 there).
 
 interface BlinkShape {
   closing_s: number;

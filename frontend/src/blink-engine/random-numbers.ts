@@ -1,4 +1,4 @@
-/** The engine's random numbers: xoshiro128** 1.1 seeded by SplitMix32, to the bit as in blink_engine/random_numbers.py. */
+/** The engine's random numbers: xoshiro128** 1.1 seeded by SplitMix32, to the bit as in blink_engine/laws.py. */
 
 // The quantile of the normal distribution: algorithm AS 241 (PPND16), Wichura (1988), Applied Statistics 37(3), 477-484.
 
