@@ -20,6 +20,7 @@ from analysis.read.text_table import (
     refuse_shared_roles,
     texts_required,
 )
+from analysis.within.level_codes import given_orders
 from experiments.errors import InputError
 
 # Subject bias and inconsistency by alternating projection, as in ITU-T P.910 (2023), Annex E.
@@ -381,8 +382,8 @@ class OpinionResult:
     decisions: tuple[str, ...]
 
 
-def read_votes(path: Path, item: str, participant: str, rating: str) -> Votes:
-    """Read one row a vote.
+def read_votes(path: Path, item: str, participant: str, rating: str, levels: Sequence[str] = ()) -> Votes:
+    """Read one row a vote; `levels` may give the order of the items (`given_orders`).
 
     Raises
     ------
@@ -404,6 +405,8 @@ def read_votes(path: Path, item: str, participant: str, rating: str) -> Votes:
         raise InputError(f"{path.name}: '{rating}' holds no rating in any row")
     people, person = np.unique(table.columns[participant].astype(str).to_numpy()[keep], return_inverse=True)
     items = names_in_order(table.columns[item], keep)
+    orders, said = given_orders({item: items}, levels)
+    items = orders.get(item, items)
     which = pd.Categorical(table.columns[item].astype(str)[keep], items).codes.astype(np.int64)
     totals, counts = np.zeros((people.size, len(items))), np.zeros((people.size, len(items)))
     np.add.at(totals, (person, which), values[keep])
@@ -420,7 +423,7 @@ def read_votes(path: Path, item: str, participant: str, rating: str) -> Votes:
         tuple(values[keep][which == index] for index in range(len(items))),
         path.name,
         table.synthetic,
-        tuple(table.decisions),
+        (*table.decisions, *said),
     )
 
 

@@ -7,7 +7,15 @@ from typing import Annotated
 
 import typer
 
-from analysis.commands.output import JsonOption, names_in, save_json, saying, show_tables, show_text
+from analysis.commands.output import (
+    JsonOption,
+    LevelsOption,
+    names_in,
+    save_json,
+    saying,
+    show_tables,
+    show_text,
+)
 
 # `analysis reliability` and `analysis agreement`.
 
@@ -134,6 +142,7 @@ def opinion(
         RepeatsChoice,
         typer.Option(help="A person's repeated votes on an item: mean (n is people) or votes (n is votes)."),
     ] = RepeatsChoice.MEAN,
+    levels: LevelsOption = None,
     json: JsonOption = None,
 ) -> None:
     """Mean opinion scores with 95% intervals; bias and inconsistency of each person (ITU-T P.910).
@@ -148,7 +157,7 @@ def opinion(
     from analysis.report.rating_tables import opinion_text, raters_table, scores_table
 
     with saying("reading votes"):
-        votes = read_votes(file, item, participant, rating)
+        votes = read_votes(file, item, participant, rating, levels or ())
     result = fit_opinion(votes, repeats.value)
     save_json(json, asdict(result), votes.synthetic)
     show_text(opinion_text(result, file.stem, votes.synthetic))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from analysis.commands.output import JsonOption, save_json, saying, show_tables, show_text
+from analysis.commands.output import JsonOption, LevelsOption, save_json, saying, show_tables, show_text
 
 if TYPE_CHECKING:
     from analysis.thresholds.answers import Answers
@@ -58,6 +58,7 @@ def pairs(
     firth: Annotated[
         bool, typer.Option("--firth", help="Finite estimates also where an item always wins (penalised).")
     ] = False,
+    levels: LevelsOption = None,
     json: JsonOption = None,
 ) -> None:
     """Abilities of items from paired comparisons.
@@ -69,6 +70,8 @@ def pairs(
       analysis pairs table.csv --left a --right b --winner choice --tie same --participant id
 
       analysis pairs table.csv --method thurstone --factors items.csv
+
+      analysis pairs comparisons.csv --levels left=baseline,ours,recorded
     """
     from analysis.pairs.abilities import fit_abilities, read_item_factors
     from analysis.pairs.comparisons import read_comparisons
@@ -76,8 +79,12 @@ def pairs(
     from analysis.report.choice_tables import abilities_table, contrasts_table, factors_table, pairs_text
 
     with saying("reading comparisons"):
-        comparisons = read_comparisons(file, left, right, winner, tie, participant)
-        design = None if factors is None else read_item_factors(factors)
+        # The items are levels of `left`; what else is ordered is a factor of theirs.
+        orders = levels or []
+        of_items = [one for one in orders if factors is None or one.partition("=")[0].strip() == left]
+        of_factors = [one for one in orders if one not in of_items]
+        comparisons = read_comparisons(file, left, right, winner, tie, participant, of_items)
+        design = None if factors is None else read_item_factors(factors, of_factors)
     usual: Method = "davidson" if comparisons.ties else "bradley-terry"
     chosen: Method = method.value if method else usual
     with saying("fitting"):
@@ -137,6 +144,7 @@ def thresholds(
             help="One model over all people: threshold and spread differ between them (--participant)."
         ),
     ] = False,
+    levels: LevelsOption = None,
     json: JsonOption = None,
 ) -> None:
     """Psychometric functions: thresholds with profile likelihood intervals.
@@ -168,7 +176,7 @@ def thresholds(
         raise InputError(f"expected --guess from 0 to below 1, got {guess:g}")
     upper = _lapse(lapse, guess)
     with saying("reading trials"):
-        answers = read_answers(file, x, response, participant, by, second)
+        answers = read_answers(file, x, response, participant, by, second, levels or ())
     if second is not None:
         if hierarchical:
             raise InputError("--hierarchical is of one stimulus variable; leave out --second or it")

@@ -1,6 +1,6 @@
 """Abilities of items and their contrasts."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 from pathlib import Path
@@ -32,6 +32,7 @@ from analysis.pairs.likelihood import (
 from analysis.read.text_table import names_in_order, read_text_table, texts_required
 from analysis.thresholds.likelihood import fit_p
 from analysis.within.adjustments import holm
+from analysis.within.level_codes import given_orders
 from experiments.errors import InputError
 
 # Abilities as a linear function of the items' factors.
@@ -98,8 +99,15 @@ class ItemFactors:
         return design
 
 
-def read_item_factors(path: Path) -> ItemFactors:
+def read_item_factors(path: Path, levels: Sequence[str] = ()) -> ItemFactors:
     """Read a CSV whose first column names the item and whose other columns are its factors.
+
+    Parameters
+    ----------
+    path : Path
+        The CSV.
+    levels : sequence of str, optional
+        Orders of levels, as for `analysis.within.level_codes.given_orders`.
 
     Raises
     ------
@@ -118,8 +126,9 @@ def read_item_factors(path: Path) -> ItemFactors:
             raise InputError(f"{path.name}: item '{name}' has two rows; give each item one")
     everywhere = np.ones(len(rows), dtype=np.bool_)
     orders = {name: names_in_order(table.columns[name], everywhere) for name in table.header[1:]}
-    levels = {str(row[0]): tuple(row[1:]) for row in rows}
-    factors = ItemFactors(tuple(table.header[1:]), levels, path.name, orders)
+    orders |= given_orders(orders, levels)[0]
+    of_items = {str(row[0]): tuple(row[1:]) for row in rows}
+    factors = ItemFactors(tuple(table.header[1:]), of_items, path.name, orders)
     for factor in factors.factors:
         if len(factors.names(factor)) < 2:
             raise InputError(f"{path.name}: factor '{factor}' has one level only; leave it out")

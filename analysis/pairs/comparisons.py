@@ -1,5 +1,6 @@
 """Paired comparisons as they were made: reading, connectedness and transitivity."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
@@ -21,6 +22,7 @@ from analysis.read.text_table import (
     refuse_shared_roles,
     texts_required,
 )
+from analysis.within.level_codes import given_orders
 from experiments.errors import InputError
 
 # Read paired comparisons: who won, by side, with every doubt about the table raised as one line.
@@ -64,7 +66,13 @@ class Comparisons:
 
 
 def read_comparisons(
-    path: Path, left: str, right: str, winner: str, tie: str | None = None, participant: str | None = None
+    path: Path,
+    left: str,
+    right: str,
+    winner: str,
+    tie: str | None = None,
+    participant: str | None = None,
+    levels: Sequence[str] = (),
 ) -> Comparisons:
     """Read one row a comparison.
 
@@ -80,6 +88,8 @@ def read_comparisons(
         What stands in `winner` for a tie.
     participant : str, optional
         Column that names the rater.
+    levels : sequence of str, optional
+        Order of the items, as that of the column `left`.
 
     Raises
     ------
@@ -101,6 +111,8 @@ def read_comparisons(
         if not judged.any():
             raise InputError(f"{path.name}: no comparison counts; {', '.join(left_out)}")
     items = _items(table.columns[left], table.columns[right], judged)
+    orders, said = given_orders({left: items}, levels)
+    items = orders.get(left, items)
     people: tuple[str, ...] = ()
     codes = None
     if participant is not None:
@@ -115,7 +127,7 @@ def read_comparisons(
         people,
         path.name,
         table.synthetic,
-        tuple(table.decisions),
+        (*table.decisions, *said),
     )
 
 

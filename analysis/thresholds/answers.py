@@ -1,5 +1,6 @@
 """Answers of a table: a stimulus and a yes or no a trial, of whom and in which condition."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from analysis.read.text_table import (
     texts_required,
 )
 from analysis.thresholds.likelihood import Trials
+from analysis.within.level_codes import given_orders
 from experiments.errors import InputError
 
 Array = NDArray[np.float64]
@@ -63,8 +65,11 @@ def read_answers(
     participant: str | None = None,
     by: str | None = None,
     second: str | None = None,
+    levels: Sequence[str] = (),
 ) -> Answers:
     """Read one row a trial: numbers `x` and `second`, and a `response` of 0/1, yes/no or correct/wrong.
+
+    `levels` may give the order of the levels of `by` (`analysis.within.level_codes.given_orders`).
 
     Raises
     ------
@@ -91,6 +96,8 @@ def read_answers(
         None if name is None else table.columns[name].astype(object).to_numpy()[keep]
         for name in (participant, by)
     ]
+    order = () if by is None else names_in_order(table.columns[by], keep)
+    orders, said = given_orders({} if by is None else {by: order}, levels)
     return Answers(
         values[keep],
         answers[keep],
@@ -98,9 +105,9 @@ def read_answers(
         names[1],
         path.name,
         table.synthetic,
-        tuple(table.decisions),
+        (*table.decisions, *said),
         None if across is None else across[keep],
-        () if by is None else names_in_order(table.columns[by], keep),
+        order if by is None else orders.get(by, order),
     )
 
 

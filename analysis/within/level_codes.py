@@ -1,7 +1,7 @@
 """Columns of a table as codes into their levels."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -75,18 +75,40 @@ def in_given_order(rows: pd.DataFrame, given: Sequence[str]) -> tuple[pd.DataFra
     InputError
         Text of another form, an unknown column, levels that are not exactly those of the column.
     """
-    said = []
+    levels = {str(name): [str(level) for level in rows[name].unique()] for name in rows.columns}
+    orders, said = given_orders(levels, given)
+    for name, order in orders.items():
+        rows = rows.assign(**{name: pd.Categorical(rows[name].astype(str), order, ordered=True)})
+    return rows, said
+
+
+def given_orders(
+    levels: Mapping[str, Sequence[str]], given: Sequence[str]
+) -> tuple[dict[str, tuple[str, ...]], tuple[str, ...]]:
+    """Orders of levels by the columns that are given one, and what is said of it.
+
+    Parameters
+    ----------
+    levels : mapping of str to sequence of str
+        The levels of each column that may be ordered.
+    given : sequence of str
+        As in `in_given_order`.
+
+    Raises
+    ------
+    InputError
+        As `in_given_order`.
+    """
+    orders: dict[str, tuple[str, ...]] = {}
     for text in given:
         name, equals, listed = text.partition("=")
         name = name.strip()
         order = [level.strip() for level in listed.split("|" if "|" in listed else ",")]
         if not equals or not all(order):
             raise InputError(f"--levels should be like time=before,after,later, got '{text}'")
-        if name not in rows.columns:
-            raise InputError(
-                f"--levels: no factor is called '{name}'{did_you_mean(name, map(str, rows.columns))}"
-            )
-        there = natural_order([str(level) for level in rows[name].unique()])
+        if name not in levels:
+            raise InputError(f"--levels: no factor is called '{name}'{did_you_mean(name, levels)}")
+        there = natural_order(list(dict.fromkeys(levels[name])))
         for level in order:
             if level not in there:
                 raise InputError(
@@ -96,9 +118,10 @@ def in_given_order(rows: pd.DataFrame, given: Sequence[str]) -> tuple[pd.DataFra
         if lacking or len(set(order)) < len(order):
             named = f"; {', '.join(lacking)} missing" if lacking else ""
             raise InputError(f"--levels: expected each level of '{name}' once ({', '.join(there)}){named}")
-        rows = rows.assign(**{name: pd.Categorical(rows[name].astype(str), order, ordered=True)})
-        said.append(f"levels of '{name}' in the order given: {', '.join(order)}")
-    return rows, tuple(said)
+        orders[name] = tuple(order)
+    return orders, tuple(
+        f"levels of '{name}' in the order given: {', '.join(order)}" for name, order in orders.items()
+    )
 
 
 def _in_order(column: pd.Series, texts: Sequence[str]) -> list[str]:
