@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from analysis.read.files.cells import Cells
 from analysis.read.files.open import Reader, reader_of
 from analysis.read.files.programs import program_of, trials_only
-from analysis.read.wide import row_codes, said_of_copies, wide_hint
+from analysis.read.wide import said_of_copies, wide_hint
 from analysis.within.level_codes import natural_order
 from experiments.errors import InputError, nearest
 
@@ -92,7 +92,7 @@ def read_text_table(
 
 def _copies(table: TextTable, names: Sequence[str]) -> str:
     """What is said of rows that are copies in every column of the file; those read are compared first."""
-    if not said_of_copies(row_codes(table.columns[list(names)]), _Places(table)):
+    if not said_of_copies(table.columns[list(names)], _Places(table)):
         return ""
     if table.reader is None:
         return ""
@@ -100,7 +100,7 @@ def _copies(table: TextTable, names: Sequence[str]) -> str:
     cells = table.reader.cells(every)
     keys = _row_keys(cells.lines, cells.files)
     where = pd.Index(keys).get_indexer(pd.Index(_row_keys(table.lines, table.files)))
-    return said_of_copies(row_codes(cells.rows.iloc[where]), _Places(table))
+    return said_of_copies(cells.rows.iloc[where], _Places(table))
 
 
 def _row_keys(lines: NDArray[np.int64], files: NDArray[np.str_] | None) -> list[tuple[str, int]]:

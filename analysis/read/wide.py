@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import count
-from math import prod
+from math import ceil, log10, prod
 from pathlib import Path
 
 import numpy as np
@@ -25,8 +25,8 @@ FEWEST = 6
 MANY = 40
 """Rows from which it is one although rows come again within it."""
 
-UNLIKELY = 16.0
-"""Logarithm of how many times less likely than chance a copy is, over all pairs of places in the table."""
+CHANCE_MAX = 1e-6
+"""A block is named as a copy where chance makes one anywhere in the table with a smaller probability."""
 
 OFFSETS = 8
 """Distances between a row and its copy that are tried, the most frequent first."""
@@ -41,19 +41,39 @@ def row_codes(rows: pd.DataFrame) -> Codes:
     return codes
 
 
-def copied_block(codes: Codes) -> tuple[int, int, int] | None:
-    """The longest block that repeats earlier rows in their order: its first row, the original's, its length.
+@dataclass(frozen=True)
+class CopiedBlock:
+    """Rows that repeat earlier ones in their order.
+
+    Attributes
+    ----------
+    first, original, length : int
+        The first of them, the first of those that they repeat, and how many they are.
+    chance : float
+        Bound on the probability that chance alone makes such a block anywhere in the table.
+    """
+
+    first: int
+    original: int
+    length: int
+    chance: float
+
+
+def copied_block(rows: pd.DataFrame) -> CopiedBlock | None:
+    """The longest block of copies for which chance has a probability below `CHANCE_MAX`; None without.
 
     Rows that come again by chance (a rating of the same condition) make short blocks, or ones of a few
     different rows; neither counts.
     """
+    codes = row_codes(rows)
     n = len(codes)
     counts = np.bincount(codes)
     if n < 2 * FEWEST or counts.max() < 2:
         return None
     surprise = np.log(n / counts)[codes]
-    best: tuple[int, int, int] | None = None
-    for distance in _distances(codes):
+    best: CopiedBlock | None = None
+    distances = _distances(codes)
+    for distance in distances:
         equal = codes[distance:] == codes[:-distance]
         edges = np.flatnonzero(np.diff(np.concatenate([[False], equal, [False]]).astype(np.int8)))
         starts, lengths = edges[::2], np.minimum(edges[1::2] - edges[::2], distance)
@@ -61,27 +81,49 @@ def copied_block(codes: Codes) -> tuple[int, int, int] | None:
             continue
         at = int(np.argmax(lengths))
         start, length = int(starts[at]), int(lengths[at])
-        if best is not None and length <= best[2]:
+        if best is not None and length <= best.length:
             continue
         block = codes[start : start + length]
         distinct = len(np.unique(block))
         varied = distinct >= 0.7 * length if length < MANY else distinct >= FEWEST // 2
-        unlikely = surprise[start : start + length].sum() > UNLIKELY + 2 * np.log(n)
-        if length >= FEWEST and varied and unlikely and _beyond_chance(lengths, length, len(equal)):
-            best = start + distance, start, length
+        if length < FEWEST or not varied:
+            continue
+        # By the frequencies of rows, over all pairs of places; and by how often rows agree in this table.
+        of_rows = 2 * np.log(n) - surprise[start : start + length].sum()
+        rate = max(
+            _usual_rate(lengths, length, len(equal)), _other_rate(codes, distances, distance, start, length)
+        )
+        of_design = np.log(len(distances) * len(equal)) + length * np.log(rate)
+        chance = float(np.exp(min(0.0, max(of_rows, of_design))))
+        if chance < CHANCE_MAX:
+            best = CopiedBlock(start + distance, start, length, chance)
     return best
 
 
-def _beyond_chance(lengths: Codes, longest: int, places: int) -> bool:
-    """Whether a run of equal rows is longer than those at this distance lead to expect.
-
-    Ratings of one person in the same conditions agree often at a distance of one round of conditions. How
-    often is what the short runs show; a copy is a long run among few of them.
-    """
-    long = 2 * lengths >= longest
+def _usual_rate(lengths: Codes, longest: int, places: int) -> float:
+    """How often rows agree at this distance, by the runs that are clearly shorter than the longest."""
+    long = 10 * lengths >= 9 * longest
     left = places - int(lengths[long].sum())
-    rate = (int(lengths[~long].sum()) + 1) / (max(left, 0) + 2)
-    return bool(longest * -np.log(rate) > UNLIKELY + np.log(places))
+    return (int(lengths[~long].sum()) + 1) / (max(left, 0) + 2)
+
+
+def _other_rate(codes: Codes, distances: Sequence[int], distance: int, start: int, length: int) -> float:
+    """How often the block's rows agree with rows at other distances, the one at which they do most often.
+
+    Ratings of one person in the same conditions agree often a round later, and a round after that: nothing
+    was copied there. Multiples of the distance do not count, where further copies would be.
+    """
+    rates, n = [0.0], len(codes)
+    for far in distances:
+        if far % distance == 0:
+            continue
+        for shift in (-far, far):
+            for of in (start, start + distance):
+                low, high = max(of, -shift, 0), min(of + length, n - shift, n)
+                if 2 * (high - low) >= length:
+                    same = codes[low:high] == codes[low + shift : high + shift]
+                    rates.append((int(same.sum()) + 1) / (high - low + 2))
+    return max(rates)
 
 
 def _distances(codes: Codes) -> list[int]:
@@ -109,17 +151,18 @@ def all_rows_twice(codes: Codes) -> int:
     return least if least > 1 and len(counts) >= 2 * FEWEST and len(counts) * least > len(codes) / 2 else 1
 
 
-def said_of_copies(codes: Codes, lines: Sequence[str]) -> str:
+def said_of_copies(rows: pd.DataFrame, lines: Sequence[str]) -> str:
     """What is said of a block of exact copies, or of rows that all occur twice; empty without."""
-    block = copied_block(codes)
+    block = copied_block(rows)
     if block is not None:
-        copy, original, length = block
+        copy, original, length = block.first, block.original, block.length
         return (
             f"lines {lines[copy]} to {lines[copy + length - 1]} are exact copies of lines {lines[original]} "
-            f"to {lines[original + length - 1]} ({length} rows): was something pasted twice? All rows count; "
-            "if they are copies, delete them and run this again"
+            f"to {lines[original + length - 1]} ({length} rows), which chance alone gives with a probability "
+            f"below {_power_of_ten(block.chance)}: was something pasted twice? "
+            "All rows count; if they are copies, delete them and run this again"
         )
-    times = all_rows_twice(codes)
+    times = all_rows_twice(row_codes(rows))
     if times > 1:
         often = "twice" if times == 2 else f"{times} times"
         return (
@@ -127,6 +170,10 @@ def said_of_copies(codes: Codes, lines: Sequence[str]) -> str:
             "copies, delete them and run this again"
         )
     return ""
+
+
+def _power_of_ten(chance: float) -> str:
+    return f"1e{min(-6, ceil(log10(max(chance, 1e-99))))}"
 
 
 _PLACEHOLDER = re.compile(r"\{([^{}]+)\}")
@@ -217,7 +264,7 @@ def lengthen(path: Path, pattern: str, rating: str) -> LongTable:
         for name, levels_of_column in levels.items()
     ]
     rows = pd.concat(parts).sort_index(kind="stable").reset_index(drop=True)
-    copies = said_of_copies(row_codes(read.rows), [str(line) for line in read.lines])
+    copies = said_of_copies(read.rows, [str(line) for line in read.lines])
     decisions = (*read.decisions, *([copies] if copies else []))
     return LongTable(rows, factors, len(levels), beside, decisions)
 

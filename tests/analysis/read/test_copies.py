@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from analysis.cli import app
-from analysis.read.wide import copied_block, row_codes
+from analysis.read.wide import CHANCE_MAX, copied_block
 
 RNG = np.random.default_rng(27)
 
@@ -87,12 +87,51 @@ def test_ratings_that_agree_by_chance_are_no_copies(seed: int) -> None:
     levels = int(rng.integers(2, 8))
     x = np.tile(np.arange(levels), 60)
     trials_of = pd.DataFrame({"x": x, "y": (x + rng.normal(0, 1.5, len(x)) > levels / 2).astype(int)})
-    assert copied_block(row_codes(trials_of)) is None
+    assert copied_block(trials_of) is None
     people = pd.DataFrame({"p": np.repeat(np.arange(15), 24), "c": np.tile(["a", "b", "c"], 120)})
     people["y"] = rng.integers(1, 6, len(people))
-    assert copied_block(row_codes(people)) is None
+    assert copied_block(people) is None
     many = pd.DataFrame({"p": np.repeat(np.arange(300), 200), "c": np.tile(["a", "b", "c", "d"], 15_000)})
     many["y"] = rng.integers(1, 6, len(many))
-    assert copied_block(row_codes(many)) is None
+    assert copied_block(many) is None
     thrice = pd.concat([many[:200]] * 3)
-    assert copied_block(row_codes(thrice)) == (200, 0, 200)
+    block = copied_block(thrice)
+    assert block is not None
+    assert (block.first, block.original, block.length) == (200, 0, 200)
+
+
+def random_table(rng: np.random.Generator) -> pd.DataFrame:
+    """Ratings of an experiment of any size: consistent people or not, fixed orders or not, named or not."""
+    people, conditions, rounds, scale = (int(rng.integers(low, high)) for low, high in SIZES)
+    is_fixed, is_named, noise = rng.random() < 0.5, rng.random() < 0.6, rng.choice([0.3, 0.7, 1.5, 9.0])
+    effects = rng.normal(0, 1.5, conditions)
+    rows = []
+    for person in range(people):
+        own = rng.normal()
+        for _ in range(rounds):
+            for condition in np.arange(conditions) if is_fixed else rng.permutation(conditions):
+                rating = round((scale + 1) / 2 + own + effects[condition] + rng.normal(0, noise))
+                rows.append((person * is_named, condition, min(max(rating, 1), scale)))
+    return pd.DataFrame(rows, columns=["person", "condition", "rating"])
+
+
+SIZES = ((1, 13), (1, 9), (1, 9), (2, 8))
+"""Least and beyond most people, conditions, rounds and steps of the scale."""
+
+
+def test_of_two_thousand_random_tables_none_has_a_copy() -> None:
+    """With a chance below one in a million for each; one in 250 had one by the rule of before."""
+    rng = np.random.default_rng(49)
+    assert [number for number in range(2_000) if copied_block(random_table(rng)) is not None] == []
+
+
+def test_copies_in_random_tables_are_found_with_the_chance_that_is_stated() -> None:
+    rng = np.random.default_rng(50)
+    found = 0
+    for _ in range(200):
+        rows = random_table(rng)
+        part = rows.iloc[: max(40, len(rows) // 2)]
+        block = copied_block(pd.concat([rows, part]))
+        assert block is None or block.chance < CHANCE_MAX
+        found += block is not None and block.length >= len(part) - 2
+    assert found >= 100, found
