@@ -30,7 +30,7 @@ import {
   helpOf,
   SECTIONS,
 } from "../../src/admin/builder/schema";
-import { shownClips } from "../../src/admin/builder/shown-clips";
+import { shownClips } from "../../src/admin/kinds";
 
 const repository = fileURLToPath(new URL("../../../", import.meta.url));
 const python = ["bin/python", "Scripts/python.exe"].map((name) => join(repository, ".venv", name)).find(existsSync);

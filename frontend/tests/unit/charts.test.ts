@@ -1,10 +1,10 @@
 /** What the charts of the results page draw: every bar, point and cell as Observable Plot computes it from the data. */
 import type * as Plot from "@observablehq/plot";
 import { describe, expect, it } from "vitest";
-import { choicePlot, levelPlot } from "../../src/admin/results/pair-plots";
+import { choicePlot, levelPlot } from "../../src/admin/kinds/paired_comparison/plots";
 import { cellPlot, delayPlot, marginPlot, timePlot } from "../../src/admin/results/plots";
-import { seriesPlot } from "../../src/admin/results/threshold-plots";
-import { cellTracePlot, tracesPlot } from "../../src/admin/results/trace-plots";
+import { seriesPlot } from "../../src/admin/kinds/threshold/plots";
+import { cellTracePlot, tracesPlot } from "../../src/admin/kinds/continuous_rating/plots";
 
 interface DrawnMark {
   ariaLabel?: string;

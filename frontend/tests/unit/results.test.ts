@@ -1,8 +1,7 @@
 import { describe, expect, it } from "vitest";
-import { cellRows, marginRows } from "../../src/admin/results/figure-rows";
+import { cellRows, marginRows, cellLabels, cellPlot, countTicks, marginPlot } from "../../src/admin/results/plots";
 import { labelOfOrigin, counted } from "../../src/admin/ui/format";
-import { cellLabels, cellPlot, countTicks, marginPlot } from "../../src/admin/results/plots";
-import { seriesLabels, seriesPlot } from "../../src/admin/results/threshold-plots";
+import { seriesLabels, seriesPlot } from "../../src/admin/kinds/threshold/plots";
 import { csvText } from "../../src/admin/ui/figure-files";
 
 const factor = (name: string, ...levels: [string, string][]) => ({

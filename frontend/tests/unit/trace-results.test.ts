@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { pointsOf, ticksOf } from "../../src/admin/results/trace-plots";
+import { pointsOf, ticksOf } from "../../src/admin/kinds/continuous_rating/plots";
 
 type Cell = Parameters<typeof pointsOf>[0];
 type Data = Parameters<typeof ticksOf>[1];

@@ -4,7 +4,7 @@ import { Group, Paper, SegmentedControl, Slider, Stack, Text } from "@mantine/co
 import { useState } from "react";
 import { languageName } from "../ui/format";
 import { type Data, isTable, textAt } from "./data";
-import { shownClips } from "./shown-clips";
+import { shownClips } from "../kinds";
 import { useBuilderHere } from "./useBuilder";
 
 const DEFAULT_POINTS: [number, number] = [1, 7];

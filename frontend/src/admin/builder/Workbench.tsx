@@ -4,6 +4,7 @@ import { Alert, List, Button, Group, Modal, NavLink, Select, Stack, Switch, Text
 import { useDebouncedValue, useHotkeys } from "@mantine/hooks";
 import { useQuery } from "@tanstack/react-query";
 import { api, type Schemas, unwrap } from "../api";
+import { adminKind } from "../kinds";
 import { counted } from "../ui/format";
 import { Link, useNavigate, useSearch } from "@tanstack/react-router";
 import { useState } from "react";
@@ -57,8 +58,8 @@ function consequence(edit: Schemas["JudgedEdit"], { series, definition }: Schema
   const raters = people > 0 ? counted(people, "participant") : counted(edit.runs, "run");
   // The ends of a scale are what its answers mean.
   const { trial } = definition;
-  const scale = trial.kind === "clip_rating" && edit.changes.some(({ path }) => path.startsWith("trial.scale")) ? trial.scale : null;
-  const on = scale !== null && "minimum" in scale && "maximum" in scale ? ` on ${scale.minimum}-${scale.maximum}` : "";
+  const scale = edit.changes.some(({ path }) => path.startsWith("trial.scale")) ? adminKind(trial.kind).scaleEnds?.(trial) : null;
+  const on = scale ? ` on ${scale.minimum}-${scale.maximum}` : "";
   const kept = present === undefined ? `series ${edit.present_series}` : present.name;
   return `${raters} answered${on}. A new data series begins with this version (series ${edit.series}): the answers so far stay separate, in ${kept}. Results, reports and analyses keep the two apart.`;
 }

@@ -5,6 +5,7 @@ import { createContext, useContext, useEffect, useMemo, useState } from "react";
 import { api, Refused, type Schemas, unwrap, sessionQuery } from "../api";
 import { type Data, isTable, listAt, type Path, textAt } from "./data";
 import { begun, edited, type History, latestToml, redone, rewritten, undone, written } from "./history";
+import { DEFAULT_KIND } from "../kinds";
 import { forgetWork, keepWork } from "./kept";
 
 type Problem = Schemas["ProblemOut"];
@@ -107,7 +108,7 @@ export function useBuilder(study: string, revision: number, stored: string, star
     problems: answer?.problems ?? [],
     design: answer?.design ?? null,
     languages: languagesOf(data),
-    trialKind: textAt(data, ["trial", "kind"]) || "clip_rating",
+    trialKind: textAt(data, ["trial", "kind"]) || DEFAULT_KIND,
     error,
     set: (path, value) => setHistory((before) => edited(before, path, value, Date.now())),
     setToml: setText,

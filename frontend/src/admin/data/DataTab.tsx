@@ -1,3 +1,4 @@
+import { adminKind } from "../kinds";
 import {
   Badge,
   Button,
@@ -253,9 +254,9 @@ export function DataTab() {
   const [series, setSeries] = useState<number | null>(null);
   const detail = useQuery(studyQuery(study)).data;
   const [excel, setExcel] = useState(false);
-  const rated = detail?.definition.trial.kind === "clip_rating";
+  const hasWide = detail !== undefined && adminKind(detail.definition.trial.kind).hasWideTable === true;
   const mine = useMay(study, "own") ? [...FILES, IDENTITIES] : FILES;
-  const files = mine.filter(([file]) => rated || !file.startsWith("wide."));
+  const files = mine.filter(([file]) => hasWide || !file.startsWith("wide."));
   const version = detail?.summary.version ?? 1;
   const chosen = (file: string) => {
     const options = new URLSearchParams();

@@ -3,6 +3,7 @@ import type { RunState, TrialInfo } from "../../api/schema";
 import { type Layout, layoutOf } from "../../participant/kinds/paired_comparison/layout";
 import { clipHeight, clipWidth } from "../../participant/screen/size";
 import type { Schemas } from "../api";
+import { adminKind } from "../kinds";
 import type { Clip, Play } from "./shown";
 
 type Replay = Schemas["Replay"];
@@ -40,11 +41,8 @@ export function arrange({ trial, display }: Pick<Replay, "trial" | "display">, c
 
 function pairLayout(trial: RunState["trial"], play: Play, pixels: Layout["canvas"], shown: Layout["shown"]): Layout | null {
   const roles = play.views.flatMap(({ clips }) => clips.map(({ role }) => role));
-  if (trial.kind !== "paired_comparison" || roles.includes("shown")) return null;
-  const declared = trial.presentation;
-  // Where the window was too narrow for the declared arrangement, the answer says that the clips were stacked.
-  const isStacked = declared.arrangement === "side_by_side" && play.answer?.["arrangement"] === "stacked";
-  const presentation = isStacked ? { arrangement: "stacked" as const, gap_mm: declared.gap_mm } : declared;
+  const presentation = adminKind(trial.kind).presentation?.(trial, play.answer?.["arrangement"]);
+  if (!presentation || roles.includes("shown")) return null;
   return layoutOf(presentation, pixels, shown, ENDLESS, play.px_per_mm);
 }
 

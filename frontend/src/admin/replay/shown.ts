@@ -3,6 +3,7 @@
  * Times are ms since the start key of a play's first view, by the participant's clock.
  */
 
+import { adminKind } from "../kinds";
 import type { Schemas } from "../api";
 import { fixed, plain, words } from "../ui/format";
 
@@ -205,11 +206,12 @@ export function longestWords({ stands }: Lane): string {
 export function traceOf(play: Play, played: PlayedBack, trial: Schemas["Replay"]["trial"]): [number, number][] {
   const { values, step_frames } = play.answer ?? {};
   const lane = played.scenes.at(-1)?.lanes[0];
-  if (trial.kind !== "continuous_rating" || !lane || !Array.isArray(values) || typeof step_frames !== "number") return [];
-  const range = Math.max(1e-9, trial.maximum - trial.minimum);
+  const slider = adminKind(trial.kind).sliderRange?.(trial);
+  if (!slider || !lane || !Array.isArray(values) || typeof step_frames !== "number") return [];
+  const range = Math.max(1e-9, slider.maximum - slider.minimum);
   return values.flatMap((value: unknown, sample): [number, number][] => {
     const stand = lane.stands.find(({ index }) => index >= sample * step_frames);
-    return stand && typeof value === "number" ? [[stand.from_ms, (value - trial.minimum) / range]] : [];
+    return stand && typeof value === "number" ? [[stand.from_ms, (value - slider.minimum) / range]] : [];
   });
 }
 

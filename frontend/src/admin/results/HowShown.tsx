@@ -3,8 +3,7 @@ import { Card, Text, Title } from "@mantine/core";
 import { useMemo } from "react";
 import { words, methodWords, ruleWords } from "../ui/format";
 import { PlotFigure } from "../ui/PlotFigure";
-import { delayRows, timeRows } from "./figure-rows";
-import { type AnyResults, delayPlot, timePlot } from "./plots";
+import { delayRows, timeRows, type AnyResults, delayPlot, timePlot } from "./plots";
 
 export function HowShown({ data }: { data: AnyResults }) {
   const times = useMemo(() => timePlot(data), [data]);

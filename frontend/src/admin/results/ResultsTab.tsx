@@ -260,7 +260,7 @@ export function ResultsTab() {
           }}
           without="series of the active version"
         />
-        {results.data?.kind === "clip_rating" && (
+        {results.data !== undefined && "scales" in results.data && (
           <ScaleChooser scales={results.data.scales} chosen={results.data.scale.name} choose={setScale} />
         )}
       </Group>

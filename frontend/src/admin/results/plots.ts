@@ -1,11 +1,22 @@
-/** The figures of the results page. */
+/** The figures of the results, and the numbers of each as they are saved: labels where the figures have labels. */
 
 import * as Plot from "@observablehq/plot";
 import type { Schemas } from "../api";
+import type { Row } from "../ui/figure-files";
+import { useMemo } from "react";
+
+// The figures of the results page.
 
 type Results = Schemas["Results"];
 export type AnyResults = Results | Schemas["PairResults"] | Schemas["ThresholdResults"] | Schemas["TraceResults"] | Schemas["OtherResults"];
 export type Factors = Schemas["DesignOut"]["factors"];
+
+/** What the results of a kind are given. */
+export interface ShownResults {
+  study: string;
+  data: AnyResults;
+  factors: Factors;
+}
 
 /** The label of a level, and the labels of a factor in declared order. */
 export function labelsOf(factors: Factors, name: string): { title: string; of: (level: string) => string; all: string[] } {
@@ -175,4 +186,73 @@ export function timePlot({ response_times }: AnyResults): Plot.PlotOptions {
 export function delayPlot({ playback }: AnyResults): Plot.PlotOptions {
   const bins = playback.key_to_first_frame_ms.map((count, bin) => ({ from: 10 * bin, count }));
   return histogram(bins, 10, "ms, key to frame (last bin: 100+)", "plays");
+}
+
+// The numbers of each figure of the results, as they are saved: labels where the figures have labels.
+
+type Labels = ReadonlyMap<string, string>;
+
+export function marginRows(margin: Schemas["Margin"], factors: Factors): Row[] {
+  const named = margin.factors.map((name) => ({ name, ...labelsOf(factors, name) }));
+  /** The place of a mean in declared order, the last factor fastest. */
+  const rank = (levels: Record<string, string>) =>
+    named.reduce((sum, { name, of, all }) => sum * (all.length + 1) + all.indexOf(of(levels[name] ?? "")), 0);
+  return margin.means
+    .toSorted((a, b) => rank(a.levels) - rank(b.levels))
+    .map(({ levels, ...numbers }) => ({
+      ...Object.fromEntries(named.map(({ name, title, of }) => [title, of(levels[name] ?? "")])),
+      ...numbers,
+    }));
+}
+
+export function cellRows({ cells, bins }: Schemas["Results"], labels: Labels): Row[] {
+  const rank = new Map([...labels.keys()].map((cell, index) => [cell, index]));
+  const inOrder = cells.toSorted((a, b) => (rank.get(a.cell) ?? 0) - (rank.get(b.cell) ?? 0));
+  return inOrder.map(({ cell, ratings, counts }) => ({
+    cell: labels.get(cell) ?? cell,
+    ratings,
+    ...Object.fromEntries(counts.map((count, bin) => [`answer ${bins[bin] ?? ""}`, count])),
+  }));
+}
+
+export function timeRows({ response_times }: AnyResults): Row[] {
+  return response_times.map(({ start_ms, answers }) => ({ from_ms: start_ms, answers }));
+}
+
+export function delayRows({ playback }: AnyResults): Row[] {
+  return playback.key_to_first_frame_ms.map((plays, bin) => ({ from_ms: 10 * bin, plays }));
+}
+
+export function choiceRows({ pairs }: Schemas["PairResults"], labels: Labels): Row[] {
+  return pairs.map(({ first, second, ...counts }) => ({
+    first: labels.get(first) ?? first,
+    second: labels.get(second) ?? second,
+    ...counts,
+  }));
+}
+
+export function levelRows(name: string, { levels }: Schemas["PairResults"], factors: Factors): Row[] {
+  const { title, of } = labelsOf(factors, name);
+  return levels.filter(({ factor }) => factor === name).map(({ level, n, share }) => ({ [title]: of(level), comparisons: n, share }));
+}
+
+export function seriesRows({ stimuli }: Schemas["SeriesResult"], along: string, second: string | undefined): Row[] {
+  return stimuli.map((stimulus) => ({
+    [along]: stimulus.value,
+    ...(second === undefined ? {} : { [second]: stimulus.second }),
+    answers: stimulus.n,
+    positive: stimulus.positive,
+  }));
+}
+
+/** The labels of the cells of these rows. */
+export function useCellLabels(rows: readonly { cell: string }[], factors: Factors): Map<string, string> {
+  return useMemo(
+    () =>
+      cellLabels(
+        rows.map(({ cell }) => cell),
+        factors,
+      ),
+    [rows, factors],
+  );
 }

@@ -2,19 +2,22 @@
 
 import { Card, SimpleGrid, Text, Title } from "@mantine/core";
 import { useMemo } from "react";
-import type { Schemas } from "../api";
-import { type Column, DataTable } from "../ui/DataTable";
-import { fixed } from "../ui/format";
-import { PlotFigure } from "../ui/PlotFigure";
-import { seriesRows } from "./figure-rows";
-import { HowShown } from "./HowShown";
-import { type Factors, labelsOf } from "./plots";
-import { type Along, seriesLabels, seriesPlot } from "./threshold-plots";
+import type { Schemas } from "../../api";
+import { type Column, DataTable } from "../../ui/DataTable";
+import { fixed } from "../../ui/format";
+import { PlotFigure } from "../../ui/PlotFigure";
+import { seriesRows, type Factors, labelsOf, type ShownResults } from "../../results/plots";
+import { HowShown } from "../../results/HowShown";
+import { type Along, seriesLabels, seriesPlot } from "./plots";
 
 type Data = Schemas["ThresholdResults"];
 type Series = Schemas["SeriesResult"];
 
-export function ThresholdResults({ data, factors }: { data: Data; factors: Factors }) {
+export function KindResults({ data, factors }: ShownResults) {
+  return data.kind === "threshold" ? <ThresholdResults data={data} factors={factors} /> : null;
+}
+
+function ThresholdResults({ data, factors }: { data: Data; factors: Factors }) {
   const labels = useMemo(() => seriesLabels(data.series_results, factors), [data, factors]);
   const along = useMemo(() => alongOf(data, factors), [data, factors]);
   return (

@@ -1,8 +1,8 @@
 /** Figures of paired comparisons. */
 
 import * as Plot from "@observablehq/plot";
-import type { Schemas } from "../api";
-import { cellLabels, type Factors, labelAxis, labelsOf, leftOf } from "./plots";
+import type { Schemas } from "../../api";
+import { cellLabels, type Factors, labelAxis, labelsOf, leftOf } from "../../results/plots";
 
 type Data = Schemas["PairResults"];
 

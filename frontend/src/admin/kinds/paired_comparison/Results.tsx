@@ -2,17 +2,20 @@
 
 import { Card, SimpleGrid, Text, Title } from "@mantine/core";
 import { useMemo } from "react";
-import type { Schemas } from "../api";
-import { type Column, DataTable } from "../ui/DataTable";
-import { PlotFigure } from "../ui/PlotFigure";
-import { choiceRows, levelRows } from "./figure-rows";
-import { HowShown } from "./HowShown";
-import { choicePlot, comparedCells, levelPlot } from "./pair-plots";
-import { type Factors, labelsOf } from "./plots";
+import type { Schemas } from "../../api";
+import { type Column, DataTable } from "../../ui/DataTable";
+import { PlotFigure } from "../../ui/PlotFigure";
+import { choiceRows, levelRows, type Factors, labelsOf, type ShownResults } from "../../results/plots";
+import { HowShown } from "../../results/HowShown";
+import { choicePlot, comparedCells, levelPlot } from "./plots";
 
 type Data = Schemas["PairResults"];
 
-export function PairResults({ data, factors }: { data: Data; factors: Factors }) {
+export function KindResults({ data, factors }: ShownResults) {
+  return data.kind === "paired_comparison" ? <PairResults data={data} factors={factors} /> : null;
+}
+
+function PairResults({ data, factors }: { data: Data; factors: Factors }) {
   const labels = useMemo(() => comparedCells(data, factors), [data, factors]);
   const choices = useMemo(() => choicePlot(data, labels), [data, labels]);
   const sides = data.left + data.right + data.ties;

@@ -1,12 +1,14 @@
-/** Every clip with its answers; the chosen one plays beside them. */
-import { Card, Group, ScrollArea, Stack, Table, Text, Title } from "@mantine/core";
+/** Ratings of single clips: the means of each level, the answers in each cell, and every clip with its answers. */
+
+import { Card, Group, ScrollArea, SimpleGrid, Stack, Table, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useMemo, useState } from "react";
-import { type Schemas, clipsQuery } from "../api";
-import { ClipCard } from "../clips/ClipCard";
-import { fixed } from "../ui/format";
-import type { Factors } from "./plots";
-import { useCellLabels } from "./useCellLabels";
+import { type Schemas, clipsQuery } from "../../api";
+import { ClipCard } from "../../clips/ClipCard";
+import { fixed } from "../../ui/format";
+import { PlotFigure } from "../../ui/PlotFigure";
+import { cellRows, marginRows, cellPlot, type Factors, labelsOf, marginPlot, type ShownResults, useCellLabels } from "../../results/plots";
+import { HowShown } from "../../results/HowShown";
 
 type Clip = Schemas["ClipResult"];
 const keyOf = (clip: Clip) => `${clip.cell} ${String(clip.exemplar)} ${clip.clip_sha256}`;
@@ -17,7 +19,64 @@ function byCells(clips: readonly Clip[], labels: ReadonlyMap<string, string>): C
   return clips.toSorted((a, b) => (rank.get(a.cell) ?? 0) - (rank.get(b.cell) ?? 0) || a.exemplar - b.exemplar);
 }
 
-export function ClipResults({ study, data, factors }: { study: string; data: Schemas["Results"]; factors: Factors }) {
+export function KindResults({ study, data, factors }: ShownResults) {
+  return data.kind === "clip_rating" ? <RatingResults study={study} data={data} factors={factors} /> : null;
+}
+
+function RatingResults({ study, data, factors }: { study: string; data: Schemas["Results"]; factors: Factors }) {
+  const singles = data.margins.filter((margin) => margin.factors.length <= 2);
+  return (
+    <Stack>
+      <SimpleGrid cols={{ base: 1, md: 2 }}>
+        {singles.map((margin) => (
+          <MarginCard key={margin.factors.join(":")} margin={margin} data={data} factors={factors} />
+        ))}
+        <CellCard data={data} factors={factors} />
+        <HowShown data={data} />
+      </SimpleGrid>
+      <ClipResults study={study} data={data} factors={factors} />
+    </Stack>
+  );
+}
+
+function CellCard({ data, factors }: { data: Schemas["Results"]; factors: Factors }) {
+  const cells = useMemo(() => cellPlot(data, factors), [data, factors]);
+  const labels = useCellLabels(data.cells, factors);
+  return (
+    <Card withBorder>
+      <Title order={2} size="h5">
+        Answers in each cell
+      </Title>
+      <PlotFigure options={cells} label="Distribution of answers in each cell" rows={cellRows(data, labels)} />
+    </Card>
+  );
+}
+
+interface MarginProps {
+  margin: Schemas["Margin"];
+  data: Schemas["Results"];
+  factors: Factors;
+}
+
+function MarginCard({ margin, data, factors }: MarginProps) {
+  const options = useMemo(() => marginPlot(margin, data, factors), [margin, data, factors]);
+  const title = margin.factors.map((name) => labelsOf(factors, name).title).join(" x ");
+  return (
+    <Card withBorder>
+      <Title order={2} size="h5">
+        {title}
+      </Title>
+      <PlotFigure
+        options={options}
+        label={`Marginal means of ${title} with within-participant error bars`}
+        rows={marginRows(margin, factors)}
+      />
+    </Card>
+  );
+}
+
+/** Every clip with its answers; the chosen one plays beside them. */
+function ClipResults({ study, data, factors }: { study: string; data: Schemas["Results"]; factors: Factors }) {
   const clips = useQuery(clipsQuery(study));
   const labels = useCellLabels(data.clips, factors);
   const [chosen, setChosen] = useState("");

@@ -1,7 +1,8 @@
 /** The figures of continuous ratings. */
 
 import * as Plot from "@observablehq/plot";
-import type { Schemas } from "../api";
+import type { Schemas } from "../../api";
+import type { Row } from "../../ui/figure-files";
 
 type Data = Schemas["TraceResults"];
 type Cell = Schemas["TraceCell"];
@@ -66,4 +67,9 @@ export function cellTracePlot(cell: Cell, data: Data): Plot.PlotOptions {
       Plot.lineY(rows, { x: "time_s", y: "mean", stroke: "currentColor", tip: true }),
     ],
   };
+}
+
+/** The numbers of the figure, as they are saved. */
+export function traceRows(cells: readonly Cell[], labels: ReadonlyMap<string, string>): Row[] {
+  return cells.flatMap((cell) => pointsOf(cell, labels.get(cell.cell) ?? cell.cell).map((point) => ({ ...point })));
 }

@@ -2,20 +2,22 @@
 
 import { Card, SimpleGrid, Text, Title } from "@mantine/core";
 import { useMemo } from "react";
-import type { Schemas } from "../api";
-import { type Column, DataTable } from "../ui/DataTable";
-import { fixed } from "../ui/format";
-import { PlotFigure } from "../ui/PlotFigure";
-import { traceRows } from "./figure-rows";
-import { HowShown } from "./HowShown";
-import type { Factors } from "./plots";
-import { cellTracePlot, tracesPlot } from "./trace-plots";
-import { useCellLabels } from "./useCellLabels";
+import type { Schemas } from "../../api";
+import { type Column, DataTable } from "../../ui/DataTable";
+import { fixed } from "../../ui/format";
+import { PlotFigure } from "../../ui/PlotFigure";
+import { HowShown } from "../../results/HowShown";
+import { type Factors, type ShownResults, useCellLabels } from "../../results/plots";
+import { cellTracePlot, traceRows, tracesPlot } from "./plots";
 
 type Data = Schemas["TraceResults"];
 type Cell = Schemas["TraceCell"];
 
-export function TraceResults({ data, factors }: { data: Data; factors: Factors }) {
+export function KindResults({ data, factors }: ShownResults) {
+  return data.kind === "continuous_rating" ? <TraceResults data={data} factors={factors} /> : null;
+}
+
+function TraceResults({ data, factors }: { data: Data; factors: Factors }) {
   const labels = useCellLabels(data.cells, factors);
   const together = useMemo(() => tracesPlot(data, labels), [data, labels]);
   return (

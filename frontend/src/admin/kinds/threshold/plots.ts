@@ -1,8 +1,8 @@
 /** The figure of an adaptive series. */
 
 import * as Plot from "@observablehq/plot";
-import type { Schemas } from "../api";
-import { type Factors, labelsOf } from "./plots";
+import type { Schemas } from "../../api";
+import { type Factors, labelsOf } from "../../results/plots";
 
 type Series = Schemas["SeriesResult"];
 
