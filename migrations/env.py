@@ -6,7 +6,7 @@ from alembic import context
 from sqlalchemy import Connection
 
 from server.core.db import open_database
-from server.core.migrate import migrating, with_wall, without_wall
+from server.core.migrate import derived_anew, migrating, refuse_without_views, revision_of
 from server.core.settings import Settings
 from server.models import Base, UtcDateTime
 
@@ -35,7 +35,8 @@ else:
     database = open_database(Settings())
     context.config.attributes["secret_key"] = database.secret_key
     with migrating(database) as connection:
-        stood = without_wall(connection)
-        migrate(connection)
-        with_wall(connection, stood=stood)
+        before = revision_of(connection)
+        with derived_anew(connection):
+            migrate(connection)
+        refuse_without_views(before, revision_of(connection))
     database.close()

@@ -78,6 +78,7 @@ def data_dictionary() -> str:
     lines += ["", "## Tables of the database", ""]
     lines += [
         "The tables may change from version to version (by migrations); the views above are the contract.",
+        "They are made from the columns at each start whose code has others; no change by hand lasts.",
         "",
     ]
     for each in Base.metadata.sorted_tables:

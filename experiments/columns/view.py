@@ -12,6 +12,8 @@ from experiments.columns.base import CLIP_TABLE, LEVELS, RUN_ALIASES, RUN_JOINS
 from experiments.columns.column import JOINED, Column, ColumnType, names_of
 
 Dialect = Literal["sqlite", "postgresql"]
+MADE_FROM = "made from the columns in experiments, anew at each upgrade"
+"""Stands in every view's own text, so that an upgrade knows a view of a kind that is gone."""
 
 _TIME: dict[Dialect, str] = {
     "sqlite": "replace({}, ' ', 'T') || 'Z'",
@@ -54,11 +56,11 @@ class View:
         return tuple(by_name[name] for name in names)
 
     def create(self, dialect: Dialect) -> str:
-        """The statement that makes the view; a migration keeps a copy of it as it was then."""
+        """The statement that makes the view, as every upgrade runs it."""
         selected = ",\n       ".join(
             f"{spelled(column, dialect)} AS {column.name}" for column in self.columns
         )
-        return f"CREATE VIEW {self.name} AS\nSELECT {selected}\n{self.rows_in(dialect)}"
+        return f"CREATE VIEW {self.name} AS\n-- {MADE_FROM}\nSELECT {selected}\n{self.rows_in(dialect)}"
 
     def rows_in(self, dialect: Dialect) -> str:
         """The SQL after SELECT, in the words of one database; it ends in the conditions."""

@@ -22,7 +22,7 @@ KINDS: dict[str, Kind] = {
 
 
 def views() -> tuple[View, ...]:
-    """The SQL views of all kinds, which migrations make and a test compares with the database's own."""
+    """The SQL views of all kinds, which every upgrade makes (`server.core.database_views`)."""
     return tuple(kind.view for kind in KINDS.values())
 
 

@@ -10,50 +10,10 @@ down_revision = "0005"
 branch_labels = None
 depends_on = None
 
-# Frozen as of this revision. {response}, {clips} and {kept} differ from revision 0005, which is restored going down.
-VIEW = """
-CREATE VIEW ratings AS
-SELECT s.name AS study, v.experiment AS experiment, v.definition_sha256 AS definition_sha256, r.phase AS phase,
-       r.origin = 'simulated' AS synthetic, r.public_id AS run, r.participant AS participant, r.status AS run_status,
-       r.language AS language, a.trial_index AS trial_index, a.kind AS kind, a.block AS block,
-       a.block_label AS block_label, t.play AS play, {json} AS levels, c.cell AS cell, c.exemplar AS exemplar,
-       c.profile_id AS profile_id, c.file AS stimulus, c.clip_sha256 AS clip_sha256, {response} AS response,
-       a.expected_response AS expected_response, t.rt AS rt, t.rt_from_first_frame AS rt_from_first_frame,
-       t.time_elapsed AS time_elapsed, t.changes AS changes, t.comment AS comment, t.method AS method,
-       t.verdict AS verdict, t.verdict_rule AS verdict_rule, t.key_to_first_frame_ms AS key_to_first_frame_ms,
-       t.frames_drawn AS frames_drawn, t.frames_late AS frames_late, t.frames_missing AS frames_missing,
-       t.longest_gap_ms AS longest_gap_ms, t.stalls AS stalls, t.focus_lost AS focus_lost,
-       t.refresh_rate_hz AS refresh_rate_hz, t.device_pixel_ratio AS device_pixel_ratio, t.px_per_mm AS px_per_mm,
-       t.viewing_distance_mm AS viewing_distance_mm, r.excluded AS excluded,
-       r.exclusion_reason AS exclusion_reason, {utc} AS saved_at, r.origin AS run_origin,
-       v.number AS study_version, v.series AS data_series, t.clock_gap_ms AS clock_gap_ms,
-       t.clock_late_ms AS clock_late_ms
-FROM trial_ratings t
-JOIN assigned_trials a ON a.study_run_id = t.study_run_id AND a.trial_index = t.trial_index
-JOIN study_runs r ON r.id = t.study_run_id
-JOIN study_versions v ON v.id = r.version_id
-JOIN studies s ON s.id = r.study_id
-{clips}
-WHERE {kept}r.origin <> 'preview' AND r.erased_at IS NULL
-"""
-SPELLING = {
-    "sqlite": {"utc": "replace(t.saved_at, ' ', 'T') || 'Z'", "json": "c.levels"},
-    "postgresql": {
-        "utc": """to_char(t.saved_at AT TIME ZONE 'UTC', 'YYYY-MM-DD"T"HH24:MI:SS.US"Z"')""",
-        "json": "CAST(c.levels AS text)",
-    },
-}
 RESPONSE = {
-    "sqlite": "json_extract(t.payload, '$.response')",
-    "postgresql": "CAST(t.payload ->> 'response' AS integer)",
+    "sqlite": "json_extract(payload, '$.response')",
+    "postgresql": "CAST(payload ->> 'response' AS integer)",
 }
-AFTER = {
-    "clips": "LEFT JOIN trial_clips shown_clip ON shown_clip.study_run_id = t.study_run_id "
-    "AND shown_clip.trial_index = t.trial_index AND shown_clip.role = 'shown'\n"
-    "LEFT JOIN version_clips c ON c.id = shown_clip.version_clip_id",
-    "kept": "t.kind = 'clip_rating' AND ",
-}
-BEFORE = {"clips": "LEFT JOIN version_clips c ON c.id = a.version_clip_id", "kept": "", "response": "t.response"}
 PAYLOAD = {"sqlite": "json_object('response', response)", "postgresql": "json_build_object('response', response)"}
 OTHER_KINDS = {
     "sqlite": "SELECT count(*) FROM study_versions "
@@ -65,7 +25,6 @@ OTHER_KINDS = {
 
 def upgrade() -> None:
     dialect = op.get_bind().dialect.name
-    op.execute("DROP VIEW ratings")
     _make_trial_clips()
     op.execute(
         "INSERT INTO trial_clips (study_run_id, trial_index, role, position, version_clip_id) "
@@ -79,7 +38,6 @@ def upgrade() -> None:
     op.execute("ALTER TABLE trial_ratings ADD COLUMN playback JSON")
     op.execute(f"UPDATE trial_ratings SET payload = {PAYLOAD[dialect]}")
     op.execute("ALTER TABLE trial_ratings DROP COLUMN response")
-    op.execute(VIEW.format(**SPELLING[dialect], **AFTER, response=RESPONSE[dialect]))
 
 
 def downgrade() -> None:
@@ -90,9 +48,8 @@ def downgrade() -> None:
             f"revision 0005 knows trials of the kind clip_rating only, and {stored} stored versions of studies have "
             "another; keep this revision, or take a backup and delete those studies first"
         )
-    op.execute("DROP VIEW ratings")
     op.execute("ALTER TABLE trial_ratings ADD COLUMN response INTEGER")
-    op.execute(f"UPDATE trial_ratings SET response = {RESPONSE[dialect].replace('t.payload', 'payload')}")
+    op.execute(f"UPDATE trial_ratings SET response = {RESPONSE[dialect]}")
     for column in ("playback", "payload", "kind"):
         op.execute(f"ALTER TABLE trial_ratings DROP COLUMN {column}")
     op.execute(
@@ -104,7 +61,6 @@ def downgrade() -> None:
         "WHERE c.study_run_id = assigned_trials.study_run_id AND c.trial_index = assigned_trials.trial_index)"
     )
     op.drop_table("trial_clips")
-    op.execute(VIEW.format(**SPELLING[dialect], **BEFORE))
 
 
 def _make_trial_clips() -> None:

@@ -1,4 +1,4 @@
-"""The first tables, and the view `ratings`: one tidy row a play."""
+"""The first tables."""
 
 import sqlalchemy as sa
 from alembic import op
@@ -7,39 +7,6 @@ revision = "0001"
 down_revision = None
 branch_labels = None
 depends_on = None
-
-# Frozen as of this revision: the columns of experiments/ratings.py, in their order. {utc} is the moment as
-# ISO 8601 text, {json} a JSON column as text; the two databases write them differently.
-VIEW = """
-CREATE VIEW ratings AS
-SELECT s.name AS study, v.experiment AS experiment, v.definition_sha256 AS definition_sha256, r.phase AS phase,
-       r.synthetic AS synthetic, r.public_id AS run, r.participant AS participant, r.status AS run_status,
-       r.language AS language, a.trial_index AS trial_index, a.kind AS kind, a.block AS block,
-       a.block_label AS block_label, t.play AS play, {json} AS levels, c.cell AS cell, c.exemplar AS exemplar,
-       c.profile_id AS profile_id, c.file AS stimulus, c.clip_sha256 AS clip_sha256, t.response AS response,
-       a.expected_response AS expected_response, t.rt AS rt, t.rt_from_first_frame AS rt_from_first_frame,
-       t.time_elapsed AS time_elapsed, t.changes AS changes, t.comment AS comment, t.method AS method,
-       t.verdict AS verdict, t.verdict_rule AS verdict_rule, t.key_to_first_frame_ms AS key_to_first_frame_ms,
-       t.frames_drawn AS frames_drawn, t.frames_late AS frames_late, t.frames_missing AS frames_missing,
-       t.longest_gap_ms AS longest_gap_ms, t.stalls AS stalls, t.focus_lost AS focus_lost,
-       t.refresh_rate_hz AS refresh_rate_hz, t.device_pixel_ratio AS device_pixel_ratio, t.px_per_mm AS px_per_mm,
-       t.viewing_distance_mm AS viewing_distance_mm, r.excluded AS excluded,
-       r.exclusion_reason AS exclusion_reason, {utc} AS saved_at
-FROM trial_ratings t
-JOIN assigned_trials a ON a.study_run_id = t.study_run_id AND a.trial_index = t.trial_index
-JOIN study_runs r ON r.id = t.study_run_id
-JOIN study_versions v ON v.id = r.version_id
-JOIN studies s ON s.id = r.study_id
-LEFT JOIN version_clips c ON c.id = a.version_clip_id
-WHERE NOT r.preview AND r.erased_at IS NULL
-"""
-SPELLING = {
-    "sqlite": {"utc": "replace(t.saved_at, ' ', 'T') || 'Z'", "json": "c.levels"},
-    "postgresql": {
-        "utc": """to_char(t.saved_at AT TIME ZONE 'UTC', 'YYYY-MM-DD"T"HH24:MI:SS.US"Z"')""",
-        "json": "CAST(c.levels AS text)",
-    },
-}
 
 
 def upgrade() -> None:
@@ -469,11 +436,9 @@ def upgrade() -> None:
             "study_run_id", "trial_index", "play", name=op.f("uq_trial_ratings_study_run_id_trial_index_play")
         ),
     )
-    op.execute(VIEW.format(**SPELLING[op.get_bind().dialect.name]))
 
 
 def downgrade() -> None:
-    op.execute("DROP VIEW ratings")
     op.drop_table("trial_ratings")
     op.drop_index("ix_run_events_link_id", "run_events")
 

@@ -1,4 +1,4 @@
-"""Origin of every run, data series and format of every version; the view `ratings` gains their columns."""
+"""Origin of every run, data series and format of every version."""
 
 import json
 from typing import Any
@@ -11,41 +11,6 @@ down_revision = "0002"
 branch_labels = None
 depends_on = None
 
-# Frozen as of this revision. {synthetic} and {kept} differ from revision 0002, which is restored going down;
-# {further} are the columns that are new.
-VIEW = """
-CREATE VIEW ratings AS
-SELECT s.name AS study, v.experiment AS experiment, v.definition_sha256 AS definition_sha256, r.phase AS phase,
-       {synthetic} AS synthetic, r.public_id AS run, r.participant AS participant, r.status AS run_status,
-       r.language AS language, a.trial_index AS trial_index, a.kind AS kind, a.block AS block,
-       a.block_label AS block_label, t.play AS play, {json} AS levels, c.cell AS cell, c.exemplar AS exemplar,
-       c.profile_id AS profile_id, c.file AS stimulus, c.clip_sha256 AS clip_sha256, t.response AS response,
-       a.expected_response AS expected_response, t.rt AS rt, t.rt_from_first_frame AS rt_from_first_frame,
-       t.time_elapsed AS time_elapsed, t.changes AS changes, t.comment AS comment, t.method AS method,
-       t.verdict AS verdict, t.verdict_rule AS verdict_rule, t.key_to_first_frame_ms AS key_to_first_frame_ms,
-       t.frames_drawn AS frames_drawn, t.frames_late AS frames_late, t.frames_missing AS frames_missing,
-       t.longest_gap_ms AS longest_gap_ms, t.stalls AS stalls, t.focus_lost AS focus_lost,
-       t.refresh_rate_hz AS refresh_rate_hz, t.device_pixel_ratio AS device_pixel_ratio, t.px_per_mm AS px_per_mm,
-       t.viewing_distance_mm AS viewing_distance_mm, r.excluded AS excluded,
-       r.exclusion_reason AS exclusion_reason, {utc} AS saved_at{further}
-FROM trial_ratings t
-JOIN assigned_trials a ON a.study_run_id = t.study_run_id AND a.trial_index = t.trial_index
-JOIN study_runs r ON r.id = t.study_run_id
-JOIN study_versions v ON v.id = r.version_id
-JOIN studies s ON s.id = r.study_id
-LEFT JOIN version_clips c ON c.id = a.version_clip_id
-WHERE {kept} AND r.erased_at IS NULL
-"""
-SPELLING = {
-    "sqlite": {"utc": "replace(t.saved_at, ' ', 'T') || 'Z'", "json": "c.levels"},
-    "postgresql": {
-        "utc": """to_char(t.saved_at AT TIME ZONE 'UTC', 'YYYY-MM-DD"T"HH24:MI:SS.US"Z"')""",
-        "json": "CAST(c.levels AS text)",
-    },
-}
-FURTHER = ", r.origin AS run_origin, v.number AS study_version, v.series AS data_series"
-AFTER = {"synthetic": "r.origin = 'simulated'", "kept": "r.origin <> 'preview'", "further": FURTHER}
-BEFORE = {"synthetic": "r.synthetic", "kept": "NOT r.preview", "further": ""}
 
 # A run's origin is what it was at its start: the database itself refuses to change it.
 KEPT = {
@@ -70,7 +35,6 @@ MEASURED = ("factors", "exemplars", "trial", "render")
 
 def upgrade() -> None:
     dialect = op.get_bind().dialect.name
-    op.execute("DROP VIEW ratings")
     # Columns are added as they are: a table made anew would take the rows that refer to it with it (SQLite).
     op.execute(
         "ALTER TABLE study_runs ADD COLUMN origin VARCHAR(12) DEFAULT 'participant' NOT NULL CONSTRAINT "
@@ -87,12 +51,10 @@ def upgrade() -> None:
     _name_series()
     for statement in KEPT[dialect]:
         op.execute(statement)
-    op.execute(VIEW.format(**SPELLING[dialect], **AFTER))
 
 
 def downgrade() -> None:
     dialect = op.get_bind().dialect.name
-    op.execute("DROP VIEW ratings")
     for statement in FREED[dialect]:
         op.execute(statement)
     no = "0" if dialect == "sqlite" else "false"
@@ -102,7 +64,6 @@ def downgrade() -> None:
     op.execute("ALTER TABLE study_runs DROP COLUMN origin")
     op.execute("ALTER TABLE study_versions DROP COLUMN series")
     op.execute("ALTER TABLE study_versions DROP COLUMN format")
-    op.execute(VIEW.format(**SPELLING[dialect], **BEFORE))
 
 
 def _name_series() -> None:

@@ -8,12 +8,17 @@ from alembic import command
 from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
+from alembic.util import CommandError
 from sqlalchemy import Connection
 
 import migrations
+from server.core.database_views import drop_views, make_views, refusals_in_one_line, views_are_current
 from server.core.db import Database
 from server.core.repository import wait_for_other_migrations
 from server.core.row_security import raise_wall, take_down_wall
+
+FIRST_WITH_DERIVED_VIEWS = "0033"
+"""From here on programs make their views themselves; those of earlier revisions had migrations for that."""
 
 
 def alembic_config(
@@ -41,25 +46,45 @@ def migrating(database: Database) -> Iterator[Connection]:
         yield connection
 
 
-def upgrade(database: Database, revision: str = "head") -> tuple[str | None, str | None]:
-    """Run the missing migrations in one transaction; return the revision before and after."""
+def upgrade(database: Database) -> tuple[str | None, str | None]:
+    """Run the missing migrations in one transaction; return the revision before and after.
+
+    Views that are not those of this program's columns are made anew, with no new revision too.
+    """
     with migrating(database) as connection:
         before = revision_of(connection)
-        stood = before != newest_revision() and without_wall(connection)
-        command.upgrade(alembic_config(connection, database.secret_key), revision)
-        with_wall(connection, stood=stood)
+        if before == newest_revision() and views_are_current(connection):
+            _raise_wall_at_newest(connection)
+            return before, before
+        with derived_anew(connection):
+            command.upgrade(alembic_config(connection, database.secret_key), "head")
         return before, revision_of(connection)
 
 
-def without_wall(connection: Connection) -> bool:
-    """Take down the policies of rows, which hold on to columns that migrations change; whether any stood."""
-    return connection.dialect.name == "postgresql" and take_down_wall(connection)
+@contextmanager
+def derived_anew(connection: Connection) -> Iterator[None]:
+    """Tables may be changed within: views and policies of rows hold on to columns, and are made after it.
+
+    They fit the newest revision alone; a database that is left at another one has none.
+    """
+    with refusals_in_one_line():
+        stood = connection.dialect.name == "postgresql" and take_down_wall(connection)
+        dropped = drop_views(connection)
+    yield
+    if revision_of(connection) == newest_revision():
+        make_views(connection, dropped)
+    _raise_wall_at_newest(connection, stood=stood)
 
 
-def with_wall(connection: Connection, *, stood: bool = False) -> None:
-    """Put up the policies of rows where the database has the newest revision; `stood` as for `raise_wall`."""
+def _raise_wall_at_newest(connection: Connection, *, stood: bool = False) -> None:
     if connection.dialect.name == "postgresql" and revision_of(connection) == newest_revision():
         raise_wall(connection, stood=stood)
+
+
+def is_up_to_date(database: Database) -> bool:
+    """Whether an upgrade would change nothing: the newest revision, with the views of this program."""
+    with database.engine.connect() as connection:
+        return revision_of(connection) == newest_revision() and views_are_current(connection)
 
 
 def revision_of(connection: Connection) -> str | None:
@@ -68,10 +93,18 @@ def revision_of(connection: Connection) -> str | None:
 
 
 def downgrade(database: Database, revision: str = "-1") -> None:
-    """Undo migrations down to `revision`."""
-    with migrating(database) as connection:
-        without_wall(connection)
+    """Undo migrations down to `revision`, which leaves no views: a program of then has its own."""
+    with migrating(database) as connection, derived_anew(connection):
         command.downgrade(alembic_config(connection, database.secret_key), revision)
+
+
+def refuse_without_views(before: str | None, after: str | None) -> None:
+    """Refuse a way down to a revision whose programs made their views by migrations, which are gone."""
+    if before is not None and after is not None and after < before and after < FIRST_WITH_DERIVED_VIEWS:
+        raise CommandError(
+            f"programs of revision {after} expect views that this one cannot make; keep revision "
+            f"{FIRST_WITH_DERIVED_VIEWS} or newer, or restore a backup of then with the program of then"
+        )
 
 
 def current_revision(database: Database) -> str | None:

@@ -16,7 +16,7 @@ from experiments.errors import InputError, counted
 from server.cli_common import migrated_services, out, stored_services
 from server.context import open_services
 from server.core.db import open_database
-from server.core.migrate import current_revision, newest_revision
+from server.core.migrate import current_revision, is_up_to_date, newest_revision
 from server.core.settings import Settings
 from server.core.values import iso, now
 from server.operations.copying import address, carry_over, copy_database
@@ -209,10 +209,11 @@ def status() -> None:
     Example: server database status
     """
     database = open_database(Settings())
-    revision, expected = current_revision(database), newest_revision()
+    revision, expected, fits = current_revision(database), newest_revision(), is_up_to_date(database)
     database.close()
-    advice = "" if revision == expected else "; run `server database upgrade`"
-    out.print(f"found {revision or 'no tables'}, expected {expected}{advice}")
+    views = " and other views" if revision == expected and not fits else ""
+    advice = "" if fits else "; run `server database upgrade`"
+    out.print(f"found {revision or 'no tables'}{views}, expected {expected}{advice}")
 
 
 @app.command("recount")

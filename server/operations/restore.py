@@ -17,7 +17,7 @@ from sqlalchemy.exc import InterfaceError, OperationalError, StatementError
 
 from experiments.errors import InputError, counted
 from server.context import Services
-from server.core.migrate import alembic_config, known_revision, with_wall, without_wall
+from server.core.migrate import alembic_config, derived_anew, known_revision
 from server.core.settings import Settings, put_key, secret_key_path
 from server.operations.backup import CLIPS, DESCRIPTION, KEY, TABLES, Description
 from server.operations.key_escrow import NAME, KeyFile, check_fits, key_file, key_file_of, put_back
@@ -175,22 +175,27 @@ def _restore_rows(
 ) -> None:
     with services.database.write_connection() as connection:
         refuse_unless_empty(connection, "the database", ELSEWHERE)
-        stood = without_wall(connection)
-        command.upgrade(alembic_config(connection), described.revision)
-        known = {table.name: table for table in tables_of(connection)}
-        for name in _in_order(known, described):
-            expected = described.tables[name]
-            written = _written(connection, known[name], tar)
-            if (written.rows, written.sha256) != (expected.rows, expected.sha256):
-                raise InputError(
-                    f"table {name}: expected {expected.rows} rows, the file holds {written.rows} or other "
-                    "values; the backup is damaged, nothing was restored"
-                )
-            told(f"{name}: {written.rows} rows")
-        if described.keys_apart:
-            _put_keys_back(connection, keys, told)
-        command.upgrade(alembic_config(connection, lambda: keys.secret), "head")
-        with_wall(connection, stood=stood)
+        with derived_anew(connection):
+            command.upgrade(alembic_config(connection), described.revision)
+            _write_tables(connection, tar, described, told)
+            if described.keys_apart:
+                _put_keys_back(connection, keys, told)
+            command.upgrade(alembic_config(connection, lambda: keys.secret), "head")
+
+
+def _write_tables(
+    connection: Connection, tar: tarfile.TarFile, described: Description, told: Callable[[str], None]
+) -> None:
+    known = {table.name: table for table in tables_of(connection)}
+    for name in _in_order(known, described):
+        expected = described.tables[name]
+        written = _written(connection, known[name], tar)
+        if (written.rows, written.sha256) != (expected.rows, expected.sha256):
+            raise InputError(
+                f"table {name}: expected {expected.rows} rows, the file holds {written.rows} or other "
+                "values; the backup is damaged, nothing was restored"
+            )
+        told(f"{name}: {written.rows} rows")
 
 
 def _put_keys_back(connection: Connection, keys: _Keys, told: Callable[[str], None]) -> None:

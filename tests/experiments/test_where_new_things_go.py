@@ -4,10 +4,7 @@ Generated files (`make docs`, `npm run api`) are not counted; docs/architecture.
 """
 
 import json
-import os
 import re
-import shutil
-import subprocess
 import sys
 from pathlib import Path
 
@@ -15,21 +12,9 @@ import pytest
 
 from tests.conftest import REPOSITORY
 from tests.experiments.additions.added import FIELD, LANGUAGE, SCALE, Edit
+from tests.experiments.additions.tree import add, copy_tree, ran
 
 FRONTEND = REPOSITORY / "frontend"
-COPIED = (
-    "experiments",
-    "server",
-    "video_conversion",
-    "analysis",
-    "migrations",
-    "tests",
-    "tools",
-    "docs",
-    "blink_engine",
-)
-NOT_COPIED = ("node_modules", "dist", "__pycache__", "backups", "databases", "browser", "decisions", "*.png")
-
 pytestmark = [
     pytest.mark.skipif(
         not (FRONTEND / "node_modules").is_dir(), reason="npm packages are not here: run `make test`"
@@ -41,37 +26,12 @@ pytestmark = [
 def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The tree with all three added."""
     folder = tmp_path_factory.mktemp("tree")
-    left_out = shutil.ignore_patterns(*NOT_COPIED)
-    for name in (*COPIED, "frontend"):
-        shutil.copytree(REPOSITORY / name, folder / name, ignore=left_out)
-    for name in ("pyproject.toml", "alembic.ini"):
-        shutil.copy(REPOSITORY / name, folder)
+    copy_tree(folder, "frontend")
     (folder / "frontend" / "node_modules").symlink_to(FRONTEND / "node_modules")
     (folder / ".venv").symlink_to(Path(sys.prefix))
     for addition in (SCALE, FIELD, LANGUAGE):
         add(folder, addition)
     return folder
-
-
-def add(folder: Path, addition: dict[str, str | Edit]) -> None:
-    """Write the new files and make the edits."""
-    for name, content in addition.items():
-        path = folder / name
-        assert path.exists() == isinstance(content, Edit), name
-        if isinstance(content, Edit):
-            text = path.read_text(encoding="utf-8")
-            assert text.count(content.before) == 1, name
-            content = text.replace(*content)
-        path.write_text(content, encoding="utf-8")
-
-
-def ran(folder: Path, *command: str) -> subprocess.CompletedProcess[str]:
-    """A command in the copy, whose packages come before those that are installed."""
-    root = folder.parent if folder.name == "frontend" else folder
-    environment = {**os.environ, "PYTHONPATH": str(root), "PYTHONDONTWRITEBYTECODE": "1"}
-    return subprocess.run(
-        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=300, check=False
-    )
 
 
 def test_the_numbers_of_files_are_those_promised() -> None:

@@ -33,10 +33,10 @@ def test_the_views_of_the_database_are_those_of_the_columns(empty_database_url: 
     with database.engine.connect() as connection:
         assert set(inspect(connection).get_view_names()) == {view.name for view in views()}
         for view in views():
-            made_by_migrations = definition_of(connection, view.name)
+            made_by_upgrade = definition_of(connection, view.name)
             connection.execute(text(f"DROP VIEW {view.name}"))
             connection.execute(text(view.create(dialect)))
-            assert made_by_migrations == definition_of(connection, view.name), "a migration is missing"
+            assert made_by_upgrade == definition_of(connection, view.name)
             assert tuple(connection.execute(text(f"SELECT * FROM {view.name}")).keys()) == view.names
     database.close()
 

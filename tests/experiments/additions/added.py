@@ -166,3 +166,26 @@ LANGUAGE: dict[str, str | Edit] = {
     "experiments/check_words/sv.py": SWEDISH_CHECKS,
     "frontend/src/i18n/languages/sv.ts": SWEDISH,
 }
+
+COLUMN: dict[str, str | Edit] = {
+    "experiments/kinds/clip_rating.py": Edit(
+        """
+        member="rt",
+    ),
+)
+""",
+        """
+        member="rt",
+    ),
+    Column(
+        "comment_length",
+        "integer",
+        "Characters of the comment.",
+        minimum=0,
+        source="length(t.comment)",
+    ),
+)
+""",
+    )
+}
+"""A column of the view of ratings; no migration and nothing else goes with it."""

@@ -44,6 +44,7 @@ unit = { en = "ms", de = "ms" }
 question = { en = "How long did it take?", de = "Wie lange dauerte es?" }
 
 """
+KEY = "a key of the tests, long enough"
 
 
 def main(folder: Path) -> dict[str, Any]:
@@ -51,7 +52,7 @@ def main(folder: Path) -> dict[str, Any]:
     start, end = SHORT.index("[trial.scale]"), SHORT.index("[[exclusions]]")
     text = (SHORT[:start] + TRIAL + SHORT[end:]).replace("[[forms.fields]]\n", FIELD, 1)
     url = f"sqlite:///{folder / 'added.sqlite'}"
-    settings = Settings(data_folder=folder, database_url=url, secret_key="a key of the tests, long enough")
+    settings = Settings(data_folder=folder, database_url=url, secret_key=KEY)
     services = open_services(settings)
     upgrade(services.database)
     study = add_study(services, folder / "clips", text)
