@@ -1,7 +1,7 @@
 """The command `analysis`: it only gathers the command groups."""
 
 from experiments.command_line import command_group, run_command_line
-from experiments.declaration.base import leave_descriptions_out
+from experiments.descriptions import leave_descriptions_out
 
 app = command_group(
     "From ratings to tables: within-participant ANOVA, means, pairs, figures and one report.", name="analysis"

@@ -7,7 +7,10 @@ import pytest
 
 from experiments.declaration.experiment import Experiment
 
-TOLD = "from experiments.declaration import Experiment as E; print(E.model_fields['name'].description)"
+TOLD = (
+    "from experiments.declaration.experiment import Experiment as E; "
+    "print(E.model_fields['name'].description)"
+)
 ALONE = "from analysis import cli; cli.run_command_line = lambda app: None; cli.main(); "
 
 

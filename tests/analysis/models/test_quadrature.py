@@ -96,7 +96,7 @@ def test_models_it_is_not_for_are_refused(more, said) -> None:
 
 
 def test_an_sd_at_its_limit_is_noted(monkeypatch) -> None:
-    for module in ("ordinal_maximum", "ordinal_result"):
+    for module in ("ordinal_maximum", "ordinal"):
         monkeypatch.setattr(f"analysis.models.{module}.SD_MAX", np.exp(0.5))
     rows = pd.read_csv(GOLDEN / "models" / "ordinal_far_apart.csv")
     result = fit_ordinal(rows, "participant", "rating", ["A"])
