@@ -6,6 +6,7 @@ from functools import cache
 from pathlib import Path
 
 from experiments import design
+from experiments.declaration.trial import ClipSpec
 from experiments.load import parse_experiment
 from experiments.manifest import MANIFEST_NAME, Clip, Manifest
 from experiments.schema.canonical import definition_sha256
@@ -79,7 +80,7 @@ def make_clip_folder(
     (folder / MANIFEST_NAME).write_text(json.dumps(manifest.model_dump(mode="json")), encoding="utf-8")
 
 
-def _clip(folder: Path, spec: design.ClipSpec, fps: int, height_px: int, seconds: float) -> Clip:
+def _clip(folder: Path, spec: ClipSpec, fps: int, height_px: int, seconds: float) -> Clip:
     # A box that players skip makes each file one of its own.
     own = f"{spec.cell}/{spec.exemplar}".encode()
     data = bar_video(fps, height_px, seconds) + (len(own) + BOX_HEAD_BYTES).to_bytes(4, "big") + b"free" + own
