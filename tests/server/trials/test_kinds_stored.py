@@ -12,19 +12,22 @@ from experiments.declaration.any_trial import TRIALS
 from experiments.declaration.experiment import Experiment
 from experiments.kinds import KINDS
 from server.context import Services
+from server.core.migrate import upgrade
 from server.models import Rating, StudyRun, TrialClip
 from tests.experiments.trials.toy import TOY
 from tests.helpers.studies import SHORT, Participant, add_study
 
 
 @pytest.fixture
-def toy() -> Iterator[None]:
-    """The tests' own kind, registered for one test."""
+def toy(services: Services) -> Iterator[None]:
+    """The tests' own kind, registered for one test; its view comes and goes with it, as at a start."""
     KINDS[TOY.name], TRIALS[TOY.name] = TOY, TOY.declaration
     Experiment.model_rebuild(force=True)
+    upgrade(services.database)
     yield
     del KINDS[TOY.name], TRIALS[TOY.name]
     Experiment.model_rebuild(force=True)
+    upgrade(services.database)
 
 
 @pytest.mark.usefixtures("toy")
@@ -48,16 +51,13 @@ def test_its_clips_are_rows_by_role_and_its_view_shows_its_answers(
         for index, same in enumerate([True, False]):
             session.add(_answer(run, index, {"same": same}))
         firsts = [shown.clip.cell for trial in assigned[:2] for shown in trial.shown if shown.role == "first"]
-    dialect = "sqlite" if services.database.is_sqlite else "postgresql"
-    with services.database.write() as session:
-        session.execute(text(TOY.view.create(dialect)))
+    with services.database.read() as session:
         query = text("SELECT same, first_cell FROM sameness ORDER BY same DESC")
         assert [(bool(same), cell) for same, cell in session.execute(query)] == [
             (True, firsts[0]),
             (False, firsts[1]),
         ]
         assert session.scalar(text("SELECT count(*) FROM ratings")) == 0
-        session.execute(text("DROP VIEW sameness"))
 
 
 def _answer(run: StudyRun, index: int, payload: dict[str, bool]) -> Rating:
