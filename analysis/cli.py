@@ -1,6 +1,7 @@
 """The command `analysis`: it only gathers the command groups."""
 
-from experiments.command_line import command_group, run_command_line
+from experiments.command_groups import command_group
+from experiments.command_line import run_command_line
 from experiments.descriptions import leave_descriptions_out
 
 app = command_group(

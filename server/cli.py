@@ -2,7 +2,8 @@
 
 import os
 
-from experiments.command_line import lazy_app, run_command_line
+from experiments.command_groups import lazy_app
+from experiments.command_line import run_command_line
 from experiments.errors import InputError
 
 PRIVATE = 0o077

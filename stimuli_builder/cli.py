@@ -1,6 +1,7 @@
 """The command `stimuli`: lists the commands; each lives with its subject and is loaded when called."""
 
-from experiments.command_line import lazy_app, run_command_line
+from experiments.command_groups import lazy_app
+from experiments.command_line import run_command_line
 
 COMMANDS = {
     "actor": (

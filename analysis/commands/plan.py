@@ -9,7 +9,7 @@ import typer
 
 from analysis.commands.output import JsonOption, names_in, save_json
 from analysis.commands.synthetic import StatisticChoice, bar, say_power
-from experiments.command_line import command_group
+from experiments.command_groups import command_group
 from experiments.errors import InputError
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from experiments.command_line import command_group
+from experiments.command_groups import command_group
 from experiments.errors import InputError
 from experiments.files import whole_file
 from server.accounts import repository

@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from experiments.command_line import command_group
+from experiments.command_groups import command_group
 from experiments.errors import InputError
 from server.accounts import invitations, letters, service
 from server.accounts.credentials import hash_password

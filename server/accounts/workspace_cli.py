@@ -6,7 +6,7 @@ import typer
 from pydantic import TypeAdapter, ValidationError
 from rich.table import Table
 
-from experiments.command_line import command_group
+from experiments.command_groups import command_group
 from experiments.errors import InputError
 from server.accounts import workspace_repository, workspaces
 from server.accounts.identity import OPERATOR

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Column, Table
 from rich.text import Text
 
-from experiments.command_line import command_group
+from experiments.command_groups import command_group
 from experiments.errors import InputError, counted
 from server.cli_common import migrated_services, out, stored_services
 from server.context import open_services

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from experiments.command_line import command_group
+from experiments.command_groups import command_group
 from experiments.errors import InputError
 from experiments.files import check_targets, whole_private_file
 from server.accounts.identity import OPERATOR

@@ -8,7 +8,7 @@ import typer
 from rich.table import Table
 from sqlalchemy.orm import Session
 
-from experiments.command_line import command_group
+from experiments.command_groups import command_group
 from experiments.errors import InputError, did_you_mean
 from experiments.load import locate
 from experiments.manifest import Manifest, read_manifest

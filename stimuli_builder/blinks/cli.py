@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from experiments.command_line import command_group
+from experiments.command_groups import command_group
 from experiments.errors import InputError
 
 if TYPE_CHECKING:

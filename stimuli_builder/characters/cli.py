@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from experiments.command_line import command_group
+from experiments.command_groups import command_group
 from experiments.errors import InputError
 from stimuli_builder.characters.retired import load_retired, restore
 from stimuli_builder.clips.characters import SHIPPED_FOLDER, geometry, shipped_names

@@ -1,92 +1,14 @@
-"""What clips need of a character, and finding one by name or folder."""
+"""Find a character by name or folder; what reads or draws it is loaded when it is asked for."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
-
-import cv2
-import numpy as np
-from numpy.typing import NDArray
 
 from experiments.errors import InputError, did_you_mean
-from stimuli_builder.characters import cartoon
-from stimuli_builder.characters.atlas import Atlas, LevelCodes, load_atlas
-from stimuli_builder.characters.cartoon_eye import OPENING_MM
-from stimuli_builder.characters.cartoon_face import BROW_DROP_MM
-from stimuli_builder.characters.colour import LINEAR_OF_CODE, srgb_to_linear
-from stimuli_builder.characters.declaration import LowerLid as DeclaredLowerLid
 from stimuli_builder.characters.retired import load_retired
-from stimuli_builder.clips.kernels import FULL_SCALE
-from stimuli_builder.clips.levels import LevelSet, Light, LowerLid, Window, quantised, window_inside
-
-if TYPE_CHECKING:
-    from stimuli_builder.clips.levels import LevelSet
-
+from stimuli_builder.clips.geometry import Character, Geometry
 
 SHIPPED_FOLDER = Path(__file__).resolve().parent.parent / "characters" / "data"
-
-
-@dataclass(frozen=True)
-class Geometry:
-    """Size and scale of a character's whole frame, before it is scaled to a clip."""
-
-    name: str
-    size_px: tuple[int, int]
-    px_per_mm: float
-    inter_ocular_mm: float
-    opening_mm: float
-    lower_range_mm: tuple[tuple[float, float], tuple[float, float]] | None
-    """Least and greatest lift, and slide, of the lower lid; None without a lower-lid layer."""
-    moved_mm: Mapping[str, float] = field(default_factory=dict)
-    """What else a whole closure moves, by part; empty where nobody measured it."""
-    blink_rows: tuple[int, int] = (0, 0)
-    """First row of the whole frame that a blink changes, and the row after the last."""
-
-    def scaled(self, width_px: int, height_px: int) -> tuple[tuple[int, int], int]:
-        """Size of the whole frame when `width_px` wide, and the rows to cut above to get `height_px`.
-
-        Raises
-        ------
-        InputError
-            The character is less high than that, or a blink would not be seen whole.
-        """
-        whole = (width_px, round(self.size_px[1] * width_px / self.size_px[0]))
-        spare = whole[1] - height_px
-        if spare < 0:
-            raise InputError(
-                f"character '{self.name}' is {whole[1]} px high at a width of {width_px} px; expected a "
-                f"height of at most that, got {height_px}"
-            )
-        top, scale = 2 * (spare // 4), width_px / self.size_px[0]
-        first, after = self.blink_rows
-        if after and (first * scale < top or after * scale > top + height_px):
-            raise InputError(
-                f"a picture of {width_px} x {height_px} px cuts off what moves in a blink of '{self.name}', "
-                f"which is {whole[1]} px high at that width; ask for a greater height (its own size: "
-                f"width_px = {self.size_px[0]}, height_px = {self.size_px[1]})"
-            )
-        return whole, top
-
-    def px_per_mm_at(self, width_px: int) -> float:
-        """Scale of a clip of that width."""
-        return self.px_per_mm * width_px / self.size_px[0]
-
-
-class Character(Protocol):
-    """What clips need of a character, drawn or baked."""
-
-    @property
-    def geometry(self) -> Geometry:
-        """Size and scale of its whole frame."""
-
-    @property
-    def fingerprint(self) -> str:
-        """SHA-256 of everything that decides its pictures."""
-
-    def levels(self, size_px: tuple[int, int]) -> "LevelSet":
-        """Its pictures at a size (width, height), ready to be blended."""
 
 
 def shipped_names() -> tuple[str, ...]:
@@ -140,223 +62,17 @@ def fingerprint(name: str, beside: Path | None = None) -> str:
 
 @lru_cache(maxsize=1)
 def _cartoon() -> Character:
+    from stimuli_builder.clips.character_levels import CartoonCharacter
 
     return CartoonCharacter()
 
 
 @lru_cache(maxsize=16)
 def _baked(folder: Path) -> Character:
+    from stimuli_builder.clips.character_levels import BakedCharacter
 
     return BakedCharacter(folder)
 
 
 DRAWN: Mapping[str, Callable[[], Character]] = {"cartoon": _cartoon}
 """Characters that are drawn by a program; every other is a folder of pictures."""
-
-
-# A baked character as clips need it: its atlas at its own size, or resampled in linear light.
-
-MARGIN_PX = 4
-LIGHT_OF_CODE = quantised(LINEAR_OF_CODE)
-"""16-bit linear light of every sRGB code value."""
-CODE_OF_LIGHT = np.searchsorted(LIGHT_OF_CODE, np.arange(FULL_SCALE + 1)).astype(np.uint8)
-"""The code value of every 16-bit linear light that `LIGHT_OF_CODE` holds."""
-
-
-class BakedCharacter:
-    """A folder of pictures with a declaration (docs/own-character.md)."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-
-    @cached_property
-    def geometry(self) -> Geometry:
-        """Size and scale as declared."""
-        declared = load_atlas(self.folder).declaration
-        return Geometry(
-            declared.name,
-            declared.size_px,
-            declared.px_per_mm,
-            declared.inter_ocular_mm,
-            declared.opening_mm,
-            None if declared.lower_lid is None else _ends(declared.lower_lid),
-            measured_movement(declared.provenance),
-            blink_rows=(declared.crop[1], declared.crop[1] + declared.crop[3]),
-        )
-
-    @cached_property
-    def fingerprint(self) -> str:
-        """SHA-256 of the declaration and every picture."""
-        return load_atlas(self.folder).fingerprint()
-
-    def levels(self, size_px: tuple[int, int]) -> LevelSet:
-        """The atlas at a size: the width scales it, a lower height cuts skin above and below."""
-        return atlas_levels(load_atlas(self.folder), self.geometry, size_px)
-
-
-def measured_movement(provenance: Mapping[str, Any]) -> dict[str, float]:
-    """Millimetres by part of the face, as its bake measured them; empty for characters made elsewhere."""
-    measured = provenance.get("moved_mm_at_closure_1")
-    if not isinstance(measured, Mapping):
-        return {}
-    return {str(part): float(mm) for part, mm in measured.items() if isinstance(mm, int | float)}
-
-
-def _ends(lid: DeclaredLowerLid) -> tuple[tuple[float, float], tuple[float, float]]:
-    vertical, horizontal = lid.vertical_mm, lid.horizontal_mm
-    return (vertical[0], vertical[-1]), (horizontal[0], horizontal[-1])
-
-
-def atlas_levels(character: Atlas, geometry: Geometry, size_px: tuple[int, int]) -> LevelSet:
-    """A baked character at a size; other sizes than its own are resampled in linear light."""
-    native = character.size_px
-    scaled, top = geometry.scaled(*size_px)
-    scale = scaled[0] / native[0]
-    rows, columns = character.crop
-    window = window_inside(
-        columns.start * scale - MARGIN_PX,
-        rows.start * scale - MARGIN_PX - top,
-        (columns.stop - columns.start) * scale + 2 * MARGIN_PX,
-        (rows.stop - rows.start) * scale + 2 * MARGIN_PX,
-        size_px,
-    )
-    read = _read_at_own_size if scaled == native else _read_resized
-    content = read(character, scaled, slice(top, top + size_px[1]), window)
-    px_per_mm = character.declaration.px_per_mm * scale
-
-    def lower() -> LowerLid:
-        return _scaled_lower_lid(load_atlas(character.folder), scaled, top, window, content.level_srgb)
-
-    read_lower = lower if character.has_lower_lid else None
-    return LevelSet(
-        character.name, content.base, content.levels, character.closures, window, px_per_mm, read_lower
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class _Content:
-    """The whole frame and the window's levels; `level_srgb` where code values can be had from them."""
-
-    base: Light
-    levels: Light
-    level_srgb: LevelCodes | None = None
-
-
-def _read_at_own_size(character: Atlas, _: tuple[int, int], shown: slice, window: Window) -> _Content:
-    """Each code value has one value of light, so a table gives it, and the code value again."""
-    rows, columns = character.crop
-    base = quantised(character.base_linear())
-    levels = np.empty((len(character.closures), window.height, window.width, 3), np.uint16)
-    levels[:] = base[shown][window.slices]
-    first_row, first_column = shown.start + window.y, window.x
-    crops = levels[
-        :,
-        rows.start - first_row : rows.stop - first_row,
-        columns.start - first_column : columns.stop - first_column,
-    ]
-    character.read_levels(crops, LIGHT_OF_CODE.__getitem__)
-    base[rows, columns] = crops[0]
-
-    def level_srgb(index: int) -> NDArray[np.uint8]:
-        codes: NDArray[np.uint8] = CODE_OF_LIGHT[crops[index]]
-        return codes
-
-    return _Content(np.ascontiguousarray(base[shown]), levels, level_srgb)
-
-
-def _read_resized(character: Atlas, scaled: tuple[int, int], shown: slice, window: Window) -> _Content:
-    frame = character.base_linear()
-    levels = np.empty((len(character.closures), window.height, window.width, 3), np.uint16)
-    for index in range(len(levels)):
-        frame[character.crop] = srgb_to_linear(character.level_srgb(index))
-        scaled_frame = _resized(frame, scaled)[shown]
-        levels[index] = quantised(scaled_frame[window.slices])
-        if index == 0:
-            base = quantised(scaled_frame)
-    return _Content(base, levels)
-
-
-def _scaled_lower_lid(
-    character: Atlas,
-    scaled: tuple[int, int],
-    top: int,
-    window: Window,
-    level_srgb: LevelCodes | None,
-) -> LowerLid:
-    crop, native = character.crop, character.size_px
-
-    def to_window(part: NDArray[np.float32]) -> NDArray[np.float32]:
-        frame = np.zeros((native[1], native[0], 3), np.float32)
-        frame[crop] = part
-        shifted = _resized(frame, scaled)[top:]
-        return np.ascontiguousarray(shifted[window.slices])
-
-    return LowerLid.of_character(character, to_window, level_srgb)
-
-
-def _resized(frame: NDArray[np.float32], size_px: tuple[int, int]) -> NDArray[np.float32]:
-    if (frame.shape[1], frame.shape[0]) == size_px:
-        return frame
-    method = cv2.INTER_AREA if size_px[0] < frame.shape[1] else cv2.INTER_LANCZOS4
-    return np.asarray(cv2.resize(frame, size_px, interpolation=method), np.float32)
-
-
-# The cartoon as clips need it: drawn anew at every size.
-
-NAME = "cartoon"
-NATIVE_WIDTH_PX = 960
-SPARE_PX = 4
-"""Rows of the crop, above and below, in which nothing moves."""
-
-
-class CartoonCharacter:
-    """The vector drawing of `stimuli_builder.characters.cartoon`; it has no lower-lid layer."""
-
-    @cached_property
-    def geometry(self) -> Geometry:
-        """Size and scale at its native width."""
-        height = round(NATIVE_WIDTH_PX * cartoon.FRAME_MM[1] / cartoon.FRAME_MM[0])
-        scale = NATIVE_WIDTH_PX / cartoon.FRAME_MM[0]
-        size = (NATIVE_WIDTH_PX, height)
-        _, first, _, rows = cartoon.crop_px(size)
-        return Geometry(
-            NAME,
-            size,
-            scale,
-            cartoon.INTER_OCULAR_MM,
-            OPENING_MM,
-            lower_range_mm=None,
-            moved_mm={"brow": BROW_DROP_MM},
-            blink_rows=(first + SPARE_PX, first + rows - SPARE_PX),
-        )
-
-    @cached_property
-    def fingerprint(self) -> str:
-        """SHA-256 of the drawing's source and library."""
-        return cartoon.fingerprint()
-
-    def levels(self, size_px: tuple[int, int]) -> LevelSet:
-        """The cartoon at a size: the width scales it, a lower height cuts skin above and below."""
-        scaled, top = self.geometry.scaled(*size_px)
-        x, y, width, height = cartoon.crop_px(scaled)
-        window = window_inside(x, y - top, width, height, size_px)
-        closures = np.linspace(0.0, 1.0, cartoon.LEVELS)
-        levels = np.empty((len(closures), window.height, window.width, 3), np.uint16)
-        rectangle = (window.x, window.y + top, window.width, window.height)
-        opened = cartoon.draw_frame(0.0, scaled, rectangle)
-        levels[:] = _light_of_code(opened)
-        for level, closure in zip(levels[1:], closures[1:], strict=True):
-            drawn = cartoon.draw_frame(float(closure), scaled, rectangle)
-            # Skin stands still, and a power costs more than a comparison.
-            moved = np.flatnonzero(drawn != opened)
-            level.reshape(-1)[moved] = _light_of_code(drawn.reshape(-1)[moved])
-        base = _light_of_code(cartoon.draw_frame(0.0, scaled, (0, top, *size_px)))
-        base[window.slices] = levels[0]
-        return LevelSet(NAME, base, levels, closures, window, scaled[0] / cartoon.FRAME_MM[0])
-
-
-def _light_of_code(code: NDArray[np.float32]) -> Light:
-    """16-bit linear light of gamma-encoded sRGB in 0-1."""
-    code = np.clip(code, 0.0, 1.0)
-    linear = np.where(code <= 0.04045, code / 12.92, ((code + np.float32(0.055)) / np.float32(1.055)) ** 2.4)
-    return quantised(linear.astype(np.float32))

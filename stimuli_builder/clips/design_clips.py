@@ -23,11 +23,12 @@ from experiments.errors import InputError, counted
 from experiments.kinds import KINDS
 from experiments.kinds.scales import block_sizes, expected_minutes, trials_per_participant
 from stimuli_builder.blinks.profile import PROFILE_FPS
-from stimuli_builder.clips.characters import DRAWN, Geometry, fingerprint, geometry
+from stimuli_builder.clips.characters import DRAWN, fingerprint, geometry
 from stimuli_builder.clips.curves import DECIMALS, Array, ClipCurve, Timing, clip_curve, generator, shown_by
 from stimuli_builder.clips.exemplars import exemplar, recorded_order
-from stimuli_builder.clips.face_movement import Movement
+from stimuli_builder.clips.geometry import Geometry
 from stimuli_builder.clips.jobs import ClipJob, Look
+from stimuli_builder.clips.movement import Movement
 from stimuli_builder.performance.run import LOWER_IN_MM, LOWER_UP_MM, speech_of
 
 # A clip of living eyes: the blink engine's lids over many seconds, as a curve at 300 fps.

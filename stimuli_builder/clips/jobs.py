@@ -3,18 +3,14 @@
 import hashlib
 import json
 from dataclasses import asdict, dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import cv2
 import numpy as np
 
 from stimuli_builder.blinks.profile import PROFILE_FPS
-from stimuli_builder.clips.characters import find_character
 from stimuli_builder.clips.curves import ClipCurve
-from stimuli_builder.clips.face_movement import AS_BAKED, Movement, moved_levels
-from stimuli_builder.clips.levels import LevelSet
+from stimuli_builder.clips.movement import AS_BAKED, Movement
 
 if TYPE_CHECKING:
     from stimuli_builder.clips.levels import LevelSet
@@ -52,6 +48,8 @@ class Look:
 
     def levels(self) -> "LevelSet":
         """The character's levels as they move, kept for the next clip."""
+
+        from stimuli_builder.clips.kept_levels import kept_levels
 
         return kept_levels(self.character, self.fingerprint, self.size_px, self.beside, self.movement)
 
@@ -92,29 +90,3 @@ def render(job: ClipJob) -> bytes:
     painter = FramePainter(look.levels())
     frames = painter.frames(job.curve, look.fps, look.motion_blur, look.barcode)
     return encode_clip(frames, look.size_px, look.fps)
-
-
-# The levels that a process keeps while it renders: the last characters at their sizes and movements.
-
-ROOMY_WIDTH_PX = 1200
-"""Up to this width a process keeps two characters; two at the largest size would pass 1.5 GB."""
-
-
-@lru_cache(maxsize=2)
-def kept_levels(
-    character: str,
-    fingerprint: str,  # noqa: ARG001 - part of the key: a character baked anew is read anew
-    size_px: tuple[int, int],
-    beside: Path | None,
-    movement: Movement = AS_BAKED,
-) -> LevelSet:
-    """A character (a name, or a folder relative to `beside`) at a picture size, (width, height), as it moves.
-
-    The last two are kept; at great sizes only the last one.
-    """
-    # Every core is already taken by a process of its own.
-    cv2.setNumThreads(1)
-    if size_px[0] > ROOMY_WIDTH_PX:
-        kept_levels.cache_clear()
-    shown = find_character(character, beside)
-    return moved_levels(shown.levels(size_px), shown.geometry, movement)

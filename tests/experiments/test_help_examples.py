@@ -8,7 +8,7 @@ from importlib import import_module
 import pytest
 import typer
 
-from experiments.command_line import broken, commands_of, whole_examples
+from experiments.command_groups import broken, commands_of, whole_examples
 
 PROGRAMS = ("stimuli", "server", "analysis")
 MODULES = {"stimuli": "stimuli_builder.cli", "server": "server.cli", "analysis": "analysis.cli"}

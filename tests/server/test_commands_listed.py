@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from experiments.command_line import commands_of
+from experiments.command_groups import commands_of
 from server.cli import COMMANDS
 
 HEAVY = (

@@ -29,7 +29,7 @@ REFUSED = 2
 
 def use_only(tree: Path) -> None:
     """Import the program from this tree alone."""
-    sys.path[0] = str(tree)
+    sys.path[0:1] = [str(tree), *map(str, sorted(tree.glob("packages/*")))]
     sys.meta_path[:] = [one for one in sys.meta_path if not is_editable(one)]
     sys.path_hooks[:] = [one for one in sys.path_hooks if not is_editable(one)]
     sys.path_importer_cache.clear()

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from stimuli_builder.clips.characters import Geometry, find_character
+from stimuli_builder.clips.characters import find_character
 from stimuli_builder.clips.curves import ClipCurve
 from stimuli_builder.clips.frames import FramePainter
+from stimuli_builder.clips.geometry import Geometry
 from stimuli_builder.clips.kernels import GAMMA
 from stimuli_builder.clips.levels import LevelSet
 

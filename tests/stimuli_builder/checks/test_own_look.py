@@ -11,7 +11,7 @@ from stimuli_builder.clips.curves import ClipCurve
 from stimuli_builder.clips.design_clips import Options, look_of
 from stimuli_builder.clips.encode import encode_clip
 from stimuli_builder.clips.frames import FramePainter
-from stimuli_builder.clips.jobs import kept_levels
+from stimuli_builder.clips.kept_levels import kept_levels
 from tests.stimuli_builder.checks.solvers import decoded
 
 Maker = Callable[[int, float, float, np.random.Generator], ClipCurve]
