@@ -9,8 +9,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from experiments.columns import Column
 from experiments.columns.column import plain_name, unlike
-from experiments.errors import InputError
-from experiments.wrong_values import expectation, shown, wrong_value
+from experiments.errors import InputError, expectation, shown, wrong_value
 
 # A CSV with the declaration of its columns beside, as a table of numbers, times and named levels.
 

@@ -5,8 +5,7 @@ import sys
 from collections.abc import Callable
 from typing import Any, NoReturn, Protocol, cast
 
-from experiments.errors import InputError
-from experiments.wrong_values import expectation, wrong_value
+from experiments.errors import InputError, expectation, wrong_value
 
 NO_ROOM = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS}
 """What a disk says that is full or may not be written to."""

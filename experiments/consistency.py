@@ -10,11 +10,10 @@ from experiments.assignment.order import motion_checks_by_block
 from experiments.declaration.base import refuse_repeats, refuse_reserved
 from experiments.declaration.experiment import Experiment
 from experiments.declaration.tables import Assignment
-from experiments.errors import did_you_mean
+from experiments.errors import did_you_mean, wrong_value
 from experiments.kinds import KINDS, reserved_names
 from experiments.rules import ScreenFormAnswer
 from experiments.wording import language_fault, silent_on_flicker, suggested_sentence
-from experiments.wrong_values import wrong_value
 
 
 def check_consistency(experiment: Experiment, *, has_data: bool = False) -> None:

@@ -1,7 +1,11 @@
-"""One way to refuse bad input: say what was expected, what came, and what to do."""
+"""One way to refuse bad input: what was expected, what came, and what to do."""
 
-from collections.abc import Iterable
+import json
+from collections.abc import Callable, Iterable, Mapping
 from difflib import get_close_matches
+from typing import Any
+
+# One way to refuse bad input: say what was expected, what came, and what to do.
 
 
 class InputError(ValueError):
@@ -46,3 +50,141 @@ def counted(number: int, noun: str) -> str:
     '2,000 frames'
     """
     return f"{number:,} {noun}{'' if number == 1 else 's'}"
+
+
+# What was expected and what came, in words, for every value that a model refuses.
+
+MAX_SHOWN = 60
+
+Context = Mapping[str, Any]
+"""What the model says of its limit: `ge`, `pattern`, `min_length`..."""
+
+TYPES = {
+    "string_type": "a text in quotes",
+    "int_type": "a whole number",
+    "int_from_float": "a whole number",
+    "int_parsing": "a whole number",
+    "int_parsing_size": "a whole number of at most 4,000 digits",
+    "float_type": "a number",
+    "float_parsing": "a number",
+    "finite_number": "a finite number",
+    "bool_type": "true or false",
+    "bool_parsing": "true or false",
+    "tuple_type": "a list",
+    "list_type": "a list",
+    "dict_type": "a table",
+    "model_type": "a table",
+    "model_attributes_type": "a table",
+}
+LIMITS: dict[str, Callable[[Context], str]] = {
+    "literal_error": lambda limit: _one_of(str(limit["expected"])),
+    "greater_than": lambda limit: f"more than {_number(limit['gt'])}",
+    "greater_than_equal": lambda limit: f"{_number(limit['ge'])} or more",
+    "less_than": lambda limit: f"less than {_number(limit['lt'])}",
+    "less_than_equal": lambda limit: f"at most {_number(limit['le'])}",
+    "multiple_of": lambda limit: f"a multiple of {_number(limit['multiple_of'])}",
+    "string_pattern_mismatch": lambda limit: f"a text that matches {limit['pattern']}",
+    "string_too_short": lambda limit: f"a text of {counted(limit['min_length'], 'character')} or more",
+    "string_too_long": lambda limit: f"a text of at most {counted(limit['max_length'], 'character')}",
+    "too_short": lambda limit: f"a list of {counted(limit['min_length'], 'item')} or more",
+    "too_long": lambda limit: f"a list of at most {counted(limit['max_length'], 'item')}",
+}
+
+
+def wrong_value(detail: Mapping[str, Any]) -> str:
+    """One error of pydantic in words: `expected a whole number, got "ten"`.
+
+    Examples
+    --------
+    >>> wrong_value({"type": "int_type", "loc": ("participants",), "input": "ten", "msg": ""})
+    "expected a whole number, got 'ten'"
+    >>> wrong_value({"type": "tuple_type", "loc": ("factors",), "input": {"name": "face"}, "msg": ""})
+    'expected a list, got a table with the key name; a list of tables is written [[factors]]'
+    """
+    kind, given, context = detail["type"], detail.get("input"), detail.get("ctx") or {}
+    if kind == "missing":
+        return "this key is required and missing"
+    expected = expectation(detail)
+    if expected is None:
+        message = str(detail["msg"]).removeprefix("Value error, ")
+        said = isinstance(given, dict | list | tuple) or ", got " in message
+        return message if said else f"{message}, got {shown(given)}"
+    if kind == "literal_error" and isinstance(given, str):
+        allowed = [word.strip("' ") for word in str(context["expected"]).replace(" or ", ", ").split(",")]
+        return f"expected {expected}, got {shown(given)}" + _nearest(given, allowed)
+    return f"expected {expected}, got {shown(given)}{_way_out(kind, detail)}"
+
+
+def expectation(detail: Mapping[str, Any]) -> str | None:
+    """What was expected where pydantic names a type or a limit; None where a validator has words of its own.
+
+    Examples
+    --------
+    >>> expectation({"type": "greater_than_equal", "ctx": {"ge": 1}})
+    '1 or more'
+    """
+    kind = detail["type"]
+    return LIMITS[kind](detail["ctx"]) if kind in LIMITS else TYPES.get(kind)
+
+
+def is_follower(detail: Mapping[str, Any]) -> bool:
+    """Whether the error follows from others: a list found too short once its wrong items were taken out."""
+    return detail["type"] == "too_short" and bool(len(detail["input"]) >= detail["ctx"]["min_length"])
+
+
+def _nearest(word: str, allowed: list[str]) -> str:
+    near = did_you_mean(word, allowed)
+    return near if near.startswith("; did you mean") else ""
+
+
+def _way_out(kind: str, detail: Mapping[str, Any]) -> str:
+    """How the two kinds of table are told apart in TOML, where one was written for the other."""
+    table = ".".join(part for part in detail["loc"] if isinstance(part, str))
+    ends_in_key = isinstance(detail["loc"][-1], str) if detail["loc"] else False
+    if kind == "tuple_type" and isinstance(detail["input"], dict):
+        return f"; a list of tables is written [[{table}]]"
+    if kind.startswith("model") and ends_in_key and _is_tables(detail["input"]):
+        return f"; a table is written [{table}]"
+    return ""
+
+
+def _is_tables(given: Any) -> bool:
+    return isinstance(given, list | tuple) and bool(given) and all(isinstance(one, dict) for one in given)
+
+
+def shown(given: Any) -> str:
+    """A value as it stands in TOML, long ones cut off and tables by their keys."""
+    if isinstance(given, str):
+        return repr(given) if len(given) <= MAX_SHOWN else f"{given[:MAX_SHOWN]!r}..."
+    if isinstance(given, dict):
+        plural = "s" if len(given) > 1 else ""
+        return f"a table with the key{plural} {_cut(', '.join(given))}" if given else "an empty table"
+    if isinstance(given, list | tuple):
+        return f"the list {_cut(_inline(given))}" if given else "an empty list"
+    if given is None:
+        return "nothing"
+    return _inline(given)
+
+
+def _inline(given: Any) -> str:
+    if isinstance(given, bool):
+        return "true" if given else "false"
+    if isinstance(given, list | tuple):
+        return f"[{', '.join(map(_inline, given))}]"
+    if isinstance(given, dict):
+        return "{ " + ", ".join(f"{key} = {_inline(value)}" for key, value in given.items()) + " }"
+    return json.dumps(given, ensure_ascii=False) if isinstance(given, str) else str(given)
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]}..."
+
+
+def _one_of(expected: str) -> str:
+    return f"one of {expected}" if " or " in expected else expected
+
+
+def _number(limit: float | str) -> str:
+    if isinstance(limit, str):  # a point in time
+        return limit
+    return f"{limit:,}" if limit != int(limit) else f"{int(limit):,}"

@@ -12,10 +12,9 @@ from pydantic import BaseModel, ValidationError
 
 from experiments.consistency import check_consistency
 from experiments.declaration.experiment import Experiment
-from experiments.errors import InputError, and_others, did_you_mean, nearest
-from experiments.schema.keys import Key, is_tag
+from experiments.errors import InputError, and_others, did_you_mean, is_follower, nearest, wrong_value
+from experiments.schema.effects import Key, is_tag
 from experiments.schema.stored import upgraded
-from experiments.wrong_values import is_follower, wrong_value
 
 # Tell dotted keys that take seconds to read in TOML text, in one pass and before any reader gets it.
 

@@ -9,8 +9,7 @@ from pydantic import Field, StringConstraints, ValidationError
 
 from experiments.checks import CheckName
 from experiments.declaration.base import Declaration
-from experiments.errors import InputError
-from experiments.wrong_values import wrong_value
+from experiments.errors import InputError, wrong_value
 
 # What a clip was made from, where it is not shown as it came: the original, and what was changed.
 

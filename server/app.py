@@ -20,9 +20,8 @@ from server.core.settings import Settings
 from server.exports import endpoints as exports
 from server.operations import endpoints as operations
 from server.operations.drill import weekly_drill
-from server.operations.metrics import Observer
+from server.operations.metrics import Observer, ProxyWatch
 from server.operations.snapshots import snapshots_taken
-from server.operations.unnamed_proxies import ProxyWatch
 from server.participation import endpoints as participation
 from server.participation.judgement import digests_judged_later
 from server.privacy import endpoints as privacy

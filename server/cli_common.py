@@ -11,8 +11,7 @@ from rich.console import Console
 from sqlalchemy.exc import DBAPIError, OperationalError
 from sqlalchemy.exc import TimeoutError as PoolTimeout
 
-from experiments.errors import InputError, did_you_mean
-from experiments.wrong_values import wrong_value
+from experiments.errors import InputError, did_you_mean, wrong_value
 from server.context import Services, open_services
 from server.core.db import checked_url, is_away, is_busy
 from server.core.errors import ApiError

@@ -24,7 +24,7 @@ from experiments.declaration.tables import Answer, GroupName
 from experiments.declaration.trial import TrialDeclaration
 from experiments.kinds import KINDS
 from experiments.load import parse_experiment
-from experiments.schema.keys import Key, is_tag, keys, models_inside
+from experiments.schema.effects import Key, is_tag, keys, models_inside
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "docs" / "reference" / "every-key.toml"
 HEADER = ("key", "type", "default", "range", "meaning", "example")

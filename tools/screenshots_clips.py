@@ -30,9 +30,9 @@ from stimuli_builder.clips.curves import ClipCurve, Timing, clip_curve, frame_we
 from stimuli_builder.clips.exemplars import exemplar  # noqa: E402
 from stimuli_builder.clips.face_movement import moved_levels  # noqa: E402
 from stimuli_builder.clips.frames import FramePainter  # noqa: E402
+from stimuli_builder.clips.geometry import Movement  # noqa: E402
 from stimuli_builder.clips.kernels import FULL_SCALE  # noqa: E402
 from stimuli_builder.clips.levels import LevelSet  # noqa: E402
-from stimuli_builder.clips.movement import Movement  # noqa: E402
 
 SIZE = (960, 360)
 CLOSURES = (0.0, 0.25, 0.5, 0.75, 1.0)

@@ -5,8 +5,7 @@ from pathlib import Path
 
 from experiments.files import temporary_beside
 from experiments.manifest import SourceVideo, file_sha256
-from video_conversion.conversion import Conversion, conversion_of
-from video_conversion.encoding import copy_pictures, encode, encoder_signature
+from video_conversion.conversion import Conversion, conversion_of, copy_pictures, encode, encoder_signature
 from video_conversion.prepared import Prepared
 from video_conversion.video_file import READ_AGAIN, NotAClip, VideoFile, examine
 

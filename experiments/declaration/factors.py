@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from experiments.declaration.base import Declaration, LevelName, Name, refuse_repeats
 from experiments.declaration.rendering import RenderOverrides
-from experiments.wrong_values import shown
+from experiments.errors import shown
 
 _VERSION = re.compile(r"(?<=.)@\d+$")
 

@@ -10,7 +10,7 @@ from pydantic.fields import FieldInfo
 
 from experiments.declaration.base import IMPLIED
 from experiments.declaration.experiment import Experiment
-from experiments.schema.keys import is_tag
+from experiments.schema.effects import is_tag
 from experiments.schema.stored import earlier_names
 
 # The keys of the first format, as commit c84c2e8 hashed them: all of them, defaults included.

@@ -1,12 +1,20 @@
-"""What an edit of each key does to the answers that are there already.
+"""What an edit of each key does to the answers that are there, and the keys of a declaration as paths."""
 
-`measured`: answers before and after are answers to something else, so a new data series begins. `wording`:
-they may be pooled. A key stands here by its path; one entry covers the keys below it that have none of their
-own. Keys under `trial` are declared by the kind of trial. A key that no entry covers fails a test.
-"""
+from collections.abc import Iterator, Mapping
+from typing import Any, Literal, NamedTuple, get_args, get_origin
 
-from collections.abc import Mapping
-from typing import Literal
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from experiments.declaration.experiment import Experiment
+from experiments.declaration.trial import ByKind
+
+# What an edit of each key does to the answers that are there already.
+#
+# `measured`: answers before and after are answers to something else, so a new data series begins.
+# `wording`: they may be pooled. A key stands here by its path; one entry covers the keys below it that have
+# none of their own. Keys under `trial` are declared by the kind of trial. A key that no entry covers fails
+# a test.
 
 Effect = Literal["wording", "measured"]
 
@@ -95,3 +103,59 @@ def effect_of(path: str, effects: Mapping[str, Effect] = EFFECTS) -> Effect | No
             return effects[path]
         path = path.rpartition(".")[0]
     return None
+
+
+# The keys of a declaration as dotted paths, by walking the models: `factors.levels.render.fps`.
+#
+# List indices are left out of a path, and a mapping from languages to texts is one key. Models of a union
+# share their paths.
+
+
+class Key(NamedTuple):
+    """One key: its path, the model that declares it, and how."""
+
+    path: str
+    model: type[BaseModel]
+    field: FieldInfo
+
+    @property
+    def name(self) -> str:
+        """The last part of the path."""
+        return self.path.rpartition(".")[2]
+
+    @property
+    def tables(self) -> list[type[BaseModel]]:
+        """The models that the key may hold, with keys of their own."""
+        for mark in self.field.metadata:
+            if isinstance(mark, ByKind):
+                return list(mark.models().values())
+        return models_inside(self.field.annotation)
+
+
+def keys(model: type[BaseModel] = Experiment, prefix: str = "") -> Iterator[Key]:
+    """Every key of `model` and of the models inside, depth first; a table comes before its keys."""
+    for name, field in model.model_fields.items():
+        path = f"{prefix}{name}"
+        key = Key(path, model, field)
+        yield key
+        for inner in key.tables:
+            yield from keys(inner, f"{path}.")
+
+
+def paths(model: type[BaseModel] = Experiment, prefix: str = "") -> set[str]:
+    """Paths of the keys that hold values rather than further keys."""
+    return {key.path for key in keys(model, prefix) if not key.tables}
+
+
+def models_inside(annotation: Any) -> list[type[BaseModel]]:
+    """The models a key may hold: itself, or the members of a union, tuple or mapping."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    if get_origin(annotation) is Literal:
+        return []
+    return [model for argument in get_args(annotation) for model in models_inside(argument)]
+
+
+def is_tag(field: FieldInfo) -> bool:
+    """True for the key that tells the members of a union apart: one constant is all it may be."""
+    return get_origin(field.annotation) is Literal and len(get_args(field.annotation)) == 1

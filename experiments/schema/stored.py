@@ -9,8 +9,7 @@ from pydantic import ValidationError
 
 from experiments.consistency import check_consistency
 from experiments.declaration.experiment import Experiment
-from experiments.errors import InputError
-from experiments.wrong_values import wrong_value
+from experiments.errors import InputError, wrong_value
 
 # From the format a declaration was stored in to the one this program reads.
 #

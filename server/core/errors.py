@@ -13,8 +13,7 @@ from sqlalchemy.exc import DataError, DBAPIError
 from sqlalchemy.exc import TimeoutError as PoolTimeout
 from starlette.exceptions import HTTPException
 
-from experiments.errors import InputError, counted
-from experiments.wrong_values import expectation, shown
+from experiments.errors import InputError, counted, expectation, shown
 from server.core.db import is_away, is_busy
 from server.core.logs import described
 

@@ -26,8 +26,8 @@ from server.core.row_security import ROLE
 from server.core.settings import KEY_LENGTH_MIN, Settings, open_to_others, own_folders, secret_key_path
 from server.core.values import now
 from server.operations import repository
+from server.operations.metrics import seen_proxy
 from server.operations.snapshots import changed_at, database_file, set_aside, snapshots_of
-from server.operations.unnamed_proxies import seen_proxy
 from server.operations.watched_backups import OLD_AFTER_S, WatchedBackups, watched_backups
 from server.participation.identity_repository import readable
 from server.participation.recruiter import refused_addresses

@@ -46,7 +46,7 @@ def actor(
     from experiments.files import check_targets
     from stimuli_builder.actor.recording import Actor, ActorOptions, write_truth, write_video
     from stimuli_builder.progress import frame_progress
-    from stimuli_builder.video_writer import check_video_name
+    from stimuli_builder.video import check_video_name
 
     options = ActorOptions(seconds, fps, seed, noise)
     check_targets([out, truth, labels])

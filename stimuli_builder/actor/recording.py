@@ -22,8 +22,7 @@ from stimuli_builder.actor.face import (
     lid_distances,
 )
 from stimuli_builder.actor.renderer import draw_eye
-from stimuli_builder.video import Picture
-from stimuli_builder.video_writer import VideoWriter
+from stimuli_builder.video import Picture, VideoWriter
 
 # When and how the synthetic actor blinks, holds the head and looks: published statistics, one seed.
 #

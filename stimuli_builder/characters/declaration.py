@@ -7,8 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from experiments.errors import InputError
-from experiments.wrong_values import wrong_value
+from experiments.errors import InputError, wrong_value
 
 REPAIR = "put a whole file in its place, or bake the character again"
 """What to do about a character's file that is missing or damaged; its pictures may be of anybody's making."""

@@ -139,7 +139,7 @@ def settings_from(**values: object) -> "RenderSettings":
     from pydantic import ValidationError
 
     from experiments.declaration.rendering import RenderSettings
-    from experiments.wrong_values import wrong_value
+    from experiments.errors import wrong_value
 
     try:
         return RenderSettings.model_validate(values)

@@ -26,9 +26,8 @@ from stimuli_builder.blinks.profile import PROFILE_FPS
 from stimuli_builder.clips.characters import DRAWN, fingerprint, geometry
 from stimuli_builder.clips.curves import DECIMALS, Array, ClipCurve, Timing, clip_curve, generator, shown_by
 from stimuli_builder.clips.exemplars import exemplar, recorded_order
-from stimuli_builder.clips.geometry import Geometry
+from stimuli_builder.clips.geometry import Geometry, Movement
 from stimuli_builder.clips.jobs import ClipJob, Look
-from stimuli_builder.clips.movement import Movement
 from stimuli_builder.performance.run import LOWER_IN_MM, LOWER_UP_MM, speech_of
 
 # A clip of living eyes: the blink engine's lids over many seconds, as a curve at 300 fps.

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from experiments.errors import InputError
 from stimuli_builder.clips.characters import DRAWN
-from stimuli_builder.clips.geometry import Geometry
+from stimuli_builder.clips.geometry import Geometry, Movement
 from stimuli_builder.clips.kernels import GAMMA
 from stimuli_builder.clips.levels import LevelSet, Light, LowerLid, Window, window_inside
-from stimuli_builder.clips.movement import Movement
 
 Array = NDArray[np.float64]
 

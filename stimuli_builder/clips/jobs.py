@@ -10,7 +10,7 @@ import numpy as np
 
 from stimuli_builder.blinks.profile import PROFILE_FPS
 from stimuli_builder.clips.curves import ClipCurve
-from stimuli_builder.clips.movement import AS_BAKED, Movement
+from stimuli_builder.clips.geometry import AS_BAKED, Movement
 
 if TYPE_CHECKING:
     from stimuli_builder.clips.levels import LevelSet

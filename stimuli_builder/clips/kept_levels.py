@@ -7,8 +7,8 @@ import cv2
 
 from stimuli_builder.clips.characters import find_character
 from stimuli_builder.clips.face_movement import moved_levels
+from stimuli_builder.clips.geometry import AS_BAKED, Movement
 from stimuli_builder.clips.levels import LevelSet
-from stimuli_builder.clips.movement import AS_BAKED, Movement
 
 ROOMY_WIDTH_PX = 1200
 """Up to this width a process keeps two characters; two at the largest size would pass 1.5 GB."""

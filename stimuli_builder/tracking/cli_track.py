@@ -20,8 +20,7 @@ from stimuli_builder.tracking.shapes import Points
 from stimuli_builder.tracking.survey import survey
 from stimuli_builder.tracking.table import TrackSummary
 from stimuli_builder.tracking.track import track_video
-from stimuli_builder.video import DamagedFileError, VideoInfo, declared_frames
-from stimuli_builder.video_writer import check_video_name
+from stimuli_builder.video import DamagedFileError, VideoInfo, check_video_name, declared_frames
 
 # What `stimuli track` and `train` print: what a model was trained on, how a track went, warnings.
 

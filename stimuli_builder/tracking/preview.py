@@ -17,8 +17,7 @@ from stimuli_builder.blinks.series import read_series
 from stimuli_builder.tracking.model import CoupledModel
 from stimuli_builder.tracking.shapes import EYE_POINTS, Points, with_border
 from stimuli_builder.tracking.table import distance_columns, numbers, point_columns, track_rows
-from stimuli_builder.video import Picture, VideoInfo, frames, rgb
-from stimuli_builder.video_writer import VideoWriter
+from stimuli_builder.video import Picture, VideoInfo, VideoWriter, frames, rgb
 
 PANEL_PX = 96
 SECONDS = 2.0

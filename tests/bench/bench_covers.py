@@ -28,8 +28,7 @@ from stimuli_builder.tracking.shapes import EYE_POINTS, Points, eye_axis
 from stimuli_builder.tracking.survey import survey
 from stimuli_builder.tracking.table import track_rows
 from stimuli_builder.tracking.track import track_video
-from stimuli_builder.video import Picture, frames, rgb, scan_video
-from stimuli_builder.video_writer import VideoWriter
+from stimuli_builder.video import Picture, VideoWriter, frames, rgb, scan_video
 
 KINDS = ("hand", "paper", "dark", "cheek", "cloth", "half")
 SEED = 7

@@ -24,8 +24,7 @@ from stimuli_builder.tracking.shapes import EYE_POINTS, Points, inter_eyelid_dis
 from stimuli_builder.tracking.survey import survey
 from stimuli_builder.tracking.table import numbers, point_columns, track_rows
 from stimuli_builder.tracking.track import track_video
-from stimuli_builder.video import Picture, VideoInfo, frames, rgb, scan_video
-from stimuli_builder.video_writer import VideoWriter
+from stimuli_builder.video import Picture, VideoInfo, VideoWriter, frames, rgb, scan_video
 
 FOLDER = Path("../shared/data/face_video")
 CLIPS = {"single_face": False, "short_human_3blink": True}

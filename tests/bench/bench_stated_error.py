@@ -31,8 +31,7 @@ from stimuli_builder.tracking.shapes import LOWER_LID, UPPER_LID, Points, defaul
 from stimuli_builder.tracking.survey import survey
 from stimuli_builder.tracking.table import error_columns, numbers, point_columns, track_rows
 from stimuli_builder.tracking.track import track_video
-from stimuli_builder.video import Picture, VideoInfo, scan_video
-from stimuli_builder.video_writer import VideoWriter
+from stimuli_builder.video import Picture, VideoInfo, VideoWriter, scan_video
 
 FOLDER = Path("../shared/data/face_video")
 CLIPS = {"single_face": False, "short_human_3blink": True}

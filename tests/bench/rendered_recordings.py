@@ -23,8 +23,7 @@ from stimuli_builder.characters.atlas import SHIPPED, Atlas, load_atlas
 from stimuli_builder.characters.colour import linear_to_srgb
 from stimuli_builder.tracking.detector.detection import eye_points
 from stimuli_builder.tracking.shapes import Points, widths
-from stimuli_builder.video import Picture
-from stimuli_builder.video_writer import VideoWriter
+from stimuli_builder.video import Picture, VideoWriter
 
 SECONDS, FPS = 6.0, 60
 CLOSE_UP_PX = 300

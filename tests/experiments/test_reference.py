@@ -6,7 +6,7 @@ import pytest
 
 from experiments.kinds import KINDS
 from experiments.load import parse_experiment
-from experiments.schema.keys import Key, keys
+from experiments.schema.effects import Key, keys
 from tests.conftest import REPOSITORY
 from tools.experiment_reference import EXAMPLES, Examples, experiment_reference, tables
 

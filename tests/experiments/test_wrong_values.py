@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 import tomli_w
 
+from experiments.errors import wrong_value
 from experiments.load import DefinitionError, locate, parse_experiment
-from experiments.wrong_values import wrong_value
 from tests.conftest import REPOSITORY
 
 FILES = ("docs/reference/every-key.toml", "docs/reference/lists.toml")

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from experiments.errors import InputError
-from stimuli_builder.video import clock_of, frames, read_frames, rgb, scan_video
-from stimuli_builder.video_writer import VideoWriter
+from stimuli_builder.video import VideoWriter, clock_of, frames, read_frames, rgb, scan_video
 
 
 def ramp(number, width=64, height=48):

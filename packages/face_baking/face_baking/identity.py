@@ -7,8 +7,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from experiments.errors import InputError, did_you_mean
-from experiments.wrong_values import wrong_value
+from experiments.errors import InputError, did_you_mean, wrong_value
 from face_baking.kit import MODES, Array, FaceKit
 
 IDENTITIES_FILE = Path(__file__).with_name("identities.toml")

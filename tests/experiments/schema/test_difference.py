@@ -3,8 +3,7 @@ import pytest
 from experiments.kinds import KINDS
 from experiments.load import load_experiment, locate, parse_experiment
 from experiments.schema.difference import Change, changes_what_is_measured, difference
-from experiments.schema.effects import EFFECTS, effect_of, effects_with
-from experiments.schema.keys import keys, paths
+from experiments.schema.effects import EFFECTS, effect_of, effects_with, keys, paths
 
 TEXT = locate("exp1").read_text(encoding="utf-8")
 

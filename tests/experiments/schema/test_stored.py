@@ -12,7 +12,7 @@ from experiments.declaration.base import IMPLIED, Declaration
 from experiments.errors import InputError
 from experiments.load import DefinitionError, load_experiment, locate, parse_experiment
 from experiments.schema.canonical import canonical, definition_sha256
-from experiments.schema.keys import keys
+from experiments.schema.effects import keys
 from experiments.schema.stored import FORMAT, Step, earlier_names, load_stored, upgraded
 from tests.conftest import REPOSITORY
 

@@ -20,8 +20,7 @@ from experiments.kinds.scales import block_sizes, trials_per_participant
 from experiments.load import DefinitionError, locate, parse_experiment
 from experiments.schema.canonical import definition_sha256
 from experiments.schema.difference import difference
-from experiments.schema.effects import effect_of, effects_with
-from experiments.schema.keys import paths
+from experiments.schema.effects import effect_of, effects_with, paths
 from experiments.schema.stored import FORMAT, load_stored
 from tests.conftest import REPOSITORY
 from tests.experiments.trials.toy import TOY

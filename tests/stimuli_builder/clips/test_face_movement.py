@@ -16,8 +16,8 @@ from stimuli_builder.clips.cli_clip import settings_from
 from stimuli_builder.clips.design_clips import Options, PlannedClip, check_look, look_of, planned_clips
 from stimuli_builder.clips.face_movement import moved_levels
 from stimuli_builder.clips.folder import moved_mm
+from stimuli_builder.clips.geometry import AS_BAKED, Movement
 from stimuli_builder.clips.levels import LevelSet
-from stimuli_builder.clips.movement import AS_BAKED, Movement
 from stimuli_builder.clips.verify import verify
 
 EXP3 = locate("exp3").read_text(encoding="utf-8")

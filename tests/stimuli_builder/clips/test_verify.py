@@ -8,7 +8,7 @@ import pytest
 
 from experiments.errors import InputError
 from experiments.manifest import MANIFEST_NAME, file_sha256
-from stimuli_builder.clips.movement import PARTS, PREFIX
+from stimuli_builder.clips.geometry import PARTS, PREFIX
 from stimuli_builder.clips.verify import verify
 
 from .conftest import CURVE, Small, make_small

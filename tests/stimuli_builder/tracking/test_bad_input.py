@@ -10,8 +10,7 @@ import pytest
 
 from stimuli_builder.tracking.labels import load_labels
 from stimuli_builder.tracking.model import save_model
-from stimuli_builder.video import opened, scan_video
-from stimuli_builder.video_writer import VideoWriter
+from stimuli_builder.video import VideoWriter, opened, scan_video
 
 
 def write_frames(path, pictures, stamps=None, fps=100, options=None):
