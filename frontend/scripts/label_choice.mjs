@@ -6,7 +6,7 @@ import { runnerImport } from "vite";
 const [path, text] = process.argv.slice(2);
 const facts = JSON.parse(text);
 const load = async (name) => (await runnerImport(new URL(`../src/labelling/${name}.ts`, import.meta.url).pathname)).module;
-const { candidateFrames } = await load("choose-frames");
+const { candidateFrames } = await load("labelled-frames");
 const [width, height] = facts.looked;
 const file = openSync(path);
 const pictures = candidateFrames(facts.frames).map((number) => {
@@ -16,7 +16,7 @@ const pictures = candidateFrames(facts.frames).map((number) => {
 });
 closeSync(file);
 
-const { seeEyes } = await load("see-eyes");
+const { seeEyes } = await load("follow-eyes");
 const { eyesFor, NO_EYES, placesOn } = await load("eyes");
 const { thumbnailOf } = await load("grey");
 const { chooseFrames } = await load("labelled-frames");

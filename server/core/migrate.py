@@ -93,7 +93,7 @@ def revision_of(connection: Connection) -> str | None:
 
 
 def downgrade(database: Database, revision: str = "-1") -> None:
-    """Undo migrations down to `revision`, which leaves no views: a program of then has its own."""
+    """Undo migrations down to `revision`, which leaves no views (`refuse_without_views` says how far)."""
     with migrating(database) as connection, derived_anew(connection):
         command.downgrade(alembic_config(connection, database.secret_key), revision)
 

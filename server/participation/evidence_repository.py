@@ -24,7 +24,7 @@ from server.models import (
     View,
 )
 
-# Reads and writes of evidence, in as few statements as it takes; what waits: `waiting_repository`.
+# Reads and writes of evidence, in as few statements as it takes.
 
 
 class Refusable(NamedTuple):

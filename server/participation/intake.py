@@ -27,6 +27,7 @@ from server.participation.refusals import (
     TicketMissing,
     TicketOfAnotherRun,
     TicketOfAnotherTrial,
+    UnratedWithoutDigest,
 )
 
 # Tickets: leave to answer one play of one trial, signed by the server when it hands the run out.
@@ -250,8 +251,10 @@ class Intake:
         """Note once a run that something of it was refused for this reason, and limit how often it may be."""
         # Each run has a share of its own: who sends false answers hinders nobody else.
         self._false_answers.hit(sent.run_id)
-        # A page that stood open for months sends nothing false: noted, and no word on the run.
-        event = what.expired if isinstance(refusal, TicketExpired) else what.refused
+        # A page that stood open for months, or that was loaded again before its clip was there, sends nothing
+        # false: noted, and no word on the run.
+        harmless = isinstance(refusal, TicketExpired | UnratedWithoutDigest)
+        event = what.expired if harmless else what.refused
         evidence_repository.note_refusal(connection, sent.run, event, refusal.code, sent.received_at)
 
     def _batch(self, answer: Answer, given: RatingEvidence | None) -> tuple[Batch, RatingEvidence]:
@@ -286,7 +289,7 @@ class Intake:
             return None
         if any(self.clips.hash_at_once(sha256, size) is None for sha256, size in answer.clips):
             return None
-        raise DigestMissing(
+        raise UnratedWithoutDigest(
             f"Expected the digest of the clip: more than {allowed} plays without a rating have none; nothing "
             "is stored."
         )

@@ -69,6 +69,10 @@ class DigestMissing(Invalid):
     code = "clip_digest_missing"
 
 
+class UnratedWithoutDigest(DigestMissing):
+    """As before, of a play without a rating: a page that was loaded again may not have its clip yet."""
+
+
 class DigestDiffers(Invalid):
     """The digest is not that of the trial's clip under its ticket."""
 

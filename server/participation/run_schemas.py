@@ -14,7 +14,7 @@ from experiments.rules import PlaybackRules
 from server.models import STAGES
 from server.participation.answer_schemas import RunStatus, Tickets, TrialInfo, WarningShown
 
-# What the participant's page gets, and what begins a run; what it sends besides is in submissions.py.
+# What the participant's page gets, and what begins a run; what it sends besides is below.
 
 Stage = Literal[
     "consent",

@@ -313,6 +313,10 @@ class Worker:
                     return
                 for _ in range(done):
                     self._note_done(started.videos.popleft())
+                if not started.videos:
+                    # The last file is done and the process is about to end: it holds no place until then.
+                    self._take_result(started)
+                    return
                 started.used_s, begun = 0.0, time.monotonic()
             now = time.monotonic()
             if started.used_s + now - begun > MAX_S_A_FILE:

@@ -83,7 +83,7 @@ def plays(
     times_ms : float array (pictures,)
         When each picture was taken.
     numbers : int array (pictures,)
-        What it shows, as `code.read` gives it.
+        What it shows, as `read_numbers` gives it.
     fps : float, optional
         The clip's frame rate; by default the usual one nearest to what is seen.
     frames : int, optional

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from stimuli_builder.tracking.model import TrainingOptions
 
 
-# `stimuli track` and `stimuli train`; `stimuli label` and `stimuli accuracy` live in cli_labels.py.
+# `stimuli track` and `stimuli train`.
 
 Video = Annotated[
     Path, typer.Argument(help="Recording: anything PyAV reads, colour or grey, upright or rotated.")

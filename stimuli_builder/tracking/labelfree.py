@@ -171,7 +171,7 @@ def write_relabel(
     Parameters
     ----------
     by_hand : mapping of int to float64 array
-        Frames that a person changed or accepted, see `proposals.by_hand`.
+        Frames that a person changed or accepted, see `labels.by_hand`.
     """
     inside = {n: np.clip(points, 0, np.array(info.size_px) - 1) for n, points in worst.items()}
     new = {n: points for n, points in inside.items() if n not in by_hand}

@@ -90,7 +90,7 @@ def test_codec_loss(character: LevelSet, benchmark: BenchmarkFixture) -> None:
 def test_cartoon_midpoints(benchmark: BenchmarkFixture) -> None:
     from stimuli_builder.characters.cartoon import LEVELS, crop_px, draw_frame
     from stimuli_builder.characters.colour import encode_srgb
-    from stimuli_builder.clips.levels import _light_of_code
+    from stimuli_builder.clips.character_levels import _light_of_code
 
     window, step = crop_px(SIZE), 1 / (LEVELS - 1)
 

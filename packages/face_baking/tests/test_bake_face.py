@@ -31,7 +31,7 @@ from stimuli_builder.characters.atlas import load_atlas
 from stimuli_builder.cli import app
 
 SIZE = (240, 90)
-ENVIRONMENT = Path(__file__).parents[4] / ".venv-bake"
+ENVIRONMENT = Path(__file__).parents[3] / ".venv-bake"
 BLENDER = ENVIRONMENT / "bin" / "python"
 NO_BLENDER = not BLENDER.exists() or bool(missing_packages(ENVIRONMENT))
 

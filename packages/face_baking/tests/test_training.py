@@ -17,7 +17,7 @@ from face_baking.training.scene import SampleScene
 from experiments.errors import InputError
 
 SIZE = (320, 160)
-BLENDER = Path(__file__).parents[4] / ".venv-bake"
+BLENDER = Path(__file__).parents[3] / ".venv-bake"
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from server.context import Services
-from server.models import AnswerEvidence
+from server.models import AnswerEvidence, RunEvent
 from server.participation.intake import TRIED_MS, UNFETCHED
 from tests.helpers.evidence import Watcher
 
@@ -81,6 +81,17 @@ def test_clips_that_the_server_has_lost_hold_nobody_up(watcher: Watcher, service
         path.unlink()
     assert go_through(watcher, TRIED_S, **NOT_FETCHED) == []
     assert complete(watcher)["completion_code"]
+
+
+def test_a_missing_digest_of_a_play_without_rating_says_nothing_of_the_person(
+    watcher: Watcher, services: Services
+) -> None:
+    """Reloads in mid-play, each before its clip was there again: no more is stored, and no word on the run."""
+    assert go_through(watcher, 60.0, **NOT_FETCHED)
+    with services.database.read() as session:
+        kinds = {event.type for event in session.query(RunEvent)}
+    assert "answer_expired" in kinds
+    assert "answer_refused" not in kinds
 
 
 @pytest.mark.parametrize("seen_s", [0.1, 1.0])

@@ -15,7 +15,7 @@ from sqlalchemy import text
 
 from server.context import Services
 from server.core.settings import Settings
-from server.participation import series
+from server.participation import series, series_repository
 from server.rehearsals.http import JsonClient
 from server.rehearsals.person import Person, Rater
 from tests.helpers.comparisons import comparisons
@@ -138,8 +138,8 @@ def _check_series(services: Services) -> None:
         loaded = services.versions.get(session, 2)
         for run in session.execute(text("SELECT id, public_id FROM study_runs WHERE version_id = 2")):
             connection = session.connection()
-            trials = series.repository.trials(connection, run.id)
-            answers = series.repository.answers(connection, run.id)
+            trials = series_repository.trials(connection, run.id)
+            answers = series_repository.answers(connection, run.id)
             assert Counter((row.series, row.number) for row in answers).most_common(1)[0][1] == 1
             for name in ("s1", "s2"):
                 numbers = [row.number for row in answers if row.series == name]

@@ -59,8 +59,13 @@ export async function saveRating(session: Session, trial: TrialInfo, body: Ratin
   if (!session.outbox.durable) await waitShown(session, handled);
 }
 
+const INTERRUPTED_WAIT_MS = 5000;
+
 /** A play whose view was broken off has no answer; the trial comes once more at the end of its block. */
 export async function saveInterrupted(session: Session, trial: TrialInfo, play: number): Promise<void> {
+  // The page has just been loaded: what shows that the play's clip was fetched needs its bytes. A network that
+  // hangs holds nobody up for long.
+  await Promise.race([session.clips.load(sourcesOf([trial])), new Promise((go) => setTimeout(go, INTERRUPTED_WAIT_MS))]);
   const body = (trial.kind === "check" ? session.checks : session.kind).unrated(session, trial, play);
   await saveRating(session, trial, { ...body, playback: { ...body.playback, disturbances: { interrupted: 1 } } });
   // The page began with this play among those owed.
