@@ -86,7 +86,7 @@ def test_clips_that_the_server_has_lost_hold_nobody_up(watcher: Watcher, service
 def test_a_missing_digest_of_a_play_without_rating_says_nothing_of_the_person(
     watcher: Watcher, services: Services
 ) -> None:
-    """Reloads in mid-play, each before its clip was there again: nothing more is stored, the run is not blamed."""
+    """Reloads in mid-play, each before its clip was there: no more is stored, the run is not blamed."""
     assert go_through(watcher, 60.0, **NOT_FETCHED)
     with services.database.read() as session:
         kinds = {event.type for event in session.query(RunEvent)}
