@@ -1,4 +1,4 @@
-import { readFileSync, writeFileSync } from "node:fs";
+import { existsSync, readFileSync, writeFileSync } from "node:fs";
 import { resolve } from "node:path";
 import { defineConfig, type Plugin } from "vite";
 
@@ -15,11 +15,23 @@ const SHARED =
 function listFiles(): Plugin {
   return {
     name: "list-files",
-    generateBundle(_options, bundle) {
-      const files = Object.keys(bundle).filter((name) => /\.(js|css)$/.test(name) && name !== `${OFFLINE}.js`);
-      const worker = bundle[`${OFFLINE}.js`];
-      if (worker?.type !== "chunk") throw new Error(`expected ${OFFLINE}.js in the bundle`);
-      worker.code = worker.code.replaceAll("__FILES__", JSON.stringify(files.map((name) => BASE + name)));
+    // Last: Vite takes away the scripts of modules that are styles alone, and one missing file keeps the worker from installing.
+    enforce: "post",
+    generateBundle: {
+      order: "post",
+      handler(_options, bundle) {
+        const files = Object.keys(bundle).filter((name) => /\.(js|css)$/.test(name) && name !== `${OFFLINE}.js`);
+        const worker = bundle[`${OFFLINE}.js`];
+        if (worker?.type !== "chunk") throw new Error(`expected ${OFFLINE}.js in the bundle`);
+        worker.code = worker.code.replaceAll("__FILES__", JSON.stringify(files.map((name) => BASE + name)));
+      },
+    },
+    writeBundle({ dir = "" }) {
+      const worker = readFileSync(resolve(dir, `${OFFLINE}.js`), "utf8");
+      const named = [...worker.matchAll(/\/assets\/participant\/([\w.-]+)/g)].map((match) => match[1] ?? "");
+      const missing = named.filter((name) => !existsSync(resolve(dir, name)));
+      if (named.length === 0 || missing.length > 0)
+        throw new Error(`the service worker names files that are not built: ${missing.join(", ")}`);
     },
   };
 }

@@ -13,7 +13,10 @@ from tests.browser.visit import Visit
 pytestmark = pytest.mark.browser
 RATED = "SELECT trial_index, play, response FROM ratings WHERE kind = 'main' ORDER BY time_elapsed"
 EVENTS = "SELECT type, data FROM run_events"
-READY = "navigator.serviceWorker.ready.then(worker => worker.active !== null)"
+READY = """Promise.race([
+  navigator.serviceWorker.ready.then(worker => worker.active !== null),
+  new Promise(late => setTimeout(() => late(false), 20_000)),
+])"""
 Change = Callable[[Page, ServerProcess], None]
 
 
