@@ -240,11 +240,20 @@ def parse_experiment(text: str, source: str = "definition", *, has_data: bool = 
 
 def _unfit_part(message: str, text: str) -> Problem:
     """A fault of parts that do not fit; its path stands before the message, items of lists from 1."""
+    location, message = _located(message)
+    return Problem(line_of(text, location), _dotted(location), message)
+
+
+def _located(message: str) -> tuple[tuple[object, ...], str]:
+    """The place that stands before a message, and the message; no place where it names none."""
     named = _LOCATION.match(message)
     if not named:
-        return Problem(line_of(text, ()), "", message)
-    parts = tuple(int(part) - 1 if part.isdecimal() else part for part in named[1].split("."))
-    return Problem(line_of(text, parts), named[1], named[2])
+        return (), message
+    return tuple(int(part) - 1 if part.isdecimal() else part for part in named[1].split(".")), named[2]
+
+
+def _dotted(location: Sequence[object]) -> str:
+    return ".".join(str(part + 1) if isinstance(part, int) else str(part) for part in location)
 
 
 def toml_data(text: str, source: str = "definition") -> dict[str, Any]:
@@ -312,11 +321,9 @@ def _problem(detail: Any, text: str) -> Problem:
     elif kind == "extra_forbidden":
         word = str(location[-1])
         message = f"unknown key '{word}'{did_you_mean(word, _keys_at(detail['loc'][:-1]))}"
-    elif not location and (named := _LOCATION.match(message)):
-        parts = named[1].split(".")
-        location, message = tuple(int(part) - 1 if part.isdecimal() else part for part in parts), named[2]
-    path = ".".join(str(part + 1) if isinstance(part, int) else str(part) for part in location)
-    return Problem(line_of(text, location), path, message)
+    elif not location:
+        location, message = _located(message)
+    return Problem(line_of(text, location), _dotted(location), message)
 
 
 def _walk(location: Sequence[object]) -> Iterator[tuple[object, type[BaseModel], bool]]:

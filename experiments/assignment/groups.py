@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from experiments import design
 from experiments.declaration.experiment import Experiment
-from experiments.declaration.forms import Question
+from experiments.declaration.forms import ChoiceField, Question
 from experiments.declaration.trial import ClipSpec
 from experiments.errors import did_you_mean
 from experiments.rules import ScreenFormAnswer
@@ -109,8 +109,6 @@ def _questions(experiment: Experiment) -> list[tuple[Deciding, Question]]:
 
 
 def _fault_of_question(experiment: Experiment, name: str) -> str | None:
-    from experiments.declaration.forms import ChoiceField
-
     every = _questions(experiment)
     asked = [(where, field) for where, field in every if field.name == name]
     if not asked:
