@@ -78,7 +78,7 @@ def test_a_column_is_named_as_it_is_by_the_blinks_command(name: str, tmp_path: P
 
 @pytest.mark.parametrize("title", ["Lids [mm]", "Lids [/mm]", "[red]Lids"])
 def test_a_plan_names_studies_and_levels_as_they_are(title: str, capsys: pytest.CaptureFixture[str]) -> None:
-    from stimuli_builder.clips.design_clips import print_plan
+    from stimuli_builder.clips.plan import print_plan
 
     plan = {
         "name": "study",

@@ -13,6 +13,7 @@ from analysis.commands.output import (
     names_in,
     save_json,
     saying,
+    scale_bounds,
     show_tables,
     show_text,
 )
@@ -59,7 +60,6 @@ def reliability(
       analysis reliability answers.xlsx --items q1,q2,q3,q4 --case id --scores scores.csv --json out.json
     """
     from analysis import agreement as numbers
-    from analysis.commands.output import scale_bounds
     from analysis.report.rating_tables import items_table, reliability_text
     from experiments.files import check_targets
 

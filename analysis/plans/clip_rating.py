@@ -88,7 +88,7 @@ def analyse(prepared: Prepared, rating: str = "response") -> Analysis:
 
 def further_sections(analysis: Analysis, prepared: Prepared, progress: Progress) -> tuple[Section, ...]:
     """Sensitivity analyses and the multiverse of one scale: the one `prepared` names, or the only one."""
-    from analysis.plans.multiverse import multiverse_section
+    from analysis.plans.multiverse_section import multiverse_section
     from analysis.plans.sensitivity import sensitivity_sections
 
     sections = sensitivity_sections(analysis, progress)

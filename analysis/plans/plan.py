@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from importlib import import_module
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -18,11 +17,6 @@ from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError, did_you_mean
 from experiments.kinds.scales import scale_called
 from experiments.schema.canonical import definition_sha256
-
-if TYPE_CHECKING:
-    from analysis.report.contents import Contents
-    from experiments.declaration.experiment import Experiment
-
 
 # What the data of a kind of trial can be asked: a file of its name here, with `PLAN`.
 #

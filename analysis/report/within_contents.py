@@ -8,7 +8,7 @@ from analysis.report.contents import Contents, Part, Picture, Progress, Section
 from analysis.report.formats import Table
 from analysis.report.json_output import as_data, left_out
 from analysis.report.numbers import apa_p, fixed, share, share_interval
-from analysis.report.r_script import r_files
+from analysis.report.r_script import r_files, robust_files
 from analysis.report.within_tables import all_tables, corrected_df, has_sphericity, uses_multivariate
 from analysis.within.effects import Effect
 from analysis.within.multivariate_tests import MultivariateTest
@@ -213,8 +213,6 @@ def scripts_of(analysis: Analysis, key: str) -> dict[str, bytes]:
     files = r_files(analysis, key)
     if analysis.robust is None:
         return files
-    from analysis.report.r_script import robust_files
-
     return {**files, **robust_files(analysis, analysis.robust, key)}
 
 

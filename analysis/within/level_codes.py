@@ -75,6 +75,8 @@ def in_given_order(rows: pd.DataFrame, given: Sequence[str]) -> tuple[pd.DataFra
     InputError
         Text of another form, an unknown column, levels that are not exactly those of the column.
     """
+    if not given:
+        return rows, ()
     levels = {str(name): [str(level) for level in rows[name].unique()] for name in rows.columns}
     orders, said = given_orders(levels, given)
     for name, order in orders.items():

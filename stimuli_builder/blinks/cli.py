@@ -454,7 +454,6 @@ def build_library(
 
     Example: stimuli profiles build --data recordings --out library
     """
-    from experiments.errors import InputError
     from stimuli_builder.blinks.library.build import recorded_profiles, write_model, write_profiles
     from stimuli_builder.blinks.library.load import LIBRARY_FOLDER, RECORDINGS_FILE, read_recordings
 

@@ -119,3 +119,9 @@ def frame_planes(frame: Any) -> list[NDArray[Any]]:
 
 def _shifted(difference: NDArray[np.int16]) -> NDArray[np.uint16]:
     return np.asarray(difference + MIDDLE, _CODE)
+
+
+def smooth(low: float, high: float, x: NDArray[np.float64] | float) -> NDArray[np.float64]:
+    """Smoothstep from 0 at `low` to 1 at `high`; falling where `low` is above `high`."""
+    t = np.clip((np.asarray(x, np.float64) - low) / (high - low), 0, 1)
+    return np.asarray(t * t * (3 - 2 * t))

@@ -85,7 +85,7 @@ def plan_command(
 ) -> None:
     """Print the design of an experiment."""
     from experiments.load import load_experiment
-    from stimuli_builder.clips.design_clips import print_plan, summary
+    from stimuli_builder.clips.plan import print_plan, summary
 
     plan = summary(load_experiment(experiment))
     if as_json:
@@ -113,7 +113,8 @@ def build_command(
     """Build the clips of an experiment."""
     from experiments.load import load_experiment
     from stimuli_builder.clips.build import Machines, build
-    from stimuli_builder.clips.design_clips import Options, experiment_folder
+    from stimuli_builder.clips.design_clips import Options
+    from stimuli_builder.clips.plan import experiment_folder
 
     declared = load_experiment(experiment)
     options = Options(seed=seed, barcode=barcode, beside=experiment_folder(experiment))
@@ -232,10 +233,10 @@ def checks_command(
     ] = False,
 ) -> None:
     """Make the clips of motion checks."""
-    from experiments.errors import InputError
     from experiments.load import load_experiment
     from stimuli_builder.checks.plan import build_checks
-    from stimuli_builder.clips.design_clips import Options, experiment_folder
+    from stimuli_builder.clips.design_clips import Options
+    from stimuli_builder.clips.plan import experiment_folder
 
     if anew and seed is not None:
         raise InputError("--anew draws a seed; leave out --seed")

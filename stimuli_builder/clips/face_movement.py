@@ -9,18 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import InputError
+from stimuli_builder.characters.colour import smooth
 from stimuli_builder.clips.characters import DRAWN
 from stimuli_builder.clips.geometry import Geometry, Movement
 from stimuli_builder.clips.kernels import GAMMA
 from stimuli_builder.clips.levels import LevelSet, Light, LowerLid, Window, window_inside
 
 Array = NDArray[np.float64]
-
-
-def smooth(low: float, high: float, x: Array | float) -> Array:
-    """Smoothstep from 0 at `low` to 1 at `high`; falling where `low` is above `high`."""
-    t = np.clip((np.asarray(x, np.float64) - low) / (high - low), 0, 1)
-    return np.asarray(t * t * (3 - 2 * t))
 
 
 # How the skin round an eye follows brow, cheek and squint: fields of displacement in the picture.

@@ -13,7 +13,7 @@ from face_baking.kit import Array, FaceKit, Index
 from face_baking.lid_loops import SIDES, chains, globe_of, lid_loops
 from face_baking.lower_lid import lower_lid_weight, moved_lower_lid, turned_about
 from face_baking.sphere import cartesian, slerp, spherical, surface_radius
-from stimuli_builder.clips.face_movement import smooth
+from stimuli_builder.characters.colour import smooth
 
 CAMERA_Z_CM = 74.0
 SIDE_TAGS = {1: "L", -1: "R"}

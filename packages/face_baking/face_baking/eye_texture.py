@@ -10,7 +10,7 @@ from face_baking.eyes import TEXTURE_LIMIT
 from face_baking.identity import Iris
 from face_baking.kit import Array
 from face_baking.sphere import IRIS_CM
-from stimuli_builder.clips.face_movement import smooth
+from stimuli_builder.characters.colour import smooth
 
 GLOBE_CM = 1.5
 WHITE = (0.61, 0.56, 0.52)

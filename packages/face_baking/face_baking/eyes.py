@@ -10,7 +10,7 @@ from face_baking.hair import edge_line
 from face_baking.kit import Array, Index
 from face_baking.lid_loops import EDGE_LOOP
 from face_baking.sphere import IRIS_CM, spherical, surface_radius
-from stimuli_builder.clips.face_movement import smooth
+from stimuli_builder.characters.colour import smooth
 
 TEXTURE_LIMIT = 1.25
 """Radians from the gaze axis at the edge of the eye's texture."""

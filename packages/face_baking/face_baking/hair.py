@@ -10,7 +10,7 @@ from face_baking.identity import Hair
 from face_baking.kit import Array, Index
 from face_baking.lid_loops import LASH_LOOP, chains
 from face_baking.lid_skin import FaceSkin, normals
-from stimuli_builder.clips.face_movement import smooth
+from stimuli_builder.characters.colour import smooth
 
 LASH_POINTS, BROW_POINTS = 12, 8
 CLUMPS = {True: [0.28, 0.32, 0.26, 0.14], False: [0.60, 0.28, 0.09, 0.03]}

@@ -9,7 +9,7 @@ from face_baking.kit import Array
 from face_baking.lid_loops import LOOPS, SIDES
 from face_baking.sphere import spherical
 from face_baking.subdivision import Subdivision
-from stimuli_builder.clips.face_movement import smooth
+from stimuli_builder.characters.colour import smooth
 
 LID_MIDDLE = 0.15
 """Azimuth half way along the lids, radians."""

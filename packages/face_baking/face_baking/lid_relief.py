@@ -12,7 +12,7 @@ from face_baking.identity import Identity
 from face_baking.kit import Array
 from face_baking.lid_coordinates import LID_MIDDLE, LidCoordinates
 from face_baking.lid_loops import SIDES, chains
-from stimuli_builder.clips.face_movement import smooth
+from stimuli_builder.characters.colour import smooth
 
 FLESH_LOOPS, FLESH_ENDS, FLESH_CM = (0, 1, 2, 3, 4, 5), (2, 5), (0.03, 0.09)
 """Loops whose nasal ends are flesh, vertices of it on each one's upper and lower half, and how far it reaches

@@ -5,7 +5,7 @@ import numpy as np
 from face_baking.kit import Array, Index
 from face_baking.lid_loops import Globe
 from face_baking.sphere import cartesian, spherical
-from stimuli_builder.clips.face_movement import smooth
+from stimuli_builder.characters.colour import smooth
 
 _WHOLE_LOOP, _STILL_LOOP = 3.5, 11.0
 

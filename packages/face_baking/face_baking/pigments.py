@@ -10,7 +10,7 @@ from face_baking.lid_coordinates import LID_MIDDLE
 from face_baking.lid_loops import EDGE_LOOP, SIDES
 from face_baking.lid_relief import age_depth
 from face_baking.lid_skin import FaceSkin, normals
-from stimuli_builder.clips.face_movement import smooth
+from stimuli_builder.characters.colour import smooth
 
 SPOTS = 220
 LID_MELANIN, LID_BLOOD, LID_ROUGH, LID_DULL = 0.25, 0.07, 0.12, 0.6

@@ -10,7 +10,7 @@ import pytest
 
 from analysis.plans.continuous_rating import clips_of
 from analysis.report.pictures import STYLE
-from analysis.report.trace_contents import traces_figure
+from analysis.report.trace_figures import traces_figure
 from analysis.traces import ClipTraces, mean_trace
 from experiments.errors import InputError
 

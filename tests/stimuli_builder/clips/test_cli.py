@@ -57,7 +57,7 @@ def test_plan_prints_the_recordings_shown_twice(
 
 def test_plan_counts_one_of_a_thing_as_one(capsys: pytest.CaptureFixture[str]) -> None:
     from experiments.load import load_experiment
-    from stimuli_builder.clips.design_clips import print_plan, summary
+    from stimuli_builder.clips.plan import print_plan, summary
 
     plan = summary(load_experiment("exp3"))
     ones = ("participants", "exemplars_per_cell", "unique_clips", "trials_per_participant", "practice_trials")

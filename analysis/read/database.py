@@ -1,0 +1,176 @@
+"""Rows of the SQL view of a kind of trial, read in portions straight into columns of codes."""
+
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from sqlalchemy import Connection, create_engine, inspect, text
+from sqlalchemy.engine import make_url
+from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError
+
+from analysis.read.reading import RUN_FLAGS, RUN_TEXTS, NoRatingsError, Reading
+from analysis.read.text_table import categorical
+from experiments.errors import InputError
+from experiments.files import with_driver
+
+PORTION = 20_000
+KINDS = ("main", "attention")
+"""Practice trials are never fetched: nobody analyses them."""
+
+
+class AnswersQuery:
+    """A read-only look at the answers of one experiment."""
+
+    def __init__(self, url: str, reading: Reading, experiment: str, study: str | None) -> None:
+        self._reading, self._view = reading, reading.view.name
+        self.name = _describe(url)
+        self._values = {"experiment": experiment, **({"study": study} if study else {})}
+        self._where = "experiment = :experiment" + (" AND study = :study" if study else "")
+        self._engine = create_engine(with_driver(url))
+        self._connection = self._open()
+
+    def _open(self) -> Connection:
+        location = self._engine.url
+        file = location.database if location.get_backend_name() == "sqlite" else None
+        if file and file != ":memory:" and not Path(file).is_file():
+            raise NoRatingsError(
+                f"there is no database at {file}; run a study first, or name one with --database or --csv"
+            )
+        try:
+            connection = self._engine.connect()
+            if self._view not in inspect(connection).get_view_names():
+                raise NoRatingsError(
+                    f"{self.name} has no view '{self._view}'; start the server once to make it"
+                )
+        except DBAPIError as error:
+            raise InputError(f"cannot read {self.name}: {_first_line(error)}") from error
+        return connection
+
+    def close(self) -> None:
+        """Let go of the database."""
+        self._connection.close()
+        self._engine.dispose()
+
+    def rows(self, further: Sequence[str], factors: Sequence[str]) -> pd.DataFrame:
+        """Main and attention rows: text as categories, numbers float, a column a factor, a run's columns.
+
+        The columns of a run (`RUN_TEXTS`, `RUN_FLAGS`) are fetched once a run, not once a row.
+        """
+        texts, numbers = self._reading.all_texts, (*self._reading.all_numbers, *further)
+        levels = ("levels",) if self._reading.has_levels else ()
+        names = [*texts, *numbers, *levels]
+        codes = {name: _Codes() for name in (*texts, *levels)}
+        values = {name: _Numbers() for name in numbers}
+        kinds = ", ".join(f"'{kind}'" for kind in KINDS)
+        for portion in self._portions(
+            f"{', '.join(names)} FROM {self._view} WHERE {self._where} AND kind IN ({kinds})"
+        ):
+            for name, column in zip(names, zip(*portion, strict=True), strict=True):
+                (codes if name in codes else values)[name].add(column)
+        columns: dict[str, Any] = {name: codes[name].column() for name in texts}
+        columns |= {name: values[name].column() for name in numbers}
+        if levels:
+            columns |= _factor_columns(codes["levels"].column(), factors)
+        return pd.DataFrame(columns | self._of_runs(columns["run"]))
+
+    def _of_runs(self, run: "pd.Categorical[str]") -> dict[str, Any]:
+        """The columns of every row's run."""
+        there = self._reading.view.names
+        texts, flags = ([name for name in names if name in there] for names in (RUN_TEXTS, RUN_FLAGS))
+        names = ["run", *texts, *flags]
+        rows_of_runs = [
+            row
+            for rows in self._portions(f"DISTINCT {', '.join(names)} FROM {self._view} WHERE {self._where}")
+            for row in rows
+        ]
+        of_run = {str(row[0]): row[1:] for row in rows_of_runs}
+        of_category = [of_run[name] for name in run.categories]
+        taken = run.codes.astype(np.int64)
+        columns: dict[str, Any] = {}
+        for i, name in enumerate(texts):
+            columns[name] = categorical(taken, ["" if row[i] is None else str(row[i]) for row in of_category])
+        for i, name in enumerate(flags, len(texts)):
+            columns[name] = np.array([bool(row[i]) for row in of_category], dtype=bool)[taken]
+        return columns
+
+    def first_seen(self) -> dict[str, str]:
+        """When the first row of each run was stored."""
+        portions = self._portions(f"run, MIN(saved_at) FROM {self._view} WHERE {self._where} GROUP BY run")
+        return {str(run): str(moment) for rows in portions for run, moment in rows}
+
+    def _portions(self, selection: str) -> Iterator[Sequence[Any]]:
+        # the driver's own cursor: SQLAlchemy's row objects cost a second a million rows
+        query = text(f"SELECT {selection}").bindparams(**self._values)
+        sql = query.compile(self._engine, compile_kwargs={"literal_binds": True})
+        cursor = self._connection.connection.cursor()
+        try:
+            cursor.execute(str(sql))
+            while portion := cursor.fetchmany(PORTION):
+                yield portion
+        finally:
+            cursor.close()
+
+
+class _Codes:
+    """Text seen in portions, as codes into the names found."""
+
+    def __init__(self) -> None:
+        self._code: dict[str | None, int] = {}
+        self._portions: list[np.ndarray[Any, Any]] = []
+
+    def add(self, values: Sequence[Any]) -> None:
+        code = self._code
+        self._portions.append(np.array([code.setdefault(value, len(code)) for value in values], np.int32))
+
+    def column(self) -> "pd.Categorical[str]":
+        texts = ["" if name is None else str(name) for name in self._code]
+        codes = np.concatenate(self._portions) if self._portions else np.empty(0, np.int32)
+        return categorical(codes, texts)
+
+
+class _Numbers:
+    """Numbers seen in portions; NULL is NaN."""
+
+    def __init__(self) -> None:
+        self._portions: list[np.ndarray[Any, Any]] = []
+
+    def add(self, values: Sequence[Any]) -> None:
+        self._portions.append(np.array(values, np.float64))
+
+    def column(self) -> np.ndarray[Any, Any]:
+        return np.concatenate(self._portions) if self._portions else np.empty(0)
+
+
+def _factor_columns(levels: "pd.Categorical[str]", factors: Sequence[str]) -> dict[str, Any]:
+    """A column a factor from the JSON objects in `levels`; empty where a row has none."""
+    parsed = [json.loads(level) if level else {} for level in levels.categories]
+    columns: dict[str, Any] = {}
+    for factor in factors:
+        texts = [str((row or {}).get(factor, "")) for row in parsed]
+        names = sorted(set(texts))
+        lookup = np.array([names.index(name) for name in texts], np.int32)
+        columns[factor] = pd.Categorical.from_codes(
+            lookup[levels.codes], categories=pd.Index(names, dtype=object)
+        )
+    return columns
+
+
+def _describe(url: str) -> str:
+    """The database in words, without a password."""
+    try:
+        parsed = make_url(with_driver(url))
+        parsed.get_dialect()
+    except (ArgumentError, NoSuchModuleError) as error:
+        raise InputError(
+            f"'{url}' is no database URL; expected e.g. sqlite:///data/palpebra.sqlite"
+        ) from error
+    if parsed.get_backend_name() == "sqlite":
+        return Path(parsed.database or ":memory:").name
+    return f"database {parsed.database} on {parsed.host}"
+
+
+def _first_line(error: DBAPIError) -> str:
+    return str(error.orig).strip().splitlines()[0]
