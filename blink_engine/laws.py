@@ -133,6 +133,7 @@ class SplitMix32:
         return mixed ^ (mixed >> 15)
 
 
+# Decision 0380: One blink engine in Python and TypeScript.
 class RandomNumbers:
     """A seeded stream of numbers; streams of one seed with different numbers are independent.
 

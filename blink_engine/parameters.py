@@ -112,6 +112,7 @@ class ProfileModel:
     lower_in: float
 
 
+# Decision 0705: Blink intervals are correlated and drift.
 @dataclass(frozen=True)
 class Drift:
     r"""How somebody's rate wanders: blinks come in stretches of many and of few.

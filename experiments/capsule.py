@@ -164,6 +164,7 @@ class ReportSource(Declaration):
     """Files of the report that making it again gives."""
 
 
+# Decision 0640: A capsule is a list of hashes and a report that can be made again.
 class Capsule(Declaration):
     """`capsule.json`."""
 

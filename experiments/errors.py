@@ -8,6 +8,7 @@ from typing import Any
 # One way to refuse bad input: say what was expected, what came, and what to do.
 
 
+# Decision 0001: One contract package.
 class InputError(ValueError):
     """Input a person gave cannot be used. The message is one line, meant for that person.
 

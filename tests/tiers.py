@@ -1,6 +1,6 @@
 """Which tests `make test` leaves to `make test-all`: those that `tests/tiers.toml` names, and three kinds.
 
-The others are in both. `tests/conftest.py` marks the long ones; nobody writes the marker itself at a test.
+All others are in both (decision 0980). `tests/conftest.py` marks the long ones; no test sets the mark itself.
 """
 
 import tomllib

@@ -400,6 +400,7 @@ def cross_products(x: Floats, y: Floats, terms: Sequence[Term]) -> CrossProducts
     )
 
 
+# Decision 0670: Mixed models eliminate the largest grouping first.
 @dataclass(frozen=True)
 class Criterion:
     """The model at one theta: deviance parts, estimates, and their derivatives.

@@ -48,6 +48,7 @@ class Tested(NamedTuple):
     anova: AnovaResult
 
 
+# Decision 0130: The paper's table shows the multivariate test.
 def tested(prepared: Prepared) -> Tested:
     """Average and test, and no more: what each choice of a multiverse needs."""
     cells, design = _averaged(prepared)

@@ -17,6 +17,7 @@ Floats = NDArray[np.float64]
 Statistic = Literal["multivariate", "greenhouse-geisser"]
 
 
+# Decision 0144: Power is simulated from the published effect at the published n.
 @dataclass(frozen=True)
 class FactorialDesign:
     r"""Cell means of participants, all with one SD and one correlation between any two cells.

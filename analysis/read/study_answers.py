@@ -72,6 +72,7 @@ def stored_at() -> str:
     return f"sqlite:///{Path(folder) / 'palpebra.sqlite'}"
 
 
+# Decision 0723: `--version N` means the answers given under version N.
 def load_database(
     url: str, experiment: Experiment, reading: Reading, study: str | None = None, whole: bool = False
 ) -> StudyAnswers:

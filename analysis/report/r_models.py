@@ -129,6 +129,7 @@ def _r_columns(
     ]
 
 
+# Decision 0134: Blinks, not clips, are the items of mixed models.
 def _grouping(name: str) -> str:
     """The script's column of a grouping: the one that is no participant is its item."""
     return name if name == "participant" else "item"

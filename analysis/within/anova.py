@@ -96,6 +96,7 @@ def within_anova(
     return linear_anova(cells, factors, levels, no_groups(len(cells)), 3, confidence)
 
 
+# Decision 0360: One multivariate linear model for within, between and covariates.
 def linear_anova(
     y: ArrayLike,
     factors: Sequence[str],

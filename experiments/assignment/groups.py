@@ -43,6 +43,7 @@ def seat_of(experiment: Experiment, slot: int) -> Seat:
     return Seat(every[slot % len(every)], slot // len(every))
 
 
+# Decision 0515: Groups have quotas and are chosen before the slot.
 def of_group(experiment: Experiment, levels: Iterable[tuple[str, str]]) -> Experiment:
     """The experiment as one group sees it: factors between participants have the group's level alone."""
     mine = dict(levels)

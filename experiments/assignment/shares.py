@@ -16,6 +16,7 @@ from experiments.errors import did_you_mean
 # Every clip for everybody.
 
 
+# Decision 0715: Faces as random items.
 def every_clip(clips: Sequence[ClipSpec]) -> frozenset[ClipSpec]:
     """All of `clips`, those of the participant's group."""
     return frozenset(clips)

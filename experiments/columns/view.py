@@ -94,6 +94,7 @@ def levels_at(columns: Iterable[Column]) -> int | None:
     return next((index for index, column in enumerate(columns) if column.name == LEVELS.name), None)
 
 
+# Decision 0002: Factors are one JSON column in SQL and one column each in CSV.
 def with_levels(row: Sequence[Any], index: int | None, factors: tuple[str, ...]) -> tuple[Any, ...]:
     """The cells with one a factor in the place of the levels, which stand at `index`."""
     if index is None:

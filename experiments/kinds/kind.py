@@ -66,6 +66,7 @@ def never(experiment: Experiment) -> bool:
     return False
 
 
+# Decision 0322: Trial kinds are found by name.
 @dataclass(frozen=True)
 class Kind:
     """A kind of trial.

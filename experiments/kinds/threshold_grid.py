@@ -18,6 +18,7 @@ MAX_TABLE = 500_000
 """Stimuli times considered parameters: one choice goes through all of them."""
 
 
+# Decision 0660: A threshold can be a line over a second factor.
 def fault(experiment: Experiment) -> str | None:
     """The first fault; None where all is well."""
     return next(_faults(experiment, threshold_of(experiment)), None)

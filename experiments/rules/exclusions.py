@@ -41,6 +41,7 @@ class RunTrials:
         return [value for value in self.numbers(name) if not isnan(value)]
 
 
+# Decision 0510: An exclusion rule is one file.
 class LeavesOutRuns(Declaration):
     """A rule about runs: its method `excludes(run: RunTrials) -> str | None` gives the reason in words.
 

@@ -54,6 +54,7 @@ class ScreenDevice(Declaration):
 # Screening by an answer of a form.
 
 
+# Decision 0220: Screening rules end a run and give no code unless one is declared.
 class ScreenFormAnswer(Declaration):
     """Screen out by an answer: one of `refused`, or a number under `below` or over `above`.
 

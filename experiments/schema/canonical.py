@@ -151,6 +151,7 @@ FIRST_KEYS: frozenset[str] = frozenset(
 )
 
 
+# Decision 0320: The hash of a declaration contains new keys only where they are set.
 def definition_sha256(experiment: Experiment) -> str:
     """SHA-256 over the canonical JSON of a declaration: equal for equal declarations, however written."""
     form = canonical(experiment, FIRST_KEYS, earlier_names())

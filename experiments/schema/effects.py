@@ -96,6 +96,7 @@ def effects_with(below_trial: Mapping[str, Effect]) -> dict[str, Effect]:
     return {**EFFECTS, "trial.kind": "measured", **{f"trial.{key}": of for key, of in below_trial.items()}}
 
 
+# Decision 0321: Which edits begin a new data series.
 def effect_of(path: str, effects: Mapping[str, Effect] = EFFECTS) -> Effect | None:
     """The effect of the key at `path`: its own entry, or that of the nearest table above; None where none."""
     while path:

@@ -75,6 +75,7 @@ def details_digest(key: bytes, salt: str, details: dict[str, Any]) -> str:
     return _keyed(key, ["details", salt, details])
 
 
+# Decision 0686: The audit log is a keyed hash chain.
 def entry_hash(key: bytes, previous: str, entry: Entry, digest: str) -> str:
     """Equation (2), 64 hexadecimal digits; `previous` is the hash of the entry before, or `START`."""
     at = entry.at.astimezone(UTC).isoformat(timespec="microseconds")

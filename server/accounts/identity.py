@@ -268,6 +268,7 @@ class _Access:
         return identity
 
 
+# Decision 0738: Lasting changes need a fresh sign-in.
 def must_be_fresh(identity: Identity) -> None:
     """SignInAgain where the browser's session began longer ago than `FRESH_FOR`."""
     if identity.signed_in_at is None or now() - identity.signed_in_at > FRESH_FOR:

@@ -390,6 +390,7 @@ def begin_invited(services: Services, provider_id: str, token: str) -> Begun:
     return begin_attempt(services, provider_id, "sign in", "/", invitation_hash=hash_token(token))
 
 
+# Decision 0747: External accounts are known by issuer and subject.
 def finish_sign_in(
     services: Services, provider_id: str, attempt: LoginAttempt, whom: Recognised, user_agent: str
 ) -> Finished:

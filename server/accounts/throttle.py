@@ -103,6 +103,7 @@ class BackOff:
             self._shared.forget(f"{self._name}:{key}")
 
 
+# Decision 0300: Wrong passwords make an address wait, not an account.
 class SignInThrottle:
     """The limits of everything that costs a password's hash."""
 

@@ -102,6 +102,7 @@ class _Queue:
         return bool(self._light or self._heavy or self._ends)
 
 
+# Decision 0160: Ratings share a commit.
 class GroupCommit:
     """The writers of one process; threads start with the first work."""
 

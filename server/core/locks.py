@@ -74,6 +74,7 @@ class LockTaken(Exception):
     """Another process, or another thread of this one, holds the lock."""
 
 
+# Decision 0780: Hosts share PostgreSQL and one folder.
 class DatabaseLocks:
     """The locks of one process; each has a name."""
 

@@ -175,6 +175,7 @@ def _condition(name: str, columns: set[str]) -> str:
     return " OR ".join(parents)
 
 
+# Decision 0782: Row-level security as a second wall.
 def raise_wall(connection: Connection, *, stood: bool = False) -> bool:
     """Make the policies unless they stand as they should; False where the user or PostgreSQL lets none be.
 

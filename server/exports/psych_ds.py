@@ -44,6 +44,7 @@ EPOCH = datetime(2000, 1, 1, tzinfo=UTC)
 MOVED = "All times of the dataset are moved alike, so that its first run starts with the year 2000."
 
 
+# Decision 0641: Shared datasets contain no personal data.
 def deidentified(table: ExportTable, first: datetime | None) -> ExportTable:
     """The table without identifying columns, its times counted from `first`."""
     kept = [index for index, column in enumerate(table.columns) if not column.identifying]

@@ -35,6 +35,7 @@ def people_begun(session: Session, study: Study) -> int:
     return people_of_series(session, study, active_version(session, study).series)
 
 
+# Decision 0642: The audit log keeps the sealed plan.
 def seal_plan(
     session: Session, study: Study, identity: Identity | None, power: dict[str, Any] | None
 ) -> Seal:

@@ -28,6 +28,7 @@ NO_SLOT = -1
 RUN_STATUSES = ("active", "complete", "screened_out", "withdrawn")
 
 
+# Decision 0330: Every run has an origin, every version a data series.
 class StudyRun(Base):
     """A participant's visit. No internet address is stored, here or anywhere.
 
@@ -123,6 +124,7 @@ class StudyRun(Base):
     link: Mapped[Link] = relationship()
 
 
+# Decision 0530: Participants have pseudonyms, and an id opens no visit.
 class RecruiterIdentity(Base):
     """Who a run's person is to the recruiter, encrypted.
 
@@ -239,6 +241,7 @@ class Calibration(Base):
 # What was counted of each run, kept in the transaction of each rating.
 
 
+# Decision 0540: One tally per run, updated with each rating.
 class RunTally(Base):
     """The counts of one run; `server.participation.tallies` reads and writes the two texts.
 

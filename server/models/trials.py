@@ -44,6 +44,7 @@ class AssignedTrial(Base):
     expected_response: Mapped[int | None]
 
 
+# Decision 0332: Answers are payloads on the rating's row.
 class TrialClip(Base):
     """A clip of a trial and the role it is shown in.
 
@@ -142,6 +143,7 @@ class Rating(Base):
 # Each time that clips of a trial were shown, with the frames that were drawn.
 
 
+# Decision 0331: Views are stored when they begin.
 class View(Base):
     """One view of a trial's clips, stored when it begins; it stays open where the page dies before its end.
 

@@ -97,6 +97,7 @@ def _write_ledger(services: Services, path: Path, moment: str) -> None:
         stream.write(erasures.copy_for_backup(services.settings, there, moment))
 
 
+# Decision 0200: Backups hold rows, not database files.
 def write_backup(
     services: Services, stream: IO[bytes], *, with_clips: bool = True
 ) -> tuple[Description, KeyFile]:

@@ -216,6 +216,7 @@ class KeptBackup:
     name: str
 
 
+# Decision 0742: Backups leave the host as age files.
 def back_up_to(
     services: Services,
     store: BackupStore,

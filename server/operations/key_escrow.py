@@ -131,6 +131,7 @@ def check_replaceable(path: Path, secret: bytes) -> None:
         )
 
 
+# Decision 0744: A key file belongs to its backups.
 def check_fits(keys: KeyFile, secret: bytes, backed_up_at: str, name: str, *, stale: bool) -> None:
     """Refuse keys of another installation than a backup's, and keys older than the backup.
 

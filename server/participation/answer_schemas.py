@@ -414,6 +414,7 @@ def _count_unknown(data: Any, unknown: Set[Path]) -> None:
         playback["disturbances"] = {**(told if isinstance(told, dict) else {}), IMPOSSIBLE: len(unknown)}
 
 
+# Decision 0501: An answer is a union over the kinds.
 class RatingIn(BaseModel):
     """One play of one trial with its answer, whose `kind` is that of the study's trials.
 

@@ -159,6 +159,7 @@ class Signals:
 SIGNAL_NAMES = tuple(field.name for field in fields(Signals))
 
 
+# Decision 0420: Tickets are derived, and watching time is counted twice.
 def signals_of(
     answers: Sequence[JudgedAnswer], passed_over: Sequence[int] = (), unstored_checks: Sequence[int] = ()
 ) -> Signals:

@@ -78,6 +78,7 @@ def identifier_hash(study_key: str, identifier: str) -> str:
     return hmac.digest(bytes.fromhex(study_key), named, hashlib.sha256).hex()
 
 
+# Decision 0740: One key per recruiter id, and no key in a backup.
 def seal(secret: bytes, run: str, known_as: KnownAs) -> Sealed:
     """Encrypt under a new key; `secret` is the installation's key, `run` the run's public id."""
     key, nonce = AESGCM.generate_key(KEY_BYTES * 8), os.urandom(NONCE_BYTES)

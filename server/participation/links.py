@@ -54,6 +54,7 @@ _REFUSALS = {
 }
 
 
+# Decision 0161: Tokens are derived from the secret key.
 def new_seed() -> int:
     """A random seed of a run: what is shown to it, in what order, with which checks, follows from it."""
     return secrets.randbits(SEED_BITS)
@@ -211,6 +212,7 @@ def _new_run(
     """Draw a seed, store the run, and give it its place, unless an answer is to decide its group."""
     origin, phase = _origin(link, study), "live" if study.status == "live" else "pilot"
     if origin == "preview":
+        # Decision 0163: Previews are stored for a day and counted nowhere.
         keep = timedelta(hours=services.settings.preview_keep_hours)
         run_repository.delete_previews(session, study, now() - keep)
     public_id = new_public_id()

@@ -67,6 +67,7 @@ def open_turns(
 # A run gets its place: group, slot, and the trials that follow from them.
 
 
+# Decision 0162: Counterbalancing assigns slots, not conditions.
 def assign_slot(session: Session, run: StudyRun, loaded: LoadedVersion, turns: Sequence[int]) -> None:
     """Give a stored run the first free slot of the groups with these turns, and its trials.
 

@@ -209,6 +209,7 @@ def signing_secret(key: bytes, study_key: str, name: str) -> bytes:
     return hmac.digest(key, f"{PURPOSE}:{study_key}:{name}".encode("utf-8", "surrogatepass"), hashlib.sha256)
 
 
+# Decision 0701: Signed addresses open a visit.
 def signature_of(secret: bytes, identifier: str) -> str:
     """The signature of a participant's id."""
     return hmac.digest(secret, identifier.encode("utf-8", "surrogatepass"), hashlib.sha256).hex()

@@ -36,6 +36,7 @@ Key = Annotated[str, StringConstraints(max_length=100)]
 LanguageTag = Annotated[str, StringConstraints(pattern=r"^[a-z]{2}(-[A-Z]{2})?$")]
 
 
+# Decision 0340: Pages get their own models; TypeScript types are generated.
 class Gates(BaseModel):
     """What the device must offer before a run begins."""
 

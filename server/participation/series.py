@@ -74,6 +74,7 @@ class Outlook:
     remaining: int = 0
 
 
+# Decision 0506: An adaptive series has no state of its own.
 def follow(database: Database, versions: Versions, token: str) -> Outlook | None:
     """Bring the series of a run up to its stored answers; None where other answers came meanwhile.
 

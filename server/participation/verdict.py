@@ -58,6 +58,7 @@ class Playback:
     disturbances: Mapping[str, int] = field(default_factory=dict)
 
 
+# Decision 0351: The verdict is about what was shown.
 def judge(
     rules: PlaybackRules,
     playback: Playback,
@@ -158,7 +159,7 @@ def _limit_ms(allowed_ms: float, refresh_rate_hz: float | None, fps: float) -> f
 
     Beyond what is allowed to every frame that is most of the time for which it stays after its first refresh.
     One that stays for a single refresh may come within most of it: pages draw so that no picture waits before
-    the screen (decision 0789). Where the rate was not measured it gets what is allowed alone: the screen may
+    the screen. Where the rate was not measured it gets what is allowed alone: the screen may
     be a faster one.
     """
     refresh_ms = _refresh_ms(refresh_rate_hz)

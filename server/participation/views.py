@@ -118,6 +118,7 @@ class Arrival:
     views: Sequence[ArrivingView]
 
 
+# Decision 0700: Views carry tickets.
 def take_views(intake: Intake, connection: Connection, arrival: Arrival) -> list[datetime | None]:
     """When the ticket of each view was issued; refused by name where one cannot have begun or ended so.
 

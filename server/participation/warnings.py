@@ -66,6 +66,7 @@ class Lapse(NamedTuple):
 NO_LAPSE = Lapse(None, ends=False)
 
 
+# Decision 0605: A warning counts once it was read.
 def after_answer(
     connection: Connection, run: int, experiment: Experiment, rating_id: str, saved_at: datetime
 ) -> Lapse:

@@ -34,6 +34,7 @@ NAME = "erasures.ndjson"
 KNOWN_FROM, KNOWN_UNTIL = "known_from", "known_until"
 
 
+# Decision 0541: A ledger of erasures outside the backups.
 def ledger(settings: Settings) -> Path:
     """The file; it may be missing where nobody was erased yet."""
     return settings.common_folder / NAME

@@ -133,6 +133,7 @@ def _periods(declared: Retention) -> list[Period]:
     return [Period(what=what, days=number) for what, number in days.items() if number is not None]
 
 
+# Decision 0741: The server enforces the declared retention.
 def carry_out(
     database: Database, settings: Settings, study: str, stopped: Callable[[], bool] = lambda: False
 ) -> Carried:

@@ -51,6 +51,7 @@ Key = tuple[int, str, int, str]
 Count = Callable[[], tuple[Revision, AnyResults]]
 
 
+# Decision 0311: Results are kept until something changes.
 class ResultsCache:
     """The results of some studies, shared by the threads of a worker."""
 

@@ -19,6 +19,7 @@ class UnknownStudy(NotFound):
     audited = True
 
 
+# Decision 0685: Workspaces are checked by the query that finds a study.
 def find_study(session: Session, name: str, identity: Identity | Operator, right: Right) -> Study:
     """The study called `name`, for one who has this right on it; see `study_with_rights`."""
     study, _ = study_with_rights(session, name, identity, right)

@@ -28,6 +28,7 @@ MAX_CUBES = 40_000
 """Of the parts of dotted keys, all together: 1,500 keys of three parts, some seconds of tomlkit at worst."""
 
 
+# Decision 0550: The builder edits data; the server writes the TOML.
 def with_data(text: str, data: Mapping[str, Any]) -> str:
     """`text` with as few changes as make it say `data`; None values are left out.
 

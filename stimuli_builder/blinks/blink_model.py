@@ -258,6 +258,7 @@ SPREAD = 0.12
 """Spread of the noise on drawn lengths and openings, as part of the recordings' own spread."""
 
 
+# Decision 0372: Blinks are sampled phase by phase.
 @dataclass(frozen=True, eq=False)
 class PhaseModel:
     """Recorded blinks taken apart.

@@ -74,7 +74,7 @@ def level_weights(levels: NDArray[np.float64], closures: ArrayLike) -> NDArray[n
 #
 # Brightness and two differences of colours (YCoCg: Malvar & Sullivan 2003, eq. 1) instead of R, G and B. A
 # face's three primaries are alike, and H.264 does not predict one plane from another: for the same error the
-# differences take a quarter to a third less (decision 0950). In ten bits all three keep every code value:
+# differences take a quarter to a third less. In ten bits all three keep every code value:
 #
 #     y = r + 2 g + b,    o = 512 + 2 (r - b),    n = 512 + 2 g - r - b                 (1)
 #     g = (y + n') / 4,   r = (y - n' + o') / 4,  b = (y - n' - o') / 4                 (2)

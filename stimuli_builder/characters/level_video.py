@@ -19,7 +19,7 @@ from stimuli_builder.characters.declaration import REPAIR, Picture
 from stimuli_builder.characters.writing import write_bytes_declared
 
 QUANTISER = 21
-"""x264's constant quantiser of ten-bit planes: with 22 `alder@7` has 48.1 dB or more (decision 0960)."""
+"""x264's constant quantiser of ten-bit planes: with 22 `alder@7` has 48.1 dB or more."""
 STILL_CODES = 2
 """Code values that the encoder may change of a pixel which stands still: skin must not flicker."""
 

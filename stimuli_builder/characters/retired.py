@@ -42,6 +42,7 @@ def next_version(name: str) -> int:
     return max((int(number) if number.isdecimal() else 1 for number in numbers), default=0) + 1
 
 
+# Decision 0695: A character's name means the same pictures for ever.
 def restore(name: str, source: Path | None, target: Path) -> Path:
     """Put a retired character into the folder `target`, whole or not at all; returns that folder.
 

@@ -207,6 +207,7 @@ LUMA_BLACK, LUMA_WHITE = 16, 235
 Planes = NDArray[np.uint8]
 
 
+# Decision 0600: No single frame of a check reveals the answer.
 @dataclass(frozen=True)
 class CheckJob:
     """A check's clip to render.

@@ -156,6 +156,7 @@ def build_checks(
     return ChecksReport(manifest, len(missing), removed)
 
 
+# Decision 0601: Checks come from a secret seed in the manifest.
 def seed_for(folder: Path, former: Manifest | None, options: Options, *, anew: bool = False) -> int:
     """The seed of the checks: the option's, that of an unfinished or former build, else a secret one."""
     if options.checks_seed is not None:

@@ -28,10 +28,11 @@ BT709, LIMITED_RANGE = 1, 1
 M_PERTURB, ZEROES = -6, 255
 """Of glibc's mallopt: every block of memory is filled with the complement of this byte when it is taken."""
 RATED = f"{X264}:trellis=0:partitions=i8x8:aq-strength=0.6:me=dia"
-"""Less for smooth skin and a lower CRF give lids back what trellis gave them (decision 0913)."""
+"""Less for smooth skin and a lower CRF give lids back what trellis gave them."""
 _ALONE = f"{X264.replace('keyint=infinite', 'keyint=1')}:aq-mode=0:mbtree=0"
 
 
+# Decision 0912: Clips are encoded with CRF 12, `faster` and less search.
 def encoder_signature(alone_qp: int | None = None) -> str:
     """Everything of the encoder that decides a clip's bytes; alone_qp as for `encode_clip`."""
     codec = ".".join(str(part) for part in av.library_versions["libavcodec"])

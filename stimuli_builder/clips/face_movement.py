@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 #
 # Letters: u the direction (unit length), c and s the middle and the spread along x, p how steep its ends are,
 # S a smoothstep that is 0 on the lids and 1 where the part lies. The numbers of brow, cheek and squint follow
-# the front of ICT-FaceKit's mean shapes browDown, cheekSquint and eyeSquint (decision 0737).
+# the front of ICT-FaceKit's mean shapes browDown, cheekSquint and eyeSquint.
 
 
 @dataclass(frozen=True)

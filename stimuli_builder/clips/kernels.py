@@ -60,6 +60,7 @@ def add_products(
                     line[x] += share * np.float32(change[x]) * np.float32(factor[x])
 
 
+# Decision 0150: The builder converts to YUV itself.
 @compiled
 def to_yuv(
     light: NDArray[np.float32],

@@ -130,7 +130,7 @@ def refined_labels(
 ) -> dict[int, Points]:
     """Labels made consistent with the pictures: each is replaced by the fit of a one-mode model to its frame.
 
-    A person's labels scatter by a pixel; what many frames agree on does not (docs/decisions/0102).
+    A person's labels scatter by a pixel; what many frames agree on does not.
     """
     plain = replace(options, shape_variance=0.0, fewest_shape_modes=1)
     frames = sorted(points)

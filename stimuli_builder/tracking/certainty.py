@@ -59,6 +59,7 @@ def _would_be_taken(one: HeldOut, limits: Values) -> bool:
     return bool((one.residuals <= limits).all() and away <= JUMP_SHARE * one.width_px)
 
 
+# Decision 0371: A track states its own error.
 def stated_errors(model: CoupledModel, fit: Fit, difference_px: float | None) -> Values:
     """Stated error of each landmark (points,) in pixels of the video; NaN for a model that knows none.
 
@@ -73,6 +74,7 @@ def stated_errors(model: CoupledModel, fit: Fit, difference_px: float | None) ->
     return np.asarray(np.sqrt(errors**2 + more**2))
 
 
+# Decision 0890: A frame without a sign of an eye is not called tracked.
 def doubt(
     model: CoupledModel,
     fit: Fit,

@@ -1,7 +1,7 @@
 """Highlights over the lids, such as reflections on glasses: where they lie, lids are not seen.
 
 Detector and model draw open lids around a highlight on shut ones, and the residual is as usual, since the one
-trained the other (decision 0743). A highlight shows in the skin around the lids: that skin lies in the brow's
+trained the other. A highlight shows in the skin around the lids: that skin lies in the brow's
 shade, and under a highlight it is brighter than the cheek. The white of an eye may be brighter than the cheek
 too, but it lies between the lids, next to a dark iris.
 """

@@ -188,7 +188,7 @@ class TrainingOptions:
     """How much of the labelled frames' variation the model keeps.
 
     Each count of modes is the one that keeps the wanted share of variance, but not fewer than the paper's
-    counts (8, 10, 10) where the labelled frames carry that many (docs/decisions/0100).
+    counts (8, 10, 10) where the labelled frames carry that many.
     """
 
     shape_variance: float = 0.98
@@ -286,7 +286,7 @@ def principal(rows: Values, variance: float, fewest: int) -> tuple[Values, Value
 def pixel_weights(textures: Values, modes: int) -> NDArray[np.float32]:
     """Inverse variance of what each labelled frame shows that the others do not explain, mean 1.
 
-    A glint or a shift of gaze is not in the model; its pixels would drag the mesh (docs/decisions/0103).
+    A glint or a shift of gaze is not in the model; its pixels would drag the mesh.
 
     Parameters
     ----------

@@ -1,5 +1,7 @@
 """Print every row of the table of issue 50, with its target, then the files and functions to look at.
 
+Decision 0985 has the rules.
+
     python -m tools.house [--tree FOLDER] [--files]
 
 FOLDER is another tree, say of `git archive COMMIT | tar x -C FOLDER`. At a419930e the rows are those of the

@@ -1,4 +1,4 @@
-"""Xvfb's frame buffer, as a memory-mapped XWD file (`Xvfb -fbdir`)."""
+"""Xvfb's frame buffer, as a memory-mapped XWD file (`Xvfb -fbdir`; decision 0350)."""
 
 import mmap
 import struct

@@ -2,7 +2,7 @@
 
 Source: Psych-DS 1.0, https://psych-ds.github.io (data files are `data/**/keyword-value_..._data.csv`, and the
 keywords of a file's name are columns). Of any other folder the files `*.csv` in it are read, and the name of
-the file without its ending is a column `file` (decision 0910).
+the file without its ending is a column `file`.
 """
 
 from collections import Counter

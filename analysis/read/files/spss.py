@@ -29,6 +29,7 @@ def cells(path: Path, names: list[str]) -> Cells:
     return Cells(read.rows, tuple(told["names"]), read.lines, labels=labels, numeric=read.numeric)
 
 
+# Decision 0815: Files that crash their reader end in one line.
 def _read(path: Path, names: list[str]) -> dict[str, Any]:
     """What `spss_reader` tells of a file, in a process of its own, which damaged files may kill."""
     searched = {**os.environ, "PYTHONPATH": os.pathsep.join(folder for folder in sys.path if folder)}

@@ -6,6 +6,7 @@
  */
 import { initJsPsych, ParameterType, type JsPsych } from "jspsych";
 
+// Decision 0170: Screens are functions; one file knows jsPsych.
 export const { INT, FLOAT, STRING, BOOL, OBJECT } = ParameterType;
 export type SimulationMode = "visual" | "data-only";
 

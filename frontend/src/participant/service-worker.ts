@@ -17,6 +17,7 @@ interface Scope {
   addEventListener(type: "install" | "activate", listener: (event: Extendable) => void): void;
   addEventListener(type: "fetch", listener: (event: Fetching) => void): void;
 }
+// Decision 0221: A service worker keeps the page, and only the page.
 const scope = self as unknown as Scope;
 
 /** The built files beside this one; the build puts them here. */

@@ -19,5 +19,5 @@ class LidPose:
 VERTICAL_MM = (0.0, 0.5, 1.0)
 HORIZONTAL_MM = tuple(k / 2 for k in range(11))
 RENDERED_HORIZONTAL_MM = HORIZONTAL_MM[::2]
-"""Slides in between are moved from these as the mesh moves (decision 0775)."""
+"""Slides in between are moved from these as the mesh moves."""
 OPEN, SHUT = LidPose(0.0), LidPose(1.0)

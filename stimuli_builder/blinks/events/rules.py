@@ -38,6 +38,7 @@ class PhaseFit:
     duration_error_s: float
 
 
+# Decision 0911: A likely squint is not a blink.
 @dataclass(frozen=True)
 class LidEvent:
     """One event of one eye.
@@ -299,7 +300,7 @@ def _is_wink(event: LidEvent, own: Array, other: Array, fps: float) -> bool:
 LIKELY = 0.5
 """Probability from which a dip of an eye by itself is one of the blinks that the other is compared at."""
 MUCH_LESS = 0.5
-"""Below this part of the other's movement an eye is no witness of the other's blinks (decision 0962)."""
+"""Below this part of the other's movement an eye is no witness of the other's blinks."""
 LEAST_MOVEMENT = 0.05
 """Below this part of the other's movement an eye does not move, whatever its noise."""
 NOISES = 2.0

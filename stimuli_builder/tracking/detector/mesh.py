@@ -45,6 +45,7 @@ def detector_environment() -> Path:
     return ensure_environment(folder, python, REQUIREMENTS, "the face detector (MediaPipe)", probe)
 
 
+# Decision 0370: The eye detector runs in its own environment.
 class MeshClient:
     """The worker, started with the block and ended with it; one picture at a time."""
 
@@ -179,7 +180,7 @@ class FaceMesh:
 
         Each face is read in the picture and in its mirror image, and the mean is taken. One that fills the
         picture may not be seen: the mesh expects something around it. Where none is seen or one fills it, the
-        picture is looked at in a grey margin (docs/decisions/0971).
+        picture is looked at in a grey margin.
         """
         faces = self._read_twice(picture)
         if not faces or _fills(faces[0], picture):

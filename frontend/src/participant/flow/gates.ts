@@ -3,6 +3,7 @@ import type { Gates } from "../../api/schema";
 import type { MessageKey } from "../../i18n";
 import { hasVideo, hasWebCodecs, playsH264 } from "../playback/worker-player";
 
+// Decision 0173: Pages without a secure context are refused.
 export interface GateFinding {
   reason: MessageKey;
   /** False where the participant may go on all the same. */

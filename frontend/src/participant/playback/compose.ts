@@ -5,6 +5,7 @@ import type { StreamedClip } from "./streamed-clip";
 
 /** One clip, all its frames decoded or those next to be shown. */
 export type SingleClip = DecodedClip | StreamedClip;
+// Decision 0390: Two clips are one composed clip to the player.
 export interface Composed {
   parts: { clip: SingleClip; at: Part }[];
   fps: number;

@@ -4,6 +4,7 @@
  */
 import { EncodedPacketSink, type InputVideoTrack } from "mediabunny";
 
+// Decision 0630: Long clips are decoded a few frames at a time.
 /** Frames that the decoder is fed ahead of the one shown: more than an H.264 decoder may hold back (16). */
 const AHEAD = 32;
 /** Frames that are pictures before the clip may start. */

@@ -1,6 +1,7 @@
 /** What disturbs a view, named as [playback.disturbances] names it; the server knows what each does to the play. */
 import { watchFocus } from "../screen/window";
 
+// Decision 0521: Disturbances of a view have a declared consequence.
 export interface Disturbed {
   /** How often each disturbed; a name that is missing did not. */
   counts: Record<string, number>;

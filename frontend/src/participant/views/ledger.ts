@@ -10,6 +10,7 @@ import { disturbancesOf } from "../playback/record";
 import type { Shown } from "../trials/showing";
 import type { Session } from "../session";
 
+// Decision 0520: Every view is stored before its first frame.
 /** A showing and the roles of the clips that were in it: one clock has drawn them all. */
 export interface RolesShown {
   roles: string[];
