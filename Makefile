@@ -39,7 +39,7 @@ check-style:
 
 check-types:
 	@$(BIN)/mypy
-	@$(BIN)/mypy --explicit-package-bases --follow-imports=silent tools
+	@$(BIN)/mypy --explicit-package-bases --follow-imports=silent tools bench
 
 check-imports:
 	@$(BIN)/lint-imports
@@ -73,7 +73,7 @@ lock: ## resolve the Python dependencies again, with hashes: what runs, what tes
 	@$(BIN)/python tools/check_lock_files.py
 
 bench: setup-test ## speed, memory and accuracy, as figures and ratios (long); goes on after a failure and lists it
-	@PYTHONPATH=. FACEKIT="$(FACEKIT)" BLINK_SERIES="$(BLINK_SERIES)" $(BIN)/python tools/benches.py $(BENCH)
+	@FACEKIT="$(FACEKIT)" BLINK_SERIES="$(BLINK_SERIES)" $(BIN)/python -m bench $(BENCH)
 
 screenshots: setup-test ## make the pictures of README and docs anew (needs the clips of `make run`)
 	@$(BIN)/python tools/screenshots.py
@@ -86,10 +86,10 @@ scope: setup-test ## what reaches a virtual screen against what is recorded (hou
 	@$(BIN)/python -m tools.scope $(SCOPE)
 
 load: setup-test ## real servers under load and kill -9, a table at the end (LOAD="--share 0.2 --only sqlite")
-	@$(BIN)/python tools/load.py $(LOAD)
+	@$(BIN)/python -m bench.load $(LOAD)
 
 evidence: setup-test ## people and programs of every manner take part: who is caught, who is warned (EVIDENCE="--runs 20 --honest 100")
-	@$(BIN)/python -m tools.evidence_table $(EVIDENCE)
+	@$(BIN)/python -m bench.evidence_table $(EVIDENCE)
 
 equal: ## make the program's outputs at BASE=COMMIT and here, and compare them byte for byte (PARTS="help exports")
 	@$(BIN)/python -m tools.equal $(BASE) $(PARTS)

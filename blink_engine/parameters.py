@@ -213,7 +213,7 @@ def _own(instance: Any) -> dict[str, Any]:
 
 @lru_cache(maxsize=1)
 def default_parameters() -> Parameters:
-    """Return the shipped defaults (`defaults.json`, written by `tools/fit_blink_engine.py`)."""
+    """Return the shipped defaults (`defaults.json`, written by `bench/blink_engine_fit.py`)."""
     return from_json(json.loads(files(__package__).joinpath("defaults.json").read_text(encoding="utf-8")))
 
 

@@ -34,7 +34,7 @@ class BlinkShape:
     T_c, T_p, T_o: closing, closed and opening time in s. p, q: when within its phase the lid is fastest;
     q < 1 is the quick start and the long tail of the opening. c and its first derivative are continuous for
     p, q > 1/3: there is no cusp at the peak. Fitted to the 21 recorded one-eye profiles that ship with
-    Palpebra the residual is 0.02 of the way (median); `tools/fit_blink_engine.py` prints it.
+    Palpebra the residual is 0.02 of the way (median); `bench/blink_engine_fit.py` prints it.
     """
 
     closing_s: float

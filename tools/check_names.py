@@ -15,6 +15,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 FOLDERS = (
     "analysis",
+    "bench",
     "blender_addon",
     "blink_engine",
     "experiments",

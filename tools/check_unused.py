@@ -14,6 +14,7 @@ from vulture import Vulture  # type: ignore[import-untyped]
 ROOT = Path(__file__).resolve().parent.parent
 OWN = (
     "analysis",
+    "bench",
     "blender_addon",
     "blink_engine",
     "experiments",
@@ -33,6 +34,8 @@ DECORATORS = [
     "@*serializer*",
     "@listens_for*",
 ]
+TIMINGS = "test_*"
+"""What pytest calls in the timings of `make bench`."""
 CALLED_FROM_OUTSIDE = {
     "handle_starttag": "html.parser",
     "handle_endtag": "html.parser",
@@ -59,7 +62,7 @@ def unused(
     paths: Iterable[Path], own: Sequence[Path], allowed: Iterable[str] = CALLED_FROM_OUTSIDE
 ) -> list[str]:
     """What is defined below `own` and called nowhere in `paths`, a line each."""
-    finder = Vulture(ignore_names=list(allowed), ignore_decorators=DECORATORS)
+    finder = Vulture(ignore_names=[*allowed, TIMINGS], ignore_decorators=DECORATORS)
     finder.scavenge([str(path) for path in paths])
     kinds = (finder.unused_funcs, finder.unused_classes, finder.unused_methods, finder.unused_props)
     items = [item for kind in kinds for item in kind]

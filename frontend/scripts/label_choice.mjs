@@ -1,5 +1,5 @@
 // What the labelling page finds in a recording: `node label_choice.mjs FRAMES.grey '{"frames": 1800, "fps": 30, ...}'`.
-// The file holds every frame's luminance, as small as the page makes it; tests/bench/bench_label_choice.py writes it.
+// The file holds every frame's luminance, as small as the page makes it; bench/label_choice.py writes it.
 import { closeSync, openSync, readSync } from "node:fs";
 import { runnerImport } from "vite";
 

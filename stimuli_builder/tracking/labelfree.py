@@ -33,7 +33,7 @@ ENOUGH_BY_HAND = 12
 FACE_SHARE, CLOSE_UP_SHARE = 0.02, 0.03
 """What the detector's lids may be off that no held-out frame tells, as part of the eye's width, in faces and
 in close-ups: a stated error is then right within a factor of 1.7 on rendered faces (exact truth) and on the
-recordings with labels (tests/bench/bench_rendered_tracks.py and bench_stated_error.py)."""
+recordings with labels (bench/rendered_tracks.py and stated_error.py)."""
 MODES = 6
 SPREADS = 8.0
 UNLIKE_SHARE = 0.02

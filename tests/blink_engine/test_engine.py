@@ -10,6 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
+from bench import blink_engine_fit
+from bench.blink_engine_fit import IntervalFit, fit_intervals, held_out_p
 from blink_engine import (
     EVENT_KINDS,
     STATE_NAMES,
@@ -23,8 +25,7 @@ from blink_engine import (
     perform,
 )
 from stimuli_builder.blinks.library import load_library
-from tools import blink_vectors, fit_blink_engine
-from tools.blink_drift import IntervalFit, fit_intervals, held_out_p
+from tools import blink_vectors
 
 VECTORS = Path(__file__).parents[1] / "golden/blink_engine/vectors.json"
 SLOW = default_parameters().slow_drift
@@ -106,7 +107,7 @@ def test_one_half_of_the_recording_is_as_the_fit_of_the_other_says(eye: str, fir
     data = Path(__file__).parents[3] / "shared/data"
     if not data.is_dir():
         pytest.skip("../shared/data is not here: the recording is not committed")
-    intervals = fit_blink_engine.intervals_of(data, eye)
+    intervals = blink_engine_fit.intervals_of(data, eye)
     fitted, kept = np.split(intervals, [intervals.size // 2])[:: 1 if first else -1]
     fit = fit_intervals(fitted)
     slow = replace(fit, slow_spread=SLOW.spread, slow_kept=SLOW.kept)
@@ -156,7 +157,7 @@ def test_blinks_fitted_to_half_of_the_recorded_ones_are_as_the_other_half() -> N
     fitted, kept = recorded[::2], recorded[1::2]
     changes = {
         name: Law(**value) if isinstance(value, dict) else value
-        for name, value in fit_blink_engine.course_defaults(fitted).items()
+        for name, value in blink_engine_fit.course_defaults(fitted).items()
     }
     blinks = perform(3600, 1, seed=2, parameters=default_parameters().with_profile(**changes)).blinks
     peaks = [profile.amplitude for profile in kept]
@@ -173,7 +174,7 @@ def test_blinks_last_as_those_of_a_recording_that_was_not_fitted() -> None:
         pytest.skip("../shared/data is not here: the recording is not committed")
     blinks = perform(3600, 1, seed=2).blinks
     drawn = [_time_above(blink.shape.course(np.arange(0, 1.5, 1e-3)), 1e-3, 0.5) for blink in blinks]
-    recorded = fit_blink_engine.half_widths_s(data)
+    recorded = blink_engine_fit.half_widths_s(data)
     assert np.median(drawn) == pytest.approx(np.median(recorded), rel=0.12)
     # One person varies less than the engine, which is of several.
     low, high = np.percentile(drawn, [1, 99])

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from sqlalchemy import make_url, text
 
@@ -30,14 +30,6 @@ from tests.helpers.studies import StudyInDatabase, add_study, link_token
 START_LIMIT_S = 240.0
 
 
-class Launched(Protocol):
-    """What is asked of a process: as `subprocess.Popen` has it."""
-
-    def send_signal(self, sig: int, /) -> None: ...
-    def wait(self, timeout: float | None = None) -> int: ...
-    def poll(self) -> int | None: ...
-
-
 class ServerProcess:
     """The server on a data folder. `kill` is kill -9; `start` after it takes the same port.
 
@@ -51,7 +43,7 @@ class ServerProcess:
         self.further = {f"PALPEBRA_{name.upper()}": value for name, value in further.items()}
         self.port = free_port()
         self.log = data_folder.with_suffix(".log")
-        self.process: Launched | None = None
+        self.process: subprocess.Popen[bytes] | None = None
         self._migrated = False
 
     @contextmanager
@@ -126,7 +118,7 @@ class ServerProcess:
         self._wait()
         return self
 
-    def _launch(self, environment: dict[str, str]) -> "Launched":
+    def _launch(self, environment: dict[str, str]) -> subprocess.Popen[bytes]:
         command = [sys.executable, "-m", *self._arguments()]
         with self.log.open("ab") as log:
             return subprocess.Popen(command, env=environment, stdout=log, stderr=log)

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from tools.benches import SCRIPTS, bench_commands, run_benches
+from bench.__main__ import SCRIPTS, bench_commands, run_benches
 
 
 def test_a_failed_and_a_hanging_bench_are_named_and_the_others_run(tmp_path: Path) -> None:
@@ -20,7 +20,10 @@ def test_a_failed_and_a_hanging_bench_are_named_and_the_others_run(tmp_path: Pat
 
 
 def test_every_bench_that_is_named_is_there() -> None:
-    assert {name.split()[0] for name in SCRIPTS} <= {path.stem for path in Path("tests/bench").glob("*.py")}
-    assert all(
-        Path(arguments[0]).is_file() for name, arguments in bench_commands().items() if name != "timings"
-    )
+    for name in SCRIPTS:
+        module, *parts = name.split()
+        source = Path("bench", f"{module}.py").read_text(encoding="utf-8")
+        assert "if __name__" in source, name
+        # `run_part` reads the first word after a bench that has parts.
+        assert "run_part(PARTS)" not in source or f'"{parts[0]}": ' in source, name
+    assert all(arguments[0] == "-m" for arguments in bench_commands().values())

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import pytest
 
+from bench.servers import nginx, nginx_configuration, nginx_program
 from tests.conftest import REPOSITORY
-from tools.load_nginx import configuration, nginx, nginx_program
 
 CLIP = bytes(range(256)) * 1000
 ADDRESS = f"/clips/{'ab' * 32}.mp4"
@@ -164,7 +164,7 @@ def test_the_file_keeps_no_addresses_and_says_what_was_changed_for_loopback(tmp_
     assert "access_log off;" in TEXT
     assert "error_log /dev/null" in TEXT
     assert "listen 443 ssl" in TEXT
-    site = (configuration(tmp_path, 8123, 8124).parent / "site.conf").read_text(encoding="utf-8")
+    site = (nginx_configuration(tmp_path, 8123, 8124).parent / "site.conf").read_text(encoding="utf-8")
     assert "server 127.0.0.1:8123;" in site
     assert "listen 127.0.0.1:8124" in site
     assert "ssl" not in site

@@ -12,11 +12,11 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
 
+from bench.raw_attacks import LENGTHS, SMUGGLED
 from server.core.settings import Settings
 from server.request_limits import ANONYMOUS_BYTES, SIGNED_IN_BYTES
 from tests.conftest import REPOSITORY
 from tests.helpers.ports import free_port
-from tools.raw_attacks import LENGTHS, SMUGGLED
 
 RUN_BYTES = Settings.model_fields["max_body_bytes"].default
 LIMITS = {

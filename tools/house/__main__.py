@@ -170,7 +170,7 @@ def recorded_rows() -> Iterator[Row]:
     result, commit = newest.get("test_all", ("measure: make test-all", ""))
     value = f"{result} ({commit})" if commit else str(result)
     yield Row("make test-all", value, "green", result == "green" if commit else None)
-    yield row("largest slowdown", "slower_percent", "%", 5, "tests/bench/before_and_after.py COMMIT 5")
+    yield row("largest slowdown", "slower_percent", "%", 5, "bench/before_and_after.py COMMIT 5")
 
 
 def main(arguments: list[str]) -> int:

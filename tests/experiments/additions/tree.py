@@ -16,6 +16,7 @@ COPIED = (
     "migrations",
     "tests",
     "tools",
+    "bench",
     "docs",
     "blink_engine",
 )

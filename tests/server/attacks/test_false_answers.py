@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from tools.false_answers import session
+from bench.false_answers import session
 
 
 def test_false_answers_at_full_speed_are_all_refused_and_hinder_nobody(tmp_path: Path) -> None:

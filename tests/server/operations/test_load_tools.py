@@ -10,14 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from bench import attack, clip_load
+from bench.load import divided
+from bench.raters import Tally, begin, prepare, run, stored
+from bench.servers import CLIP_BYTES, LoadServer, load_server, nginx, nginx_program
 from tests.helpers.attacked import api_token
-from tools import attack, attacks, load_clips
-from tools.load_client import Tally
-from tools.load_measures import stored
-from tools.load_nginx import nginx, nginx_program
-from tools.load_scenarios import begin, prepare, run
-from tools.load_server import CLIP_BYTES, LoadServer, load_server
-from tools.load_snapshots import divided
 
 RATERS, SECONDS, EVERY_S = 4, 3.0, 0.5
 STATUSES = {
@@ -41,13 +38,13 @@ def server() -> Iterator[LoadServer]:
 
 
 @pytest.fixture(scope="module")
-def target(server: LoadServer) -> attacks.Target:
-    owner = api_token(server.services, "read", "personal", "write", "export", name="owner")
+def target(server: LoadServer) -> attack.Target:
+    owner = api_token(server.opened, "read", "personal", "write", "export", name="owner")
 
     async def token() -> str:
         return await attack.run_of_attacker(server)
 
-    return attacks.Target(server.port, server.link, owner, asyncio.run(token()), attack.a_clip(server))
+    return attack.Target(server.port, server.link_token, owner, asyncio.run(token()), attack.a_clip(server))
 
 
 def test_the_raters_of_load_rate_and_everything_is_stored(server: LoadServer) -> None:
@@ -75,12 +72,12 @@ def test_a_rating_counts_for_a_snapshot_that_it_was_under_way_with() -> None:
     assert divided(tally, [(1.0, 2.0)]) == ([200.0, 5.0], [100.0, 7.0])
 
 
-@pytest.mark.parametrize("name", attacks.ATTACKS)
-def test_each_attack_reaches_the_server(target: attacks.Target, name: str) -> None:
+@pytest.mark.parametrize("name", attack.ATTACKS)
+def test_each_attack_reaches_the_server(target: attack.Target, name: str) -> None:
     answers: dict[str, int] = {}
     for seconds in (0.5, 4.0, 16.0, 64.0):  # a busy machine answers late, and what is sent is made first
         if not answers:
-            answers = asyncio.run(attacks.ATTACKS[name](target, time.monotonic() + seconds))
+            answers = asyncio.run(attack.ATTACKS[name](target, time.monotonic() + seconds))
     assert sum(answers.values()) > 0, answers
     if name in STATUSES:
         assert set(answers) <= STATUSES[name]
@@ -93,11 +90,11 @@ def fetched_by_urllib(port: int, path: str) -> bytes:
 
 
 def test_clips_as_fast_as_they_come_are_whole_ones_and_counted(server: LoadServer) -> None:
-    paths = load_clips.addresses(server)
-    assert 0 < len(paths) == len(set(paths)) <= load_clips.CLIPS_ASKED_FOR
+    paths = clip_load.addresses(server)
+    assert 0 < len(paths) == len(set(paths)) <= clip_load.CLIPS_ASKED_FOR
     assert len(fetched_by_urllib(server.port, paths[0])) == CLIP_BYTES
     before = server.cpu_s()
-    got = load_clips.measured(server.port, paths, 1.0, server.cpu_s)
+    got = clip_load.measured(server.port, paths, 1.0, server.cpu_s)
     assert got.clips > 0
     assert got.seconds >= 1.0
     assert 0 < got.sender_s <= server.cpu_s() - before
@@ -108,11 +105,11 @@ def test_clips_by_way_of_nginx_are_counted_as_nginxs(server: LoadServer, tmp_pat
     program = nginx_program()
     if program is None:
         pytest.skip("nginx is not installed here")
-    paths = load_clips.addresses(server)
+    paths = clip_load.addresses(server)
     with nginx(program, tmp_path, server.port) as proxy:
-        got = load_clips.measured(proxy.port, paths, 1.0, proxy.cpu_s)
+        got = clip_load.measured(proxy.port, paths, 1.0, proxy.cpu_s)
         servers_own = server.cpu_s()
-        again = load_clips.measured(proxy.port, paths, 1.0, proxy.cpu_s)
+        again = clip_load.measured(proxy.port, paths, 1.0, proxy.cpu_s)
         servers_own = server.cpu_s() - servers_own
     assert min(got.clips, again.clips) > 0
     # What nginx has it sends by itself: the server's part is that of a server that does nothing else.
@@ -147,7 +144,7 @@ def test_what_is_no_whole_clip_is_not_counted(answer: bytes, said: str) -> None:
     with socket.create_connection(answering.listener.getsockname()) as connection:
         connection.sendall(b"GET / HTTP/1.1\r\n\r\n")
         with pytest.raises(RuntimeError, match=said):
-            load_clips._take(connection, memoryview(bytearray(1024)))
+            clip_load._take(connection, memoryview(bytearray(1024)))
 
 
 def test_a_connection_closed_between_two_clips_counts_nothing() -> None:
@@ -155,7 +152,7 @@ def test_a_connection_closed_between_two_clips_counts_nothing() -> None:
     answering.start()
     with socket.create_connection(answering.listener.getsockname()) as connection:
         connection.sendall(b"GET / HTTP/1.1\r\n\r\n")
-        assert load_clips._take(connection, memoryview(bytearray(1024))) is False
+        assert clip_load._take(connection, memoryview(bytearray(1024))) is False
 
 
 def test_a_clip_in_two_pieces_behind_its_head_is_one() -> None:
@@ -164,5 +161,5 @@ def test_a_clip_in_two_pieces_behind_its_head_is_one() -> None:
     answering.start()
     with socket.create_connection(answering.listener.getsockname()) as connection:
         connection.sendall(b"GET / HTTP/1.1\r\n\r\n")
-        assert load_clips._take(connection, memoryview(bytearray(1024))) is True
+        assert clip_load._take(connection, memoryview(bytearray(1024))) is True
         assert connection.recv(10) == b""

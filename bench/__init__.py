@@ -1,0 +1,1 @@
+"""What measures Palpebra: speed, memory, accuracy, load and attacks. No program imports it."""
