@@ -39,7 +39,7 @@ check-style:
 
 check-types:
 	@$(BIN)/mypy
-	@$(BIN)/mypy --explicit-package-bases --follow-imports=silent tools bench
+	@$(BIN)/mypy --explicit-package-bases --follow-imports=silent tools bench packages/screen_bench/screen_bench packages/blender_addon/addon_build
 
 check-imports:
 	@$(BIN)/lint-imports
@@ -83,7 +83,7 @@ screenshots: setup-test ## make the pictures of README and docs anew (needs the 
 	@$(BIN)/python tools/screenshots_builder.py
 
 scope: setup-test ## what reaches a virtual screen against what is recorded (hours; SCOPE=short, SCOPE="rows --plays 20")
-	@$(BIN)/python -m tools.scope $(SCOPE)
+	@$(BIN)/python -m screen_bench $(SCOPE)
 
 load: setup-test ## real servers under load and kill -9, a table at the end (LOAD="--share 0.2 --only sqlite")
 	@$(BIN)/python -m bench.load $(LOAD)
@@ -101,10 +101,10 @@ sbom: setup-test ## bill of materials (CycloneDX) and licences of all that a ser
 	@$(BIN)/python tools/sbom.py
 
 addon: setup ## build the Blender add-on: dist/palpebra_blinks-VERSION.zip
-	@$(BIN)/python tools/build_addon.py
+	@$(BIN)/python -m addon_build.addon
 
 playground: setup ## build the blink engine's pages that open from a folder: dist/playground.html, dist/vrm.html
-	@$(BIN)/python tools/build_playground.py
+	@$(BIN)/python -m addon_build.playground
 
 docs: setup-test ## write the references in docs/ (data dictionary, settings, declaration) from the code
 	@$(BIN)/python tools/reference.py

@@ -1,6 +1,6 @@
 import { defineConfig } from "vite";
 
-// One script, which tools/build_playground.py puts into a page that opens from a folder.
+// One script, which addon_build/playground.py puts into a page that opens from a folder.
 export default defineConfig({
   build: {
     outDir: "dist/vrm",

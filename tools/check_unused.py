@@ -15,16 +15,18 @@ ROOT = Path(__file__).resolve().parent.parent
 OWN = (
     "analysis",
     "bench",
-    "blender_addon",
     "blink_engine",
     "experiments",
     "server",
+    "packages/blender_addon/addon_build",
+    "packages/blender_addon/blender_addon",
     "packages/face_baking/face_baking",
+    "packages/screen_bench/screen_bench",
     "stimuli_builder",
     "tools",
     "video_conversion",
 )
-CALLERS = (*OWN, "tests", "migrations", "frontend/scripts")
+CALLERS = (*OWN, "tests", "packages", "migrations", "frontend/scripts")
 DECORATORS = [
     "@*router.*",
     "@app.*",

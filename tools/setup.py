@@ -45,7 +45,7 @@ STARTED = (
 )
 
 
-WORKSPACE = ("packages/face_baking",)
+WORKSPACE = ("packages/face_baking", "packages/blender_addon", "packages/screen_bench")
 """Packages of the workspace: they use the main one, which imports none of them."""
 
 

@@ -3,11 +3,11 @@
 from pathlib import Path
 
 import pytest
+from addon_build.playground import build_scripts, playground_page, vrm_page
 from playwright.sync_api import BrowserContext
 
 from blink_engine import BlinkEngine
 from stimuli_builder.clips.preview import write_strips
-from tools.build_playground import build_scripts, playground_page, vrm_page
 
 FACES = ".playground-side:first-child canvas:not(.playground-trace)"
 DARK = """() => [...document.querySelectorAll('FACES')].map((canvas) => {

@@ -27,7 +27,7 @@ def test_the_pages_and_their_lock_file_have_it() -> None:
     [
         ("CITATION.cff", r"^version: (\S+)$"),
         ("docker-compose.yml", r"image: palpebra:(\S+)$"),
-        ("blender_addon/blender_manifest.toml", r'^version = "(.+)"$'),
+        ("packages/blender_addon/blender_addon/blender_manifest.toml", r'^version = "(.+)"$'),
         ("docs/blink-engine.md", r"palpebra_blinks-(\d+\.\d+\.\d+)\.zip"),
     ],
 )

@@ -1,4 +1,4 @@
-// A headed browser for tools/scope: node driver.mjs chromium|firefox PROGRAM, then one JSON command a line.
+// A headed browser for packages/screen_bench: node driver.mjs chromium|firefox PROGRAM, then one JSON command a line.
 // The page goes through consent and texts by itself whenever its state is asked for.
 import { createInterface } from "node:readline";
 import { mkdtemp, rm } from "node:fs/promises";

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Page
+from screen_bench.display import HEIGHT_PX, WIDTH_PX, Display, missing_here
 from sqlalchemy import select
 
 from server.cli_common import migrated_services
@@ -18,7 +19,6 @@ from tests.browser.conftest import CHROMIUM_FLAGS, system_chromium
 from tests.browser.server_process import ServerProcess
 from tests.browser.studies import PLAIN
 from tests.browser.visit import Visit
-from tools.scope.display import HEIGHT_PX, WIDTH_PX, Display, missing_here
 
 pytestmark = pytest.mark.browser
 

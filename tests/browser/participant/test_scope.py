@@ -7,17 +7,17 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from screen_bench.browser import program
+from screen_bench.compare import POLL_MS, REFRESH_MS, Play
+from screen_bench.conditions import CONDITIONS
+from screen_bench.display import Display, missing_here
+from screen_bench.measure import measure
+from screen_bench.pairs import APART_MS, measure_pairs
+from screen_bench.results import cells
+from screen_bench.views import count_views
 
 from tests.browser.server_process import ServerProcess
 from tests.helpers.processor_waits import ProcessorWaits
-from tools.scope.browser import program
-from tools.scope.compare import POLL_MS, REFRESH_MS, Play
-from tools.scope.conditions import CONDITIONS
-from tools.scope.display import Display, missing_here
-from tools.scope.measure import measure
-from tools.scope.pairs import APART_MS, measure_pairs
-from tools.scope.table import cells
-from tools.scope.views import count_views
 
 pytestmark = pytest.mark.browser
 LOG = logging.getLogger(__name__)
