@@ -16,6 +16,7 @@ COPY pyproject.toml LICENSE docs/server.md ./
 COPY experiments experiments
 COPY server server
 COPY stimuli_builder stimuli_builder
+COPY table_files table_files
 COPY video_conversion video_conversion
 COPY analysis analysis
 COPY migrations migrations

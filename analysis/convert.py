@@ -10,6 +10,7 @@ from pydantic import TypeAdapter, ValidationError
 from experiments.columns import Column
 from experiments.columns.column import plain_name, unlike
 from experiments.errors import InputError, expectation, shown, wrong_value
+from table_files.open import reader_of
 
 # A CSV with the declaration of its columns beside, as a table of numbers, times and named levels.
 
@@ -51,11 +52,11 @@ def read_typed(path: Path, columns: Columns) -> pd.DataFrame:
     InputError
         The CSV has other columns than are declared, or a number that is none.
     """
-    frame = pd.read_csv(path, dtype=str, keep_default_na=False, encoding="utf-8-sig")
-    names = [column.name for column in columns]
-    if list(frame.columns) != names:
-        odd = sorted(set(frame.columns) ^ set(names)) or ["their order"]
+    reader = reader_of(path)
+    names, columns_there = [column.name for column in columns], reader.header()
+    if odd := sorted(set(columns_there) ^ set(names)):
         raise InputError(f"{path.name}: expected the declared columns, got others ({odd[0]})")
+    frame = reader.cells(names).rows
     return pd.DataFrame({column.name: _typed(frame[column.name], column, path) for column in columns})
 
 

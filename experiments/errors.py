@@ -1,56 +1,18 @@
 """One way to refuse bad input: what was expected, what came, and what to do."""
 
 import json
-from collections.abc import Callable, Iterable, Mapping
-from difflib import get_close_matches
+from collections.abc import Callable, Mapping
 from typing import Any
 
-# One way to refuse bad input: say what was expected, what came, and what to do.
-
-
-# Decision 0001: One contract package.
-class InputError(ValueError):
-    """Input a person gave cannot be used. The message is one line, meant for that person.
-
-    Command lines print it without a traceback and exit with code 2; the server answers with a 4xx.
-    """
-
-
-def nearest(word: str, candidates: Iterable[str], cutoff: float = 0.5) -> str | None:
-    """Return the candidate most like `word`, or None where none is as like as `cutoff` (1: the same)."""
-    choices = {candidate.casefold(): candidate for candidate in candidates}
-    nearest = get_close_matches(word.casefold(), list(choices), n=1, cutoff=cutoff)
-    return choices[nearest[0]] if nearest else None
-
-
-def did_you_mean(word: str, candidates: Iterable[str]) -> str:
-    """Return `; did you mean 'x'?` or the list of what is allowed, ready to end an error line."""
-    allowed = list(candidates)
-    near = nearest(word, allowed)
-    if near is not None:
-        return f"; did you mean '{near}'?"
-    return f"; expected one of: {', '.join(allowed)}" if allowed else ""
+from table_files.errors import InputError as InputError
+from table_files.errors import counted as counted
+from table_files.errors import did_you_mean as did_you_mean
+from table_files.errors import nearest as nearest
 
 
 def and_others(number: int) -> str:
     """Return ` (and 2 more problems)`, to end a line that tells the first; nothing where it is alone."""
     return f" (and {number} more problem{'s' if number > 1 else ''})" if number else ""
-
-
-# Numbers with the noun that they count.
-
-
-def counted(number: int, noun: str) -> str:
-    """How many of what.
-
-    Examples
-    --------
-    >>> counted(1, "blink")
-    '1 blink'
-    >>> counted(2000, "frame")
-    '2,000 frames'
-    """
-    return f"{number:,} {noun}{'' if number == 1 else 's'}"
 
 
 # What was expected and what came, in words, for every value that a model refuses.

@@ -1,7 +1,5 @@
 """Which cell each of somebody's own clips belongs to: by a table of levels, or by a pattern of file names."""
 
-import csv
-import io
 import math
 import re
 import unicodedata
@@ -14,7 +12,7 @@ from pathlib import PurePosixPath
 
 from experiments.errors import InputError, did_you_mean
 from experiments.kinds import reserved_names
-from experiments.text_tables import separator_of
+from table_files.delimited import NamedRows, table_of_text
 
 # Patterns of file names such as `{character}_{speed}.mp4`: what stands in the place of each field.
 #
@@ -256,17 +254,12 @@ def one_form(name: str) -> str:
 
 def levels_from_table(text: str, files: Iterable[str]) -> Placed:
     """Read levels from CSV text; each clip needs one row, each row a clip, every level a value."""
-    try:
-        return _read_table(text, files)
-    except csv.Error as error:
-        raise InputError(f"the table is no CSV that can be read ({error}); write it anew") from error
+    return levels_from_rows(table_of_text(text, "the table").named_rows(), files)
 
 
-def _read_table(text: str, files: Iterable[str]) -> Placed:
-    reader = csv.DictReader(
-        io.StringIO(text.lstrip("\ufeff")), delimiter=separator_of(text.partition("\n")[0])
-    )
-    columns = [name for name in (reader.fieldnames or []) if name]
+def levels_from_rows(table: NamedRows, files: Iterable[str]) -> Placed:
+    """Read levels from a table as `levels_from_table` does."""
+    columns = [name for name in table.header if name]
     if "file" not in columns or len(columns) < 2:
         raise InputError(
             f"expected a CSV with a column 'file' and one a factor, got {', '.join(columns) or 'none'}"
@@ -274,7 +267,7 @@ def _read_table(text: str, files: Iterable[str]) -> Placed:
     factors = [name for name in columns if name not in ("file", FIRST_FIELD)]
     refuse_reserved_factors(factors)
     known, rows = set(files), {}
-    for number, row in enumerate(reader, start=2):
+    for number, row in table.rows:
         name = one_form((row["file"] or "").strip())
         if name not in known:
             raise InputError(

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-PACKAGES = ("analysis", "experiments", "server", "stimuli_builder", "video_conversion")
+PACKAGES = ("analysis", "experiments", "server", "stimuli_builder", "table_files", "video_conversion")
 PRINTERS = ("Console", "TextColumn")
 """What reads square brackets in a text as markup unless it is switched off."""
 ROOT = Path(__file__).parents[1]

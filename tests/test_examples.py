@@ -7,7 +7,7 @@ import pytest
 
 from tests.conftest import REPOSITORY
 
-PACKAGES = ("server", "experiments", "analysis", "stimuli_builder", "blink_engine")
+PACKAGES = ("server", "experiments", "analysis", "stimuli_builder", "table_files", "blink_engine")
 WITH_EXAMPLES = sorted(
     ".".join(path.relative_to(REPOSITORY).with_suffix("").parts)
     for package in PACKAGES

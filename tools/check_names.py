@@ -25,6 +25,7 @@ FOLDERS = (
     "packages/screen_bench/screen_bench",
     "stimuli_builder",
     "tools",
+    "table_files",
     "video_conversion",
 )
 EMPTY = {"found", "place", "wanted", "who"}

@@ -24,6 +24,7 @@ OWN = (
     "packages/screen_bench/screen_bench",
     "stimuli_builder",
     "tools",
+    "table_files",
     "video_conversion",
 )
 CALLERS = (*OWN, "tests", "packages", "migrations", "frontend/scripts")

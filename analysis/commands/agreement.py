@@ -109,7 +109,7 @@ def _save_scores(path: Path, scores: tuple[tuple[str, float], ...], case: str) -
     import csv
 
     from experiments.files import whole_file
-    from experiments.text_tables import guarded_row
+    from table_files.formulas import guarded_row
 
     with whole_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
         out = csv.writer(file, lineterminator="\n")

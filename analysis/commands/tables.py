@@ -68,7 +68,7 @@ def reshape(
     """
     from analysis.read.wide import lengthen
     from experiments.files import check_targets, whole_file
-    from experiments.text_tables import guarded_cell, guarded_row
+    from table_files.formulas import guarded_cell, guarded_row
 
     check_targets([out])
     table = lengthen(file, columns, rating)

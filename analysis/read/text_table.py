@@ -10,12 +10,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from analysis.read.files.cells import Cells
-from analysis.read.files.open import Reader, reader_of
-from analysis.read.files.programs import program_of, trials_only
+from analysis.read.folder import reader_of
+from analysis.read.programs import program_of, trials_only
 from analysis.read.wide import said_of_copies, wide_hint
 from analysis.within.level_codes import natural_order
 from experiments.errors import InputError, nearest
+from table_files.cells import Cells
+from table_files.open import Reader
 
 NAMED_ROWS = 5
 NAMED_COLUMNS = 30

@@ -11,9 +11,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from analysis.read.files.cells import Cells
-from analysis.read.files.open import reader_of
+from analysis.read.folder import reader_of
 from experiments.errors import InputError
+from table_files.cells import Cells
 
 # Blocks of rows that are in a table twice, as where a file was pasted twice.
 

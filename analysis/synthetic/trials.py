@@ -18,7 +18,7 @@ from experiments.design import blocks, exemplar_key, rated_clips
 from experiments.files import whole_file
 from experiments.kinds.clip_rating import RATINGS
 from experiments.schema.canonical import definition_sha256
-from experiments.text_tables import guarded_row
+from table_files.formulas import guarded_row
 
 Integers = NDArray[np.int64]
 Row = dict[str, Any]

@@ -15,13 +15,13 @@ from experiments.columns import View
 from experiments.columns.view import Dialect, Stretch, Stretches, levels_at, with_levels
 from experiments.errors import InputError
 from experiments.kinds import KINDS
-from experiments.text_tables import csv_lines, csv_text
 from server.core.values import encoded
 from server.exports import repository
 from server.exports.extract import Extract
 from server.exports.repository import Rows, Runs
 from server.models import Study
 from server.studies.lookup import active_definition, all_definitions
+from table_files.formulas import csv_lines, csv_text
 
 # The lines of the tidy CSV: what the rows of a run or of a clip share is read and written once.
 #

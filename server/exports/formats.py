@@ -15,7 +15,6 @@ from sqlalchemy.orm import Session
 from experiments.columns import Column
 from experiments.columns.runs import IDENTITY_COLUMNS
 from experiments.errors import InputError
-from experiments.text_tables import guarded_csv
 from server.core.values import encoded, now
 from server.exports import psych_ds, repository, tables
 from server.exports.csv_lines import csv_pieces, rating_count, rating_pieces, whole
@@ -23,6 +22,7 @@ from server.exports.extract import Extract
 from server.exports.tables import ExportTable, answers_table, cells_of, runs_table, wide_table
 from server.models import Study
 from server.studies.lookup import active_definition, all_definitions
+from table_files.formulas import guarded_csv
 
 # Tables as SPSS or Parquet, written by the program `analysis`: the server carries no numerics.
 

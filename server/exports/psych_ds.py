@@ -16,7 +16,6 @@ from experiments.design import rated_levels
 from experiments.kinds import KINDS
 from experiments.kinds.scales import scales_of
 from experiments.rules import DropFailedPlays, DropSlowTrials, ExcludeIncomplete
-from experiments.text_tables import guarded_csv
 from server.core.values import encoded, iso
 from server.exports.csv_lines import csv_pieces, zip_pieces
 from server.exports.extract import Extract
@@ -33,6 +32,7 @@ from server.exports.tables import (
 from server.models import Study
 from server.studies.lookup import all_definitions, definition_of
 from server.studies.series import version_of_series
+from table_files.formulas import guarded_csv
 
 # A table without what may tell who a person is, for datasets that are handed on.
 #

@@ -6,7 +6,6 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query, Response
 from fastapi.responses import PlainTextResponse
 
-from experiments.text_tables import guarded_table
 from server.accounts.audit import record
 from server.accounts.identity import Myself, Viewer, Writer
 from server.accounts.workspaces import Uploader
@@ -53,6 +52,7 @@ from server.studies.schemas import (
     StudyDetail,
     StudySummary,
 )
+from table_files.formulas import guarded_table
 
 # Studies on the dashboard.
 

@@ -1,6 +1,5 @@
 """The shipped blinks and the characters at closures, for the blinks page."""
 
-import csv
 import json
 from collections import defaultdict
 from functools import lru_cache
@@ -13,6 +12,7 @@ from pydantic import BaseModel, Field, ValidationError
 from server.accounts.identity import Viewer
 from server.context import ServicesDep
 from server.core.errors import ERROR_RESPONSES, NotFound
+from table_files.delimited import delimited_table
 
 # The shipped blinks, recorded and modelled, read from the files that come with `stimuli`.
 
@@ -57,7 +57,7 @@ def get_library(services: ServicesDep, _identity: Viewer) -> BlinkLibrary:
 def _library(folder: Path, _changed_ns: int) -> BlinkLibrary:
     curves: dict[str, list[float]] = defaultdict(list)
     others: dict[str, list[float]] = defaultdict(list)
-    for row in _rows(folder / "closures.csv"):
+    for _, row in delimited_table(folder / "closures.csv").named_rows().rows:
         curves[row["profile_id"]].append(float(row["closure"]))
         if row.get("closure_other"):
             others[row["profile_id"]].append(float(row["closure_other"]))
@@ -66,15 +66,10 @@ def _library(folder: Path, _changed_ns: int) -> BlinkLibrary:
             {name: row[name] for name in RecordedProfile.model_fields if name in row}
             | {"closure": curves[row["profile_id"]], "closure_other": others[row["profile_id"]]}
         )
-        for row in _rows(folder / "profiles.csv")
+        for _, row in delimited_table(folder / "profiles.csv").named_rows().rows
     ]
     model = json.loads((folder / "model.json").read_text(encoding="utf-8"))
     return BlinkLibrary(fps=float(model.get("fps", 300)), profiles=profiles, model=model)
-
-
-def _rows(path: Path) -> list[dict[str, str]]:
-    with path.open(encoding="utf-8", newline="") as stream:
-        return list(csv.DictReader(stream))
 
 
 # The characters at closures from open to shut, for the blinks page: files that `stimuli strips` wrote.

@@ -287,9 +287,9 @@ def manifest_command(
 ) -> None:
     """Write the manifest of somebody's own clips."""
     from experiments.load import load_experiment
-    from experiments.own_clips import levels_from_names, levels_from_table
-    from experiments.text_tables import whole_text_of
+    from experiments.own_clips import levels_from_names, levels_from_rows
     from stimuli_builder.clips.own_manifest import clip_names, understood, write_own_manifest
+    from table_files.open import named_rows
 
     if (pattern is None) == (table is None):
         raise InputError("expected either --pattern or --table, to know which levels each clip has")
@@ -299,7 +299,7 @@ def manifest_command(
     elif table is not None:
         if not table.is_file():
             raise InputError(f"no file {table}; expected a CSV with a column 'file' and one a factor")
-        placed = levels_from_table(whole_text_of(table), names)
+        placed = levels_from_rows(named_rows(table), names)
     print(*understood(placed, pattern), sep="\n", flush=True)
     declared = load_experiment(experiment) if experiment else None
     with _looking_into(len(placed)) as report:

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from experiments.errors import InputError
 from experiments.files import whole_text
-from experiments.text_tables import separator_of, whole_text_of
 from stimuli_builder.sync_patch.film import NO_FRAME, NUMBERS, UNREADABLE
 
 RATES = (24.0, 25.0, 30.0, 50.0, 60.0)
@@ -188,10 +187,11 @@ def read_trace(path: Path) -> Trace:
     """Read a CSV of two columns with a line of names: time in ms, value."""
     if not path.is_file():
         raise InputError(f"{path}: expected a CSV of a photodiode, found none; check the path")
-    text = whole_text_of(path)
-    lines = list(csv.reader(text.splitlines(), delimiter=separator_of(text.partition("\n")[0])))[1:]
+    from stimuli_builder.blinks.csv_table import read_table  # pandas, for this alone
+
+    table = read_table(path)
     try:
-        rows = np.array([[float(cell) for cell in line[:2]] for line in lines if line], np.float64)
+        rows = table.iloc[:, :2].to_numpy(dtype=np.float64)
     except ValueError as error:
         raise InputError(f"{path}: expected two columns of numbers, time_ms and value ({error})") from error
     if rows.ndim != 2 or rows.shape[1] != 2 or len(rows) < 2:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from experiments.errors import InputError
 from experiments.files import whole_text
 from stimuli_builder.tracking.shapes import EYE_POINTS, Points
+from table_files.open import named_rows
 
 # The track table: one row a frame, written as tracking goes, read back column by column.
 
@@ -114,17 +115,12 @@ class TrackWriter:
 
 def track_rows(path: Path) -> Iterator[dict[str, str]]:
     """Rows of a track (or of the actor's truth) one at a time, as text."""
-    try:
-        with path.open(encoding="utf-8", newline="") as stream:
-            reader = csv.DictReader(stream)
-            names = reader.fieldnames or []
-            if "x01" not in names or "frame" not in names:
-                raise InputError(f"{path}: not a track; expected the columns frame, time_s, x01, y01 ...")
-            yield from reader
-    except FileNotFoundError as error:
-        raise InputError(f"{path}: expected a track, found no file; make one with 'stimuli track'") from error
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: not a track (it is not text)") from error
+    if not path.is_file():
+        raise InputError(f"{path}: expected a track, found no file; make one with 'stimuli track'")
+    header, rows = named_rows(path)
+    if "x01" not in header or "frame" not in header:
+        raise InputError(f"{path}: not a track; expected the columns frame, time_s, x01, y01 ...")
+    yield from (row for _, row in rows)
 
 
 def numbers(row: dict[str, str], names: list[str], where: str) -> NDArray[np.float64]:

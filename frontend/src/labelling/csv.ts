@@ -16,7 +16,7 @@ const NUMBER = /^\s*[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?\s*$/i;
 /** A plus or minus counts where an operand may follow: the ";-)" of a comment is not a formula. */
 const INNER = /^([=@＝＠﹦﹫]|[+\-＋－﹢﹣][^)\]/|])/;
 
-/** The text of a cell with an apostrophe where a spreadsheet would run it as a formula (experiments/text_tables.py). */
+/** The text of a cell with an apostrophe where a spreadsheet would run it as a formula (table_files/formulas.py). */
 export function guardedText(text: string): string {
   const whole = /^[=+\-@＝＋－＠﹦﹢﹣﹫\t\r\n]/.test(text) && !NUMBER.test(text) ? `'${text}` : text;
   // Without lookbehind, which Safari before 16.4 cannot read: the parts keep their separators.

@@ -6,7 +6,6 @@ import pandas as pd
 import pyreadstat
 import pytest
 
-from analysis.read.files import delimited
 from analysis.read.long_csv import read_long_table
 from analysis.read.text_table import _names_to_read
 from analysis.within.cell_means import cell_table
@@ -38,9 +37,9 @@ def test_text_with_a_byte_order_mark_is_read(tmp_path, encoding, separator) -> N
     ("content", "said"),
     [
         ("\ufeffid,face\nx".encode("utf-16-le")[:-1], r"a.csv is not UTF-16 text .*; save it as CSV UTF-8"),
-        (TEXT.encode("latin-1"), r"a.csv is not UTF-8 text .*; save it as CSV UTF-8"),
+        (TEXT.encode("cp1250") + b"\x81", r"a.csv is not UTF-8 text .*; save it as CSV UTF-8"),
     ],
-    ids=["cut off", "Latin-1"],
+    ids=["cut off", "no letter of Windows-1252"],
 )
 def test_other_encodings_say_what_to_do(tmp_path, content, said) -> None:
     (tmp_path / "a.csv").write_bytes(content)
@@ -178,8 +177,7 @@ def test_lines_are_those_of_an_editor_where_blank_ones_are_skipped(tmp_path, bod
         ratings(path)
 
 
-def test_lines_stay_true_over_blocks(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(delimited, "_BLOCK", 7)
+def test_lines_stay_true_over_many_blank_ones(tmp_path) -> None:
     path = tmp_path / "a.csv"
     path.write_text("id,face,score\n" + "\np1,a,3\n" * 20 + "p2,a,x\n", encoding="utf-8")
     with pytest.raises(InputError, match=r"got 'x' in line 42;"):

@@ -81,7 +81,7 @@ def test_blank_lines_and_blanks_around_cells_do_not_matter(tmp_path) -> None:
         ("id,y,f\n1,2\n", "line 2 has 2 cells, the header 3"),
         ('id,y,f\n1,2,"a\n', "line 2 opens is never closed"),
         ("id,y,f\n1,,a\n", "no rating in any row"),
-        (b"id,y,f\nM\xfcller,2,a\n", "not UTF-8"),
+        (b"id,y,f\nM\xfcller\x81,2,a\n", "not UTF-8"),
         (b"\x89PNG\x00\xff\xfe", "not UTF-8"),
     ],
 )

@@ -11,6 +11,7 @@ from tests.experiments.additions.added import Edit
 COPIED = (
     "experiments",
     "server",
+    "table_files",
     "video_conversion",
     "analysis",
     "migrations",

@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from experiments.text_tables import unguarded_cell
 from server.context import Services
+from table_files.formulas import unguarded_cell
 from tests.helpers.admins import Admin
 from tests.helpers.studies import SHORT, Participant, add_study
 

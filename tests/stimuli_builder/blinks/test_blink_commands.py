@@ -218,7 +218,7 @@ def test_every_format_is_exported(stimuli, tmp_path, name):
         (["export", "--format", "maya", "--fps", "31", "--out", "x"], "nearest is --fps 30"),
         (["fit", "--eyes", "bth"], "did you mean 'both'"),
         (["fit", "--components", "99"], "allow 1 to"),
-        (["fit", "none.csv"], "cannot be read"),
+        (["fit", "none.csv"], "no file none.csv; expected a table"),
         (["sample", "--duration", "0", "--out", "x.csv"], "a blink lasts"),
         (["sample", "--model", "none.json", "--out", "x.csv"], "cannot be read"),
         (["sample", "--out", "x.csv", "--plot", "x.bmp"], "no figure format"),

@@ -113,7 +113,7 @@ def test_the_table_of_irises_is_not_written_over(stimuli, close_up, tmp_path):
     [
         ("frame,iris_diameter_px\n0,\n1,46\n", "with 5 irises or more, got 1"),
         ("frame,a\n0,1\n", "with 5 irises or more, got 0"),
-        (None, "cannot be read"),
+        (None, "expected a table as CSV, Excel (.xlsx), SPSS (.sav) or JSON"),
     ],
 )
 def test_a_table_without_irises_is_no_scale(stimuli, close_up, tmp_path, content, message):

@@ -130,7 +130,7 @@ def test_a_file_that_is_no_table_is_refused(tmp_path, content):
 
 
 def test_a_missing_file_is_refused(tmp_path):
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match=r"no file .*none\.csv; expected a table"):
         read_series(tmp_path / "none.csv", [], 240)
 
 

@@ -8,9 +8,9 @@ import pandas as pd
 import pytest
 
 from experiments.errors import InputError
-from experiments.text_tables import guarded_cell
 from stimuli_builder.blinks.csv_table import NOTE, line_of, read_table, write_table
 from stimuli_builder.blinks.series import read_series
+from table_files.formulas import guarded_cell
 
 
 def test_semicolons_and_decimal_commas_are_read_and_said(stimuli, series_file, tmp_path):
@@ -50,7 +50,9 @@ def test_decimal_commas_among_commas_are_refused(tmp_path, text):
     """The first column would have become an index, and the digits behind the commas the distance."""
     path = tmp_path / "t.csv"
     path.write_text(text, encoding="utf-8")
-    with pytest.raises(InputError, match="more fields than the header names columns"):
+    with pytest.raises(
+        InputError, match=r"line 2 has \d cells, the header \d; .* semicolons where commas are decimal"
+    ):
         read_table(path)
 
 
@@ -184,7 +186,7 @@ TITLED = "Recording of Monday\nName,Value\na,b,c,d,e\n1,2,3,4,5\n"
         ("a.asc", ASC, "EyeLink recording"),
         ("a.txt", ASC, "EyeLink recording"),
         ("a.csv", DEEPLABCUT, "DeepLabCut table of points"),
-        ("a.csv", TITLED, "line 2 has 2 fields, the header line 1|line 3 has 5 fields"),
+        ("a.csv", TITLED, "line 2 has 2 cells, the header 1; .* delete lines above the header"),
     ],
 )
 def test_files_of_other_programs_are_refused_by_what_they_are(tmp_path, name, content, said):

@@ -85,13 +85,13 @@ def test_a_table_of_profiles_with_semicolons(tmp_path: Path) -> None:
         ("closure\n0\n1\n", "at least 3 samples of closure, found 2"),
         ("closure\n0\n1,2\n1,2,3\n0\n", "closure must be a number, sample 3 is '1,2,3'"),
         ("closure\n0,1\n1,1\n0,1\n", "between 0 .open. and 1 .closed., sample 2 is 1.1"),
-        ("closure,closure_other\n0,0\n0,5,0,4\n1,1\n0,0\n", "line 3 has 4 fields, the header line 2"),
+        ("closure,closure_other\n0,0\n0,5,0,4\n1,1\n0,0\n", "line 3 has 4 cells, the header 2"),
         ("closure\n0\n1.3\n0\n", "between 0 .open. and 1 .closed., sample 2 is 1.3"),
         ("closure\n0\n-0.2\n0\n", "sample 2 is -0.2"),
         ("closur\n0\n1\n0\n", "no column 'closure'; did you mean 'closur'"),
         ("run,score\n1,2\n", r"no column 'closure'; expected one blink .* or a table of profiles \(NAME"),
         ("closure\n1\n0.5\n0\n", "must lie inside the blink"),
-        ("", "bad.csv is empty; expected a CSV table"),
+        ("", "bad.csv is empty; expected a table"),
     ],
 )
 def test_bad_files_are_refused_in_one_line(tmp_path: Path, text: str, line: str) -> None:

@@ -46,7 +46,7 @@ def test_a_missing_frame_is_a_long_interval(tmp_path: Path, capsys: pytest.Captu
     [
         ("time_ms,value\n0,1\n0,2\n", "expected times that grow"),
         ("time_ms,value\n0,one\n", "expected two columns of numbers"),
-        ("time_ms,value\n", "expected two columns of numbers"),
+        ("time_ms,value\n", "has a header but no rows"),
     ],
 )
 def test_bad_traces_are_one_line(tmp_path: Path, text: str, message: str) -> None:

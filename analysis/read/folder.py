@@ -16,9 +16,11 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from analysis.read.files.cells import Cells
-from analysis.read.files.delimited import delimited_cells, delimited_header
 from experiments.errors import InputError
+from table_files.cells import Cells
+from table_files.delimited import delimited_table
+from table_files.open import Reader, delimited_cells
+from table_files.open import reader_of as reader_of_file
 
 # Files of a folder that were joined of others of it, known by what their cells say, not by their bytes.
 
@@ -107,6 +109,13 @@ class Folder:
         return [*shared, *[ORIGIN] * origin]
 
 
+def reader_of(path: Path) -> Reader:
+    """The reader of a file or a folder of files."""
+    if path.is_dir():
+        return Reader(lambda: header(path), lambda names: cells(path, names))
+    return reader_of_file(path)
+
+
 def header(folder: Path) -> list[str]:
     """Columns that every data file has, and those of the files' names."""
     return _known(folder).header
@@ -147,7 +156,7 @@ def _look_through(folder: Path, stamps: tuple[tuple[Path, int, int], ...]) -> Fo
     filled = [path for path, rows in tables.items() if any(rows[name].str.strip().any() for name in rows)]
     if not filled:
         raise InputError(f"no data file of the folder {folder.resolve().name} has rows")
-    files = tuple(DataFile(path, tuple(delimited_header(path)[0]), names_of(folder, path)) for path in filled)
+    files = tuple(DataFile(path, delimited_table(path).header, names_of(folder, path)) for path in filled)
     sort = "Psych-DS folder" if _is_psych_ds(folder) else "folder"
     said = [f"read {len(files)} data file{'s' * (len(files) > 1)} of the {sort} {folder.name}"]
     if without_rows := [path.name for path in paths if path not in filled]:
@@ -183,7 +192,7 @@ def _table(path: Path) -> pd.DataFrame:
     """All cells of a file, each column once; none of a file that holds nothing."""
     if not path.read_bytes().strip(b"\xef\xbb\xbf\xff\xfe\0\r\n\t ,;"):
         return pd.DataFrame()
-    return delimited_cells(path, list(dict.fromkeys(delimited_header(path)[0]))).rows
+    return delimited_cells(path, list(dict.fromkeys(delimited_table(path).header))).rows
 
 
 def _columns_of_some(files: Sequence[DataFile]) -> list[str]:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from experiments.text_tables import csv_text, guarded_cell, guarded_csv, guarded_table, unguarded_cell
+from table_files.formulas import csv_text, guarded_cell, guarded_csv, guarded_table, unguarded_cell
 
 FORMULAS = [
     "=1", "+1+1", "-1+1", "@SUM(A1)", "\t=1", "\r=1", "\n=1", "-", "+fast",

@@ -5,10 +5,10 @@ import zipfile
 import openpyxl
 import pytest
 
-from analysis.read.files import workbook as workbook_reader
-from analysis.read.files.workbook import _pages
 from analysis.read.long_csv import read_long_table
 from experiments.errors import InputError
+from table_files import workbook as workbook_reader
+from table_files.workbook import _pages
 
 RELATIONS, TYPES = "xl/_rels/workbook.xml.rels", "[Content_Types].xml"
 SHEET = "xl/worksheets/sheet1.xml"

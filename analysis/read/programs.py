@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
-from analysis.read.files.cells import Cells
+from table_files.cells import Cells
 
 EMPTY = frozenset({"", "null", "None", "undefined", '""', "NaN"})
 

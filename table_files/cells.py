@@ -1,13 +1,17 @@
 """What every reader of a file gives: a header and cells of text."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import date, datetime, time
-from typing import Any
+from numbers import Integral, Real
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-import pandas as pd
-from numpy.typing import NDArray
+from table_files.formulas import unguarded_cell
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pandas as pd
+    from numpy.typing import NDArray
 
 # The text of a value, as a person would type it; free of pandas, for readers that start anew.
 
@@ -16,9 +20,9 @@ def cell_text(value: Any) -> str:
     """A value of a sheet as a person would type it: whole numbers without a point, days as 2026-11-22."""
     if value is None or value != value:  # NaN, and pandas' time that is none
         return ""
-    if isinstance(value, bool | np.bool_):
-        return str(bool(value))
-    if isinstance(value, float | np.floating):
+    if isinstance(value, bool):
+        return str(value)
+    if isinstance(value, Real) and not isinstance(value, Integral):  # numpy's floats are such too
         number = float(value)
         return str(int(number)) if number.is_integer() and abs(number) < 1e15 else repr(number)
     if isinstance(value, datetime):
@@ -48,15 +52,15 @@ class Cells:
         Name of the file in which each row stands, (rows,), where they are several.
     """
 
-    rows: pd.DataFrame
+    rows: "pd.DataFrame"
     header: tuple[str, ...]
-    lines: NDArray[np.int64] = field(repr=False)
+    lines: "NDArray[np.int64]" = field(repr=False)
     labels: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     numeric: frozenset[str] = frozenset()
     decisions: tuple[str, ...] = ()
-    files: NDArray[np.str_] | None = field(default=None, repr=False)
+    files: "NDArray[np.str_] | None" = field(default=None, repr=False)
 
-    def of_rows(self, keep: NDArray[np.bool_]) -> "Cells":
+    def of_rows(self, keep: "NDArray[np.bool_]") -> "Cells":
         """The rows to `keep` (rows,) alone."""
         files = None if self.files is None else self.files[keep]
         rows = self.rows[keep].reset_index(drop=True)
@@ -67,6 +71,9 @@ def cells_of(
     header: list[str], rows: list[list[Any]], names: list[str], first_line: int, **more: Any
 ) -> Cells:
     """Cells of rows of values; rows without any value are left out, as blank lines of CSV are."""
+    import numpy as np
+    import pandas as pd
+
     texts = [[cell_text(value) for value in row] for row in rows]
     filled = [i for i, row in enumerate(texts) if any(row)]
     positions = [header.index(name) for name in names]
@@ -80,6 +87,25 @@ def cells_of(
 
 def _is_number(value: Any) -> bool:
     """Whether a cell is a number, or empty."""
-    return value is None or (
-        isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
-    )
+    return value is None or (isinstance(value, Real) and not isinstance(value, bool))
+
+
+def text_cells(
+    rows: Sequence[tuple[str, ...]],
+    lines: Sequence[int],
+    names: list[str],
+    header: tuple[str, ...],
+    decisions: tuple[str, ...],
+) -> Cells:
+    """Cells of rows of text, as they were before a writer guarded them against being run as formulas."""
+    import numpy as np
+    import pandas as pd
+
+    columns = zip(*rows, strict=True) if rows else ((),) * len(names)
+    plain = {
+        position: [unguarded_cell(cell) for cell in column] if any("'" in cell for cell in column) else column
+        for position, column in enumerate(columns)
+    }
+    frame = pd.DataFrame(plain, dtype=str)
+    frame.columns = pd.Index(names)
+    return Cells(frame, header, np.array(lines, dtype=np.int64), decisions=decisions)

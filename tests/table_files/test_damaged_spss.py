@@ -7,9 +7,9 @@ import pandas as pd
 import pyreadstat
 import pytest
 
-from analysis.read.files import spss
 from analysis.read.long_csv import read_long_table
 from experiments.errors import InputError
+from table_files import spss
 
 ROWS = [(f"p{i}", cond, 1 + (2 * i + 3 * k) % 7) for i in range(40) for k, cond in enumerate("abc")]
 LENGTHS = [b"\xff\xff\xff\x7f", b"\xff\xff\xff\xff", b"\0\0\0\x80", b"\0\0\0\0"]

@@ -1,1 +1,0 @@
-"""Files as people have them, each read into the same cells of text: CSV, Excel, SPSS, JSON, Psych-DS."""
