@@ -12,7 +12,7 @@ WORKDIR /app
 COPY requirements.lock deploy/s3.lock ./
 RUN python -m venv venv
 RUN venv/bin/python -m pip install --no-cache-dir --disable-pip-version-check --require-hashes -r requirements.lock -r s3.lock
-COPY pyproject.toml LICENSE docs/server.md ./
+COPY pyproject.toml LICENSE docs/explanation/server.md ./
 COPY experiments experiments
 COPY server server
 COPY stimuli_builder stimuli_builder

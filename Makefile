@@ -106,8 +106,9 @@ addon: setup ## build the Blender add-on: dist/palpebra_blinks-VERSION.zip
 playground: setup ## build the blink engine's pages that open from a folder: dist/playground.html, dist/vrm.html
 	@$(BIN)/python -m addon_build.playground
 
-docs: setup-test ## write the references in docs/ (data dictionary, settings, declaration) from the code
+docs: setup-test ## write the reference pages from the code and build the documentation site, served at /docs
 	@$(BIN)/python tools/reference.py
+	@$(BIN)/python -m sphinx -q -W --keep-going -b html -d build/doctrees docs frontend/dist/docs
 
 audit: setup-test ## ask the advisory databases about every locked package; says where none answered
 	@$(BIN)/python tools/audit.py

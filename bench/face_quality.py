@@ -130,7 +130,7 @@ def scene_of(character: Atlas, facekit: Path) -> FaceScene:
     if made["recipe"] != RECIPES[framing]:
         say(
             f"{character.name} is of recipe {made['recipe']}, the references of {RECIPES[framing]}: "
-            "they differ in what the recipes of docs/face-quality.md say"
+            "they differ in what the recipes of docs/explanation/face-quality.md say"
         )
     identity = Identity.model_validate(made["face"])
     return FaceScene(load_facekit(facekit), identity, framing, character.size_px)

@@ -1,6 +1,6 @@
 """Living eyelids: a seeded stream of lid curves for animation, avatars and robots.
 
-Pure numpy; the same core in TypeScript gives the same curves (docs/blink-engine.md).
+Pure numpy; the same core in TypeScript gives the same curves (docs/explanation/blink-engine.md).
 """
 
 from blink_engine.laws import Law

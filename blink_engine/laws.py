@@ -107,7 +107,7 @@ def _horner(coefficients: tuple[float, ...], x: float) -> float:
 #
 # The generator is xoshiro128** 1.1 (Blackman & Vigna 2021, ACM Transactions on Mathematical Software 47(4),
 # 36), its state filled by SplitMix32: both need 32-bit integers alone, so that a page in a browser and this
-# module draw the same numbers to the last bit. docs/blink-engine.md specifies every step.
+# module draw the same numbers to the last bit. docs/explanation/blink-engine.md specifies every step.
 
 MASK = 0xFFFFFFFF
 GOLDEN_GAMMA = 0x9E3779B9

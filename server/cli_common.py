@@ -118,4 +118,4 @@ def refusal(error: Exception) -> str | None:
 def _setting(problem: ErrorDetails) -> str:
     name = "__".join(map(str, problem["loc"])).upper() or "a setting"
     shown = name if name.startswith(("PALPEBRA_", "DATABASE_")) else f"PALPEBRA_{name}"
-    return f"{shown}: {wrong_value(problem)}; see docs/settings.md"
+    return f"{shown}: {wrong_value(problem)}; see docs/reference/settings.md"

@@ -51,7 +51,7 @@ def run(
 ) -> None:
     """Serve participants and experimenters until stopped (Ctrl-C); what is under way is finished first.
 
-    Settings come from the environment, see docs/settings.md. Behind https set PALPEBRA_PUBLIC_URL.
+    Settings come from the environment, see docs/reference/settings.md. Behind https set PALPEBRA_PUBLIC_URL.
     Example: server run --host 0.0.0.0 --port 8000 --workers 2
     """
     _check_free(host, port)

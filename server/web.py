@@ -177,6 +177,26 @@ def asset(settings: SettingsDep, site: str, name: str) -> Response:
     raise NotFound(f"There is no file {name[:200]}.")
 
 
+@page_router.get("/docs")
+def docs_home() -> RedirectResponse:
+    """Pages of the documentation link one another relative to /docs/."""
+    return RedirectResponse("/docs/")
+
+
+@page_router.get("/docs/{name:path}")
+def documentation(settings: SettingsDep, name: str) -> Response:
+    """A file of the documentation site; a folder shows its index."""
+    folder = (settings.frontend_folder / "docs").resolve()
+    if not (folder / "index.html").is_file():
+        raise PagesNotBuilt("The documentation is not built; run `make docs`.")
+    path = _file_within(folder, folder / name) or _file_within(folder, folder / name / "index.html")
+    if path is None:
+        raise NotFound(f"There is no page {name[:200]} in the documentation.")
+    kind = mimetypes.guess_type(path.name)[0] or "application/octet-stream"
+    content = _read(path, path.stat().st_mtime_ns)
+    return Response(content, media_type=kind, headers={"cache-control": "no-cache"})
+
+
 def _file_within(folder: Path, asked: Path) -> Path | None:
     """The file asked for where it is one of this folder's; its name may be one that no file can have."""
     try:

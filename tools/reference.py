@@ -1,4 +1,4 @@
-"""Write what is declared in code as documentation: docs/data-dictionary.md, docs/settings.md,
+"""Write what is declared in code as documentation: docs/reference/columns.md, docs/reference/settings.md,
 docs/reference/experiment.md.
 
 python tools/reference.py           write them
@@ -119,8 +119,8 @@ def declaration_reference() -> str:
 
 
 PAGES = {
-    "docs/data-dictionary.md": data_dictionary,
-    "docs/settings.md": settings_reference,
+    "docs/reference/columns.md": data_dictionary,
+    "docs/reference/settings.md": settings_reference,
     "docs/reference/experiment.md": declaration_reference,
 }
 

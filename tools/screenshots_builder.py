@@ -1,4 +1,4 @@
-"""The pictures of docs/builder.md, taken on the way it describes: `make screenshots` writes them.
+"""The pictures of docs/how-to/build-a-study.md, taken while following it: `make screenshots` writes them.
 
 Twelve clips are drawn, brought by a browser to a server of its own, and made a study; each page is
 photographed on the way, at 1440 px and light, in few colours.

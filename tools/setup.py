@@ -157,6 +157,22 @@ def build_pages() -> None:
     call("npm", "run", "--silent", "build", cwd=FRONTEND)
 
 
+def build_docs() -> None:
+    say("building the documentation site")
+    shutil.rmtree(FRONTEND / "dist" / "docs", ignore_errors=True)
+    # fmt: off
+    call(BIN / "python", "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", "-d", ROOT / "build" / "doctrees",
+         ROOT / "docs", FRONTEND / "dist" / "docs")
+    # fmt: on
+
+
+def docs_sources() -> list[Path]:
+    """The pages, and the programs whose commands, endpoints and docstrings they show."""
+    pages = [path for path in (ROOT / "docs").rglob("*") if path.is_file() and "generated" not in path.parts]
+    programs = ("server", "stimuli_builder", "analysis", "experiments", "blink_engine")
+    return pages + [path for name in programs for path in (ROOT / name).rglob("*.py")]
+
+
 def frontend_sources() -> list[Path]:
     folders = [FRONTEND / "src", FRONTEND / "public"]
     files = [path for folder in folders if folder.is_dir() for path in folder.rglob("*") if path.is_file()]
@@ -211,7 +227,9 @@ def main() -> None:
     provide_node()
     npm_inputs = [FRONTEND / "package.json", FRONTEND / "package-lock.json"]
     step("npm", npm_inputs, install_npm, FRONTEND / "node_modules")
-    step("pages", frontend_sources(), build_pages, FRONTEND / "dist")
+    step("pages", frontend_sources(), build_pages, FRONTEND / "dist" / "admin", FRONTEND / "dist" / "participant")
+    if with_tests:  # Sphinx is a test package: `make run` alone serves no documentation site
+        step("docs", docs_sources(), build_docs, FRONTEND / "dist" / "docs" / "index.html")
     if purpose == "test":
         provide_browsers()
 

@@ -86,7 +86,7 @@ def anova(
 
       analysis anova ratings.csv --participant id --rating score --within face --robust
 
-    The JSON file has effects[], marginal_means[], pairwise[], dropped[], n_participants: docs/analysis.md.
+    The JSON file has effects[], marginal_means[], pairwise[], dropped[], n_participants.
     """
     from analysis.plans.result import analyse_cells
     from analysis.read.long_csv import design_of, read_long_table

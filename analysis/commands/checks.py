@@ -44,7 +44,7 @@ def check_paper(
       analysis check-paper figures.toml
 
     Exit code 1 where a statistic or figure does not fit.
-    The shipped analysis/paper/published/FIGURES.toml shows the format of figures (docs/analysis.md).
+    The shipped analysis/paper/published/FIGURES.toml shows the format of figures.
     """
     from analysis.paper.printed import SHIPPED
 

@@ -230,7 +230,7 @@ class Goodness:
 
 @dataclass(frozen=True)
 class PairsResult:
-    """Everything `analysis pairs` knows of a table; `docs/analysis.md` says what each key is."""
+    """Everything `analysis pairs` knows of a table; `docs/explanation/analysis.md` says what each key is."""
 
     method: Method
     scale: str

@@ -179,4 +179,4 @@ PRESENTATION: tuple[Column, ...] = (
         f"{_ROUNDED.format(_REFRESH_MS)} END",
     ),
 )
-"""What `make scope` knows of the way from the drawing to the screen (docs/participant.md)."""
+"""What `make scope` knows of the way from the drawing to the screen (docs/explanation/participant.md)."""

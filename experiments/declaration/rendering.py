@@ -89,7 +89,7 @@ class RenderSettings(Declaration):
     seconds: Seconds = 20.0
     """Length of a performance, in seconds."""
     state: State = "listening"
-    """What the person of a performance does, which sets the mean blink rate (docs/blink-engine.md)."""
+    """What the person in a performance does; it sets the mean blink rate (page: blink engine)."""
     blinks_per_minute: PerMinute | None = None
     """Mean blink rate of a performance; left out, that published for its state."""
     events_s: Moments = ()

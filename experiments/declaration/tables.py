@@ -253,7 +253,7 @@ class MotionChecks(Declaration):
 
 
 class Evidence(Declaration):
-    """What is asked for to tell people from programs, beside what every page brings (docs/evidence.md)."""
+    """Checks that tell people from programs, in addition to what every page records (page: evidence)."""
 
     online_recruitment: bool = False
     """For participants recruited online: each run has two motion checks and one attention question at least,

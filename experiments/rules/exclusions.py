@@ -127,7 +127,7 @@ EvidenceVerdict = Literal["unlikely", "unclear", "not_judged"]
 
 
 class ExcludeEvidence(LeavesOutRuns):
-    """Leave out runs by the verdict on whether a person answered (docs/evidence.md)."""
+    """Leave out runs by the verdict on whether a person answered (docs/explanation/evidence.md)."""
 
     rule: Literal["evidence_verdict"] = "evidence_verdict"
     """Names this rule."""

@@ -31,7 +31,7 @@ writeFileSync(
   )}\n`,
 );
 copyFileSync(new URL("../LICENSE", root), new URL("LICENSE", folder));
-copyFileSync(new URL("../docs/blink-engine.md", root), new URL("README.md", folder));
+copyFileSync(new URL("../docs/explanation/blink-engine.md", root), new URL("README.md", folder));
 
 const bytes = gzipSync(readFileSync(new URL("index.js", folder)), { level: 9 }).length;
 console.log(`${String(bytes).padStart(7)}  blink-engine, gzipped; budget ${BUDGET}`);

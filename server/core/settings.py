@@ -297,7 +297,7 @@ class Settings(BaseSettings):
     oidc: dict[ProviderId, Provider] = Field(
         default={},
         description="Services that sign people in (OpenID Connect): LABEL, ISSUER, CLIENT_ID, "
-        "CLIENT_SECRET_FILE and more of each; see docs/sign-in.md.",
+        "CLIENT_SECRET_FILE and more of each; see docs/how-to/sign-in.md.",
     )
     smtp_host: str = Field(
         default="", description="Server that takes mail, for new passwords; empty: none is sent."

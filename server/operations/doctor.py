@@ -359,7 +359,9 @@ def public_address(services: Services) -> Iterator[Finding]:
     settings = services.settings
     local = settings.is_local
     fine = settings.is_https or local
-    advice = "" if fine else "put https in front (docs/deployment.md) and set PALPEBRA_PUBLIC_URL=https://..."
+    advice = (
+        "" if fine else "put https in front (docs/how-to/deploy.md) and set PALPEBRA_PUBLIC_URL=https://..."
+    )
     yield Finding("public address", "ok" if fine else "failed", settings.public_url, advice)
     if local:
         advice = "set PALPEBRA_PUBLIC_URL before sending links to anybody on another machine"

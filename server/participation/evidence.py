@@ -282,7 +282,7 @@ def _cycle(responses: Sequence[int | str]) -> float:
     )
 
 
-# From signals to one verdict a run, by a table of points; docs/evidence.md says how they were set.
+# From signals to one verdict per run, by a table of points; docs/explanation/evidence.md explains it.
 #
 # Points of all signals are added. From `LIKELY` on a run is `likely` a person's, up to `UNLIKELY` it is
 # `unlikely`, between them `unclear`. A signal that cannot be had adds nothing, unless the table says so.

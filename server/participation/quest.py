@@ -1,7 +1,7 @@
 """QUEST+ (Watson 2017, Journal of Vision 17(3):10) by the library questplus: the one module that uses it.
 
 It is loaded with the first series that is followed, since it brings numpy, scipy and pandas with it; servers
-without such studies never load it (docs/decisions/0505). Equal answers give equal estimates and choices.
+without such studies never load it (decision 0505). Equal answers give equal estimates and choices.
 """
 
 import math

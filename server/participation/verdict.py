@@ -14,7 +14,8 @@ if TYPE_CHECKING:
 
 # The playback verdict of one play, by the declared rules: good, uncertain, flagged or failed, and why.
 #
-# `good` says that every frame was on the screen, within the uncertainty that docs/participant.md states.
+# `good` means that every frame was on the screen, within the uncertainty stated in
+# docs/explanation/participant.md.
 # `uncertain` says that nothing is known against the play, and not enough for it.
 
 Verdict = Literal["good", "uncertain", "flagged", "failed"]

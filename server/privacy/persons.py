@@ -19,7 +19,7 @@ from server.privacy import repository
 
 ABOUT = (
     "Everything that this server stores of one person in this study, table by table and column by column "
-    "(docs/data-dictionary.md tells what each column is). Left out are the secrets that open a visit, "
+    "(docs/reference/columns.md tells what each column is). Left out are the secrets that open a visit, "
     "and the codes that pay for one until it is complete. "
     "Downloads and reports that were made before are not part of it."
 )

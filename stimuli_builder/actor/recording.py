@@ -27,7 +27,7 @@ from stimuli_builder.video import Picture, VideoWriter
 # When and how the synthetic actor blinks, holds the head and looks: published statistics, one seed.
 #
 # Sources: VanderWerf et al. 2003 (phases), Doughty 2001 (rate), Ousler et al. 2014 and the paper (complete
-# and partial blinks); the table stands in docs/tracking.md.
+# and partial blinks); the table stands in docs/explanation/tracking.md.
 
 Values = NDArray[np.float64]
 

@@ -1,4 +1,4 @@
-"""`character.toml`: what a folder of pictures must say to be a character. See docs/characters.md."""
+"""`character.toml`: what a folder of pictures must say to be a character (docs/explanation/characters.md)."""
 
 import tomllib
 from itertools import pairwise
@@ -180,7 +180,7 @@ def read_declaration(folder: Path) -> Declaration:
         raise InputError(f"{file} is not TOML: {error}; correct that line") from error
     except ValidationError as error:
         raise InputError(
-            f"{file}: {_first_fault(error)}; correct it (docs/own-character.md), or bake it again where "
+            f"{file}: {_first_fault(error)}; correct it (docs/how-to/own-character.md) or bake again where "
             "another version of Palpebra wrote it"
         ) from error
 

@@ -46,7 +46,7 @@ def write_declaration(folder: Path, declaration: Declaration) -> None:
     write_bytes(folder / DECLARATION_FILE, declaration_toml(declaration).encode())
 
 
-# The smallest character there can be: what a lab with pictures of its own writes (docs/characters.md).
+# The smallest character there can be: what a lab with its own pictures writes (docs/how-to/own-character.md).
 
 WIDTH, HEIGHT = 48, 24
 CROP = (4, 4, 40, 16)

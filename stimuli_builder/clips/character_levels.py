@@ -30,7 +30,7 @@ CODE_OF_LIGHT = np.searchsorted(LIGHT_OF_CODE, np.arange(FULL_SCALE + 1)).astype
 
 
 class BakedCharacter:
-    """A folder of pictures with a declaration (docs/own-character.md)."""
+    """A folder of pictures with a declaration (docs/how-to/own-character.md)."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder

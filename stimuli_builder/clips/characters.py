@@ -37,7 +37,9 @@ def character_folder(name: str, beside: Path | None = None) -> Path:
             "studies that were made with it; a new study names another, say character = 'alder@8'"
         )
     if folder.is_dir():
-        raise InputError(f"{folder} is no character: it holds no character.toml (docs/own-character.md)")
+        raise InputError(
+            f"{folder} is no character: it holds no character.toml (docs/how-to/own-character.md)"
+        )
     raise InputError(
         f"no character '{name}': neither shipped nor a folder{did_you_mean(name, shipped_names())}"
     )

@@ -16,7 +16,7 @@ CLIP_HELP = """
 Render one clip from a blink profile and a character.
 
 PROFILE is real, model, SL, AL, SL_ease, AL_ease, the name of a shipped recording (`stimuli profiles`), or a
-CSV file of closure samples at 300 fps (0 open, 1 closed; docs/clips.md), columns parted by commas, semicolons
+CSV file of closure samples at 300 fps (0 open, 1 closed), columns separated by commas, semicolons
 or tabs, with decimal points or commas.
 
 Examples:

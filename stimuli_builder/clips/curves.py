@@ -269,6 +269,6 @@ def _held(curve: ClipCurve, signal: Array, limits: tuple[float, float], way: str
         raise InputError(
             f"profile {curve.profile_id} moves the lower lid {signal.min():.2f} to {signal.max():.2f} mm "
             f"{way}, its character is baked for {limits[0]:g} to {limits[1]:g} mm; bake it further "
-            "(docs/characters.md) or leave this signal out with lower_lid"
+            "(docs/explanation/characters.md) or leave this signal out with lower_lid"
         )
     return held, beyond

@@ -61,7 +61,7 @@ DRAWN_BROW = SkinField((0.0, -1.0), 3.0, 27.0, 4.5, 6.5, power=16.0)
 # The eyeball that a half-shut eye shows, found in a character's levels, and how it turns under the lid.
 #
 # Along a column of the picture the upper lid's margin goes from its place in the open eye to the lower lid's
-# (docs/characters.md: closure w leaves an opening of 1 - w). So the closure at which a pixel is covered rises
+# (closure w leaves an opening of 1 - w). So the closure at which a pixel is covered rises
 # along the column in proportion to the distance from the upper margin:
 #
 # y_m(x, w) = y_u(x) + w (y_l(x) - y_u(x))                                                              (1)

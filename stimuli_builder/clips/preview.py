@@ -119,7 +119,7 @@ def _clip_data(clip: Clip, lower_mm: float) -> dict[str, Any]:
 
 # A character at closures from open to shut, one picture below the other, for the dashboard's blinks page.
 #
-# The dashboard may not draw characters itself (docs/architecture.md), so it is given these files.
+# The dashboard may not draw characters itself (docs/explanation/architecture.md), so it is given these files.
 
 STRIPS_FILE = "strips.json"
 STEPS = 33

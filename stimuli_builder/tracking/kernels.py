@@ -1,4 +1,4 @@
-"""Compiled loops of the coupled AAM: compose, compare, step and the fit of them (docs/tracking.md).
+"""Compiled loops of the coupled AAM: compose, compare, step and fit (docs/explanation/tracking.md).
 
 float32 over pixels, float64 over parameters. `fit` also calls the loops that sample and those that solve.
 """

@@ -84,7 +84,7 @@ def inter_eyelid_distances(points: Points, markers: LidMarkers) -> NDArray[np.fl
     Returns
     -------
     (eyes,) array in pixels, image-left eye first. Zero where the markers meet or the upper one passes the
-    lower one (see docs/decisions/0101).
+    lower one (see docs/explanation/decisions/0101).
     """
     # Plain numbers: so few of them take numpy ten times as long, in every frame.
     rows = points.tolist()

@@ -8,7 +8,7 @@ import pytest
 
 from tests.conftest import REPOSITORY
 
-FOLDER = REPOSITORY / "docs" / "decisions"
+FOLDER = REPOSITORY / "docs" / "explanation" / "decisions"
 RECORDS = sorted(FOLDER.glob("[0-9]*.md"))
 NUMBERS = {record.name[:4] for record in RECORDS}
 ROW = re.compile(r"\| \[(?P<number>\d{4})\]\((?P<file>[^)]+)\) \| (?P<title>.+) \| (?P<date>\S+) \|")
@@ -22,7 +22,7 @@ NAMED = re.compile(r"[Dd]ecisions?[ /](\d{4})")
 
 def test_index_lists_every_record_in_order() -> None:
     assert [row["file"] for row in INDEX] == [record.name for record in RECORDS], (
-        "add the new decision's row to docs/decisions/README.md"
+        "add the new decision's row to docs/explanation/decisions/README.md"
     )
 
 

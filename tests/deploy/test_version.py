@@ -28,7 +28,7 @@ def test_the_pages_and_their_lock_file_have_it() -> None:
         ("CITATION.cff", r"^version: (\S+)$"),
         ("docker-compose.yml", r"image: palpebra:(\S+)$"),
         ("packages/blender_addon/blender_addon/blender_manifest.toml", r'^version = "(.+)"$'),
-        ("docs/blink-engine.md", r"palpebra_blinks-(\d+\.\d+\.\d+)\.zip"),
+        ("docs/explanation/blink-engine.md", r"palpebra_blinks-(\d+\.\d+\.\d+)\.zip"),
     ],
 )
 def test_other_files_have_it(name: str, pattern: str) -> None:
@@ -44,4 +44,4 @@ def test_the_changelog_begins_with_it_and_the_day_it_is_cited_by() -> None:
 
 
 def test_the_supported_version_is_the_latest() -> None:
-    assert f"the latest version alone, {VERSION.rpartition('.')[0]};" in read("docs/security.md")
+    assert f"the latest version alone, {VERSION.rpartition('.')[0]};" in read("docs/explanation/security.md")

@@ -1,6 +1,6 @@
 """What a new type of scale, type of field or language costs in files, shown on a copy of the tree.
 
-Generated files (`make docs`, `npm run api`) are not counted; docs/architecture.md has the numbers.
+Generated files (`make docs`, `npm run api`) do not count. docs/explanation/architecture.md has the numbers.
 """
 
 import json
@@ -35,7 +35,7 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_numbers_of_files_are_those_promised() -> None:
-    page = (REPOSITORY / "docs" / "architecture.md").read_text(encoding="utf-8")
+    page = (REPOSITORY / "docs" / "explanation" / "architecture.md").read_text(encoding="utf-8")
     for row, addition, most in (
         ("type of scale", SCALE, 5),
         ("field type", FIELD, 3),

@@ -34,7 +34,9 @@ def test_without_a_database_url_sqlite_lies_in_the_data_folder(
 
 
 def test_every_setting_is_described() -> None:
-    described = (Path(__file__).resolve().parents[2] / "docs" / "settings.md").read_text(encoding="utf-8")
+    described = (Path(__file__).resolve().parents[2] / "docs" / "reference" / "settings.md").read_text(
+        encoding="utf-8"
+    )
     for name, field in Settings.model_fields.items():
         assert field.description, name
         variable = "DATABASE_URL" if name == "database_url" else f"PALPEBRA_{name.upper()}"

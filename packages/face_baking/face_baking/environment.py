@@ -26,7 +26,7 @@ def ensure_blender(folder: Path) -> Path:
         run_step([*uv(), "pip", "install", "--python", str(python), *missing], "install Blender")
     run_step(
         [str(python), "-c", "import bpy, OpenEXR"],
-        "start Blender (it needs the libraries of docs/characters.md)",
+        "start Blender (it needs the libraries of docs/explanation/characters.md)",
     )
     return python
 

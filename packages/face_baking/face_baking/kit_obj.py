@@ -12,7 +12,7 @@ from experiments.errors import InputError
 
 MISSING = (
     "no face kit there: expected ict_facekit.npz or ICT-FaceKit's FaceXModel folder "
-    "(generic_neutral_mesh.obj and its shapes, see docs/characters.md)"
+    "(generic_neutral_mesh.obj and its shapes, see docs/explanation/characters.md)"
 )
 NEUTRAL_FILE, INDEX_FILE = "generic_neutral_mesh.obj", "vertex_indices.json"
 

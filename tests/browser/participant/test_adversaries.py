@@ -104,7 +104,7 @@ def with_keys(display: Display, page: Page) -> None:
 def test_keys_of_the_operating_system_are_trusted(
     strict: ServerProcess, tmp_path: Path, chromium: Browser
 ) -> None:
-    """What passes every look at whether events are the browser's own; docs/evidence.md says so."""
+    """Passes every check that events are the browser's own; docs/explanation/evidence.md says so."""
     study = strict.add_study(tmp_path / "clips", STUDY, frames=4)
     strict.start()
     with Display(tmp_path, scan_out=False) as display:

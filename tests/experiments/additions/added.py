@@ -79,7 +79,7 @@ SCALE: dict[str, str | Edit] = {
         'minimum = 0.0\nmaximum = 500.0\nunit = { en = "ms" }\nreverse = false\n'
         'question = { en = "How long did it take?" }\nnot_applicable = { en = "I cannot say" }\n',
     ),
-    "docs/trials/clip_rating.md": Edit(
+    "docs/reference/trials/clip_rating.md": Edit(
         "| `slider` | a line", "| `magnitude` | a number that is typed |\n| `slider` | a line"
     ),
 }

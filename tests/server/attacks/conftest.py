@@ -1,4 +1,4 @@
-"""Attacks from outside, one file an item of docs/security.md."""
+"""Attacks from outside, one file an item of docs/explanation/security.md."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Participants apart from one another, headers, Origin and limits: what docs/security.md promises."""
+"""What docs/explanation/security.md promises: separation of participants, headers, Origin and limits."""
 
 import re
 import uuid

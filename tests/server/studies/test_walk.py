@@ -1,4 +1,4 @@
-"""The walk of docs/builder.md from a folder of clips to a link, as it stands there."""
+"""The walk of docs/how-to/build-a-study.md from a folder of clips to a link, as it stands there."""
 
 import re
 import shlex
@@ -12,7 +12,7 @@ from tests.helpers.databases import run_server_command
 from tests.helpers.tiny_clips import encoded_video
 
 REPOSITORY = Path(__file__).resolve().parents[3]
-GUIDE = (REPOSITORY / "docs" / "builder.md").read_text(encoding="utf-8")
+GUIDE = (REPOSITORY / "docs" / "how-to" / "build-a-study.md").read_text(encoding="utf-8")
 WALK = GUIDE.partition("## A folder of clips, on the command line")[2].partition("\n## ")[0]
 
 

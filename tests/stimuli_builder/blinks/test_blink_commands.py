@@ -10,7 +10,7 @@ from stimuli_builder.blinks.library import load_library
 from stimuli_builder.blinks.profile import TABLE_COLUMNS, read_profile_table
 from stimuli_builder.blinks.tables import BLINK_COLUMNS
 
-GUIDE = (Path(__file__).parents[3] / "docs" / "blinks.md").read_text(encoding="utf-8")
+GUIDE = (Path(__file__).parents[3] / "docs" / "explanation" / "blinks.md").read_text(encoding="utf-8")
 
 
 def test_blinks_of_both_eyes_are_written_with_their_profiles(stimuli, series_file, tmp_path):

@@ -90,7 +90,7 @@ def test_a_solver_that_knows_every_shape_fails_at_chance_on_pictures(
 def test_a_solver_that_computes_optical_flow_passes(
     delivered: list[tuple[CheckJob, NDArray[np.float64]]],
 ) -> None:
-    """As docs/evidence.md says: such a program is not stopped by these checks."""
+    """As docs/explanation/evidence.md says: such a program is not stopped by these checks."""
     right = [solvers.answer_by_flow(one, clip) == one.answer for one, clip in delivered]
     assert sum(right) >= 0.9 * len(right)
     ways = [job("direction", number, 1.0) for number in range(1, 9)]

@@ -1,4 +1,4 @@
-"""The snippets for Unity and Unreal, as docs/blink-engine.md prints them, against stand-ins for both.
+"""The snippets for Unity and Unreal in docs/explanation/blink-engine.md, against stand-ins for both.
 
 Neither program can be had from a registry: this shows that the snippets are free of mistakes of their own.
 """
@@ -23,7 +23,7 @@ STUBS = Path(__file__).with_name("unity") / "Stubs.cs"
 
 def snippet(language: str, naming: str) -> str:
     """The block of the page in this language that names something."""
-    text = (REPOSITORY / "docs" / "blink-engine.md").read_text(encoding="utf-8")
+    text = (REPOSITORY / "docs" / "explanation" / "blink-engine.md").read_text(encoding="utf-8")
     blocks = re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)
     return next(block for block in blocks if naming in block)
 

@@ -1,4 +1,4 @@
-// As much of Unity's interface as the snippet in docs/blink-engine.md uses, and a Main that plays it.
+// As much of Unity's interface as the snippet in docs/explanation/blink-engine.md uses, and a Main that plays it.
 using System;
 using System.Globalization;
 using System.Linq;

@@ -1,0 +1,73 @@
+"""Make the built site work under `script-src 'self'; style-src 'self'`.
+
+The theme and the search page write scripts and styles into the pages. After the build each of them moves to a
+file named by its hash, and style attributes become classes. What cannot move stops the build.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import Any
+
+from bs4 import BeautifulSoup, Tag
+from sphinx.application import Sphinx
+from sphinx.errors import ExtensionError
+
+FOLDER = "_static/inline"
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Connect to Sphinx."""
+    app.connect("build-finished", move_inline_code)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
+
+
+def move_inline_code(app: Sphinx, failure: Exception | None) -> None:
+    """Rewrite every page of a build that succeeded."""
+    if failure is None and app.builder.format == "html":
+        for page in sorted(Path(app.outdir).rglob("*.html")):
+            page.write_text(without_inline_code(page, Path(app.outdir)), encoding="utf-8")
+
+
+def without_inline_code(page: Path, site: Path) -> str:
+    """The page with its inline scripts and styles in files."""
+    soup = BeautifulSoup(page.read_text(encoding="utf-8"), "html.parser")
+    up = "../" * len(page.relative_to(site).parent.parts)
+    for script in soup.find_all("script", src=False):
+        if script.get("type", "text/javascript") in ("text/javascript", "module"):
+            text = script.string or ""
+            script.clear()
+            script["src"] = up + _kept(site, text, "js")
+    for style in soup.find_all("style"):
+        link = soup.new_tag("link", rel="stylesheet", href=up + _kept(site, style.string or "", "css"))
+        # A stylesheet inside <noscript> stays there: it hides what needs JavaScript.
+        style.replace_with(link)
+    rules: dict[str, str] = {}
+    for element in soup.find_all(style=True):
+        declared = str(element["style"]).strip().rstrip(";")
+        name = "style-" + hashlib.sha256(declared.encode()).hexdigest()[:8]
+        rules[name] = f".{name} {{ {declared}; }}"
+        element["class"] = [*_classes(element), name]
+        del element["style"]
+    if rules and soup.head is not None:
+        text = "\n".join(rules[name] for name in sorted(rules))
+        soup.head.append(soup.new_tag("link", rel="stylesheet", href=up + _kept(site, text, "css")))
+    for element in soup.find_all(True):
+        handlers = [name for name in element.attrs if name.startswith("on")]
+        if handlers:
+            raise ExtensionError(f"{page}: expected no inline event handlers, got {', '.join(handlers)}")
+    return str(soup)
+
+
+def _classes(element: Tag) -> list[str]:
+    names: Any = element.get("class") or []
+    return [names] if isinstance(names, str) else list(names)
+
+
+def _kept(site: Path, text: str, ending: str) -> str:
+    name = f"{FOLDER}/{hashlib.sha256(text.encode()).hexdigest()[:16]}.{ending}"
+    file = site / name
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(text, encoding="utf-8")
+    return name

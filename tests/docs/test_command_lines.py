@@ -1,0 +1,79 @@
+"""Every command line in the documentation names a command and options that exist."""
+
+import re
+import shlex
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.main import get_command
+
+from analysis.cli import app as analysis
+from server.cli import app as server
+from stimuli_builder.cli import app as stimuli
+from tests.conftest import REPOSITORY
+
+PROGRAMS = {"stimuli": get_command(stimuli), "server": get_command(server), "analysis": get_command(analysis)}
+PAGES = [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").rglob("*.md"))]
+FENCED = re.compile(r"^\s*```(?:sh|text|console)?\n(.*?)^\s*```$", re.MULTILINE | re.DOTALL)
+INLINE = re.compile(r"(?<!`)`((?:stimuli|server|analysis) [^`\n]+)`")
+
+
+def command_lines(text: str) -> list[str]:
+    """Lines of code blocks, continued lines joined, and commands in running text."""
+    lines = [
+        line.strip() for block in FENCED.findall(text) for line in block.replace("\\\n", " ").splitlines()
+    ]
+    commands = [piece for line in lines for piece in re.split(r"&&|\|\||;|\|", line)]
+    inline = [piece for code in INLINE.findall(text) for piece in code.split("&&")]
+    return [
+        re.sub(r"\$\([^)]*\)", "X", command).strip()
+        for command in [*commands, *inline]
+        if re.match(r"\s*(stimuli|server|analysis) [a-z-]", command)
+    ]
+
+
+def fault_of(line: str) -> str | None:
+    """What does not exist in a command line, or None."""
+    words = shlex.split(line.replace("...", ""), comments=True)
+    command: Any = PROGRAMS[words[0]]
+    context = command.context_class(command, info_name=words[0])
+    rest = words[1:]
+    while hasattr(command, "get_command") and rest and not rest[0].startswith("-"):
+        names = rest[0].split("|")
+        if any(command.get_command(context, name) is None for name in names):
+            return f"no command {rest[0]!r}"
+        # Commands are loaded when they are resolved: what get_command gives is a stub without options.
+        _, command, _ = command.resolve_command(context, names[:1])
+        rest = rest[1:]
+        context = command.context_class(command, info_name=command.name, parent=context)
+    known = {
+        name
+        for parameter in command.get_params(context)
+        for name in [*parameter.opts, *parameter.secondary_opts]
+    }
+    known.add("--help")
+    for word in rest:
+        option = word.partition("=")[0]
+        if re.fullmatch(r"--?[a-z][\w-]*", option) and option not in known:
+            return f"{command.name}: no option {option}"
+    return None
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(REPOSITORY)))
+def test_commands_of_page_exist(page: Path) -> None:
+    faults = {}
+    for line in command_lines(page.read_text(encoding="utf-8")):
+        try:
+            fault = fault_of(line)
+        except ValueError as error:
+            fault = str(error)
+        if fault:
+            faults[line] = fault
+    assert not faults
+
+
+def test_a_wrong_option_is_found() -> None:
+    assert fault_of("analysis anova x.csv --witihn a") == "anova: no option --witihn"
+    assert fault_of("stimuli blink x.csv") == "no command 'blink'"
+    assert len([line for page in PAGES for line in command_lines(page.read_text(encoding="utf-8"))]) > 150
