@@ -248,7 +248,7 @@ class Line:
         return quick and self.memory_mb < MAX_MB
 
     def markdown(self) -> str:
-        """As a row of the table in docs/security.md."""
+        """As a row of the table in docs/explanation/security.md."""
         times = " | ".join(f"{one[0]:.0f}, {one[1]:.0f}" for one in (self.clips, self.ratings))
         verdict = "withstood" if self.withstood else "falls short"
         return f"| {self.name} | {times} | {self.memory_mb:.0f} | {self.answers} | {verdict} |"

@@ -2,7 +2,7 @@
 
 Part of `make bench`; alone: python -m pytest bench/bench_blinks.py -o python_files='bench_*.py' -s
 
-Blink labels of tracked video against the synthetic actor's plan: the table of docs/tracking.md.
+Blink labels of tracked video against the synthetic actor's plan: the table of docs/explanation/tracking.md.
 
     python -m bench.bench_blinks [seconds of actor a seed, default 90] [folder that keeps the drawings]
 

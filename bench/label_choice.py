@@ -1,4 +1,4 @@
-"""Which blinks the labelling page chooses, and how near its first points lie: the table of docs/labelling.md.
+"""Which blinks the labelling page chooses, and how near its first points are (docs/how-to/label-frames.md).
 
     python -m bench.label_choice develop|held-out [folder with the real clips]
 

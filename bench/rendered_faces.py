@@ -3,10 +3,10 @@
     python -m bench.rendered_faces iris KIT.npz [every, 8]
     python -m bench.rendered_faces close-up KIT.npz [FOLDER] [FACES, 2]
 
-iris: KIT is ICT-FaceKit's packed file (docs/characters.md). The lids' points are the true ones with 1.5% of
+iris: KIT is ICT-FaceKit's packed file. The lids' points are the true ones with 1.5% of
 the eye's width of noise. Errors in percent of the eye's width (middle) and of the true diameter.
 
-close-up: KIT is ICT-FaceKit's packed file (docs/characters.md). Each eye of the rendered faces that ship,
+close-up: KIT is ICT-FaceKit's packed file. Each eye of the rendered faces that ship,
 at nine closures, and of FOLDER's single_face (../shared/data/face_video; labels good to 3 to 6%) is
 enlarged to 416 px of a picture of 640 x 480; FOLDER's short_human_3blink is a close-up. Mean distance of
 the lids from the true ones in percent of the eye's width: of all pictures, of those open, of those shut;

@@ -2,7 +2,7 @@
 
     python -m bench.rendered_tracks KIT.npz [PICTURE.svg]
 
-KIT is ICT-FaceKit's packed file (docs/characters.md). Eight recordings of 360 frames: two faces, each at
+KIT is ICT-FaceKit's packed file. Eight recordings of 360 frames: two faces, each at
 two sizes, and close-ups of four, with a blink every second, a moving head, unsteady light, noise, blur and
 compression; every third run of 12 frames is spoilt as in `stated_error.py`. Lids are compared with the
 geometry the faces were rendered from: how far off the detector and the track are, r of the lid distance,

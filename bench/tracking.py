@@ -1,4 +1,4 @@
-"""Speed and accuracy of the tracker against the targets of docs/tracking.md: prints one table.
+"""Speed and accuracy of the tracker against the targets of docs/explanation/tracking.md: prints one table.
 
     python -m bench.tracking actor [seconds of actor, default 20]
     python -m bench.tracking light
