@@ -160,10 +160,9 @@ def build_pages() -> None:
 def build_docs() -> None:
     say("building the documentation site")
     shutil.rmtree(FRONTEND / "dist" / "docs", ignore_errors=True)
-    # fmt: off
-    call(BIN / "python", "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", "-d", ROOT / "build" / "doctrees",
-         ROOT / "docs", FRONTEND / "dist" / "docs")
-    # fmt: on
+    target, trees = FRONTEND / "dist" / "docs", ROOT / "build" / "doctrees"
+    quiet = ("-q", "-W", "--keep-going", "-b", "html", "-d", trees)
+    call(BIN / "python", "-m", "sphinx", *quiet, ROOT / "docs", target)
 
 
 def docs_sources() -> list[Path]:
@@ -227,7 +226,13 @@ def main() -> None:
     provide_node()
     npm_inputs = [FRONTEND / "package.json", FRONTEND / "package-lock.json"]
     step("npm", npm_inputs, install_npm, FRONTEND / "node_modules")
-    step("pages", frontend_sources(), build_pages, FRONTEND / "dist" / "admin", FRONTEND / "dist" / "participant")
+    step(
+        "pages",
+        frontend_sources(),
+        build_pages,
+        FRONTEND / "dist" / "admin",
+        FRONTEND / "dist" / "participant",
+    )
     if with_tests:  # Sphinx is a test package: `make run` alone serves no documentation site
         step("docs", docs_sources(), build_docs, FRONTEND / "dist" / "docs" / "index.html")
     if purpose == "test":
