@@ -75,12 +75,8 @@ lock: ## resolve the Python dependencies again, with hashes: what runs, what tes
 bench: setup-test ## speed, memory and accuracy, as figures and ratios (long); goes on after a failure and lists it
 	@FACEKIT="$(FACEKIT)" BLINK_SERIES="$(BLINK_SERIES)" $(BIN)/python -m bench $(BENCH)
 
-screenshots: setup-test ## make the pictures of README and docs anew (needs the clips of `make run`)
-	@$(BIN)/python tools/screenshots.py
-	@PYTHONPATH=. $(BIN)/python tools/screenshots_clips.py
-	@PYTHONPATH=. $(BIN)/python tools/screenshots_performance.py
-	@$(BIN)/python tools/screenshots_admin.py
-	@$(BIN)/python tools/screenshots_builder.py
+screenshots: setup-test ## make the pictures of README and docs again (needs the clips of `make run`; PICTURES="builder")
+	@PYTHONPATH=. $(BIN)/python tools/screenshots.py $(PICTURES)
 
 scope: setup-test ## what reaches a virtual screen against what is recorded (hours; SCOPE=short, SCOPE="rows --plays 20")
 	@$(BIN)/python -m screen_bench $(SCOPE)
