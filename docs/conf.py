@@ -30,14 +30,14 @@ nitpicky = False
 
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 4
-# Formulas are written as text in the pages: nothing is fetched to draw them.
-math_number_all = False
+html_math_renderer = "mathml"
 
 autosummary_generate = True
 autodoc_typehints = "none"
 numpydoc_show_class_members = False
 numpydoc_class_members_toctree = False
 
+html_favicon = "_static/favicon.svg"
 html_theme = "pydata_sphinx_theme"
 html_title = "Palpebra"
 html_static_path = ["_static"]
@@ -58,6 +58,7 @@ html_theme_options = {
     "pygments_light_style": "a11y-high-contrast-light",
     "pygments_dark_style": "a11y-high-contrast-dark",
 }
+html_context = {"default_mode": "auto"}
 html_sidebars = {"index": [], "search": []}
 copybutton_prompt_text = "$ "
 suppress_warnings = ["myst.xref_missing"] if "--allow-missing" in sys.argv else []

@@ -1,6 +1,6 @@
 """Results of the bench on disk, each as it ends, so that a run that was stopped goes on where it was.
 
-A row is measured in pieces, each stored as it ends; the rows become a table, as in docs/explanation/participant.md.
+A row is measured in pieces, each stored as it ends. The page docs/explanation/participant.md has their table.
 """
 
 import hashlib
