@@ -1,0 +1,150 @@
+"""Plain English: banned words with the better one, and how hard pages are to read.
+
+    python -m tools.check_language              every finding in docs, texts and code; fails where there is one
+    python -m tools.check_language --grades     reading grade (Flesch-Kincaid) of each page, hardest first
+
+Text in code (backticks, code blocks, quotations) is left alone. docs/explanation/... may quote the old words in
+quotation marks. The words and their reasons: docs/reference/glossary.md.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+import statistics
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+MEDIAN_GRADE, HIGHEST_GRADE = 10.0, 14.0
+"""Reading grades of pages with text: the median, and the hardest page."""
+REFERENCE = ("docs/reference/columns.md", "docs/reference/settings.md", "docs/reference/experiment.md")
+"""Tables written from the code: their grade says nothing."""
+BANNED = {
+    r"\btold\b|\btells?\b(?! (?:people|apart))": "reported, shown, detected, identified",
+    r"\banew\b": "again",
+    r"\breckon(?:s|ed|ing)?\b": "compute, count",
+    r"\bmend(?:s|ed|ing)?\b": "fix, correct",
+    r"\bparted by\b": "separated by",
+    r"\bbeside(?!s)\b": "next to, in addition to, with",
+    r"\bstands?\b(?! (?:for|still|up|out|alone|apart|guard))": "is, are",
+    r"\bwhoever\b": "anyone who, people who",
+    r"\ba row an? |\bone an? (?:row|play|person|visit|cell)\b": "one row per ...",
+    r"\b(?:is|are) no (?!longer|one\b|doubt|more|such)": "is not a ...",
+    r"\bby its name\b": "by name",
+    r"\bof (?:its|their|his|her|one's) own\b": "separate, its own ...",
+    r"\bwhat is asked\b": "required",
+    r"\band (?:said|says) so\b": "and reports it",
+    r"\bthereof\b": "of it",
+    r"\bhindmost\b|\bthe likes? of\b": "plain words",
+}
+BANNED_WORDS = tuple((re.compile(pattern, re.IGNORECASE), better) for pattern, better in BANNED.items())
+CODE_BLOCK = re.compile(r"^(\s*)(```|~~~|:::).*?^\1\2", re.MULTILINE | re.DOTALL)
+CODE = re.compile(r"`[^`\n]*`|\"[^\"\n]*\"|“[^”\n]*”|\]\([^)]*\)")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A banned word and where it is."""
+
+    file: str
+    line: int
+    word: str
+    better: str
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}: '{self.word}': better {self.better}"
+
+
+def banned_words_in(text: str) -> Iterator[tuple[int, str, str]]:
+    """Line, word and better word of each banned word outside code and quotations."""
+    for number, line in enumerate(text.splitlines(), start=1):
+        plain = CODE.sub(" ", line)
+        for pattern, better in BANNED_WORDS:
+            for found in pattern.finditer(plain):
+                yield number, found.group(0).strip(), better
+
+
+def prose_of(page: str) -> str:
+    """A Markdown page without code, tables, pictures, links and headings."""
+    text = re.sub(r"^```.*?^```", "", page, flags=re.MULTILINE | re.DOTALL)
+    text = re.sub(r"^(?:\||#|:::|!\[|\[).*$", "", text, flags=re.MULTILINE)
+    text = re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", text)
+    text = re.sub(r"`([^`]*)`", r"code", text)
+    # Items of a list are sentences, whether or not they end in a full stop.
+    text = re.sub(r"^(\s*(?:-|\d+\.) .*[^.:;!?\s])\s*$", r"\1.", text, flags=re.MULTILINE)
+    return re.sub(r"[*_>]|^\s*(?:-|\d+\.) ", "", text, flags=re.MULTILINE)
+
+
+def pages() -> list[Path]:
+    """The pages of the site that people write."""
+    found = [*(ROOT / "docs").rglob("*.md"), ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"]
+    return sorted(page for page in found if "generated" not in page.parts)
+
+
+def without_code_blocks(text: str) -> str:
+    """The page with its code blocks blanked, so that lines keep their numbers."""
+    return re.sub(
+        r"^```.*?^```",
+        lambda block: "\n" * block.group(0).count("\n"),
+        text,
+        flags=re.MULTILINE | re.DOTALL,
+    )
+
+
+def grade_of(page: Path) -> float | None:
+    """The Flesch-Kincaid grade of a page; None where it has too little text."""
+    from textstat import textstat  # takes half a second to import
+
+    prose = prose_of(page.read_text(encoding="utf-8"))
+    return textstat.flesch_kincaid_grade(prose) if len(prose.split()) >= 60 else None
+
+
+def source_texts(file: Path) -> Iterator[tuple[int, str]]:
+    """Line and text of every string, docstring and comment of a Python module."""
+    source = file.read_text(encoding="utf-8")
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value:
+            yield node.lineno, node.value
+    for number, line in enumerate(source.splitlines(), start=1):
+        if line.lstrip().startswith("#"):
+            yield number, line
+
+
+def findings() -> Iterator[Finding]:
+    """Every banned word in pages, Python and TypeScript of the programs."""
+    for page in pages():
+        name = str(page.relative_to(ROOT))
+        for line, word, better in banned_words_in(without_code_blocks(page.read_text(encoding="utf-8"))):
+            yield Finding(name, line, word, better)
+    listed = subprocess.run(
+        ["git", "ls-files", "*.py", "*.ts", "*.tsx"], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    for name in listed.stdout.splitlines():
+        file = ROOT / name
+        if not file.is_file() or name.startswith(("migrations/versions", "frontend/src/api")):
+            continue
+        texts = source_texts(file) if name.endswith(".py") else [(1, file.read_text(encoding="utf-8"))]
+        for first, text in texts:
+            for line, word, better in banned_words_in(text):
+                yield Finding(name, first + line - 1, word, better)
+
+
+def main() -> int:
+    """Print the findings or the grades."""
+    if "--grades" in sys.argv:
+        graded = [(grade, page) for page in pages() if (grade := grade_of(page)) is not None]
+        for grade, page in sorted(graded, reverse=True, key=lambda pair: pair[0]):
+            print(f"{grade:5.1f}  {page.relative_to(ROOT)}")
+        print(f"{statistics.median(grade for grade, _ in graded):5.1f}  median of {len(graded)} pages")
+        return 0
+    found = [str(finding) for finding in findings()]
+    print("\n".join(found) or "language: no banned words")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
