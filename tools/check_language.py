@@ -1,10 +1,9 @@
 """Plain English: banned words with the better one, and how hard pages are to read.
 
-    python -m tools.check_language              every finding in docs, texts and code; fails where there is one
+    python -m tools.check_language              every finding in docs, texts and code; fails if there is one
     python -m tools.check_language --grades     reading grade (Flesch-Kincaid) of each page, hardest first
 
-Text in code (backticks, code blocks, quotations) is left alone. docs/explanation/... may quote the old words in
-quotation marks. The words and their reasons: docs/reference/glossary.md.
+Code (backticks, code blocks) and quotations are left alone.
 """
 
 from __future__ import annotations
@@ -81,7 +80,12 @@ def prose_of(page: str) -> str:
 
 def pages() -> list[Path]:
     """The pages of the site that people write."""
-    found = [*(ROOT / "docs").rglob("*.md"), ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"]
+    found = [
+        *(ROOT / "docs").rglob("*.md"),
+        ROOT / "README.md",
+        ROOT / "CONTRIBUTING.md",
+        ROOT / "CHANGELOG.md",
+    ]
     return sorted(page for page in found if "generated" not in page.parts)
 
 
@@ -97,7 +101,7 @@ def without_code_blocks(text: str) -> str:
 
 def grade_of(page: Path) -> float | None:
     """The Flesch-Kincaid grade of a page; None where it has too little text."""
-    from textstat import textstat  # takes half a second to import
+    from textstat import textstat  # type: ignore[import-untyped]  # takes half a second to import
 
     prose = prose_of(page.read_text(encoding="utf-8"))
     return textstat.flesch_kincaid_grade(prose) if len(prose.split()) >= 60 else None

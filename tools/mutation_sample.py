@@ -1,0 +1,183 @@
+"""Change the same expressions in two versions of the program and count how many changes their tests notice.
+
+    python -m tools.mutation_sample BASE --tree FOLDER --count 200 --minutes 90
+
+FOLDER holds a checkout of BASE (`git worktree add FOLDER BASE`). An expression is taken only if the same line,
+in a function of the same name, exists once in both versions. For each one the tests that import its module run
+in both versions, until the first failure. Results are appended to `out/mutation.jsonl` as they come, so a run
+that was stopped continues; without `--minutes` it runs to the end. The last lines are the killed shares.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import copy
+import json
+import random
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGES = ("server", "analysis", "experiments", "stimuli_builder", "blink_engine", "video_conversion")
+RESULTS = ROOT / "out" / "mutation.jsonl"
+SECONDS = 300
+"""Longest run of the tests of one expression; a change that makes them hang counts as noticed."""
+MOST_FILES = 8
+SLOW = re.compile(r"tests/(browser|experiments_e2e|docs|bench|scope|equal|house|server/attacks)")
+SWAPS: dict[type[ast.AST], type[ast.AST]] = {
+    ast.Lt: ast.LtE,
+    ast.LtE: ast.Lt,
+    ast.Gt: ast.GtE,
+    ast.GtE: ast.Gt,
+    ast.Eq: ast.NotEq,
+    ast.NotEq: ast.Eq,
+    ast.Add: ast.Sub,
+    ast.Sub: ast.Add,
+    ast.Mult: ast.Div,
+    ast.Div: ast.Mult,
+    ast.And: ast.Or,
+    ast.Or: ast.And,
+    ast.Is: ast.IsNot,
+    ast.IsNot: ast.Is,
+    ast.In: ast.NotIn,
+    ast.NotIn: ast.In,
+}
+
+
+@dataclass(frozen=True)
+class Site:
+    """One operator in one version: where it is, and how it is known in another version."""
+
+    file: Path
+    line: int
+    column: int
+    function: str
+    text: str
+
+    @property
+    def key(self) -> str:
+        """The same in every version that has the line in a function of this name."""
+        return f"{self.function}|{self.text}|{self.column}"
+
+
+def sites_in(tree: Path) -> dict[str, Site]:
+    """Every operator whose function and line are unique in a version."""
+    found: dict[str, list[Site]] = {}
+    for package in PACKAGES:
+        for file in sorted((tree / package).rglob("*.py")):
+            for site in _sites(file):
+                found.setdefault(site.key, []).append(site)
+    return {key: sites[0] for key, sites in found.items() if len(sites) == 1}
+
+
+def _sites(file: Path) -> Iterator[Site]:
+    source = file.read_text(encoding="utf-8")
+    lines = source.splitlines()
+    for function in ast.walk(ast.parse(source)):
+        if not isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef):
+            continue
+        for node in ast.walk(function):
+            if isinstance(node, ast.Compare | ast.BinOp | ast.BoolOp) and _operator(node) in SWAPS:
+                text = lines[node.lineno - 1]
+                indent = len(text) - len(text.lstrip())
+                yield Site(file, node.lineno, node.col_offset - indent, function.name, text.strip())
+
+
+def _operator(node: ast.Compare | ast.BinOp | ast.BoolOp) -> type[ast.AST]:
+    return type(node.ops[0]) if isinstance(node, ast.Compare) else type(node.op)
+
+
+def changed_source(site: Site) -> str:
+    """The module with this one operator replaced."""
+    tree = copy.deepcopy(ast.parse(site.file.read_text(encoding="utf-8")))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Compare | ast.BinOp | ast.BoolOp) and node.lineno == site.line:
+            text = site.file.read_text(encoding="utf-8").splitlines()[site.line - 1]
+            if node.col_offset - (len(text) - len(text.lstrip())) != site.column:
+                continue
+            other = SWAPS[_operator(node)]()
+            if isinstance(node, ast.Compare):
+                node.ops[0] = other  # type: ignore[call-overload]
+            else:
+                node.op = other  # type: ignore[assignment]
+            break
+    return ast.unparse(tree)
+
+
+def tests_of(file: Path, tree: Path) -> list[str]:
+    """The test files that import a module, else those of the folder named like its own."""
+    module = ".".join(file.relative_to(tree).with_suffix("").parts)
+    parent, name = module.rpartition(".")[::2]
+    imports = re.compile(rf"(from|import) {re.escape(module)}\b|from {re.escape(parent)} import .*\b{name}\b")
+    tests = [path for path in sorted((tree / "tests").rglob("test_*.py")) if not SLOW.search(str(path))]
+    direct = [path for path in tests if imports.search(path.read_text(encoding="utf-8"))]
+    near = [path for path in tests if path.parent.name == file.parent.name]
+    return [str(path.relative_to(tree)) for path in (direct or near)[:MOST_FILES]]
+
+
+def outcome(site: Site, tree: Path) -> str:
+    """`killed`, `survived`, or `untested` where no test imports the module or its tests fail anyway."""
+    tests = tests_of(site.file, tree)
+    if not tests or not _passes(tests, tree):
+        return "untested"
+    original = site.file.read_text(encoding="utf-8")
+    try:
+        site.file.write_text(changed_source(site), encoding="utf-8")
+        return "survived" if _passes(tests, tree) else "killed"
+    finally:
+        site.file.write_text(original, encoding="utf-8")
+
+
+def _passes(tests: list[str], tree: Path) -> bool:
+    command = [sys.executable, "-m", "pytest", "-q", "-x", "-n", "0", "-m", "not long", *tests]
+    try:
+        done = subprocess.run(command, cwd=tree, capture_output=True, timeout=SECONDS, check=False)
+    except subprocess.TimeoutExpired:
+        return False
+    return done.returncode == 0
+
+
+def main() -> int:
+    """Run the sample, or go on with it."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("base")
+    parser.add_argument("--tree", type=Path, required=True, help="a checkout of BASE")
+    parser.add_argument("--here", type=Path, default=ROOT, help="a checkout of the newer version")
+    parser.add_argument("--count", type=int, default=200)
+    parser.add_argument("--minutes", type=float, default=float("inf"))
+    parser.add_argument("--results", type=Path, default=RESULTS)
+    given = parser.parse_args()
+    before, after = sites_in(given.tree), sites_in(given.here)
+    chosen = random.Random(50).sample(sorted(set(before) & set(after)), given.count)
+    given.results.parent.mkdir(exist_ok=True)
+    lines = given.results.read_text(encoding="utf-8").splitlines() if given.results.is_file() else []
+    known = {row["key"]: row for row in map(json.loads, lines)}
+    until = time.monotonic() + given.minutes * 60
+    for key in chosen:
+        if key in known or time.monotonic() > until:
+            continue
+        row = {"key": key, "base": given.base}
+        row["before"] = outcome(before[key], given.tree)
+        row["after"] = outcome(after[key], given.here)
+        known[key] = row
+        with given.results.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(row) + "\n")
+        print(f"{row['before']:9} {row['after']:9} {key[:90]}", flush=True)
+    rows = [known[key] for key in chosen if key in known]
+    both = [row for row in rows if "untested" not in (row["before"], row["after"])]
+    for side in ("before", "after"):
+        killed = sum(row[side] == "killed" for row in both)
+        print(f"{side}: {killed} of {len(both)} killed ({len(rows)} of {given.count} tried)")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
