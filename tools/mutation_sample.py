@@ -2,10 +2,11 @@
 
     python -m tools.mutation_sample BASE --tree FOLDER --count 200 --minutes 90
 
-FOLDER holds a checkout of BASE (`git worktree add FOLDER BASE`). An expression is taken only if the same line,
-in a function of the same name, exists once in both versions. For each one the tests that import its module run
-in both versions, until the first failure. Results are appended to `out/mutation.jsonl` as they come, so a run
-that was stopped continues; without `--minutes` it runs to the end. The last lines are the killed shares.
+FOLDER holds a checkout of BASE (`git worktree add FOLDER BASE`). An expression is taken only if the same
+line, in a function of the same name, exists once in both versions. For each one the tests that import its
+module run in both versions, until the first failure. Results are appended to `out/mutation.jsonl` as they
+come, so a run that was stopped continues; without `--minutes` it runs to the end. The last lines are the
+killed shares of both versions.
 """
 
 from __future__ import annotations
