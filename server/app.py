@@ -15,7 +15,7 @@ from server.accounts import provider_endpoints, reset_endpoints, workspace_endpo
 from server.accounts.audit import note_refusal
 from server.context import open_services
 from server.core.changes import ChangesTold
-from server.core.errors import install_error_handlers
+from server.core.error_handlers import install_error_handlers
 from server.core.settings import Settings
 from server.exports import endpoints as exports
 from server.operations import endpoints as operations

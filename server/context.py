@@ -19,8 +19,8 @@ from server.core.storage import ClipStore, FolderStore, open_s3
 from server.core.values import now
 from server.participation.clip_bytes import ClipBytes
 from server.participation.intake import Intake
+from server.participation.versions import Versions
 from server.results.cache import ResultsCache
-from server.studies.versions import Versions
 from server.transcoding.preparing import Preparing
 
 SIMULATED_TIME = "x-palpebra-simulated-time"

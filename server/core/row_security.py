@@ -13,7 +13,7 @@ from sqlalchemy.orm import Session, SessionTransaction
 
 from experiments.errors import InputError
 from experiments.kinds import views
-from server.models import Base
+from server.models.base import Base
 
 # The second wall between laboratories: on PostgreSQL a member's transactions see her own studies' rows.
 #

@@ -25,7 +25,7 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from experiments.errors import InputError
 from experiments.files import with_driver
-from server.models.accounts import Role
+from server.core.values import Role
 
 # The file that keeps the secret key in the data folder: for its owner alone, made once for all workers.
 

@@ -8,9 +8,13 @@ import re
 import secrets
 from collections.abc import Iterator
 from datetime import UTC, datetime
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+Role = Literal["viewer", "experimenter", "owner"]
+ROLES: tuple[Role, ...] = get_args(Role)
+"""Each may do what those before it may, and more; on the server (`Account.role`) and in a workspace alike."""
 
 # The server's time: always UTC, with its zone.
 

@@ -1,9 +1,9 @@
 """All tables, one module a subject; import them from here."""
 
+from server.core.values import ROLES, Role
 from server.models.accounts import (
     DEFAULT_WORKSPACE,
     RIGHTS,
-    ROLES,
     Account,
     AccountLogin,
     AdminSession,
@@ -16,25 +16,28 @@ from server.models.accounts import (
     MailedLink,
     Purpose,
     Right,
-    Role,
     StudyGrant,
     Workspace,
     WorkspaceMember,
 )
 from server.models.base import Base, SharedCount, UtcDateTime
-from server.models.runs import (
+from server.models.studies import (
     NO_SLOT,
     RUN_STATUSES,
     STAGES,
     Calibration,
+    Clip,
     FormAnswer,
     IdentityKey,
+    Link,
     RecruiterIdentity,
     RunEvent,
     RunTally,
+    Study,
     StudyRun,
+    StudyVersion,
+    VersionClip,
 )
-from server.models.studies import Clip, Link, Study, StudyVersion, VersionClip
 from server.models.trials import (
     AnswerEvidence,
     AssignedTrial,

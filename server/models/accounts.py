@@ -6,14 +6,10 @@ from typing import Any, Literal, get_args
 from sqlalchemy import ForeignKey, Index, String, Text, UniqueConstraint
 from sqlalchemy.orm import Mapped, mapped_column, relationship
 
-from server.core.values import now
+from server.core.values import ROLES, now
 from server.models.base import Base, one_of
 
 # Experimenters: accounts, sessions, API tokens, the audit log; and long jobs.
-
-Role = Literal["viewer", "experimenter", "owner"]
-ROLES: tuple[Role, ...] = get_args(Role)
-"""Each may what those before it may, and more; on the server (`Account.role`) and in a workspace alike."""
 
 
 class Account(Base):

@@ -31,6 +31,10 @@ FrameTime = tuple[
 ]
 
 
+Part = Literal["practice", "main", "attention", "check"]
+"""What a trial is for."""
+Verdict = Literal["good", "uncertain", "flagged", "failed"]
+"""Of the playback rules on a play (`server.participation.verdict`)."""
 Role = Literal["shown", "left", "right", "first", "second", "reference"]
 DisturbanceCounts = Annotated[
     dict[Annotated[str, StringConstraints(pattern=r"^[a-z_]{1,40}$")], Count], Field(max_length=20)

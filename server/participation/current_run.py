@@ -13,8 +13,8 @@ from server.core.values import new_public_id, now
 from server.models import RunEvent, StudyRun
 from server.participation import run_repository
 from server.participation.evidence_repository import ANSWER, VIEW
+from server.participation.rating_repository import REFUSED
 from server.participation.refusals import RunClosed, RunUnknown
-from server.participation.refused_records import REFUSED
 from server.participation.warnings import EVENT
 
 # The run a token stands for.

@@ -13,7 +13,7 @@ from sqlalchemy.orm import Session
 
 from experiments.kinds import KINDS
 from server.context import DatabaseDep, Services, ServicesDep
-from server.core.errors import ERROR_RESPONSES, ApiError, finished, refused_value
+from server.core.errors import ERROR_RESPONSES, ApiError, json_response, refused_value
 from server.core.limits import RateLimit
 from server.core.values import hash_token
 from server.participation import links, refused_records, returning, runs
@@ -219,7 +219,7 @@ async def post_views(services: ServicesDep, request: Request, token: RunToken, b
             services.versions, services.intake, connection, token, body, received_at
         )
 
-    return finished(await services.group_commit.run(token, save))
+    return json_response(await services.group_commit.run(token, save))
 
 
 # The one endpoint that must never lose anything: a rating is answered after it is committed.
@@ -247,7 +247,7 @@ async def put_rating(
         saved, left_out["next"] = RatingSaved(receipt=receipt), True
     status = 201 if is_new else 200
     if saved.next is None:
-        return finished(saved, status, left_out)
+        return json_response(saved, status, left_out)
     return await run_in_threadpool(finished_for_page, services, request, token, saved, status, left_out)
 
 

@@ -17,7 +17,7 @@ from server.core.limits import RateLimit
 from server.core.settings import Settings
 from server.participation import evidence_repository
 from server.participation.answer_schemas import RatingEvidence
-from server.participation.clip_bytes import ClipBytes, ClipTime, clip_digest, older_digest
+from server.participation.clip_bytes import ClipBytes, clip_digest, older_digest
 from server.participation.refusals import (
     ClipsOutlastTickets,
     DigestDiffers,
@@ -29,6 +29,7 @@ from server.participation.refusals import (
     TicketOfAnotherTrial,
     UnratedWithoutDigest,
 )
+from server.participation.tallies import ClipTime
 
 # Tickets: leave to answer one play of one trial, signed by the server when it hands the run out.
 #

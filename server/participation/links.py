@@ -37,7 +37,7 @@ from server.participation.refusals import (
     StudyPaused,
 )
 from server.participation.run_schemas import Gates, LinkedStudy, LinkState, Origin, RunStart, RunStarted
-from server.studies.versions import LoadedVersion
+from server.participation.versions import LoadedVersion
 
 RUN_PURPOSE = "run"
 OLD_PAGES_ACCEPTED = timedelta(hours=48)

@@ -15,7 +15,7 @@ from server.models import StudyRun
 from server.participation import run_repository, series
 from server.participation.refusals import GroupRefused
 from server.participation.run_repository import compared
-from server.studies.versions import LoadedVersion
+from server.participation.versions import LoadedVersion
 
 if TYPE_CHECKING:
     from server.models import Link

@@ -8,10 +8,8 @@ from sqlalchemy import Connection, Table, bindparam, insert, or_, select, update
 
 from server.core.commit import Prepared, Query
 from server.models import AssignedTrial, Rating, RunEvent, RunTally, StudyRun, TrialClip
-from server.participation.answer_schemas import RunStatus
-from server.participation.kinds import Part
+from server.participation.answer_schemas import Part, RunStatus, Verdict
 from server.participation.tallies import COLUMNS, Tally, tally_of
-from server.participation.verdict import Verdict
 
 # Tables instead of classes, and statements made ready once: else they would take most of a rating's time.
 _runs = cast(Table, StudyRun.__table__)

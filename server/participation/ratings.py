@@ -11,26 +11,27 @@ from experiments.checks import CHECK_KINDS
 from experiments.declaration.any_trial import CheckAnswer
 from experiments.declaration.experiment import Experiment
 from experiments.kinds import KINDS
-from server.core.errors import Conflict, Invalid, NotFound
+from server.core.errors import Conflict, Invalid
 from server.core.values import hash_token
 from server.participation import rating_repository, series, warnings
-from server.participation.answer_schemas import RatingEvidence, RatingIn, Receipt, RunStatus, ShownClips
+from server.participation.answer_schemas import (
+    RatingEvidence,
+    RatingIn,
+    Receipt,
+    RunStatus,
+    ShownClips,
+    Verdict,
+)
 from server.participation.intake import TRIED_MS, Answer, Intake
 from server.participation.kinds import answer_of, served
-from server.participation.refusals import ConsentMissing, RunClosed, RunUnknown
+from server.participation.refusals import ConsentMissing, RunClosed, RunUnknown, TrialNotInRun
 from server.participation.tallies import Counted, Play, Tally
-from server.participation.verdict import Ruling, Verdict, is_settled, playback_of
+from server.participation.verdict import Ruling, is_settled, playback_of
 from server.participation.verdict import judge as judge_play
+from server.participation.versions import LoadedVersion, Versions
 from server.participation.warnings import by_attention
-from server.studies.versions import LoadedVersion, Versions
 
 # A rating as it came, with the run, the trial and the version it is for, and the rows that keep it.
-
-
-class TrialNotInRun(NotFound):
-    """The run has no such trial."""
-
-    code = "trial_not_in_run"
 
 
 @dataclass(frozen=True)

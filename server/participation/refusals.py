@@ -18,6 +18,12 @@ class RunClosed(Conflict):
     code = "run_closed"
 
 
+class TrialNotInRun(NotFound):
+    """The run has no such trial."""
+
+    code = "trial_not_in_run"
+
+
 class ConsentMissing(Conflict):
     """Nothing is stored before the participant has agreed."""
 

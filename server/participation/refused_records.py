@@ -17,16 +17,14 @@ from sqlalchemy import Connection
 from server.core.errors import Conflict
 from server.core.values import hash_token
 from server.participation import rating_repository
-from server.participation.answer_schemas import RatingEvidence, RefusedRecord
+from server.participation.answer_schemas import Part, RatingEvidence, RefusedRecord
 from server.participation.intake import Intake
-from server.participation.kinds import Part
-from server.participation.ratings import TrialNotInRun, answer_to
-from server.participation.refusals import ConsentMissing, RunClosed, RunUnknown
+from server.participation.ratings import answer_to
+from server.participation.refusals import ConsentMissing, RunClosed, RunUnknown, TrialNotInRun
 from server.participation.tallies import Tally
+from server.participation.versions import Versions
 from server.participation.warnings import by_attention
-from server.studies.versions import Versions
 
-REFUSED = rating_repository.REFUSED
 KEPT_BYTES = 32 * 1024
 MAX_DEPTH = 16
 """Levels of nesting that are kept, more than a page's record has."""

@@ -49,8 +49,8 @@ from server.participation.run_schemas import (
     Unsupported,
 )
 from server.participation.trial_list import shown_checks, trial_list
+from server.participation.versions import LoadedVersion
 from server.participation.warnings import EVENT, RULE, failed_checks, in_language, waiting
-from server.studies.versions import LoadedVersion
 
 # Check a form's answers against its declaration.
 

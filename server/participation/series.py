@@ -27,7 +27,7 @@ from server.participation.kinds import answer_of
 from server.participation.quest import Answers, Estimate
 from server.participation.rating_repository import StoredTrial, refused_trials
 from server.participation.verdict import Ruling
-from server.studies.versions import LoadedVersion, Versions
+from server.participation.versions import LoadedVersion, Versions
 
 
 @dataclass(frozen=True)

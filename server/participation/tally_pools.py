@@ -26,7 +26,7 @@ from server.participation.tallies import (
     unpacked,
 )
 from server.participation.tally_repository import CellClip, ShownClip
-from server.studies.versions import Versions
+from server.participation.versions import Versions
 
 # The tallies of many runs together: what Results, monitor and participants read instead of ratings.
 

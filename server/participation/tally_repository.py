@@ -8,8 +8,7 @@ from sqlalchemy.orm import Session
 
 from experiments.checks import CHECK_CELL
 from server.models import AnswerEvidence, AssignedTrial, Rating, RunTally, StudyRun, TrialClip, VersionClip
-from server.participation.clip_bytes import ClipTime
-from server.participation.tallies import COLUMNS, Tally, tally_of
+from server.participation.tallies import COLUMNS, ClipTime, Tally, tally_of
 
 RUNS_AT_ONCE = 100
 READ_AT_ONCE = 500

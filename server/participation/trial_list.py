@@ -13,7 +13,7 @@ from experiments.checks import CHECK_KINDS, CheckName
 from experiments.declaration.experiment import Experiment
 from experiments.kinds import KINDS
 from server.context import Services
-from server.core.errors import Answer, finished
+from server.core.errors import Answer, json_response
 from server.core.storage import clip_address
 from server.models import StudyRun
 from server.participation import run_repository, series
@@ -23,10 +23,10 @@ from server.participation.rating_repository import refused_trials
 from server.participation.run_schemas import ShownCheck, ShownChecks, ShownOtherWay
 from server.participation.series import Outlook
 from server.participation.verdict import is_settled
+from server.participation.versions import LoadedVersion, PlacedClip
 from server.participation.view_repository import numbers
 from server.participation.views import unanswered_views
 from server.participation.warnings import in_language
-from server.studies.versions import LoadedVersion, PlacedClip
 
 # A run's trials as the page gets them: in stored order, with what is still to be shown of each.
 
@@ -171,7 +171,7 @@ def finished_for_page(
 ) -> Answer:
     """The answer as a response, with addresses and sizes of clips where the page does not know them."""
     if KNOWS_ADDRESSES in request.headers.get("accept", ""):
-        return finished(answer, status, exclude)
+        return json_response(answer, status, exclude)
     content = answer.model_dump(mode="json", exclude=exclude)
     if trials := list(_trials(content)):
         with services.database.read() as session:

@@ -2,15 +2,12 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from experiments.rules import PlaybackRules
 from experiments.rules.playback import Consequence
-from server.participation.answer_schemas import IMPOSSIBLE, PlaybackLog, RatingIn
-
-if TYPE_CHECKING:
-    from server.studies.versions import PlacedClip
-
+from server.participation.answer_schemas import IMPOSSIBLE, PlaybackLog, RatingIn, Verdict
+from server.participation.versions import PlacedClip
 
 # The playback verdict of one play, by the declared rules: good, uncertain, flagged or failed, and why.
 #
@@ -18,7 +15,6 @@ if TYPE_CHECKING:
 # docs/explanation/participant.md.
 # `uncertain` says that nothing is known against the play, and not enough for it.
 
-Verdict = Literal["good", "uncertain", "flagged", "failed"]
 Ruling = tuple[Verdict, str]
 GOOD: Ruling = ("good", "")
 INTERRUPTED = "interrupted"

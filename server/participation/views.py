@@ -24,10 +24,15 @@ from server.participation.answer_schemas import (
     ViewState,
 )
 from server.participation.intake import Intake, check_ticket, milliseconds, too_short
-from server.participation.ratings import TrialNotInRun
-from server.participation.refusals import ClipsOutlastTickets, ConsentMissing, RunUnknown, TicketMissing
+from server.participation.refusals import (
+    ClipsOutlastTickets,
+    ConsentMissing,
+    RunUnknown,
+    TicketMissing,
+    TrialNotInRun,
+)
+from server.participation.versions import LoadedVersion, Versions
 from server.participation.view_repository import RunOfViews, StoredView, TrialClips
-from server.studies.versions import LoadedVersion, Versions
 
 # The log of drawn frames, packed: differences from entry to entry as numbers of few bytes, in base64.
 #

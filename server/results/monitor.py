@@ -11,8 +11,7 @@ from sqlalchemy.orm import Session
 from experiments.assignment.groups import names
 from experiments.declaration.experiment import Experiment
 from server.core.values import now
-from server.models import Study
-from server.models.runs import STAGES
+from server.models import STAGES, Study
 from server.participation.run_schemas import Origin
 from server.results import monitor_repository
 from server.results.monitor_repository import MetRun, RunCount

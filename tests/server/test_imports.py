@@ -28,7 +28,7 @@ def test_no_module_imports_itself_by_a_detour(graph: grimp.ImportGraph) -> None:
     [
         ("server.participation.runs", "server.participation.ratings"),
         ("server.context", "server.studies.clip_endpoints"),
-        ("server.core.errors", "server.operations"),
+        ("server.core.error_handlers", "server.operations"),
         ("server.participation.views", "server.participation.runs"),
     ],
 )

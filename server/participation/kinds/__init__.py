@@ -7,20 +7,15 @@ import random
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar, get_args
+from typing import Any, Protocol, TypeVar, get_args
 
 from experiments.declaration.experiment import Experiment
 from experiments.declaration.trial import Answer
 from server.core.errors import Invalid
-from server.participation.answer_schemas import RatingIn
+from server.participation.answer_schemas import Part, RatingIn
 from server.participation.tallies import Counted, NumberedClip
 from server.participation.verdict import Ruling
-
-if TYPE_CHECKING:
-    from server.studies.versions import LoadedVersion
-
-
-Part = Literal["practice", "main", "attention", "check"]
+from server.participation.versions import LoadedVersion
 
 
 class Preference(Protocol):
@@ -61,7 +56,7 @@ class Served:
     """
 
     validate: Callable[[Experiment, Part, RatingIn], None]
-    judge: "Callable[[LoadedVersion, Mapping[str, int], RatingIn], Ruling]"
+    judge: Callable[[LoadedVersion, Mapping[str, int], RatingIn], Ruling]
     simulated: Callable[[Preference, Mapping[str, Any], Mapping[str, Any], random.Random], dict[str, Any]]
     counted: Callable[[Mapping[str, NumberedClip], Mapping[str, Any]], Iterable[Counted]]
 

@@ -10,14 +10,14 @@ from experiments.declaration.trial import RatedScale
 from experiments.kinds.clip_rating import ShownClipRating
 from experiments.kinds.scales import scales_of
 from server.core.errors import Invalid
-from server.participation.answer_schemas import RatingIn
-from server.participation.kinds import Part, Preference, Served, answer_of, asked_in
+from server.participation.answer_schemas import Part, RatingIn
+from server.participation.kinds import Preference, Served, answer_of, asked_in
 from server.participation.tallies import Counted, NumberedClip
 from server.participation.verdict import Ruling, judge_several, playback_of
 from server.participation.verdict import judge as judge_play
 
 if TYPE_CHECKING:
-    from server.studies.versions import LoadedVersion
+    from server.participation.versions import LoadedVersion
 
 
 TRIAL_SD = 1.0

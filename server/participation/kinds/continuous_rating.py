@@ -13,15 +13,15 @@ from experiments.declaration.continuous_rating import (
 )
 from experiments.declaration.experiment import Experiment
 from server.core.errors import Invalid
-from server.participation.answer_schemas import RatingIn
-from server.participation.kinds import Part, Preference, Served, answer_of, asked_in
+from server.participation.answer_schemas import Part, RatingIn
+from server.participation.kinds import Preference, Served, answer_of, asked_in
 from server.participation.kinds.clip_rating import RatingMissing, RatingOutOfScale
 from server.participation.tallies import Counted, NumberedClip
 from server.participation.verdict import Ruling, playback_of
 from server.participation.verdict import judge as judge_play
 
 if TYPE_CHECKING:
-    from server.studies.versions import LoadedVersion
+    from server.participation.versions import LoadedVersion
 
 
 LAG_S, RISE_S, HEIGHT_SHARE = 0.8, 0.6, 0.12

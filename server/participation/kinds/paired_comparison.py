@@ -14,15 +14,15 @@ from experiments.declaration.paired_comparison import (
     paired_comparison_of,
 )
 from server.core.errors import Invalid
-from server.participation.answer_schemas import RatingIn
-from server.participation.kinds import Part, Preference, Served, answer_of, asked_in
+from server.participation.answer_schemas import Part, RatingIn
+from server.participation.kinds import Preference, Served, answer_of, asked_in
 from server.participation.kinds.clip_rating import RatingMissing
 from server.participation.tallies import Counted, NumberedClip
 from server.participation.verdict import Ruling, judge_several, playback_of
 from server.participation.verdict import judge as judge_play
 
 if TYPE_CHECKING:
-    from server.studies.versions import LoadedVersion
+    from server.participation.versions import LoadedVersion
 
 
 TIE_SHARE = 0.5

@@ -13,7 +13,7 @@ from server.core.migrate import downgrade, upgrade
 from server.models import AnswerEvidence, RunTally, StudyRun
 from server.operations import doctor
 from server.participation import evidence_repository
-from server.participation.clip_bytes import ClipTime
+from server.participation.tallies import ClipTime
 from server.participation.tally_pools import Recount
 from tests.helpers.evidence import Watcher
 from tests.server.evidence.conftest import CLIP_S

@@ -21,7 +21,7 @@ from server.core.migrate import current_revision, downgrade, newest_revision, up
 from server.core.settings import Settings
 from server.exports.extract import Extract
 from server.exports.formats import FORMATS
-from server.models.runs import StudyRun
+from server.models import StudyRun
 from server.participation import returning
 from server.studies.lookup import find_study
 from tests.helpers.databases import BACKENDS

@@ -3,7 +3,7 @@ import pytest
 from experiments.rules import PlaybackRules
 from server.participation.answer_schemas import RatingIn
 from server.participation.verdict import judge_several
-from server.studies.versions import PlacedClip
+from server.participation.versions import PlacedClip
 
 SLOW, FAST = "a" * 64, "b" * 64
 

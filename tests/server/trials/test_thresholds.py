@@ -13,7 +13,7 @@ from server.exports.extract import Extract
 from server.exports.formats import FORMATS
 from server.models import SeriesAnswer, SeriesOffer, Study, StudyRun, View
 from server.participation import quest, series
-from server.studies.versions import Versions
+from server.participation.versions import Versions
 from tests.helpers.admins import Admin
 from tests.helpers.simulated import take_part
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study, good_playback

@@ -5,14 +5,14 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from experiments.declaration.experiment import Experiment
-from server.participation.answer_schemas import RatingIn
-from server.participation.kinds import Part, Preference, Served, answer_of
+from server.participation.answer_schemas import Part, RatingIn
+from server.participation.kinds import Preference, Served, answer_of
 from server.participation.tallies import Counted, NumberedClip
 from server.participation.verdict import Ruling
 from tests.experiments.trials.toy import SameAnswer
 
 if TYPE_CHECKING:
-    from server.studies.versions import LoadedVersion
+    from server.participation.versions import LoadedVersion
 
 
 def validate(_experiment: Experiment, _part: Part, rating: RatingIn) -> None:
