@@ -12,7 +12,7 @@ from starlette.routing import BaseRoute
 from server import web
 from server.accounts import endpoints as accounts
 from server.accounts import provider_endpoints, reset_endpoints, workspace_endpoints
-from server.accounts.audit import note_refusal
+from server.accounts.audit import RefusalLog
 from server.context import open_services
 from server.core.changes import ChangesTold
 from server.core.error_handlers import install_error_handlers
@@ -138,7 +138,8 @@ def create_app(settings: Settings | None = None, *, rehearses: bool = False) -> 
     )
     app.state.services = services
     app.router.routes.extend(every_route())
-    install_error_handlers(app, note_refusal)
+    refusals = RefusalLog(services.database, known=services.refusals, strangers=services.strangers)
+    install_error_handlers(app, refusals.note)
     app.add_middleware(ChangesTold, changes=services.changes)
     app.add_middleware(ExperimentersLane)  # inside the door: a body that comes slowly holds no place
     app.add_middleware(Door, settings=services.settings)

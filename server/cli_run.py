@@ -20,7 +20,7 @@ from server.context import Services
 from server.core.logs import logging_configuration
 from server.core.settings import Settings, close_to_others
 from server.operations.metrics import MULTIPROCESS_VARIABLE
-from server.privacy.erasures import begin_ledger
+from server.privacy.ledger import begin_ledger
 from server.protocol import BoundedHttp
 from server.studies.links import general_links, link_url
 from server.studies.repository import open_studies

@@ -104,19 +104,9 @@ def services_of(request: Request) -> Services:
     return services
 
 
-# The dependencies are async so that FastAPI does not send them through its thread pool.
+# Async, so that FastAPI does not send it through its thread pool.
 async def _services(request: Request) -> Services:
     return services_of(request)
 
 
-async def _settings(request: Request) -> Settings:
-    return services_of(request).settings
-
-
-async def _database(request: Request) -> Database:
-    return services_of(request).database
-
-
 ServicesDep = Annotated[Services, Depends(_services)]
-SettingsDep = Annotated[Settings, Depends(_settings)]
-DatabaseDep = Annotated[Database, Depends(_database)]

@@ -11,7 +11,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from server.accounts.identity import identify
+from server.accounts.access import identify
 from server.accounts.workspaces import recognise_uploader
 from server.context import services_of
 from server.core.errors import ApiError, refusal_response
@@ -142,7 +142,8 @@ class Door:
     async def _upload(self, scope: Scope, receive: Receive) -> Receive:
         """Recognise the sender first; then let the body pass, counted and timed."""
         request = Request(scope)
-        await run_in_threadpool(recognise_uploader, request, services_of(request))
+        services = services_of(request)
+        await run_in_threadpool(recognise_uploader, request, services.database, services.settings)
         if _declared(scope) > self.upload_bytes:
             raise too_large(self.upload_bytes)
         return _counted(receive, self.upload_bytes)
@@ -183,7 +184,8 @@ class Door:
         """Let an account send more than a stranger; BodyTooLarge where that is not enough or nobody's."""
         if kind == "admin" and body.limit < SIGNED_IN_BYTES:
             request = Request(scope)
-            await run_in_threadpool(identify, request, services_of(request))
+            services = services_of(request)
+            await run_in_threadpool(identify, request, services.database, services.settings)
             body.limit = SIGNED_IN_BYTES
         if size > body.limit:
             raise too_large(body.limit)

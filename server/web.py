@@ -16,11 +16,12 @@ from pydantic import BaseModel
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from server.context import Services, ServicesDep, SettingsDep
+from server.context import Services, ServicesDep
 from server.core.db import Database
 from server.core.errors import ERROR_RESPONSES, ApiError, NotFound
 from server.core.migrate import current_revision, newest_revision
 from server.core.repository import newest_clip
+from server.core.requests import SettingsDep
 from server.core.row_security import acting
 from server.core.settings import Settings
 

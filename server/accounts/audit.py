@@ -25,9 +25,9 @@ from sqlalchemy.orm import Session
 from experiments.errors import InputError
 from server.accounts import repository
 from server.accounts.identity import OPERATOR, Identity, Operator
-from server.context import Services, services_of
-from server.core.db import SIGNING_KEY, SYSLOG
+from server.core.db import SIGNING_KEY, SYSLOG, Database
 from server.core.errors import ApiError
+from server.core.limits import BoundedRecords
 from server.core.logs import described
 from server.core.settings import syslog_address
 from server.core.values import now
@@ -309,32 +309,40 @@ def latest(session: Session, before: int | None, limit: int) -> list[AuditEntry]
 ADMIN = "/api/admin/"
 
 
-async def note_refusal(request: Request, refusal: ApiError) -> None:
-    """Put a refusal of the admin API into the audit log, so many a minute; the rest are counted.
+class RefusalLog:
+    """Puts refusals of the admin API into the audit log, so many a minute; the rest are counted.
 
-    Where it cannot be written the refusal is answered all the same, and the log has a line.
+    Parameters
+    ----------
+    known, strangers : BoundedRecords
+        How many a minute: of accounts, and of nobody.
     """
-    services = services_of(request)
-    if request.url.path.startswith(ADMIN):
-        route = str(getattr(request.scope.get("route"), "path", "unmatched"))
-        try:
-            await run_in_threadpool(_note, services, request, route, refusal)
-        except (SQLAlchemyError, OSError, ValueError) as error:
-            log.error("a refusal could not be put into the audit log: %s", described(error))
 
+    def __init__(self, database: Database, known: BoundedRecords, strangers: BoundedRecords) -> None:
+        self._database, self._known, self._strangers = database, known, strangers
 
-def _note(services: Services, request: Request, route: str, refusal: ApiError) -> None:
-    actor = getattr(request.state, "identity", None) or NOBODY
-    name, records = (NOBODY, services.strangers) if actor == NOBODY else (actor.name, services.refusals)
-    unwritten = records.written(f"{name} {request.method} {route} {refusal.code}")
-    if unwritten is None:
-        return
-    details = {"code": refusal.code, "status": refusal.status}
-    details |= {"not_written_before": unwritten} if unwritten else {}
-    # No column of PostgreSQL holds a NUL.
-    study = str(request.path_params.get("study", "")).replace("\0", "\ufffd")
-    with services.database.write() as session:
-        record(
-            session, actor, "refused", "study" if study else "route", study or f"{request.method} {route}",
-            **details, **({"route": f"{request.method} {route}"} if study else {}),
-        )  # fmt: skip
+    async def note(self, request: Request, refusal: ApiError) -> None:
+        """Write one down. Where it cannot be written it is answered all the same, and the log has a line."""
+        if request.url.path.startswith(ADMIN):
+            route = str(getattr(request.scope.get("route"), "path", "unmatched"))
+            try:
+                await run_in_threadpool(self._write, request, route, refusal)
+            except (SQLAlchemyError, OSError, ValueError) as error:
+                log.error("a refusal could not be put into the audit log: %s", described(error))
+
+    def _write(self, request: Request, route: str, refusal: ApiError) -> None:
+        actor = getattr(request.state, "identity", None) or NOBODY
+        name, records = (NOBODY, self._strangers) if actor == NOBODY else (actor.name, self._known)
+        unwritten = records.written(f"{name} {request.method} {route} {refusal.code}")
+        if unwritten is None:
+            return
+        details = {"code": refusal.code, "status": refusal.status}
+        details |= {"not_written_before": unwritten} if unwritten else {}
+        # No column of PostgreSQL holds a NUL.
+        study = str(request.path_params.get("study", "")).replace("\0", "\ufffd")
+        asked = f"{request.method} {route}"
+        with self._database.write() as session:
+            if study:
+                record(session, actor, "refused", "study", study, **details, route=asked)
+            else:
+                record(session, actor, "refused", "route", asked, **details)

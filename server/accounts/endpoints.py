@@ -7,19 +7,18 @@ from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.orm import Session
 
 from server.accounts import audit, credentials, invitations, letters, service, signing_in
-from server.accounts.credentials import checked_password, hash_password
-from server.accounts.identity import (
+from server.accounts.access import (
     COOKIE,
     FreshMyself,
     FreshOwner,
-    Identity,
     Myself,
-    NotSignedIn,
     Owner,
     account_of,
     check_origin,
     identify,
 )
+from server.accounts.credentials import checked_password, hash_password
+from server.accounts.identity import Identity, NotSignedIn
 from server.accounts.invitations import must_fit, must_prove
 from server.accounts.schemas import (
     AccountOut,
@@ -98,7 +97,7 @@ def _set_device(response: Response, services: Services, name: str) -> None:
 def get_session(request: Request, services: ServicesDep) -> Me:
     """Who is signed in here."""
     try:
-        identity: Identity | None = identify(request, services)
+        identity: Identity | None = identify(request, services.database, services.settings)
     except NotSignedIn:
         identity = None
     with services.database.read() as session:
@@ -131,7 +130,7 @@ async def sign_in(
     device_cookie: Annotated[str | None, Cookie(alias=DEVICE_COOKIE, include_in_schema=False)] = None,
 ) -> Me:
     """Sign in; sets the session cookie. After some wrong attempts from one place the next must wait."""
-    check_origin(request, services)
+    check_origin(request, services.settings)
     token = await attempt(services, body, address_of(request), device_cookie, user_agent)
     set_session_cookie(response, services, token)
     _set_device(response, services, body.name)
@@ -222,7 +221,7 @@ async def accept_invitation(
     user_agent: UserAgent = "",
 ) -> Me:
     """Use a one-time link: make the account and sign in."""
-    check_origin(request, services)
+    check_origin(request, services.settings)
     key = services.sign_ins.key(body.name, address_of(request), None)
     await run_in_threadpool(services.sign_ins.enter, key, address_of(request), None)
     await run_in_threadpool(invitations.check_invitation, services, token)

@@ -7,8 +7,8 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import RedirectResponse
 
 from server.accounts import letters, provider_sign_in
+from server.accounts.access import FreshMyself, Myself, check_origin
 from server.accounts.endpoints import address_of, set_session_cookie
-from server.accounts.identity import FreshMyself, Myself, check_origin
 from server.accounts.invitations import must_prove
 from server.accounts.letters import can_send
 from server.accounts.provider_protocol import NotRecognised
@@ -66,7 +66,7 @@ async def begin_sign_in(
     request: Request, services: ServicesDep, provider: ProviderId, body: BeginSignIn, response: Response
 ) -> Elsewhere:
     """Begin to sign in with a provider: where the browser goes, and a cookie by which it is known again."""
-    check_origin(request, services)
+    check_origin(request, services.settings)
     provider_sign_in.provider_of(services, provider)
     await _enter(services, request, f"provider {provider}")
     begun = await run_in_threadpool(provider_sign_in.begin_attempt, services, provider, "sign in", body.next)
@@ -79,7 +79,7 @@ async def begin_invited(
     request: Request, services: ServicesDep, token: str, provider: ProviderId, response: Response
 ) -> Elsewhere:
     """Begin to make an invited account that signs in with a provider: where the browser goes."""
-    check_origin(request, services)
+    check_origin(request, services.settings)
     provider_sign_in.provider_of(services, provider)
     await _enter(services, request, f"provider {provider}")
     begun = await run_in_threadpool(provider_sign_in.begin_invited, services, provider, token)
@@ -152,7 +152,7 @@ async def finish_with_code(
     browser: LoginCookie = "",
 ) -> BeginSignIn:
     """Enter the second factor after a provider signed one in; gives the page to go on with."""
-    check_origin(request, services)
+    check_origin(request, services.settings)
     await _enter(services, request, "code after a provider")
     finished = await run_in_threadpool(
         provider_sign_in.finish_with_code, services, browser, body.code, user_agent

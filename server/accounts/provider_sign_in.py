@@ -16,9 +16,10 @@ from sqlalchemy.orm import Session
 from server.accounts import repository
 from server.accounts import repository as accounts
 from server.accounts import workspace_repository as workspaces
+from server.accounts.access import account_of
 from server.accounts.audit import NOBODY, record
 from server.accounts.credentials import is_recovery_code
-from server.accounts.identity import OPERATOR, Identity, account_of
+from server.accounts.identity import OPERATOR, Identity
 from server.accounts.invitations import check_invitation, find_invitation, invited_account
 from server.accounts.letters import LOGIN_ADDED, RECOVERY_CODE_USED, Told
 from server.accounts.provider_protocol import NotRecognised, Recognised, Secrets, SignedOut

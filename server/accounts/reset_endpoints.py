@@ -6,9 +6,9 @@ from fastapi import APIRouter, BackgroundTasks, Cookie, Request
 from fastapi.concurrency import run_in_threadpool
 
 from server.accounts import letters, resets
+from server.accounts.access import Myself, account_of, check_origin
 from server.accounts.credentials import hash_password
 from server.accounts.endpoints import address_of
-from server.accounts.identity import Myself, account_of, check_origin
 from server.accounts.invitations import must_fit, must_prove
 from server.accounts.resets import Asking
 from server.accounts.schemas import (
@@ -46,7 +46,7 @@ async def forgot_password(
     device_cookie: Annotated[str | None, Cookie(alias=DEVICE_COOKIE, include_in_schema=False)] = None,
 ) -> None:
     """Ask for a link by mail for a new password; the answer is the same whether there is such an account."""
-    check_origin(request, services)
+    check_origin(request, services.settings)
     _must_send(services)
     await _enter(services, request, "forgotten password")
     after.add_task(
@@ -59,7 +59,7 @@ async def set_password(
     request: Request, services: ServicesDep, body: NewPassword, after: BackgroundTasks
 ) -> None:
     """Choose a new password by a link; every session and every API token of the account ends."""
-    check_origin(request, services)
+    check_origin(request, services.settings)
     await _enter(services, request, "new password")
     name = await run_in_threadpool(resets.name_of, services, body.token)
     fresh = await services.passwords.run(lambda: hash_password(body.password, name))
@@ -98,7 +98,7 @@ async def confirm_address(
     request: Request, services: ServicesDep, body: ConfirmAddress, after: BackgroundTasks
 ) -> None:
     """Confirm an address of mail by the link that went there; the address before it is told."""
-    check_origin(request, services)
+    check_origin(request, services.settings)
     await _enter(services, request, "confirm an address")
     letter = await run_in_threadpool(resets.confirm_address, services, body.token)
     after.add_task(resets.post, services.settings, letter)

@@ -7,8 +7,9 @@ from sqlalchemy.orm import Session
 
 from server.accounts import letters, repository
 from server.accounts import repository as accounts
+from server.accounts.access import account_of
 from server.accounts.audit import NOBODY, record
-from server.accounts.identity import Identity, NotSignedIn, account_of
+from server.accounts.identity import Identity, NotSignedIn
 from server.accounts.service import renew
 from server.accounts.signing_in import identity_of
 from server.accounts.throttle import known_device

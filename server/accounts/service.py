@@ -7,9 +7,10 @@ from sqlalchemy.orm import Session
 
 from experiments.errors import did_you_mean
 from server.accounts import credentials, repository
+from server.accounts.access import account_of
 from server.accounts.audit import SECOND_FACTOR_SET_UP, record
 from server.accounts.credentials import hash_password, password_fits
-from server.accounts.identity import Identity, account_of
+from server.accounts.identity import Identity
 from server.accounts.signing_in import WrongCredentials, WrongProof, identity_of, second_factor_failure
 from server.accounts.workspace_repository import default_workspace, set_member
 from server.accounts.workspaces import Membership

@@ -3,7 +3,7 @@
 from fastapi import APIRouter
 
 from server.accounts import workspaces
-from server.accounts.identity import Founder, FreshMyself, Myself, Owner
+from server.accounts.access import Founder, FreshMyself, Myself, Owner
 from server.accounts.schemas import (
     ChangeWorkspace,
     GrantOut,

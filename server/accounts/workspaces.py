@@ -10,13 +10,16 @@ from sqlalchemy.orm import Session
 from experiments.errors import did_you_mean
 from server.accounts import repository as accounts
 from server.accounts import workspace_repository
+from server.accounts.access import WRITER, Writer, account_of
 from server.accounts.audit import record
-from server.accounts.identity import WRITER, Identity, NotAllowed, Operator, Writer, account_of, must_be_fresh
+from server.accounts.identity import Identity, NotAllowed, Operator, must_be_fresh
 from server.accounts.schemas import GrantOut, MemberOut, WorkspaceOut
 from server.accounts.workspace_repository import ordered
-from server.context import Services, ServicesDep
+from server.core.db import Database
 from server.core.errors import Conflict, Invalid, NotFound
+from server.core.requests import DatabaseDep
 from server.core.row_security import every_row
+from server.core.settings import Settings
 from server.models import DEFAULT_WORKSPACE, Account, Right, Role, Study, Workspace
 
 # The rules of workspaces: who may put a study where, who manages members and grants.
@@ -262,20 +265,20 @@ def move(session: Session, study: Study, workspace: Workspace, identity: Identit
 # Who may send clips: recognised before the body of an upload is read.
 
 
-def _must_make_studies(services: Services, identity: Identity) -> Identity:
-    with services.database.read() as session:
+def _must_make_studies(database: Database, identity: Identity) -> Identity:
+    with database.read() as session:
         if not workspace_repository.may_upload(session, identity):
             raise NotAllowed("This needs the role experimenter in a workspace; you have it in none.")
     return identity
 
 
-def recognise_uploader(request: Request, services: Services) -> Identity:
+def recognise_uploader(request: Request, database: Database, settings: Settings) -> Identity:
     """The account behind an upload; NotSignedIn or NotAllowed where it may send none."""
-    return _must_make_studies(services, WRITER(request, services, None, None))
+    return _must_make_studies(database, WRITER(request, database, settings, None, None))
 
 
-def _uploader(services: ServicesDep, identity: Writer) -> Identity:
-    return _must_make_studies(services, identity)
+def _uploader(database: DatabaseDep, identity: Writer) -> Identity:
+    return _must_make_studies(database, identity)
 
 
 Uploader = Annotated[Identity, Depends(_uploader)]

@@ -27,6 +27,7 @@ from server.exports.repository import runs_by_origin
 from server.exports.seals import page, seal_of, seal_plan
 from server.results import methods as methods_service
 from server.studies.lookup import find_study
+from server.studies.series import definition_of_series
 
 # `server export`: take the data of a study out, in the same forms as the dashboard's data page.
 
@@ -107,7 +108,7 @@ def export(
     with stored_services() as services, services.database.snapshot() as session:
         known = find_study(session, study, OPERATOR, "view")
         extract = Extract(origin, series)
-        extract.definition(session, known)
+        definition_of_series(session, known, extract.series)
         if form != "codebook":
             action = "identities downloaded" if form == "identities" else "data downloaded"
             with services.database.write() as noted:
@@ -117,7 +118,7 @@ def export(
                 out_file, spreadsheet_pieces(FORMATS[form](session, known, extract), form, bom, guard)
             )
             if form == "csv" and scripts and str(out_file) != "-":
-                beside = _write_scripts(out_file, extract.definition(session, known))
+                beside = _write_scripts(out_file, definition_of_series(session, known, extract.series))
         except (ValueError, SQLAlchemyError) as error:
             raise InputError(
                 f"the export broke off ({str(error).splitlines()[0]}) and was not kept; run: server doctor"
@@ -198,7 +199,7 @@ def capsule(
     with stored_services() as services, Console(stderr=True, markup=False).status("capsule") as status:
         with services.database.write() as session:
             known = find_study(session, study, OPERATOR, "view")
-            about = Extract(origin, series).definition(session, known).dataset
+            about = definition_of_series(session, known, series).dataset
             record(session, None, "data downloaded", "study", study, what="capsule", origin=origin)
         made = build_capsule(
             services,

@@ -14,8 +14,9 @@ from pydantic import BaseModel, ConfigDict, Field
 from starlette.background import BackgroundTask
 
 from experiments.seal import Seal
+from server.accounts.access import Exporter, Myself, ReportReader, Viewer, Writer
 from server.accounts.audit import record
-from server.accounts.identity import Exporter, Identity, Myself, ReportReader, Viewer, Writer
+from server.accounts.identity import Identity
 from server.context import Services, ServicesDep
 from server.core.errors import ERROR_RESPONSES, Conflict, NotFound
 from server.core.values import Number, encoded
@@ -39,6 +40,7 @@ from server.exports.seals import page, people_begun, seal_of, seal_plan
 from server.models import Right
 from server.participation.identity_keys import UnreadableError
 from server.studies.lookup import active_definition, find_study
+from server.studies.series import definition_of_series
 
 # Downloads of a study's data, of one origin unless all are asked for; streamed in constant memory.
 
@@ -85,7 +87,8 @@ class Download:
         action = "identities downloaded" if form == "identities" else "data downloaded"
         right: Right = "own" if form == "identities" else "export"
         with self.services.database.write() as session:
-            self.extract.definition(session, find_study(session, self.study, self.identity, right))
+            study = find_study(session, self.study, self.identity, right)
+            definition_of_series(session, study, self.extract.series)
             series = {} if self.extract.series is None else {"series": self.extract.series}
             details = {"what": form, "origin": self.extract.origin} | series
             record(session, self.identity, action, "study", self.study, **details)
@@ -281,8 +284,6 @@ def remove_capsule(services: ServicesDep, identity: Writer, study: str, capsule:
 report_router = APIRouter(
     prefix="/api/admin/studies/{study}/reports", tags=["reports"], responses=ERROR_RESPONSES
 )
-# A report is one page with its own styles and pictures inside; it may load and run nothing.
-REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; sandbox allow-popups"
 
 
 @report_router.get("")
@@ -306,7 +307,7 @@ def get_report_file(
     with services.database.read() as session:
         path = report_service.report_file(services, session, study, identity, report, file)
     kind = "attachment" if download or path.suffix != ".html" else "inline"
-    headers = {"content-security-policy": REPORT_POLICY}
+    headers = {"content-security-policy": report_service.REPORT_POLICY}
     return FileResponse(path, filename=f"{study}-{path.name}", content_disposition_type=kind, headers=headers)
 
 

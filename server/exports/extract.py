@@ -4,13 +4,9 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from sqlalchemy import ColumnElement
-from sqlalchemy.orm import Session
 
-from experiments.declaration.experiment import Experiment
 from server.models import Study, StudyRun
-from server.studies.lookup import definition_of
 from server.studies.repository import ids_of_series
-from server.studies.series import version_of_series
 
 ExportOrigin = Literal["participant", "pilot", "simulated", "all"]
 """Previews are in no export: they are stored for a day only."""
@@ -24,17 +20,13 @@ class Extract:
     origin: ExportOrigin = "participant"
     series: int | None = None
 
-    def of(self, study: Study) -> ColumnElement[bool]:
+    def condition(self, study: Study) -> ColumnElement[bool]:
         """The condition that a run of the study is in it."""
         origins = EXPORTED if self.origin == "all" else (self.origin,)
         runs = (StudyRun.study_id == study.id) & StudyRun.origin.in_(origins)
         if self.series is None:
             return runs
         return runs & StudyRun.version_id.in_(ids_of_series(study, self.series))
-
-    def definition(self, session: Session, study: Study) -> Experiment:
-        """The newest declaration of the series, or that in use; NotFound where there is no such series."""
-        return definition_of(version_of_series(session, study, self.series))
 
     def __str__(self) -> str:
         """In words, as READMEs have it."""

@@ -22,6 +22,7 @@ from server.exports.extract import Extract
 from server.exports.tables import ExportTable, answers_table, cells_of, runs_table, wide_table
 from server.models import Study
 from server.studies.lookup import active_definition, all_definitions
+from server.studies.series import definition_of_series
 from table_files.formulas import guarded_csv
 
 # Tables as SPSS or Parquet, written by the program `analysis`: the server carries no numerics.
@@ -202,6 +203,6 @@ def row_count(form: Format, session: Session, study: Study, extract: Extract) ->
         return repository.known_person_count(session, study)
     if form in ("wide", "spss-wide", "parquet-wide"):
         # Refuses a kind without ratings before a download begins.
-        cells_of(extract.definition(session, study))
+        cells_of(definition_of_series(session, study, extract.series))
     count = rating_count if form in ("csv", "psych-ds", "spss", "parquet") else repository.run_count
     return count(session, study, extract)

@@ -31,7 +31,7 @@ from server.exports.tables import (
 )
 from server.models import Study
 from server.studies.lookup import all_definitions, definition_of
-from server.studies.series import version_of_series
+from server.studies.series import definition_of_series, version_of_series
 from table_files.formulas import guarded_csv
 
 # A table without what may tell who a person is, for datasets that are handed on.
@@ -177,7 +177,10 @@ def dataset(session: Session, study: Study, made: str, extract: Extract) -> Iter
 
 def dataset_folder(session: Session, study: Study, made: str, extract: Extract) -> Folder:
     """`dataset_description.json`, README, CHANGES, `data/`, codebook, definition and scripts."""
-    definition, definitions = extract.definition(session, study), all_definitions(session, study)
+    definition, definitions = (
+        definition_of_series(session, study, extract.series),
+        all_definitions(session, study),
+    )
     factors = {factor.name for one in definitions for factor in one.factors}
     renamed = {name: beside_runs(name) for name in sorted(factors) if beside_runs(name) != name}
     first = first_start(session, study, extract)

@@ -28,6 +28,8 @@ from server.studies.lookup import find_study
 from server.studies.series import version_of_series
 
 SEAL = "sealed-plan.json"
+# A report is one page with its own styles and pictures inside; it may load and run nothing.
+REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; sandbox allow-popups"
 _one_at_a_time = threading.Lock()
 
 

@@ -45,25 +45,25 @@ class KnownPerson(NamedTuple):
 
 def runs_by_origin(session: Session, study: Study) -> dict[str, int]:
     """How many runs there are of each exported origin."""
-    query = select(StudyRun.origin, func.count()).where(EVERYTHING.of(study))
+    query = select(StudyRun.origin, func.count()).where(EVERYTHING.condition(study))
     return dict(session.execute(query.group_by(StudyRun.origin)).all())
 
 
 def run_count(session: Session, study: Study, extract: Extract) -> int:
     """Runs of this origin."""
-    return session.scalar(select(func.count()).select_from(StudyRun).where(extract.of(study))) or 0
+    return session.scalar(select(func.count()).select_from(StudyRun).where(extract.condition(study))) or 0
 
 
 def first_start(session: Session, study: Study, extract: Extract) -> datetime | None:
     """When the first of these runs started; None where there are none."""
-    return session.scalar(select(func.min(StudyRun.started_at)).where(extract.of(study)))
+    return session.scalar(select(func.min(StudyRun.started_at)).where(extract.condition(study)))
 
 
 def each_run(session: Session, study: Study, extract: Extract) -> Iterator[StudyRun]:
     """The runs of this extract, in the order they began; a batch of them is in memory at a time."""
     latest = 0
     while True:
-        query = select(StudyRun).where(extract.of(study), StudyRun.id > latest)
+        query = select(StudyRun).where(extract.condition(study), StudyRun.id > latest)
         runs = session.scalars(query.order_by(StudyRun.id).limit(RUNS_AT_ONCE)).all()
         if not runs:
             return
@@ -74,7 +74,7 @@ def each_run(session: Session, study: Study, extract: Extract) -> Iterator[Study
 
 def public_ids(session: Session, study: Study, extract: Extract) -> Sequence[str]:
     """The public ids of the runs of this extract, in the order they began."""
-    query = select(StudyRun.public_id).where(extract.of(study))
+    query = select(StudyRun.public_id).where(extract.condition(study))
     return session.scalars(query.order_by(StudyRun.id)).all()
 
 
@@ -88,7 +88,7 @@ def play_count(session: Session, study: Study, extract: Extract, kind: str | Non
     """Stored plays of trials of this kind; None counts those of any, which an index holds."""
     query = select(func.count()).select_from(Rating).join(StudyRun, StudyRun.id == Rating.study_run_id)
     of_kind = true() if kind is None else Rating.kind == kind
-    return session.scalar(query.where(extract.of(study), of_kind)) or 0
+    return session.scalar(query.where(extract.condition(study), of_kind)) or 0
 
 
 def rows_in_view(session: Session, study: Study, extract: Extract, view: View) -> int:
@@ -172,7 +172,7 @@ def plain_rows(result: CursorResult[Any]) -> Rows:
 
 
 def _runs_after(session: Session, study: Study, extract: Extract, latest: int, at_once: int) -> Runs:
-    query = select(StudyRun.id, StudyRun.public_id).where(extract.of(study), StudyRun.id > latest)
+    query = select(StudyRun.id, StudyRun.public_id).where(extract.condition(study), StudyRun.id > latest)
     runs = session.execute(query.order_by(StudyRun.id).limit(at_once))
     return [(run, public_id) for run, public_id in runs]
 

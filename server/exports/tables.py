@@ -38,6 +38,7 @@ from server.participation.judgement import judge_run
 from server.participation.visit_repository import calibrations
 from server.results import runs
 from server.studies.lookup import all_definitions
+from server.studies.series import definition_of_series
 
 # Runs as CSV rows, and everything stored as JSON lines; one run is in memory at a time.
 
@@ -417,7 +418,7 @@ def runs_table(session: Session, study: Study, extract: Extract) -> ExportTable:
 def wide_table(session: Session, study: Study, extract: Extract) -> ExportTable:
     """One row a visit, a column a cell with the mean rating in it; InputError for trials without a scale."""
     definitions, number = all_definitions(session, study), run_count(session, study, extract)
-    newest, forms = extract.definition(session, study), form_columns(definitions)
+    newest, forms = definition_of_series(session, study, extract.series), form_columns(definitions)
     rows = whole(wide_rows(session, study, extract, newest, forms), number)
     return ExportTable("wide", wide_columns(newest, forms), rows, number)
 

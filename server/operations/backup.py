@@ -27,7 +27,7 @@ from server.core.values import iso, now
 from server.operations import key_escrow
 from server.operations.key_escrow import KeyFile
 from server.operations.repository import clip_hashes
-from server.privacy import erasures
+from server.privacy.ledger import LEDGER_NAME, begin_ledger, ledger_for_backup
 from server.privacy.rows import Content, Digest, read_rows, snapshot, tables_of
 
 # `server backup`: database, clips and secret key of one moment in one file.
@@ -72,9 +72,9 @@ def back_up(
     InputError
         A folder is missing, or a file cannot be written or holds the keys of another installation.
     """
-    erasures.begin_ledger(services.settings)
+    begin_ledger(services.settings)
     key_path = keys or key_escrow.key_file_of(path)
-    check_targets([path, key_path, key_path.parent / erasures.NAME])
+    check_targets([path, key_path, key_path.parent / LEDGER_NAME])
     key_escrow.check_replaceable(key_path, services.settings.key)
     with _written(path) as stream:
         described, kept = write_backup(services, stream, with_clips=with_clips)
@@ -87,14 +87,14 @@ def _write_keys(services: Services, path: Path, kept: KeyFile) -> None:
     with locked(services.settings.common_folder / "backup-keys.lock"):
         key_escrow.check_replaceable(path, services.settings.key)
         key_escrow.write_keys(path, kept)
-        _write_ledger(services, path.parent / erasures.NAME, kept.written_at)
+        _write_ledger(services, path.parent / LEDGER_NAME, kept.written_at)
 
 
 def _write_ledger(services: Services, path: Path, moment: str) -> None:
     """A copy of the ledger of erasures beside the key file; what it names already stays."""
     there = path.read_bytes() if path.is_file() else b""
     with whole_private_file(path) as stream:
-        stream.write(erasures.copy_for_backup(services.settings, there, moment))
+        stream.write(ledger_for_backup(services.settings, there, moment))
 
 
 # Decision 0200: Backups hold rows, not database files.

@@ -19,7 +19,7 @@ from server.core.storage import s3_client
 from server.core.values import iso, now
 from server.operations.backup import ENDING, Description, decrypt, encrypted, write_backup
 from server.operations.key_escrow import NAME, content_of_keys, installation
-from server.privacy import erasures
+from server.privacy.ledger import LEDGER_NAME, ledger_for_backup
 
 # Where backups are kept: a folder (of another disk or host), or a bucket of an S3-compatible store.
 
@@ -247,8 +247,8 @@ def back_up_to(
     def write(stream: IO[bytes]) -> None:
         described, keys = write_backup(services, stream, with_clips=with_clips)
         _put_newest(store, _Kept(NAME, ours, keys.written_at), content_of_keys(keys), recipient)
-        ledger = _Kept(erasures.NAME, ours, iso(now()))
-        copy = erasures.copy_for_backup(services.settings, b"", keys.written_at)
+        ledger = _Kept(LEDGER_NAME, ours, iso(now()))
+        copy = ledger_for_backup(services.settings, b"", keys.written_at)
         _put_newest(store, ledger, copy, recipient)
         made.append(described)
 
@@ -330,7 +330,7 @@ def brought_here(kept: KeptBackup, folder: Path, identity: x25519.Identity | Non
 def _beside(kept: KeptBackup) -> Iterator[tuple[str, str]]:
     """Key file and ledger of a backup: as they are stored, and as they are called beside it."""
     whose = installation_of(kept.name) or ""
-    for name in (NAME, erasures.NAME):
+    for name in (NAME, LEDGER_NAME):
         if kept.name.endswith(ENDING):
             # Where somebody renamed the backup: restore refuses keys that are not its own.
             stored = _named(kept.store, name, whose)

@@ -32,7 +32,7 @@ from server.operations.watched_backups import OLD_AFTER_S, WatchedBackups, watch
 from server.participation.identity_repository import readable
 from server.participation.recruiter import refused_addresses
 from server.participation.tally_pools import Recount
-from server.privacy import erasures
+from server.privacy.ledger import LEDGER_NAME, ledger_content, ledger_path, merge_ledgers
 
 # What a check of `server doctor` says.
 
@@ -130,23 +130,23 @@ def _taken(settings: Settings) -> Finding:
 def ledger(services: Services) -> Iterator[Finding]:
     """A ledger that was kept before PALPEBRA_SHARED_FOLDER was set is in the one that is kept now."""
     settings = services.settings
-    before = settings.data_folder / erasures.NAME
+    before = settings.data_folder / LEDGER_NAME
     if settings.shared_folder is None or not before.is_file():
-        yield Finding("ledger of erasures", "ok", str(erasures.ledger(settings)))
+        yield Finding("ledger of erasures", "ok", str(ledger_path(settings)))
         return
-    kept = erasures.merged(erasures.content(settings), b"")
-    missing = len(erasures.merged(kept, before.read_bytes()).splitlines()) - len(kept.splitlines())
+    kept = merge_ledgers(ledger_content(settings), b"")
+    missing = len(merge_ledgers(kept, before.read_bytes()).splitlines()) - len(kept.splitlines())
     if missing:
-        said = f"{missing} of the lines of {before} are not in {erasures.ledger(settings)}"
+        said = f"{missing} of the lines of {before} are not in {ledger_path(settings)}"
         # Added at the end, so that what the new one gains meanwhile stays; `echo` ends a line cut off.
-        one, other = (shlex.quote(str(path)) for path in (before, erasures.ledger(settings)))
+        one, other = (shlex.quote(str(path)) for path in (before, ledger_path(settings)))
         advice = (
             "a restore would bring these people back; as the server's user, run: "
             f"(umask 077; {{ echo; cat {one}; }} >> {other})"
         )
         yield Finding("ledger of erasures", "failed", said, advice)
     else:
-        yield Finding("ledger of erasures", "ok", f"{erasures.ledger(settings)} has all that was kept before")
+        yield Finding("ledger of erasures", "ok", f"{ledger_path(settings)} has all that was kept before")
 
 
 def connection_pool(services: Services) -> Iterator[Finding]:

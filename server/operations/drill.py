@@ -28,7 +28,7 @@ from server.operations.doctor import Finding, counts, database, identities
 from server.operations.key_escrow import key_file_of
 from server.operations.restore import restore
 from server.operations.watched_backups import DrillResult, drill_file, last_drill, newest_backup
-from server.privacy.erasures import ledger
+from server.privacy.ledger import ledger_path
 
 # `server drill`: bring the newest backup back beside the data, examine it, and say how it went.
 #
@@ -183,8 +183,8 @@ def _beside(settings: Settings, folder: Path) -> Settings:
             "audit_syslog": "",
         }
     )
-    if ledger(settings).is_file():
-        shutil.copyfile(ledger(settings), ledger(apart))
+    if ledger_path(settings).is_file():
+        shutil.copyfile(ledger_path(settings), ledger_path(apart))
     return apart
 
 

@@ -7,7 +7,7 @@ from prometheus_client import CONTENT_TYPE_LATEST
 from pydantic import BaseModel, Field
 
 from experiments.errors import InputError
-from server.accounts.identity import Owner
+from server.accounts.access import Owner
 from server.context import ServicesDep
 from server.core.errors import ERROR_RESPONSES, ApiError
 from server.core.settings import Settings

@@ -21,8 +21,15 @@ from server.core.migrate import alembic_config, derived_anew, known_revision
 from server.core.settings import Settings, put_key, secret_key_path
 from server.operations.backup import CLIPS, DESCRIPTION, KEY, TABLES, Description
 from server.operations.key_escrow import NAME, KeyFile, check_fits, key_file, key_file_of, put_back
-from server.privacy import erasures
-from server.privacy.erasures import ledger, replay
+from server.privacy.erasures import replay
+from server.privacy.ledger import (
+    LEDGER_NAME,
+    add_to_ledger,
+    known_from,
+    known_until,
+    ledger_content,
+    ledger_path,
+)
 from server.privacy.rows import Content, Row, refuse_unless_empty, tables_of, write_rows
 
 FORMAT = 1
@@ -65,7 +72,7 @@ def restore(
         has another secret key; the key file is another installation's or older than the backup; no ledger of
         erasures knows who was erased since the backup.
     """
-    copied_ledger = (keys or key_file_of(path)).parent / erasures.NAME
+    copied_ledger = (keys or key_file_of(path)).parent / LEDGER_NAME
     try:
         with tarfile.open(path) as tar:
             described = _description(tar, path)
@@ -101,28 +108,28 @@ def _reason(error: Exception) -> str:
 
 def _is_covered(settings: Settings, copy: Path, described: Description) -> bool:
     """Whether a ledger knows who was erased since the backup: else they would come back unnoticed."""
-    if ledger(settings).is_file() and erasures.known_from(erasures.content(settings)) <= described.created_at:
+    if ledger_path(settings).is_file() and known_from(ledger_content(settings)) <= described.created_at:
         return True
-    return copy.is_file() and erasures.known_until(copy.read_bytes()) > described.created_at
+    return copy.is_file() and known_until(copy.read_bytes()) > described.created_at
 
 
 def _not_covered(settings: Settings, copy: Path, described: Description) -> InputError:
     return InputError(
         f"expected a ledger of erasures that is newer than the backup of {described.created_at}, in the data "
-        f"folder ({ledger(settings)}) or next to the backup ({copy}), got none: people erased since would "
-        f"come back. Put the newest {erasures.NAME} there; if nobody was erased since, restore with "
+        f"folder ({ledger_path(settings)}) or next to the backup ({copy}), got none: people erased since "
+        f"would come back. Put the newest {LEDGER_NAME} there; if nobody was erased since, restore with "
         "--despite-erasures"
     )
 
 
 def _take_over_ledger(settings: Settings, path: Path) -> None:
     """Who was erased after the backup is in the copy of the ledger beside it, if it was written since."""
-    if path.is_file() and path != ledger(settings):
-        erasures.take_over(settings, path.read_bytes())
+    if path.is_file() and path != ledger_path(settings):
+        add_to_ledger(settings, path.read_bytes())
 
 
 def _erase_again(services: Services, told: Callable[[str], None], *, covered: bool) -> None:
-    path = ledger(services.settings)
+    path = ledger_path(services.settings)
     if path.is_file():
         with services.database.write() as session:
             erased = replay(session, services.settings)

@@ -20,7 +20,8 @@ from server.core.migrate import upgrade
 from server.core.settings import Settings
 from server.core.values import iso, now
 from server.operations.repository import run_counts
-from server.privacy.erasures import ledger, replay
+from server.privacy.erasures import replay
+from server.privacy.ledger import ledger_path
 
 # What snapshots ask of SQLite itself: a copy, one file without a WAL, a database that nobody else uses.
 
@@ -225,7 +226,7 @@ def erase_in_snapshots(settings: Settings) -> int:
 
     The time stamp of a snapshot's file tells up to when the ledger was carried out in it.
     """
-    path = ledger(settings)
+    path = ledger_path(settings)
     if not path.is_file():
         return 0
     # The ledger is written before the erasure is committed: a snapshot between the two holds what was erased.

@@ -12,9 +12,10 @@ from sqlalchemy import Connection
 from sqlalchemy.orm import Session
 
 from experiments.kinds import KINDS
-from server.context import DatabaseDep, Services, ServicesDep
+from server.context import Services, ServicesDep
 from server.core.errors import ERROR_RESPONSES, ApiError, json_response, refused_value
 from server.core.limits import RateLimit
+from server.core.requests import DatabaseDep
 from server.core.values import hash_token
 from server.participation import links, refused_records, returning, runs
 from server.participation import ratings as rating_service

@@ -2,7 +2,7 @@
 
 from fastapi import APIRouter, Response
 
-from server.accounts.identity import Myself
+from server.accounts.access import Myself
 from server.context import ServicesDep
 from server.core.errors import ERROR_RESPONSES
 from server.core.values import now

@@ -21,8 +21,9 @@ from server.core.locks import Locks, LockTaken
 from server.core.settings import Settings
 from server.core.values import now
 from server.models import Study, StudyRun, StudyVersion
-from server.privacy import erasures, repository
+from server.privacy import repository
 from server.privacy.erasures import forget, forget_identifiers
+from server.privacy.ledger import note_erased, note_identifiers_erased
 from server.studies.lookup import definition_of
 
 # What is erased by the declared periods, as pages and the command line show it.
@@ -184,9 +185,9 @@ def _erase(session: Session, settings: Settings, study: Study, rule: Rule, runs:
     session.flush()
     ids = [run.public_id for run in runs]
     if rule.what == "identifiers":
-        erasures.note_identifiers(settings, ids)
+        note_identifiers_erased(settings, ids)
     else:
-        erasures.note(settings, ids)
+        note_erased(settings, ids)
 
 
 def names(session: Session) -> list[str]:

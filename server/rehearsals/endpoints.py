@@ -3,10 +3,10 @@
 from fastapi import APIRouter
 from fastapi.responses import FileResponse
 
-from server.accounts.identity import Viewer, Writer
+from server.accounts.access import Viewer, Writer
 from server.context import ServicesDep
 from server.core.errors import ERROR_RESPONSES
-from server.exports.endpoints import REPORT_POLICY
+from server.exports.reports import REPORT_POLICY
 from server.rehearsals import service
 from server.rehearsals.schemas import NewRehearsal, RehearsalOut, RehearsalResult
 

@@ -10,19 +10,9 @@ from fastapi.concurrency import run_in_threadpool
 from fastapi.responses import StreamingResponse
 from pydantic import BaseModel, Field
 
+from server.accounts.access import Eraser, Myself, PersonalReader, Viewer, Writer, identify
 from server.accounts.audit import record
-from server.accounts.identity import (
-    Eraser,
-    Identity,
-    Myself,
-    NotAllowed,
-    NotSignedIn,
-    PersonalReader,
-    SecondFactorNeeded,
-    Viewer,
-    Writer,
-    identify,
-)
+from server.accounts.identity import Identity, NotAllowed, NotSignedIn, SecondFactorNeeded
 from server.context import Services, ServicesDep
 from server.core.errors import ERROR_RESPONSES, NotFound
 from server.core.values import Number
@@ -184,7 +174,7 @@ async def stream_monitor(
                 return
             seen = services.changes.number
             try:
-                anew = await run_in_threadpool(identify, request, services)
+                anew = await run_in_threadpool(identify, request, services.database, services.settings)
                 yield await run_in_threadpool(_snapshot, services, study, anew, origin)
             except (NotSignedIn, NotFound, NotAllowed, SecondFactorNeeded):  # or the study was deleted
                 return

@@ -11,7 +11,8 @@ from fastapi.params import File
 from fastapi.responses import FileResponse, PlainTextResponse, RedirectResponse, StreamingResponse
 
 from experiments.manifest import FrameRate
-from server.accounts.identity import Identity, Viewer
+from server.accounts.access import Viewer
+from server.accounts.identity import Identity
 from server.accounts.workspaces import Uploader
 from server.context import Services, ServicesDep
 from server.core.errors import ERROR_RESPONSES, ApiError, Invalid, NotFound

@@ -6,8 +6,8 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query, Response
 from fastapi.responses import PlainTextResponse
 
+from server.accounts.access import Myself, Viewer, Writer
 from server.accounts.audit import record
-from server.accounts.identity import Myself, Viewer, Writer
 from server.accounts.workspaces import Uploader
 from server.context import Services, ServicesDep
 from server.core.errors import ERROR_RESPONSES

@@ -9,7 +9,7 @@ from typing import Any
 from fastapi import APIRouter, Response
 from pydantic import BaseModel, Field, ValidationError
 
-from server.accounts.identity import Viewer
+from server.accounts.access import Viewer
 from server.context import ServicesDep
 from server.core.errors import ERROR_RESPONSES, NotFound
 from table_files.delimited import delimited_table

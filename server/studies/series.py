@@ -64,6 +64,11 @@ def version_of_series(session: Session, study: Study, series: int | None) -> Stu
     return version
 
 
+def definition_of_series(session: Session, study: Study, series: int | None) -> Experiment:
+    """The newest declaration of a series, or that in use; NotFound where there is no such series."""
+    return definition_of(version_of_series(session, study, series))
+
+
 def series_for(study: Study, experiment: Experiment, manifest: Manifest) -> int:
     """The series of a further version: the latest whose versions all measure the same by the same clips.
 

@@ -9,8 +9,11 @@ from importlib import import_module
 from sqlalchemy.orm import Session
 
 from server.models import Study, StudyVersion
+from server.participation.tally_pools import pooled
 from server.results.repository import Pool
-from server.results.schemas import AnyResults
+from server.results.schemas import AnyResults, OtherResults
+from server.results.service import common
+from server.studies.lookup import definition_of
 
 Summarise = Callable[[Session, Study, StudyVersion, Pool], AnyResults]
 """The results of a pool of answers, which is of the data series of this version."""
@@ -24,5 +27,16 @@ def summary_of(kind: str) -> Summarise:
     except ModuleNotFoundError as error:
         if error.name != module:
             raise
-        from server.results.kinds.unknown import summarise
+        return _summarise_unknown
     return summarise
+
+
+def _summarise_unknown(session: Session, study: Study, version: StudyVersion, of: Pool) -> OtherResults:
+    """Of a kind without a file here: how much there is, how it was shown, and that this is all."""
+    kind = definition_of(version).trial.kind
+    tally = pooled(session, of.runs(), "", ())
+    return OtherResults(
+        **common(study, version, of, tally),
+        ratings=tally.answers.total(),
+        note=f"Answers of {kind.replace('_', ' ')} trials have no summary here; the Data page exports them.",
+    )

@@ -3,7 +3,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from server.accounts import invitations
-from server.accounts.identity import COOKIE
+from server.accounts.access import COOKIE
 from server.context import Services
 from server.core.settings import Settings
 from server.models import Account, AdminSession, ApiToken, Invitation

@@ -6,7 +6,7 @@ import pytest
 from fastapi.testclient import TestClient
 from sqlalchemy import text
 
-from server.accounts.identity import COOKIE
+from server.accounts.access import COOKIE
 from server.context import REFUSALS_PER_MINUTE, Services
 from server.core.limits import BoundedRecords
 from server.core.settings import Settings

@@ -18,7 +18,7 @@ from server.operations.drill import drill
 from server.operations.key_escrow import NAME
 from server.operations.restore import restore
 from server.participation.identity_repository import known_as, readable
-from server.privacy import erasures
+from server.privacy.ledger import LEDGER_NAME, ledger_path, merge_ledgers
 from tests.helpers.admins import Admin
 from tests.helpers.databases import BACKENDS, run_server_command
 from tests.helpers.studies import Participant, StudyInDatabase
@@ -245,13 +245,13 @@ def test_the_ledger_goes_along_so_that_a_new_machine_erases_again(
     assert erased == [run]
     again.database.close()
     # An installation that lost its ledger does not take it from the backups.
-    erasures.ledger(services.settings).unlink()
+    ledger_path(services.settings).unlink()
     back_up(services, tmp_path / "b" / "newest.tar", with_clips=False)
-    assert run in (tmp_path / "b" / erasures.NAME).read_text()
+    assert run in (tmp_path / "b" / LEDGER_NAME).read_text()
 
 
 def test_ledgers_are_merged_line_by_line() -> None:
-    assert erasures.merged(b'{"run": "a"}\n{"run": "cut', b'{"run": "b"}\n{"run": "a"}\n') == (
+    assert merge_ledgers(b'{"run": "a"}\n{"run": "cut', b'{"run": "b"}\n{"run": "a"}\n') == (
         b'{"run": "a"}\n{"run": "cut\n{"run": "b"}\n'
     )
-    assert erasures.merged(b"", b"") == b""
+    assert merge_ledgers(b"", b"") == b""

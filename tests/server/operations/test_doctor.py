@@ -13,7 +13,7 @@ from server.app import create_app
 from server.context import Services, open_services
 from server.core.settings import Settings, close_to_others
 from server.operations.doctor import CHECKS, Finding, examine, ledger
-from server.privacy import erasures
+from server.privacy.ledger import erasures_in_ledger, ledger_path, note_erased
 from tests.helpers.databases import run_server_command
 from tests.helpers.studies import StudyInDatabase
 
@@ -82,32 +82,32 @@ def test_a_database_that_cannot_be_opened_is_one_finding_each(tmp_path: Path) ->
 def test_a_ledger_left_in_the_data_folder_is_told_until_it_was_moved(
     services: Services, settings: Settings, tmp_path: Path
 ) -> None:
-    erasures.note(settings, ["run-a", "run-b"])
+    note_erased(settings, ["run-a", "run-b"])
     assert by_subject(services)["ledger of erasures"].verdict == "ok"
     shared = settings.model_copy(update={"shared_folder": tmp_path / "it's shared"})
-    erasures.note(shared, ["run-c"])
-    with erasures.ledger(shared).open("a", encoding="utf-8") as torn:
+    note_erased(shared, ["run-c"])
+    with ledger_path(shared).open("a", encoding="utf-8") as torn:
         torn.write('{"run": "run-')
     sharing = open_services(shared)
     found = by_subject(sharing)["ledger of erasures"]
     assert (found.verdict, found.state[:2]) == ("failed", "2 "), found
     subprocess.run(["sh", "-c", found.advice.partition("run: ")[2]], check=True)
-    assert erasures.ledger(shared).stat().st_mode & 0o777 == 0o600
+    assert ledger_path(shared).stat().st_mode & 0o777 == 0o600
     found = by_subject(sharing)["ledger of erasures"]
     sharing.database.close()
-    assert (found.verdict, set(erasures.noted(shared))) == ("ok", {"run-a", "run-b", "run-c"}), found
+    assert (found.verdict, set(erasures_in_ledger(shared))) == ("ok", {"run-a", "run-b", "run-c"}), found
 
 
 def test_the_advised_command_makes_a_ledger_that_only_the_server_reads(
     services: Services, settings: Settings, tmp_path: Path
 ) -> None:
-    erasures.note(settings, ["run-a"])
+    note_erased(settings, ["run-a"])
     shared = settings.model_copy(update={"shared_folder": tmp_path / "it's shared"})
-    erasures.ledger(shared).parent.mkdir()
+    ledger_path(shared).parent.mkdir()
     [finding] = ledger(replace(services, settings=shared))
     subprocess.run(["sh", "-c", finding.advice.partition("run: ")[2]], check=True)
-    assert erasures.ledger(shared).stat().st_mode & 0o777 == 0o600
-    assert erasures.noted(shared) == ["run-a"]
+    assert ledger_path(shared).stat().st_mode & 0o777 == 0o600
+    assert erasures_in_ledger(shared) == ["run-a"]
 
 
 class TestProxies:

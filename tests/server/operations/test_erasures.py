@@ -15,7 +15,7 @@ from server.operations.backup import back_up
 from server.operations.restore import restore
 from server.participation.identity_keys import KnownAs
 from server.participation.identity_repository import keep
-from server.privacy import erasures
+from server.privacy.ledger import begin_ledger, erasures_in_ledger, ledger_path, note_erased
 from tests.helpers.admins import Admin
 from tests.helpers.databases import BACKENDS, run_server_command
 from tests.helpers.studies import Participant, StudyInDatabase
@@ -41,9 +41,9 @@ def test_every_visit_of_the_same_person_is_erased(
     assert answer.status_code == 200
     assert answer.json()["runs"] == [first, second]
     assert answer.json()["reports"] == []
-    assert answer.json()["ledger"] == str(erasures.ledger(services.settings))
+    assert answer.json()["ledger"] == str(ledger_path(services.settings))
     assert erased_runs(services) == {first, second}
-    assert other not in erasures.noted(services.settings)
+    assert other not in erasures_in_ledger(services.settings)
     with services.database.read() as session:
         query = select(AuditEntry.target).where(AuditEntry.action == "run erased").order_by(AuditEntry.id)
         assert session.scalars(query).all() == [first, second]
@@ -79,7 +79,7 @@ def test_a_restore_does_not_bring_an_erased_person_back(
     restore(restored, backup, lines.append, despite_erasures=True)
     assert lines[-1].startswith(f"WARNING: no ledger of erasures at {folder}")
     assert erased_runs(restored) == set()
-    shutil.copy(erasures.ledger(services.settings), erasures.ledger(settings))
+    shutil.copy(ledger_path(services.settings), ledger_path(settings))
     assert run_server_command(settings, "database", "erase-again").stdout == "1 run erased\n"
     assert erased_runs(restored) == {run}
     assert run_server_command(settings, "database", "erase-again").stdout == "0 runs erased\n"
@@ -94,7 +94,7 @@ def test_a_ledger_begun_after_the_backup_knows_of_no_erasure_before_it(
     participant.agree()
     back_up(services, tmp_path / "before.tar", with_clips=False)
     settings = Settings(database_url=f"sqlite:///{tmp_path / 'x.sqlite'}", data_folder=tmp_path / "new")
-    erasures.begin_ledger(settings)
+    begin_ledger(settings)
     restored = open_services(settings)
     with pytest.raises(InputError, match="newer than the backup"):
         restore(restored, tmp_path / "before.tar")
@@ -109,14 +109,14 @@ def test_a_restore_replays_the_ledger_that_is_there(
     backup = tmp_path / "before.tar"
     back_up(services, backup, with_clips=False)
     settings = Settings(database_url=f"sqlite:///{tmp_path / 'x.sqlite'}", data_folder=tmp_path / "new")
-    erasures.note(settings, [participant.run_id, "of another installation"])
-    with erasures.ledger(settings).open("a") as stream:
+    note_erased(settings, [participant.run_id, "of another installation"])
+    with ledger_path(settings).open("a") as stream:
         stream.write('{"run": "cut o')
     restored, lines = open_services(settings), list[str]()
     restore(restored, backup, lines.append)
-    assert f"1 run erased again, by {erasures.ledger(settings)}" in lines
+    assert f"1 run erased again, by {ledger_path(settings)}" in lines
     assert erased_runs(restored) == {participant.run_id}
-    assert erasures.ledger(settings).stat().st_mode & 0o077 == 0
+    assert ledger_path(settings).stat().st_mode & 0o077 == 0
     restored.database.close()
 
 
@@ -125,7 +125,7 @@ def test_a_ledger_as_old_as_the_backup_is_named_after_a_restore_despite_it(
     services: Services, participant: Participant, tmp_path: Path
 ) -> None:
     participant.agree()
-    erasures.note(services.settings, ["somebody erased long before"])
+    note_erased(services.settings, ["somebody erased long before"])
     backup = tmp_path / "before.tar"
     back_up(services, backup, with_clips=False)
     folder = tmp_path / "new"

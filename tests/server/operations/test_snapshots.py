@@ -40,7 +40,7 @@ from server.operations.snapshots import (
 )
 from server.participation.identity_keys import KnownAs
 from server.participation.identity_repository import keep
-from server.privacy import erasures
+from server.privacy.ledger import note_erased
 from tests.helpers.admins import Admin
 from tests.helpers.databases import run_server_command
 from tests.helpers.studies import Participant, StudyInDatabase
@@ -306,7 +306,7 @@ class TestErasures:
     ) -> None:
         participant.agree()
         take_snapshot(services.settings)
-        erasures.note(services.settings, [participant.run_id])
+        note_erased(services.settings, [participant.run_id])
         closed(services)
         done = run_server_command(services.settings, "database", "go-back", "newest")
         assert done.stdout.splitlines()[0] == "1 run erased again, by the ledger of erasures"

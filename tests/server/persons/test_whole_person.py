@@ -13,7 +13,7 @@ from server.context import Services
 from server.models import Base, RunEvent, StudyRun, View, ViewClip
 from server.participation.identity_keys import KnownAs
 from server.participation.identity_repository import keep
-from server.privacy import erasures
+from server.privacy.ledger import erasures_in_ledger, ledger_path, note_erased
 from server.privacy.persons import visits_of
 from server.privacy.retention import every_study
 from tests.helpers.admins import Admin
@@ -157,22 +157,22 @@ def test_a_person_is_the_same_by_id_and_by_run(
             assert {visit.public_id for visit in visits_of(session, known, named, code)} == hers
     done = run_server_command(services.settings, "person", "erase", "short", "--id", "a", "--yes")
     assert done.returncode == 0, done.stderr
-    assert set(erasures.noted(services.settings)) == hers
+    assert set(erasures_in_ledger(services.settings)) == hers
 
 
 @on_sqlite
 def test_a_torn_line_of_the_ledger_swallows_no_erasure(
     services: Services, caplog: pytest.LogCaptureFixture
 ) -> None:
-    erasures.note(services.settings, ["a"])
-    path = erasures.ledger(services.settings)
+    note_erased(services.settings, ["a"])
+    path = ledger_path(services.settings)
     path.write_bytes(path.read_bytes() + b'{"run": "b", "era')
-    erasures.note(services.settings, ["c", "d"])
-    assert erasures.noted(services.settings) == ["a", "c", "d"]
+    note_erased(services.settings, ["c", "d"])
+    assert erasures_in_ledger(services.settings) == ["a", "c", "d"]
     assert "cut off" in caplog.text
     caplog.clear()
-    erasures.note(services.settings, ["e"])
-    assert erasures.noted(services.settings) == ["a", "c", "d", "e"]
+    note_erased(services.settings, ["e"])
+    assert erasures_in_ledger(services.settings) == ["a", "c", "d", "e"]
     assert caplog.text == ""
 
 

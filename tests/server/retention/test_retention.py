@@ -18,7 +18,7 @@ from server.models import AuditEntry, Link, Rating, Study, StudyRun
 from server.operations.backup import back_up
 from server.operations.restore import restore
 from server.participation.identity_repository import known_as
-from server.privacy import erasures
+from server.privacy.ledger import erasures_in_ledger, ledger_path
 from server.privacy.retention import AT_ONCE, carry_out, hourly_retention, preview
 from server.studies.creation import add_version
 from tests.helpers.admins import Admin
@@ -102,7 +102,9 @@ def test_each_period_is_carried_out_and_nothing_else(
     entries = {(entry.action, entry.target) for entry in logged if "retention_days" in entry.details}
     told = {"erased": "run erased", "unnamed": "identifiers erased"}
     assert entries == {(told[kind], run) for run, kind in of_age.items() if kind != "named"}
-    assert set(erasures.noted(services.settings)) == {run for run, kind in of_age.items() if kind == "erased"}
+    assert set(erasures_in_ledger(services.settings)) == {
+        run for run, kind in of_age.items() if kind == "erased"
+    }
     again = carry_out(services.database, services.settings, "short")
     assert (again.identifiers, again.visits) == (0, 0)
     assert looked_at(services, "short")[:2] == (0, 0)
@@ -120,7 +122,7 @@ class TestOnSqlite:
         folder = tmp_path / "new"
         folder.mkdir()
         new = Settings(database_url=f"sqlite:///{folder / 'x.sqlite'}", data_folder=folder)
-        erasures.ledger(new).write_bytes(erasures.ledger(services.settings).read_bytes())
+        ledger_path(new).write_bytes(ledger_path(services.settings).read_bytes())
         again = open_services(new)
         restore(again, tmp_path / "b.tar", despite_erasures=True)
         assert state(again) == {unnamed: "unnamed", erased: "erased"}

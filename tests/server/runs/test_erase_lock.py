@@ -11,8 +11,8 @@ from server.accounts.identity import OPERATOR
 from server.context import Services
 from server.core.errors import Conflict
 from server.models import AuditEntry
-from server.privacy import erasures
 from server.privacy.erasures import erase
+from server.privacy.ledger import erasures_in_ledger
 from server.studies.lookup import find_study
 from tests.helpers.studies import Participant, StudyInDatabase
 
@@ -51,7 +51,7 @@ def test_the_second_waits_for_the_first_and_erases_nothing_again(
         assert refusals == []
     other.join(PATIENCE_S)
     assert [refusal.message for refusal in refusals] == ["This run's data were erased already."]
-    assert erasures.noted(services.settings) == [person.run_id]
+    assert erasures_in_ledger(services.settings) == [person.run_id]
     with services.database.read() as session:
         assert session.query(AuditEntry).filter(AuditEntry.action == "run erased").count() == 1
 
