@@ -13,7 +13,7 @@ from sqlalchemy.exc import TimeoutError as PoolTimeout
 
 from experiments.errors import InputError, did_you_mean, wrong_value
 from server.context import Services, open_services
-from server.core.db import checked_url, is_away, is_busy
+from server.core.db import Database, checked_url, is_away, is_busy
 from server.core.errors import ApiError
 from server.core.migrate import current_revision, known_revision, upgrade
 from server.core.settings import KEY_LENGTH_MIN, Settings
@@ -32,7 +32,7 @@ def migrated_services(settings: Settings | None = None, *, stored: bool = False)
     """
     services = open_services(settings or Settings())
     try:
-        revision = _stored_revision(services)
+        revision = _stored_revision(services.database)
         if revision is None and stored:
             address = services.database.url.render_as_string(hide_password=True)
             raise _no_database(address, "nothing in the database")
@@ -79,11 +79,11 @@ def _no_database(address: str, what: str) -> InputError:
     )
 
 
-def _stored_revision(services: Services) -> str | None:
+def _stored_revision(database: Database) -> str | None:
     try:
-        return current_revision(services.database)
+        return current_revision(database)
     except OperationalError as error:
-        address = services.database.url.render_as_string(hide_password=True)
+        address = database.url.render_as_string(hide_password=True)
         reason = str(error.orig).strip().splitlines()[0]
         raise InputError(f"cannot open the database {address}: {reason}") from error
 

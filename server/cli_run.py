@@ -16,7 +16,7 @@ from server.accounts import invitations
 from server.accounts import service as accounts
 from server.accounts.endpoints import invitation_url
 from server.cli_common import migrated_services, out
-from server.context import Services
+from server.core.db import Database
 from server.core.logs import logging_configuration
 from server.core.settings import Settings, close_to_others
 from server.operations.metrics import MULTIPROCESS_VARIABLE
@@ -61,7 +61,7 @@ def run(
         begin_ledger(settings)
         services.settings.key  # noqa: B018 - made now, once, before workers ask for it
         if welcome:
-            _welcome(services)
+            _welcome(services.database, services.settings)
     # No access log: it would write every participant's internet address.
     with _shared_counts(workers):
         uvicorn.run(
@@ -113,10 +113,9 @@ def _check_free(host: str, port: int) -> None:
             ) from error
 
 
-def _welcome(services: Services) -> None:
+def _welcome(database: Database, settings: Settings) -> None:
     """Print where to go: participant links of open studies, the admin site, the first owner's link."""
-    settings = services.settings
-    with services.database.write() as session:
+    with database.write() as session:
         for study in open_studies(session):
             for link in general_links(session, settings.key, study):
                 url = link_url(settings.public_url, settings.key, link.public_id)
@@ -125,5 +124,5 @@ def _welcome(services: Services) -> None:
         first = not accounts.accounts_exist(session)
     out.print(f"admin site: {settings.public_url}/admin/")
     if first:
-        _, token = invitations.invite(services.database, "owner", "first owner", None)
+        _, token = invitations.invite(database, "owner", "first owner", None)
         out.print(f"make the first account (once): {invitation_url(settings.public_url, token)}")

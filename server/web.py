@@ -16,7 +16,7 @@ from pydantic import BaseModel
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from server.context import Services, ServicesDep
+from server.context import ServicesDep
 from server.core.db import Database
 from server.core.errors import ERROR_RESPONSES, ApiError, NotFound
 from server.core.migrate import current_revision, newest_revision
@@ -24,6 +24,7 @@ from server.core.repository import newest_clip
 from server.core.requests import SettingsDep
 from server.core.row_security import acting
 from server.core.settings import Settings
+from server.core.storage import ClipStore
 
 # What every request passes through: security headers, and for whom it acts.
 #
@@ -141,7 +142,7 @@ def security_txt(settings: SettingsDep) -> PlainTextResponse:
 @page_router.head("/run/{link_token}", include_in_schema=False)
 def participant_page(services: ServicesDep, link_token: str) -> Response:  # noqa: ARG001 - read by the page
     """The participant's page; it reads its link from the address."""
-    return _page(services, "participant")
+    return _page(services.settings, services.clips, "participant")
 
 
 @page_router.get("/service-worker.js")
@@ -158,7 +159,7 @@ def service_worker(settings: SettingsDep) -> Response:
 @page_router.get("/admin/{rest:path}")
 def admin_page(services: ServicesDep, rest: str = "") -> Response:  # noqa: ARG001 - read by the page
     """The admin site; its own router reads the address."""
-    return _page(services, "admin")
+    return _page(services.settings, services.clips, "admin")
 
 
 @page_router.get("/assets/{site}/{name:path}")
@@ -207,8 +208,8 @@ def _file_within(folder: Path, asked: Path) -> Path | None:
         return None
 
 
-def _page(services: Services, site: str) -> Response:
-    index = services.settings.frontend_folder / site / "index.html"
+def _page(settings: Settings, clips: ClipStore, site: str) -> Response:
+    index = settings.frontend_folder / site / "index.html"
     if not index.is_file():
         raise PagesNotBuilt(f"The page {site} is not built; run `make run`, or `npm run build` in frontend.")
     text = _read(index, index.stat().st_mtime_ns).decode("utf-8")
@@ -216,7 +217,7 @@ def _page(services: Services, site: str) -> Response:
     if NONCE_PLACEHOLDER in text:
         nonce = new_nonce()
         text = text.replace(NONCE_PLACEHOLDER, nonce)
-        policy = content_security_policy(nonce, services.clips.origin())
+        policy = content_security_policy(nonce, clips.origin())
         headers = {"cache-control": "no-store", "content-security-policy": policy}
     return HTMLResponse(text, headers=headers)
 

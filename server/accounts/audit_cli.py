@@ -15,7 +15,7 @@ from server.accounts import repository
 from server.accounts.audit import written
 from server.accounts.audit_verification import verify
 from server.cli_common import out, stored_services
-from server.context import Services
+from server.core.db import Database
 
 app = command_group("The audit log: verify its chain of hashes, export it.")
 
@@ -72,14 +72,14 @@ def export(
     """
     with stored_services() as services:
         if str(out_file) == "-":
-            sys.stdout.writelines(_lines(services, after))
+            sys.stdout.writelines(_lines(services.database, after))
             return
         with whole_file(out_file) as unfinished, unfinished.open("w", encoding="utf-8") as stream:
-            stream.writelines(_lines(services, after))
+            stream.writelines(_lines(services.database, after))
 
 
-def _lines(services: Services, after: int) -> Iterator[str]:
-    with services.database.snapshot() as session:
+def _lines(database: Database, after: int) -> Iterator[str]:
+    with database.snapshot() as session:
         number = 0
         for entry in repository.chained_entries(session, after):
             number += 1

@@ -85,7 +85,7 @@ def reset_password(
         fresh = hash_password(given, name)
         with services.database.write() as session:
             account_id, logins = service.reset_password(session, name, fresh)
-        letters.send_notice(services, account_id, letters.PASSWORD_RESET)
+        letters.send_notice(services.database, services.settings, account_id, letters.PASSWORD_RESET)
     out.print(f"the password of '{name}' is changed; its sessions and API tokens have ended")
     if logins:
         out.print(logins)
@@ -101,5 +101,5 @@ def reset_second_factor(name: Annotated[str, typer.Argument(help="Name of the ac
     with stored_services() as services:
         with services.database.write() as session:
             account_id = service.reset_second_factor(session, name)
-        letters.send_notice(services, account_id, letters.SECOND_FACTOR_REMOVED)
+        letters.send_notice(services.database, services.settings, account_id, letters.SECOND_FACTOR_REMOVED)
     out.print(f"the second factor of '{name}' is off; its sessions and API tokens have ended")

@@ -17,7 +17,7 @@ from server.accounts.access import (
     check_origin,
     identify,
 )
-from server.accounts.credentials import checked_password, hash_password
+from server.accounts.credentials import PasswordWork, checked_password, hash_password
 from server.accounts.identity import Identity, NotSignedIn
 from server.accounts.invitations import must_fit, must_prove
 from server.accounts.schemas import (
@@ -42,10 +42,12 @@ from server.accounts.schemas import (
     SignIn,
     TokenOut,
 )
-from server.accounts.throttle import DEVICE_COOKIE, known_device, new_device
+from server.accounts.throttle import DEVICE_COOKIE, SignInThrottle, known_device, new_device
 from server.accounts.workspaces import own_workspaces
-from server.context import Services, ServicesDep
+from server.context import ServicesDep
+from server.core.db import Database
 from server.core.errors import ERROR_RESPONSES
+from server.core.settings import Settings
 from server.core.values import Number, now
 from server.models import Account
 
@@ -68,27 +70,27 @@ def account_out(account: Account) -> AccountOut:
     )
 
 
-def set_session_cookie(response: Response, services: Services, token: str) -> None:
+def set_session_cookie(response: Response, settings: Settings, token: str) -> None:
     """Give the browser its session; scripts and other sites do not get at it."""
     response.set_cookie(
         COOKIE,
         token,
-        max_age=int(services.settings.session_hours * 3600),
+        max_age=int(settings.session_hours * 3600),
         httponly=True,
         samesite="strict",
-        secure=services.settings.is_https,
+        secure=settings.is_https,
         path="/api/admin",
     )
 
 
-def _set_device(response: Response, services: Services, name: str) -> None:
+def _set_device(response: Response, settings: Settings, name: str) -> None:
     response.set_cookie(
         DEVICE_COOKIE,
-        new_device(services.settings.key, name),
+        new_device(settings.key, name),
         max_age=DEVICE_DAYS * 86400,
         httponly=True,
         samesite="strict",
-        secure=services.settings.is_https,
+        secure=settings.is_https,
         path="/api/admin/session",
     )
 
@@ -131,42 +133,58 @@ async def sign_in(
 ) -> Me:
     """Sign in; sets the session cookie. After some wrong attempts from one place the next must wait."""
     check_origin(request, services.settings)
-    token = await attempt(services, body, address_of(request), device_cookie, user_agent)
-    set_session_cookie(response, services, token)
-    _set_device(response, services, body.name)
-    me = await run_in_threadpool(_just_signed_in, services, token)
-    notice = _notice(services, body, device_cookie)
+    token = await attempt(
+        services.database,
+        services.settings,
+        services.sign_ins,
+        services.passwords,
+        body,
+        address_of(request),
+        device_cookie,
+        user_agent,
+    )
+    set_session_cookie(response, services.settings, token)
+    _set_device(response, services.settings, body.name)
+    me = await run_in_threadpool(_just_signed_in, services.database, token)
+    notice = _notice(services.settings, body, device_cookie)
     if me.account is not None and notice is not None:
-        after.add_task(letters.send_notice, services, me.account.id, notice)
+        after.add_task(letters.send_notice, services.database, services.settings, me.account.id, notice)
     return me
 
 
-def _notice(services: Services, body: SignIn, device_cookie: str | None) -> letters.Notice | None:
+def _notice(settings: Settings, body: SignIn, device_cookie: str | None) -> letters.Notice | None:
     """What of a sign-in its account is told by mail; None of one in a browser as always."""
     if credentials.is_recovery_code(body.code or ""):
         return letters.RECOVERY_CODE_USED
-    known = known_device(services.settings.key, body.name, device_cookie)
+    known = known_device(settings.key, body.name, device_cookie)
     return None if known else letters.NEW_BROWSER
 
 
 async def attempt(
-    services: Services, body: SignIn, address: str, device_cookie: str | None, user_agent: str
+    database: Database,
+    settings: Settings,
+    sign_ins: SignInThrottle,
+    passwords: PasswordWork,
+    body: SignIn,
+    address: str,
+    device_cookie: str | None,
+    user_agent: str,
 ) -> str:
     """Check the credentials within the limits; return the token of a new session.
 
     Names that exist and names that do not take the same steps.
     """
-    device = known_device(services.settings.key, body.name, device_cookie)
-    throttle = services.sign_ins
+    device = known_device(settings.key, body.name, device_cookie)
+    throttle = sign_ins
     key = throttle.key(body.name, address, device)
     await run_in_threadpool(throttle.enter, key, address, device)
-    stored = await run_in_threadpool(signing_in.stored_password, services, body.name)
-    checked = await services.passwords.run(lambda: checked_password(body.password, stored))
+    stored = await run_in_threadpool(signing_in.stored_password, database, body.name)
+    checked = await passwords.run(lambda: checked_password(body.password, stored))
     fits = checked.stored is not None
     if fits and not device:
         await run_in_threadpool(throttle.codes.check, body.name.casefold())
     token, failure = await run_in_threadpool(
-        signing_in.open_session, services, body.name, checked, body.code, user_agent
+        signing_in.open_session, database, settings, sign_ins, body.name, checked, body.code, user_agent
     )
     if token is not None:
         await run_in_threadpool(throttle.names.succeeded, key)
@@ -185,8 +203,8 @@ def address_of(request: Request) -> str:
     return request.client.host if request.client else ""
 
 
-def _just_signed_in(services: Services, token: str) -> Me:
-    with services.database.read() as session:
+def _just_signed_in(database: Database, token: str) -> Me:
+    with database.read() as session:
         signed_in = signing_in.session_of(session, token)
         if signed_in is None:
             return Me(account=None, accounts_exist=True)
@@ -224,14 +242,20 @@ async def accept_invitation(
     check_origin(request, services.settings)
     key = services.sign_ins.key(body.name, address_of(request), None)
     await run_in_threadpool(services.sign_ins.enter, key, address_of(request), None)
-    await run_in_threadpool(invitations.check_invitation, services, token)
+    await run_in_threadpool(invitations.check_invitation, services.database, token)
     fresh = await services.passwords.run(lambda: hash_password(body.password, body.name))
     cookie = await run_in_threadpool(
-        invitations.accept_invitation, services, token, body.name, fresh, user_agent
+        invitations.accept_invitation,
+        services.database,
+        services.settings,
+        token,
+        body.name,
+        fresh,
+        user_agent,
     )
-    set_session_cookie(response, services, cookie)
-    _set_device(response, services, body.name)
-    return await run_in_threadpool(_just_signed_in, services, cookie)
+    set_session_cookie(response, services.settings, cookie)
+    _set_device(response, services.settings, body.name)
+    return await run_in_threadpool(_just_signed_in, services.database, cookie)
 
 
 @router.get("/sessions")
@@ -329,16 +353,18 @@ async def change_password(
     services: ServicesDep, me: Myself, body: ChangePassword, after: BackgroundTasks
 ) -> None:
     """Change the password; every other session and every API token ends."""
-    await must_fit(services, me, body.password)
+    await must_fit(services.database, services.sign_ins, services.passwords, me, body.password)
     fresh = await services.passwords.run(lambda: hash_password(body.new_password, me.name))
-    await run_in_threadpool(service.change_password, services, me, fresh)
-    after.add_task(letters.send_notice, services, me.account_id, letters.PASSWORD_CHANGED)
+    await run_in_threadpool(service.change_password, services.database, me, fresh)
+    after.add_task(
+        letters.send_notice, services.database, services.settings, me.account_id, letters.PASSWORD_CHANGED
+    )
 
 
 @credential_router.post("/second-factor")
 def start_second_factor(services: ServicesDep, me: FreshMyself) -> SecondFactorSetup:
     """Begin the set-up of a second factor: a secret for an authenticator app."""
-    secret = service.start_second_factor(services, me)
+    secret = service.start_second_factor(services.database, services.settings, me)
     uri = credentials.provisioning_uri(secret, me.name)
     return SecondFactorSetup(secret=secret, uri=uri, qr_svg=credentials.qr_svg(uri))
 
@@ -348,8 +374,10 @@ def confirm_second_factor(
     services: ServicesDep, me: FreshMyself, body: ConfirmCode, after: BackgroundTasks
 ) -> RecoveryCodes:
     """Turn the second factor on with the app's first code; gives the recovery codes, this once."""
-    codes = service.confirm_second_factor(services, me, body.code)
-    after.add_task(letters.send_notice, services, me.account_id, letters.SECOND_FACTOR_ADDED)
+    codes = service.confirm_second_factor(services.database, services.settings, me, body.code)
+    after.add_task(
+        letters.send_notice, services.database, services.settings, me.account_id, letters.SECOND_FACTOR_ADDED
+    )
     return RecoveryCodes(codes=codes)
 
 
@@ -358,9 +386,17 @@ async def remove_second_factor(
     services: ServicesDep, me: Myself, body: ConfirmPassword, after: BackgroundTasks
 ) -> None:
     """Turn the second factor off; asks for the password, and where the account has none for a code."""
-    await must_prove(services, me, body.password)
-    await run_in_threadpool(service.remove_second_factor, services, me)
-    after.add_task(letters.send_notice, services, me.account_id, letters.SECOND_FACTOR_REMOVED)
+    await must_prove(
+        services.database, services.settings, services.sign_ins, services.passwords, me, body.password
+    )
+    await run_in_threadpool(service.remove_second_factor, services.database, services.settings, me)
+    after.add_task(
+        letters.send_notice,
+        services.database,
+        services.settings,
+        me.account_id,
+        letters.SECOND_FACTOR_REMOVED,
+    )
 
 
 @credential_router.get("/tokens")

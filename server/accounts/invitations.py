@@ -7,14 +7,16 @@ from sqlalchemy.orm import Session
 
 from server.accounts import repository, service, signing_in
 from server.accounts.audit import record
+from server.accounts.credentials import PasswordWork
 from server.accounts.identity import Identity
 from server.accounts.service import add_account, known_role
 from server.accounts.signing_in import begin_session
+from server.accounts.throttle import SignInThrottle
 from server.accounts.workspace_repository import default_workspace
 from server.accounts.workspaces import Membership, find_workspace
-from server.context import Services
 from server.core.db import Database
 from server.core.errors import Conflict, NotFound
+from server.core.settings import Settings
 from server.core.values import hash_token, new_token, now
 from server.models import DEFAULT_WORKSPACE, Account, Invitation, Role
 
@@ -77,19 +79,21 @@ def find_invitation(session: Session, token: str) -> Invitation:
     return invitation
 
 
-def check_invitation(services: Services, token: str) -> None:
+def check_invitation(database: Database, token: str) -> None:
     """NotFound or Conflict where an invitation does not work, before anything is done for it."""
-    with services.database.read() as session:
+    with database.read() as session:
         invitation = find_invitation(session, token)
         if invitation.used_at is not None or invitation.expires_at <= now():
             raise INVITATION_USED
 
 
-def accept_invitation(services: Services, token: str, name: str, password_hash: str, user_agent: str) -> str:
+def accept_invitation(
+    database: Database, settings: Settings, token: str, name: str, password_hash: str, user_agent: str
+) -> str:
     """Make the invited account and sign it in; return the session's token."""
-    with services.database.write() as session:
+    with database.write() as session:
         account = invited_account(session, find_invitation(session, token), name, password_hash)
-        return begin_session(services, session, account, user_agent)
+        return begin_session(settings, session, account, user_agent)
 
 
 def invited_account(
@@ -107,28 +111,37 @@ def invited_account(
 # Who is signed in proves once more to be the account's owner, within the limits of wrong attempts.
 
 
-async def must_fit(services: Services, me: Identity, password: str) -> None:
+async def must_fit(
+    database: Database, sign_ins: SignInThrottle, passwords: PasswordWork, me: Identity, password: str
+) -> None:
     """Ask for the present password; a stolen session may not try many."""
     key = f"session {me.session_id}"
-    await run_in_threadpool(services.sign_ins.names.check, key)
-    stored = await run_in_threadpool(service.own_password, services, me)
+    await run_in_threadpool(sign_ins.names.check, key)
+    stored = await run_in_threadpool(service.own_password, database, me)
     try:
-        await services.passwords.run(lambda: service.must_fit(password, stored))
+        await passwords.run(lambda: service.must_fit(password, stored))
     except signing_in.WrongCredentials:
-        await run_in_threadpool(services.sign_ins.names.failed, key)
+        await run_in_threadpool(sign_ins.names.failed, key)
         raise
-    await run_in_threadpool(services.sign_ins.names.succeeded, key)
+    await run_in_threadpool(sign_ins.names.succeeded, key)
 
 
-async def must_prove(services: Services, me: Identity, proof: str) -> None:
+async def must_prove(
+    database: Database,
+    settings: Settings,
+    sign_ins: SignInThrottle,
+    passwords: PasswordWork,
+    me: Identity,
+    proof: str,
+) -> None:
     """Ask for the present password, and where the account has none for a code of its second factor."""
-    if await run_in_threadpool(service.own_password, services, me):
-        await must_fit(services, me, proof)
+    if await run_in_threadpool(service.own_password, database, me):
+        await must_fit(database, sign_ins, passwords, me, proof)
         return
     key = f"session {me.session_id}"
-    await run_in_threadpool(services.sign_ins.names.check, key)
-    failure = await run_in_threadpool(service.own_code_failure, services, me, proof)
+    await run_in_threadpool(sign_ins.names.check, key)
+    failure = await run_in_threadpool(service.own_code_failure, database, settings, me, proof)
     if failure is not None:
-        await run_in_threadpool(services.sign_ins.names.failed, key)
+        await run_in_threadpool(sign_ins.names.failed, key)
         raise failure
-    await run_in_threadpool(services.sign_ins.names.succeeded, key)
+    await run_in_threadpool(sign_ins.names.succeeded, key)

@@ -12,7 +12,7 @@ from email.message import EmailMessage
 from email.utils import formatdate, make_msgid
 
 from server.accounts import repository
-from server.context import Services
+from server.core.db import Database
 from server.core.settings import Settings
 
 # Mail by the SMTP server of the settings: short letters in plain text.
@@ -133,21 +133,21 @@ class Told:
     notice: Notice
 
 
-def send_notice(services: Services, account_id: int, notice: Notice) -> None:
+def send_notice(database: Database, settings: Settings, account_id: int, notice: Notice) -> None:
     """Send a notice to an account's confirmed address, if it has one and the server sends mail.
 
     Runs after the answer: whether a letter goes out shows in no answer and holds none up.
     """
-    if not can_send(services.settings):
+    if not can_send(settings):
         return
-    with services.database.read() as session:
+    with database.read() as session:
         account = repository.account(session, account_id)
         name, address = (account.name, account.email) if account else ("", None)
     if address is None:
         return
     text = (
-        f"{notice.sentence.format(name=name)} This is the server {services.settings.public_url}.\n\n"
+        f"{notice.sentence.format(name=name)} This is the server {settings.public_url}.\n\n"
         "If it was you, there is nothing to do. If it was not, sign in, choose a new password under My "
         "account, which signs every other browser out, and tell an owner of the server.\n"
     )
-    send_mail(services.settings, address, notice.subject, text)
+    send_mail(settings, address, notice.subject, text)

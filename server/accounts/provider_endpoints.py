@@ -21,9 +21,11 @@ from server.accounts.schemas import (
     SecondFactorCode,
     WaysIn,
 )
-from server.context import Services, ServicesDep
+from server.accounts.throttle import SignInThrottle
+from server.context import ServicesDep
+from server.core.db import Database
 from server.core.errors import ERROR_RESPONSES, ApiError
-from server.core.settings import ProviderId
+from server.core.settings import ProviderId, Settings
 from server.core.values import Number
 
 router = APIRouter(prefix="/api/admin", tags=["account"], responses=ERROR_RESPONSES)
@@ -34,7 +36,7 @@ LoginCookie = Annotated[str, Cookie(alias=LOGIN_COOKIE, include_in_schema=False,
 Told = Annotated[str, Query(max_length=2000)]
 
 
-def _set_login_cookie(response: Response, services: Services, token: str) -> None:
+def _set_login_cookie(response: Response, settings: Settings, token: str) -> None:
     """Lax, not strict: the provider sends the browser back from another site."""
     response.set_cookie(
         LOGIN_COOKIE,
@@ -42,15 +44,15 @@ def _set_login_cookie(response: Response, services: Services, token: str) -> Non
         max_age=provider_sign_in.ATTEMPT_MINUTES * 60,
         httponly=True,
         samesite="lax",
-        secure=services.settings.is_https,
+        secure=settings.is_https,
         path=COOKIE_PATH,
     )
 
 
-async def _enter(services: Services, request: Request, what: str) -> None:
+async def _enter(sign_ins: SignInThrottle, request: Request, what: str) -> None:
     address = address_of(request)
-    key = services.sign_ins.key(what, address, None)
-    await run_in_threadpool(services.sign_ins.enter, key, address, None)
+    key = sign_ins.key(what, address, None)
+    await run_in_threadpool(sign_ins.enter, key, address, None)
 
 
 @router.get("/session/ways")
@@ -67,10 +69,12 @@ async def begin_sign_in(
 ) -> Elsewhere:
     """Begin to sign in with a provider: where the browser goes, and a cookie by which it is known again."""
     check_origin(request, services.settings)
-    provider_sign_in.provider_of(services, provider)
-    await _enter(services, request, f"provider {provider}")
-    begun = await run_in_threadpool(provider_sign_in.begin_attempt, services, provider, "sign in", body.next)
-    _set_login_cookie(response, services, begun.browser)
+    provider_sign_in.provider_of(services.settings, provider)
+    await _enter(services.sign_ins, request, f"provider {provider}")
+    begun = await run_in_threadpool(
+        provider_sign_in.begin_attempt, services.database, services.settings, provider, "sign in", body.next
+    )
+    _set_login_cookie(response, services.settings, begun.browser)
     return Elsewhere(url=await services.providers.of(provider).authorization_url(begun.secrets))
 
 
@@ -80,10 +84,12 @@ async def begin_invited(
 ) -> Elsewhere:
     """Begin to make an invited account that signs in with a provider: where the browser goes."""
     check_origin(request, services.settings)
-    provider_sign_in.provider_of(services, provider)
-    await _enter(services, request, f"provider {provider}")
-    begun = await run_in_threadpool(provider_sign_in.begin_invited, services, provider, token)
-    _set_login_cookie(response, services, begun.browser)
+    provider_sign_in.provider_of(services.settings, provider)
+    await _enter(services.sign_ins, request, f"provider {provider}")
+    begun = await run_in_threadpool(
+        provider_sign_in.begin_invited, services.database, services.settings, provider, token
+    )
+    _set_login_cookie(response, services.settings, begun.browser)
     return Elsewhere(url=await services.providers.of(provider).authorization_url(begun.secrets))
 
 
@@ -92,12 +98,14 @@ async def begin_link(
     services: ServicesDep, me: Myself, provider: ProviderId, body: BeginLink, response: Response
 ) -> Elsewhere:
     """Begin to give one's own account a login with a provider; asks for the password once more."""
-    provider_sign_in.provider_of(services, provider)
-    await must_prove(services, me, body.proof)
-    begun = await run_in_threadpool(
-        provider_sign_in.begin_attempt, services, provider, "link", "/account", me
+    provider_sign_in.provider_of(services.settings, provider)
+    await must_prove(
+        services.database, services.settings, services.sign_ins, services.passwords, me, body.proof
     )
-    _set_login_cookie(response, services, begun.browser)
+    begun = await run_in_threadpool(
+        provider_sign_in.begin_attempt, services.database, services.settings, provider, "link", "/account", me
+    )
+    _set_login_cookie(response, services.settings, begun.browser)
     return Elsewhere(url=await services.providers.of(provider).authorization_url(begun.secrets))
 
 
@@ -120,24 +128,34 @@ async def come_back(
     """
     page = "/sign-in"
     try:
-        provider_sign_in.provider_of(services, provider)
+        provider_sign_in.provider_of(services.settings, provider)
         if not browser or not state:
             raise NotRecognised("This sign-in was begun in another browser.")
         await run_in_threadpool(services.sign_ins.come_back, address_of(request))
-        attempt = await run_in_threadpool(provider_sign_in.take_attempt, services, provider, state, browser)
+        attempt = await run_in_threadpool(
+            provider_sign_in.take_attempt, services.database, provider, state, browser
+        )
         page = "/account" if attempt.purpose == "link" else page
         if not code:
             raise NotRecognised("The service to sign in with said no.")
         secrets = provider_sign_in.secrets_of(services.settings.key, browser, state)
         whom = await services.providers.of(provider).recognise(code, iss, secrets)
         finished = await run_in_threadpool(
-            provider_sign_in.finish_sign_in, services, provider, attempt, whom, user_agent
+            provider_sign_in.finish_sign_in,
+            services.database,
+            services.settings,
+            provider,
+            attempt,
+            whom,
+            user_agent,
         )
     except ApiError as refusal:
-        await run_in_threadpool(provider_sign_in.note_failure, services, provider, refusal)
+        await run_in_threadpool(
+            provider_sign_in.note_failure, services.database, services.sign_ins, provider, refusal
+        )
         return RedirectResponse(f"/admin{page}?refused={refusal.code}", 303)
     response = RedirectResponse(f"/admin{finished.page}", 303)
-    _go_on(response, services, finished, after)
+    _go_on(response, services.database, services.settings, finished, after)
     return response
 
 
@@ -153,11 +171,17 @@ async def finish_with_code(
 ) -> BeginSignIn:
     """Enter the second factor after a provider signed one in; gives the page to go on with."""
     check_origin(request, services.settings)
-    await _enter(services, request, "code after a provider")
+    await _enter(services.sign_ins, request, "code after a provider")
     finished = await run_in_threadpool(
-        provider_sign_in.finish_with_code, services, browser, body.code, user_agent
+        provider_sign_in.finish_with_code,
+        services.database,
+        services.settings,
+        services.sign_ins,
+        browser,
+        body.code,
+        user_agent,
     )
-    _go_on(response, services, finished, after)
+    _go_on(response, services.database, services.settings, finished, after)
     return BeginSignIn(next=finished.page)
 
 
@@ -173,26 +197,32 @@ async def end_by_provider(
     Who sends what is no logout token is kept waiting, not the provider: its people may all sign out at once.
     A token that comes again ends nothing that was begun since.
     """
-    provider_sign_in.provider_of(services, provider)
+    provider_sign_in.provider_of(services.settings, provider)
     client = services.providers.of(provider)
     async with services.sign_ins.logout(provider, address_of(request)):
         ended = await client.signed_out(logout_token)
     if not client.has_handled(ended):
-        await run_in_threadpool(provider_sign_in.sign_out, services, provider, ended)
+        await run_in_threadpool(provider_sign_in.sign_out, services.database, provider, ended)
         client.handled(ended)
 
 
 def _go_on(
-    response: Response, services: Services, finished: provider_sign_in.Finished, after: BackgroundTasks
+    response: Response,
+    database: Database,
+    settings: Settings,
+    finished: provider_sign_in.Finished,
+    after: BackgroundTasks,
 ) -> None:
     if finished.told is not None:
-        after.add_task(letters.send_notice, services, finished.told.account_id, finished.told.notice)
+        after.add_task(
+            letters.send_notice, database, settings, finished.told.account_id, finished.told.notice
+        )
     if finished.asks_code is not None:
-        _set_login_cookie(response, services, finished.asks_code)
+        _set_login_cookie(response, settings, finished.asks_code)
         return
     response.delete_cookie(LOGIN_COOKIE, path=COOKIE_PATH)
     if finished.session is not None:
-        set_session_cookie(response, services, finished.session)
+        set_session_cookie(response, settings, finished.session)
 
 
 @router.get("/logins")
@@ -205,5 +235,7 @@ def list_logins(services: ServicesDep, me: Myself) -> list[LoginOut]:
 @router.delete("/logins/{login_id}", status_code=204)
 def remove_login(services: ServicesDep, me: FreshMyself, login_id: Number, after: BackgroundTasks) -> None:
     """Take a login off one's own account."""
-    provider_sign_in.remove_login(services, me, login_id)
-    after.add_task(letters.send_notice, services, me.account_id, letters.LOGIN_REMOVED)
+    provider_sign_in.remove_login(services.database, me, login_id)
+    after.add_task(
+        letters.send_notice, services.database, services.settings, me.account_id, letters.LOGIN_REMOVED
+    )

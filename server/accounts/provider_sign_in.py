@@ -26,10 +26,11 @@ from server.accounts.provider_protocol import NotRecognised, Recognised, Secrets
 from server.accounts.service import add_account
 from server.accounts.signing_in import begin_session, identity_of, record_failure
 from server.accounts.signing_in import second_factor_failure as code_failure
+from server.accounts.throttle import SignInThrottle
 from server.accounts.workspaces import Membership
-from server.context import Services
+from server.core.db import Database
 from server.core.errors import ApiError, Conflict, NotFound
-from server.core.settings import Provider, RoleRule
+from server.core.settings import Provider, RoleRule, Settings
 from server.core.values import derived_token, hash_token, new_token, now
 from server.models import (
     DEFAULT_WORKSPACE,
@@ -56,9 +57,9 @@ class Begun:
     browser: str
 
 
-def provider_of(services: Services, provider_id: str) -> Provider:
+def provider_of(settings: Settings, provider_id: str) -> Provider:
     """The provider declared under this name; NotFound where there is none."""
-    provider = services.settings.oidc.get(provider_id)
+    provider = settings.oidc.get(provider_id)
     if provider is None:
         raise NotFound("There is no such service to sign in with here.")
     return provider
@@ -72,7 +73,8 @@ def secrets_of(key: bytes, browser: str, state: str) -> Secrets:
 
 
 def begin_attempt(
-    services: Services,
+    database: Database,
+    settings: Settings,
     provider_id: str,
     purpose: Purpose,
     next_page: str,
@@ -89,10 +91,10 @@ def begin_attempt(
         Of the invitation by which a new account is to be made of whom the provider recognises.
     """
     state, browser = new_token(), new_token()
-    with services.database.write() as session:
+    with database.write() as session:
         repository.forget_old_attempts(session)
         keep(session, provider_id, purpose, state, browser, next_page, asking, invitation_hash)
-    return Begun(secrets_of(services.settings.key, browser, state), browser)
+    return Begun(secrets_of(settings.key, browser, state), browser)
 
 
 def keep(
@@ -121,24 +123,24 @@ def keep(
     )
 
 
-def take_attempt(services: Services, provider_id: str, state: str, browser: str) -> LoginAttempt:
+def take_attempt(database: Database, provider_id: str, state: str, browser: str) -> LoginAttempt:
     """End a sign-in under way, whatever becomes of it; NotRecognised where this browser began none.
 
     A state counts once, in the browser that got it, with the provider it was made for: shown to another one's
     address it is used up as well. What nobody began takes no turn to write.
     """
-    with services.database.read() as session:
+    with database.read() as session:
         attempt = repository.find_attempt(session, hash_token(state), hash_token(browser), "sign in", "link")
-    if attempt is None or not _ended(services, attempt):
+    if attempt is None or not _ended(database, attempt):
         raise NotRecognised("This sign-in was finished before, or begun in another browser.")
     if attempt.provider != provider_id:
         raise NotRecognised("This sign-in was begun with another service.")
     return attempt
 
 
-def _ended(services: Services, attempt: LoginAttempt) -> bool:
+def _ended(database: Database, attempt: LoginAttempt) -> bool:
     """Whether it was this request that ended it, of several at once."""
-    with services.database.write() as session:
+    with database.write() as session:
         return repository.end_attempt(session, attempt.id)
 
 
@@ -170,9 +172,9 @@ def add_login(session: Session, provider_id: str, account: Account, whom: Recogn
     )  # fmt: skip
 
 
-def link(services: Services, provider_id: str, attempt: LoginAttempt, whom: Recognised) -> None:
+def link(database: Database, provider_id: str, attempt: LoginAttempt, whom: Recognised) -> None:
     """Give the account whose open session asked for it a login, unless the subject is somebody's already."""
-    with services.database.write() as session:
+    with database.write() as session:
         accounts.hold(session, attempt.account_id or 0)
         asking = accounts.session_of(session, attempt.account_id or 0, attempt.session_id)
         if asking is None or asking.revoked_at or asking.expires_at <= now() or asking.account.disabled_at:
@@ -189,12 +191,12 @@ def own_logins(session: Session, me: Identity) -> list[AccountLogin]:
     return repository.logins_of(session, me.account_id)
 
 
-def remove_login(services: Services, me: Identity, login_id: int) -> None:
+def remove_login(database: Database, me: Identity, login_id: int) -> None:
     """Take a login off one's own account, and end the other sessions that its provider began.
 
     Without the login the provider could not end them any more. One way to sign in must remain.
     """
-    with services.database.write() as session:
+    with database.write() as session:
         own = repository.logins_of(session, me.account_id)
         login = next((one for one in own if one.id == login_id), None)
         if login is None:
@@ -383,24 +385,29 @@ class Finished:
     told: Told | None = None
 
 
-def begin_invited(services: Services, provider_id: str, token: str) -> Begun:
+def begin_invited(database: Database, settings: Settings, provider_id: str, token: str) -> Begun:
     """Keep a sign-in that is to make an invited account; NotFound or Conflict where it cannot."""
-    check_invitation(services, token)
-    with services.database.read() as session:
-        check_no_rule_decides(session, provider_of(services, provider_id), find_invitation(session, token))
-    return begin_attempt(services, provider_id, "sign in", "/", invitation_hash=hash_token(token))
+    check_invitation(database, token)
+    with database.read() as session:
+        check_no_rule_decides(session, provider_of(settings, provider_id), find_invitation(session, token))
+    return begin_attempt(database, settings, provider_id, "sign in", "/", invitation_hash=hash_token(token))
 
 
 # Decision 0747: External accounts are known by issuer and subject.
 def finish_sign_in(
-    services: Services, provider_id: str, attempt: LoginAttempt, whom: Recognised, user_agent: str
+    database: Database,
+    settings: Settings,
+    provider_id: str,
+    attempt: LoginAttempt,
+    whom: Recognised,
+    user_agent: str,
 ) -> Finished:
     """Let in whom the provider recognised, or give the account that asked for it a login."""
     if attempt.purpose == "link":
-        link(services, provider_id, attempt, whom)
+        link(database, provider_id, attempt, whom)
         return Finished("/account", told=Told(attempt.account_id or 0, LOGIN_ADDED))
-    provider = provider_of(services, provider_id)
-    with services.database.write() as session:
+    provider = provider_of(settings, provider_id)
+    with database.write() as session:
         held = held_workspaces(session, provider)
         login = repository.find_login(session, whom.issuer, whom.subject)
         if attempt.invitation_hash is not None:
@@ -421,25 +428,27 @@ def finish_sign_in(
             keep(session, provider_id, "code", state, state, attempt.next_page, identity_of(account))
             return Finished("/sign-in?code=asked", asks_code=state)
         token = begin_session(
-            services, session, account, user_agent, second_factor=whom.second_factor, provider=provider_id
+            settings, session, account, user_agent, second_factor=whom.second_factor, provider=provider_id
         )
         record(session, identity_of(account), "signed in", "account", account.name, provider=provider_id)
     return Finished(attempt.next_page, session=token)
 
 
-def finish_with_code(services: Services, browser: str, code: str, user_agent: str) -> Finished:
+def finish_with_code(
+    database: Database, settings: Settings, sign_ins: SignInThrottle, browser: str, code: str, user_agent: str
+) -> Finished:
     """After the provider: the account's own second factor, which its session then has.
 
     Wrong codes are counted outside of the transaction: on PostgreSQL a count is a transaction of its own.
     """
-    with services.database.read() as session:
+    with database.read() as session:
         name = _name_behind(session, browser)
-    services.sign_ins.codes.check(name)
-    finished, failure = _finish_held(services, browser, code, user_agent)
+    sign_ins.codes.check(name)
+    finished, failure = _finish_held(database, settings, sign_ins, browser, code, user_agent)
     if finished is not None:
-        services.sign_ins.codes.succeeded(name)
+        sign_ins.codes.succeeded(name)
         return finished
-    services.sign_ins.codes.failed(name)
+    sign_ins.codes.failed(name)
     raise failure or NotRecognised("This sign-in was finished before; please begin it again.")
 
 
@@ -456,34 +465,34 @@ def _no_code_asked() -> NotRecognised:
 
 
 def _finish_held(
-    services: Services, browser: str, code: str, user_agent: str
+    database: Database, settings: Settings, sign_ins: SignInThrottle, browser: str, code: str, user_agent: str
 ) -> tuple[Finished | None, ApiError | None]:
     """With the account held, so that a code works once however many ask at once.
 
     Where it has no second factor any more, no code is one. Failures are written down too.
     """
-    with services.database.write() as session:
+    with database.write() as session:
         attempt = repository.find_attempt(session, hash_token(browser), hash_token(browser), "code")
         account = accounts.account(session, attempt.account_id or 0, lock=True) if attempt else None
         if attempt is None or account is None or account.disabled_at or account.totp_confirmed_at is None:
             raise _no_code_asked()
-        failure = code_failure(services, account, code)
+        failure = code_failure(settings, account, code)
         if failure is None and repository.end_attempt(session, attempt.id):
             token = begin_session(
-                services, session, account, user_agent, second_factor=True, provider=attempt.provider
+                settings, session, account, user_agent, second_factor=True, provider=attempt.provider
             )
             record(
                 session, identity_of(account), "signed in", "account", account.name, provider=attempt.provider
             )
             told = Told(account.id, RECOVERY_CODE_USED) if is_recovery_code(code) else None
             return Finished(attempt.next_page, session=token, told=told), None
-        record_failure(services, session, account)
+        record_failure(sign_ins, session, account)
     return None, failure
 
 
-def sign_out(services: Services, provider_id: str, ended: SignedOut) -> None:
+def sign_out(database: Database, provider_id: str, ended: SignedOut) -> None:
     """End the sessions that a provider began for a subject that signed out there."""
-    with services.database.write() as session:
+    with database.write() as session:
         login = repository.find_login(session, ended.issuer, ended.subject)
         number = repository.end_sessions(session, login.account_id, provider_id) if login else 0
         if login is not None and number:
@@ -493,13 +502,13 @@ def sign_out(services: Services, provider_id: str, ended: SignedOut) -> None:
             )  # fmt: skip
 
 
-def note_failure(services: Services, provider_id: str, refusal: ApiError) -> None:
+def note_failure(database: Database, sign_ins: SignInThrottle, provider_id: str, refusal: ApiError) -> None:
     """Write a sign-in by a provider down that came to nothing, so many a minute."""
-    unwritten = services.sign_ins.written()
+    unwritten = sign_ins.written()
     if unwritten is None:
         return
     details = {"not_written_before": unwritten} if unwritten else {}
-    with services.database.write() as session:
+    with database.write() as session:
         record(
             session, NOBODY, "sign-in failed", "account", "(unknown)",
             provider=provider_id, reason=refusal.code, **details,

@@ -19,21 +19,22 @@ from server.accounts.schemas import (
     NewPassword,
     OwnAddress,
 )
-from server.accounts.throttle import DEVICE_COOKIE
-from server.context import Services, ServicesDep
+from server.accounts.throttle import DEVICE_COOKIE, SignInThrottle
+from server.context import ServicesDep
 from server.core.errors import ERROR_RESPONSES, NotFound
+from server.core.settings import Settings
 
 router = APIRouter(prefix="/api/admin", tags=["account"], responses=ERROR_RESPONSES)
 
 
-async def _enter(services: Services, request: Request, what: str) -> None:
+async def _enter(sign_ins: SignInThrottle, request: Request, what: str) -> None:
     address = address_of(request)
-    key = services.sign_ins.key(what, address, None)
-    await run_in_threadpool(services.sign_ins.enter, key, address, None)
+    key = sign_ins.key(what, address, None)
+    await run_in_threadpool(sign_ins.enter, key, address, None)
 
 
-def _must_send(services: Services) -> None:
-    if not letters.can_send(services.settings):
+def _must_send(settings: Settings) -> None:
+    if not letters.can_send(settings):
         raise NotFound("This server sends no mail; ask an owner of it for a new password.")
 
 
@@ -47,10 +48,15 @@ async def forgot_password(
 ) -> None:
     """Ask for a link by mail for a new password; the answer is the same whether there is such an account."""
     check_origin(request, services.settings)
-    _must_send(services)
-    await _enter(services, request, "forgotten password")
+    _must_send(services.settings)
+    await _enter(services.sign_ins, request, "forgotten password")
     after.add_task(
-        resets.write_to_who_forgot, services, body.name, Asking(address_of(request), device_cookie)
+        resets.write_to_who_forgot,
+        services.database,
+        services.settings,
+        services.sign_ins,
+        body.name,
+        Asking(address_of(request), device_cookie),
     )
 
 
@@ -60,10 +66,10 @@ async def set_password(
 ) -> None:
     """Choose a new password by a link; every session and every API token of the account ends."""
     check_origin(request, services.settings)
-    await _enter(services, request, "new password")
-    name = await run_in_threadpool(resets.name_of, services, body.token)
+    await _enter(services.sign_ins, request, "new password")
+    name = await run_in_threadpool(resets.name_of, services.database, body.token)
     fresh = await services.passwords.run(lambda: hash_password(body.password, name))
-    letter = await run_in_threadpool(resets.set_password, services, body.token, fresh)
+    letter = await run_in_threadpool(resets.set_password, services.database, body.token, fresh)
     after.add_task(resets.post, services.settings, letter)
 
 
@@ -77,9 +83,11 @@ def own_address(services: ServicesDep, me: Myself) -> OwnAddress:
 @router.put("/mail", status_code=202)
 async def change_address(services: ServicesDep, me: Myself, body: NewAddress, after: BackgroundTasks) -> None:
     """Enter an address of mail; it is the account's once the link that goes there was opened."""
-    _must_send(services)
-    await must_fit(services, me, body.password)
-    letter = await run_in_threadpool(resets.ask_to_confirm, services, me, body.address)
+    _must_send(services.settings)
+    await must_fit(services.database, services.sign_ins, services.passwords, me, body.password)
+    letter = await run_in_threadpool(
+        resets.ask_to_confirm, services.database, services.settings, me, body.address
+    )
     after.add_task(resets.post, services.settings, letter)
 
 
@@ -88,8 +96,10 @@ async def remove_address(
     services: ServicesDep, me: Myself, body: ConfirmPassword, after: BackgroundTasks
 ) -> None:
     """Take the address of mail off one's own account; passwords are then reset by the command line alone."""
-    await must_prove(services, me, body.password)
-    letter = await run_in_threadpool(resets.remove_address, services, me)
+    await must_prove(
+        services.database, services.settings, services.sign_ins, services.passwords, me, body.password
+    )
+    letter = await run_in_threadpool(resets.remove_address, services.database, me)
     after.add_task(resets.post, services.settings, letter)
 
 
@@ -99,6 +109,6 @@ async def confirm_address(
 ) -> None:
     """Confirm an address of mail by the link that went there; the address before it is told."""
     check_origin(request, services.settings)
-    await _enter(services, request, "confirm an address")
-    letter = await run_in_threadpool(resets.confirm_address, services, body.token)
+    await _enter(services.sign_ins, request, "confirm an address")
+    letter = await run_in_threadpool(resets.confirm_address, services.database, body.token)
     after.add_task(resets.post, services.settings, letter)

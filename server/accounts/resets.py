@@ -12,8 +12,8 @@ from server.accounts.audit import NOBODY, record
 from server.accounts.identity import Identity, NotSignedIn
 from server.accounts.service import renew
 from server.accounts.signing_in import identity_of
-from server.accounts.throttle import known_device
-from server.context import Services
+from server.accounts.throttle import SignInThrottle, known_device
+from server.core.db import Database
 from server.core.errors import Conflict
 from server.core.settings import Settings
 from server.core.values import hash_token, new_token, now
@@ -66,33 +66,37 @@ def post(settings: Settings, letter: Letter | None) -> None:
         letters.send_mail(settings, letter.to, letter.subject, letter.text)
 
 
-def write_to_who_forgot(services: Services, name: str, asking: Asking) -> None:
+def write_to_who_forgot(
+    database: Database, settings: Settings, sign_ins: SignInThrottle, name: str, asking: Asking
+) -> None:
     """Send links for a new password to the accounts of this name or address; nothing where there are none.
 
     Runs after the answer, which so says nothing of whether there are any, by its words or its time.
     """
     letters = []
-    with services.database.write() as session:
+    with database.write() as session:
         repository.forget_old(session)
         for account in repository.accounts_to_write_to(session, name):
-            if account.email is None or not _may_have_one(services, session, account, asking):
+            if account.email is None or not _may_have_one(settings, sign_ins, session, account, asking):
                 continue
             token = _keep(session, account, "new password", account.email)
             record(session, NOBODY, "password reset asked for", "account", account.name)
-            letters.append(_reset_letter(services.settings.public_url, account, token))
+            letters.append(_reset_letter(settings.public_url, account, token))
     for letter in letters:
-        post(services.settings, letter)
+        post(settings, letter)
 
 
-def _may_have_one(services: Services, session: Session, account: Account, asking: Asking) -> bool:
+def _may_have_one(
+    settings: Settings, sign_ins: SignInThrottle, session: Session, account: Account, asking: Asking
+) -> bool:
     """Whether one more letter goes out: a share is kept for browsers of the account's own."""
-    own = known_device(services.settings.key, account.name, asking.device) is not None
+    own = known_device(settings.key, account.name, asking.device) is not None
     links = MAX_OPEN_LINKS + (RESERVED_LINKS if own else 0)
     letters = MAX_RESET_LETTERS_A_DAY - (0 if own else RESERVED_LETTERS)
     return (
         repository.open_links(session, account.id, "new password") < links
         and repository.links_of_a_day(session, account.id, "new password") < letters
-        and (own or services.sign_ins.may_have_letter(account.id, asking.address))
+        and (own or sign_ins.may_have_letter(account.id, asking.address))
     )
 
 
@@ -111,13 +115,13 @@ def _keep(session: Session, account: Account, purpose: LetterPurpose, address: s
     return token
 
 
-def name_of(services: Services, token: str) -> str:
+def name_of(database: Database, token: str) -> str:
     """Whose password a link is for; LinkOver where it does not work."""
-    with services.database.read() as session:
+    with database.read() as session:
         return _link(session, token, "new password").account.name
 
 
-def set_password(services: Services, token: str, fresh: str) -> Letter | None:
+def set_password(database: Database, token: str, fresh: str) -> Letter | None:
     """Give the account of a link a new password (its hash); its sessions, API tokens and logins end.
 
     Returns
@@ -125,16 +129,16 @@ def set_password(services: Services, token: str, fresh: str) -> Letter | None:
     Letter or None
         That it happened, to the account's address.
     """
-    with services.database.write() as session:
+    with database.write() as session:
         account = _used(session, token, "new password")
         logins = renew(session, identity_of(account), account, fresh)
         record(session, identity_of(account), "password reset by mail", "account", account.name)
         return _done_letter(account, logins)
 
 
-def ask_to_confirm(services: Services, me: Identity, address: str) -> Letter:
+def ask_to_confirm(database: Database, settings: Settings, me: Identity, address: str) -> Letter:
     """Keep a link by which an address of mail becomes one's own; the password was asked for."""
-    with services.database.write() as session:
+    with database.write() as session:
         repository.forget_old(session)
         account = account_of(session, me)
         accounts.hold(session, account.id)
@@ -144,10 +148,10 @@ def ask_to_confirm(services: Services, me: Identity, address: str) -> Letter:
         if repository.open_links(session, account.id, "address") >= MAX_OPEN_LINKS:
             raise Conflict(f"Several letters are under way already; try again in {LINK_MINUTES} minutes.")
         token = _keep(session, account, "address", address)
-        return _confirm_letter(services.settings.public_url, account, address, token)
+        return _confirm_letter(settings.public_url, account, address, token)
 
 
-def confirm_address(services: Services, token: str) -> Letter | None:
+def confirm_address(database: Database, token: str) -> Letter | None:
     """Make the address that a link went to the account's own.
 
     Returns
@@ -155,7 +159,7 @@ def confirm_address(services: Services, token: str) -> Letter | None:
     Letter or None
         That it happened, to the address that was the account's before; None where it had none or this one.
     """
-    with services.database.write() as session:
+    with database.write() as session:
         address = _link(session, token, "address").address
         account = _used(session, token, "address")
         repository.forget_links(session, account.id, "new password")
@@ -164,9 +168,9 @@ def confirm_address(services: Services, token: str) -> Letter | None:
         return _moved_letter(account, before)
 
 
-def remove_address(services: Services, me: Identity) -> Letter | None:
+def remove_address(database: Database, me: Identity) -> Letter | None:
     """Take the address of mail off one's own account; gives the letter that says so to that address."""
-    with services.database.write() as session:
+    with database.write() as session:
         account = account_of(session, me)
         before, account.email = account.email, None
         repository.forget_links(session, account.id, "new password")

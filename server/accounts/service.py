@@ -14,9 +14,9 @@ from server.accounts.identity import Identity
 from server.accounts.signing_in import WrongCredentials, WrongProof, identity_of, second_factor_failure
 from server.accounts.workspace_repository import default_workspace, set_member
 from server.accounts.workspaces import Membership
-from server.context import Services
 from server.core.db import Database
 from server.core.errors import ApiError, Conflict, NotFound
+from server.core.settings import Settings
 from server.core.values import hash_token, new_token, now
 from server.models import ROLES, Account, AdminSession, ApiToken, Role
 
@@ -129,17 +129,17 @@ def known_role(word: str) -> Role:
     return ROLES[ROLES.index(word)]
 
 
-def change_password(services: Services, identity: Identity, fresh: str) -> None:
+def change_password(database: Database, identity: Identity, fresh: str) -> None:
     """Give oneself a new password (its hash); every other session and every API token ends."""
-    with services.database.write() as session:
+    with database.write() as session:
         account_of(session, identity).password_hash = fresh
         end_everything(session, identity.account_id, keep_session=identity.session_id)
         record(session, identity, "password changed", "account", identity.name)
 
 
-def own_password(services: Services, identity: Identity) -> str:
+def own_password(database: Database, identity: Identity) -> str:
     """The hash of one's own password."""
-    with services.database.read() as session:
+    with database.read() as session:
         return account_of(session, identity).password_hash
 
 
@@ -151,9 +151,11 @@ def must_fit(password: str, stored: str) -> None:
         raise WrongProof("The present password is wrong.")
 
 
-def own_code_failure(services: Services, identity: Identity, code: str) -> ApiError | None:
+def own_code_failure(
+    database: Database, settings: Settings, identity: Identity, code: str
+) -> ApiError | None:
     """Why this is no code of one's own second factor; None where it is, and so is used up."""
-    with services.database.write() as session:
+    with database.write() as session:
         account = account_of(session, identity)
         repository.hold(session, account.id)
         session.refresh(account)
@@ -161,7 +163,7 @@ def own_code_failure(services: Services, identity: Identity, code: str) -> ApiEr
             return Conflict(
                 "This account has neither password nor second factor; set up a second factor first."
             )
-        failure = second_factor_failure(services, account, code)
+        failure = second_factor_failure(settings, account, code)
         return WrongProof(failure.message) if isinstance(failure, WrongCredentials) else failure
 
 
@@ -235,24 +237,24 @@ def _named(session: Session, name: str) -> Account:
     return account
 
 
-def start_second_factor(services: Services, identity: Identity) -> str:
+def start_second_factor(database: Database, settings: Settings, identity: Identity) -> str:
     """Give the account a fresh, unconfirmed secret and return it."""
-    with services.database.write() as session:
+    with database.write() as session:
         account = account_of(session, identity)
         if account.totp_confirmed_at is not None:
             raise Conflict("A second factor is set up already; remove it first.")
         account.totp_secret = credentials.new_seed()
-        return credentials.secret_of(services.settings.key, account.totp_secret)
+        return credentials.secret_of(settings.key, account.totp_secret)
 
 
-def confirm_second_factor(services: Services, identity: Identity, code: str) -> list[str]:
+def confirm_second_factor(database: Database, settings: Settings, identity: Identity, code: str) -> list[str]:
     """Turn the second factor on once the app's first code fits; return the recovery codes."""
     codes = credentials.new_recovery_codes()
-    with services.database.write() as session:
+    with database.write() as session:
         account = account_of(session, identity)
         if account.totp_secret is None or account.totp_confirmed_at is not None:
             raise Conflict("There is no second factor to confirm; start its set-up first.")
-        secret = credentials.secret_of(services.settings.key, account.totp_secret)
+        secret = credentials.secret_of(settings.key, account.totp_secret)
         step = credentials.accepted_step(secret, code, None)
         if step is None:
             raise WrongCredentials("That code does not fit; check the clock of your phone and try again.")
@@ -264,11 +266,11 @@ def confirm_second_factor(services: Services, identity: Identity, code: str) -> 
     return codes
 
 
-def remove_second_factor(services: Services, identity: Identity) -> None:
+def remove_second_factor(database: Database, settings: Settings, identity: Identity) -> None:
     """Turn the second factor off again; the password was asked for."""
-    with services.database.write() as session:
+    with database.write() as session:
         _without_second_factor(session, account_of(session, identity))
-        used_since = now() - services.settings.session_idle
+        used_since = now() - settings.session_idle
         for row in repository.open_sessions(session, identity.account_id, used_since):
             row.second_factor = False
         record(session, identity, "second factor removed", "account", identity.name)

@@ -8,8 +8,10 @@ from server.accounts import credentials, repository
 from server.accounts.audit import NOBODY, record
 from server.accounts.credentials import Checked
 from server.accounts.identity import Identity
-from server.context import Services
+from server.accounts.throttle import SignInThrottle
+from server.core.db import Database
 from server.core.errors import ApiError
+from server.core.settings import Settings
 from server.core.values import hash_token, new_token, now
 from server.models import Account, AdminSession
 
@@ -44,15 +46,21 @@ def session_of(session: Session, token: str) -> AdminSession | None:
     return repository.session_by_token(session, hash_token(token))
 
 
-def stored_password(services: Services, name: str) -> str | None:
+def stored_password(database: Database, name: str) -> str | None:
     """The password's hash of the account called `name`; None where there is none."""
-    with services.database.read() as session:
+    with database.read() as session:
         account = repository.account_named(session, name)
         return account.password_hash if account else None
 
 
 def open_session(
-    services: Services, name: str, checked: Checked, code: str | None, user_agent: str
+    database: Database,
+    settings: Settings,
+    sign_ins: SignInThrottle,
+    name: str,
+    checked: Checked,
+    code: str | None,
+    user_agent: str,
 ) -> tuple[str | None, ApiError | None]:
     """After a right password: the token of a new session (the cookie's value), or why there is none.
 
@@ -62,25 +70,25 @@ def open_session(
         The stored hash that the password fitted. The account is held meanwhile, so that a code works once
         however many ask at once; failures are written down too.
     """
-    with services.database.write() as session:
+    with database.write() as session:
         account = repository.account_named(session, name, lock=True)
         if account is None or account.disabled_at is not None or account.password_hash != checked.stored:
             failure: ApiError | None = WrongCredentials("Name or password are wrong.")
         else:
-            failure = second_factor_failure(services, account, code)
+            failure = second_factor_failure(settings, account, code)
         if account is not None and failure is None:
             account.password_hash = checked.renewed or account.password_hash
-            token = begin_session(services, session, account, user_agent)
+            token = begin_session(settings, session, account, user_agent)
             record(session, identity_of(account), "signed in", "account", account.name)
             return token, None
         if not isinstance(failure, SecondFactorRequired):
-            record_failure(services, session, account)
+            record_failure(sign_ins, session, account)
     return None, failure
 
 
-def record_failure(services: Services, session: Session, account: Account | None) -> None:
+def record_failure(sign_ins: SignInThrottle, session: Session, account: Account | None) -> None:
     """Write a failed sign-in down, so many a minute; a name that is nobody's may be a password: not kept."""
-    unwritten = services.sign_ins.written()
+    unwritten = sign_ins.written()
     if unwritten is None:
         return
     name = account.name if account else "(unknown)"
@@ -88,13 +96,13 @@ def record_failure(services: Services, session: Session, account: Account | None
     record(session, NOBODY, "sign-in failed", "account", name, **details)
 
 
-def second_factor_failure(services: Services, account: Account, code: str | None) -> ApiError | None:
+def second_factor_failure(settings: Settings, account: Account, code: str | None) -> ApiError | None:
     """Why a code is not enough; None where it fits, or none is asked for."""
     if account.totp_secret is None or account.totp_confirmed_at is None:
         return None
     if not code:
         return SecondFactorRequired("Please enter the code of your authenticator app, or a recovery code.")
-    secret = credentials.secret_of(services.settings.key, account.totp_secret)
+    secret = credentials.secret_of(settings.key, account.totp_secret)
     step = credentials.accepted_step(secret, code, account.totp_last_step)
     if step is not None:
         account.totp_last_step = step
@@ -107,7 +115,7 @@ def second_factor_failure(services: Services, account: Account, code: str | None
 
 
 def begin_session(
-    services: Services,
+    settings: Settings,
     session: Session,
     account: Account,
     user_agent: str,
@@ -132,7 +140,7 @@ def begin_session(
             second_factor=account.totp_confirmed_at is not None if second_factor is None else second_factor,
             user_agent=user_agent[:300],
             provider=provider,
-            expires_at=now() + timedelta(hours=services.settings.session_hours),
+            expires_at=now() + timedelta(hours=settings.session_hours),
         )
     )
     return token

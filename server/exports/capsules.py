@@ -37,8 +37,10 @@ from experiments.files import json_text, whole_file
 from experiments.manifest import Manifest
 from server.accounts.audit import record
 from server.accounts.identity import OPERATOR, Identity
-from server.context import Services
+from server.core.db import Database
 from server.core.errors import Conflict, NotFound
+from server.core.locks import Locks
+from server.core.settings import Settings
 from server.core.storage import ClipStore
 from server.core.values import now
 from server.exports.extract import Extract
@@ -187,7 +189,8 @@ class CapsuleContents:
 
 
 def build_capsule(
-    services: Services,
+    database: Database,
+    clips: ClipStore,
     name: str,
     contents: CapsuleContents,
     target: Path,
@@ -208,7 +211,7 @@ def build_capsule(
         folder.mkdir()
         work.mkdir()
         progress(0.05, "exporting")
-        with services.database.snapshot() as session:
+        with database.snapshot() as session:
             study = find_study(session, name, OPERATOR, "view")
             version = version_of_series(session, study, contents.series)
             source = _write_study(session, study, version, folder, made, contents)
@@ -217,7 +220,7 @@ def build_capsule(
         # The snapshot has ended: what follows may take an hour, and the database must not wait for it.
         if contents.clips:
             progress(0.15, "copying clips")
-            _copy_clips(services.clips, manifest, folder)
+            _copy_clips(clips, manifest, folder)
         progress(0.3, "analysing")
         source = _report(known, source, folder, work)
         progress(0.9, "packing")
@@ -323,16 +326,24 @@ def _list(study: str, experiment: Experiment, source: ReportSource, folder: Path
 _one_at_a_time = threading.Lock()
 
 
-def start(services: Services, name: str, order: NewCapsule, identity: Identity) -> CapsuleOut:
+def start(
+    database: Database,
+    settings: Settings,
+    clips: ClipStore,
+    locks: Locks,
+    name: str,
+    order: NewCapsule,
+    identity: Identity,
+) -> CapsuleOut:
     """Begin a capsule in the background; Conflict where one of this study is under way.
 
     NotFound where there is no such data series.
     """
-    with services.database.write() as session:
+    with database.write() as session:
         study = find_study(session, name, identity, "run")
         version_of_series(session, study, order.series)
         job = begun(
-            services,
+            locks,
             session,
             study,
             "capsule",
@@ -342,73 +353,82 @@ def start(services: Services, name: str, order: NewCapsule, identity: Identity) 
         )
         record(session, identity, "data downloaded", "study", name, what="capsule", origin=order.origin)
         session.flush()
-        capsule = _capsule_out(services, job)
-    in_background(services, capsule.id, partial(_build, services, name, capsule.id, order))
+        capsule = _capsule_out(settings, locks, job)
+    in_background(
+        database,
+        locks,
+        capsule.id,
+        partial(_build, database, settings, clips, locks, name, capsule.id, order),
+    )
     return capsule
 
 
-def capsules(services: Services, session: Session, name: str, identity: Identity) -> list[CapsuleOut]:
+def capsules(
+    settings: Settings, locks: Locks, session: Session, name: str, identity: Identity
+) -> list[CapsuleOut]:
     """Every finished capsule of a study among its latest attempts, newest first."""
     study = find_study(session, name, identity, "view")
     every = job_repository.jobs(session, study, "capsule")
     listed = every[: job_repository.LISTED] + [
         job for job in every[job_repository.LISTED :] if job.status == "done"
     ]
-    return [_capsule_out(services, job) for job in listed]
+    return [_capsule_out(settings, locks, job) for job in listed]
 
 
-def capsule_file(services: Services, session: Session, name: str, identity: Identity, public_id: str) -> Path:
+def capsule_file(settings: Settings, session: Session, name: str, identity: Identity, public_id: str) -> Path:
     """The zip of a finished capsule; NotFound where there is none."""
     study = find_study(session, name, identity, "export")
     job = job_repository.find_job(session, study, "capsule", public_id)
-    path = _zip_of(services, public_id)
+    path = _zip_of(settings, public_id)
     if job is None or job.status != "done" or not path.is_file():
         raise NotFound("There is no such capsule, or it is not done; reload the page to see how far it is.")
     return path
 
 
-def remove(services: Services, name: str, public_id: str, identity: Identity) -> None:
+def remove(
+    database: Database, settings: Settings, locks: Locks, name: str, public_id: str, identity: Identity
+) -> None:
     """Delete a capsule for good; NotFound where there is none, Conflict while it is made."""
-    with services.database.write() as session:
+    with database.write() as session:
         study = find_study(session, name, identity, "run")
         job = job_repository.find_job(session, study, "capsule", public_id)
         if job is None:
             raise NotFound("There is no such capsule; reload the page to see which there are.")
-        if is_under_way(services, job):
+        if is_under_way(locks, job):
             raise Conflict("This capsule is being made; delete it when it is done.")
         job_repository.remove_job(session, study, "capsule", public_id)
         record(session, identity, "capsule removed", "study", name, capsule=public_id)
-    _zip_of(services, public_id).unlink(missing_ok=True)
+    _zip_of(settings, public_id).unlink(missing_ok=True)
 
 
-def remove_old(services: Services, name: str) -> None:
+def remove_old(database: Database, settings: Settings, locks: Locks, name: str) -> None:
     """Remove what a study has too many of, and what has become too old; the audit log says so."""
-    oldest = now() - timedelta(days=services.settings.capsule_keep_days)
-    with services.database.write() as session:
+    oldest = now() - timedelta(days=settings.capsule_keep_days)
+    with database.write() as session:
         study = find_study(session, name, OPERATOR, "view")
         ended = [
-            job for job in job_repository.jobs(session, study, "capsule") if not is_under_way(services, job)
+            job for job in job_repository.jobs(session, study, "capsule") if not is_under_way(locks, job)
         ]
         recent = [job for job in ended if job.created_at >= oldest]
-        surplus = [job for job in recent if job.status == "done"][services.settings.capsules_kept :]
+        surplus = [job for job in recent if job.status == "done"][settings.capsules_kept :]
         gone = [job.public_id for job in ended if job not in recent or job in surplus]
         for public_id in gone:
             job_repository.remove_job(session, study, "capsule", public_id)
             record(session, OPERATOR, "capsule removed", "study", name, capsule=public_id)
     for public_id in gone:
-        _zip_of(services, public_id).unlink(missing_ok=True)
+        _zip_of(settings, public_id).unlink(missing_ok=True)
 
 
-def _zip_of(services: Services, public_id: str) -> Path:
-    return services.settings.common_folder / "capsules" / f"{public_id}.zip"
+def _zip_of(settings: Settings, public_id: str) -> Path:
+    return settings.common_folder / "capsules" / f"{public_id}.zip"
 
 
-def _capsule_out(services: Services, job: Job) -> CapsuleOut:
-    path, result = _zip_of(services, job.public_id), job.result or {}
+def _capsule_out(settings: Settings, locks: Locks, job: Job) -> CapsuleOut:
+    path, result = _zip_of(settings, job.public_id), job.result or {}
     is_there = job.status == "done" and path.is_file()
     return CapsuleOut.model_validate(
         {
-            **shown(services, job, "the server was stopped while it was made"),
+            **shown(locks, job, "the server was stopped while it was made"),
             "origin": job.parameters.get("origin", "participant"),
             "series": job.parameters.get("series"),
             "clips": job.parameters.get("clips", True),
@@ -418,19 +438,28 @@ def _capsule_out(services: Services, job: Job) -> CapsuleOut:
     )
 
 
-def _build(services: Services, name: str, public_id: str, order: NewCapsule) -> None:
+def _build(
+    database: Database,
+    settings: Settings,
+    clips: ClipStore,
+    locks: Locks,
+    name: str,
+    public_id: str,
+    order: NewCapsule,
+) -> None:
     """The background thread's work."""
-    target = _zip_of(services, public_id)
+    target = _zip_of(settings, public_id)
     target.parent.mkdir(parents=True, exist_ok=True)
     with _one_at_a_time:
-        note(services, public_id, status="running", started_at=now())
+        note(database, public_id, status="running", started_at=now())
         made = build_capsule(
-            services,
+            database,
+            clips,
             name,
             CapsuleContents(order.origin, order.clips, order.sensitivity, order.series),
             target,
-            lambda share, step: note(services, public_id, progress=share, message=step),
+            lambda share, step: note(database, public_id, progress=share, message=step),
         )
     ended = {"status": "done", "progress": 1.0, "message": "", "result": {"sha256": made.sha256}}
-    note(services, public_id, finished_at=now(), **ended)
-    remove_old(services, name)
+    note(database, public_id, finished_at=now(), **ended)
+    remove_old(database, settings, locks, name)

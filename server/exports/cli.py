@@ -202,7 +202,8 @@ def capsule(
             about = definition_of_series(session, known, series).dataset
             record(session, None, "data downloaded", "study", study, what="capsule", origin=origin)
         made = build_capsule(
-            services,
+            services.database,
+            services.clips,
             study,
             CapsuleContents(origin, clips, sensitivity, series),
             out_file,

@@ -18,6 +18,7 @@ from server.accounts.access import Exporter, Myself, ReportReader, Viewer, Write
 from server.accounts.audit import record
 from server.accounts.identity import Identity
 from server.context import Services, ServicesDep
+from server.core.db import Database
 from server.core.errors import ERROR_RESPONSES, Conflict, NotFound
 from server.core.values import Number, encoded
 from server.exports import capsules as capsule_service
@@ -256,27 +257,29 @@ capsule_router = APIRouter(
 def list_capsules(services: ServicesDep, identity: Viewer, study: str) -> list[CapsuleOut]:
     """The latest capsules, the newest first."""
     with services.database.read() as session:
-        return capsule_service.capsules(services, session, study, identity)
+        return capsule_service.capsules(services.settings, services.locks, session, study, identity)
 
 
 @capsule_router.post("", status_code=202)
 def build_study_capsule(services: ServicesDep, identity: Writer, study: str, body: NewCapsule) -> CapsuleOut:
     """Begin a capsule: Psych-DS and RO-Crate with data, clips, definition, seal, plan and report."""
-    return capsule_service.start(services, study, body, identity)
+    return capsule_service.start(
+        services.database, services.settings, services.clips, services.locks, study, body, identity
+    )
 
 
 @capsule_router.get("/{capsule}.zip", response_class=FileResponse)
 def get_capsule(services: ServicesDep, identity: ReportReader, study: str, capsule: str) -> FileResponse:
     """A finished capsule. Anybody can verify it with `analysis verify`."""
     with services.database.read() as session:
-        path = capsule_service.capsule_file(services, session, study, identity, capsule)
+        path = capsule_service.capsule_file(services.settings, session, study, identity, capsule)
     return FileResponse(path, filename=f"{study}-capsule.zip", media_type="application/zip")
 
 
 @capsule_router.delete("/{capsule}", status_code=204)
 def remove_capsule(services: ServicesDep, identity: Writer, study: str, capsule: str) -> None:
     """Delete a capsule for good; one that is being made is left alone."""
-    capsule_service.remove(services, study, capsule, identity)
+    capsule_service.remove(services.database, services.settings, services.locks, study, capsule, identity)
 
 
 # The analysis report of a study, built on request.
@@ -290,13 +293,13 @@ report_router = APIRouter(
 def list_reports(services: ServicesDep, identity: Viewer, study: str) -> list[ReportOut]:
     """The latest reports, the newest first."""
     with services.database.read() as session:
-        return report_service.reports(services, session, study, identity)
+        return report_service.reports(services.settings, services.locks, session, study, identity)
 
 
 @report_router.post("", status_code=202)
 def build_report(services: ServicesDep, identity: Writer, study: str, body: NewReport) -> ReportOut:
     """Begin a report: exclusions, the paper's table, every test, figures."""
-    return report_service.start(services, study, body, identity)
+    return report_service.start(services.database, services.settings, services.locks, study, body, identity)
 
 
 @report_router.get("/{report}/{file}", response_class=FileResponse)
@@ -305,7 +308,9 @@ def get_report_file(
 ) -> FileResponse:
     """One file of a finished report: needs the right `export`, for it holds rows of single persons."""
     with services.database.read() as session:
-        path = report_service.report_file(services, session, study, identity, report, file)
+        path = report_service.report_file(
+            services.settings, services.locks, session, study, identity, report, file
+        )
     kind = "attachment" if download or path.suffix != ".html" else "inline"
     headers = {"content-security-policy": report_service.REPORT_POLICY}
     return FileResponse(path, filename=f"{study}-{path.name}", content_disposition_type=kind, headers=headers)
@@ -370,14 +375,14 @@ def download_seal(
     services: ServicesDep, identity: Viewer, study: str, ending: Literal["json", "html"]
 ) -> Response:
     """The sealed file, or a page of it that prints well."""
-    seal = _sealed(services, study, identity)
+    seal = _sealed(services.database, study, identity)
     text, kind = (seal.text(), "application/json") if ending == "json" else (page(seal), "text/html")
     headers = {"content-disposition": f'attachment; filename="{study}-seal.{ending}"'}
     return Response(encoded(text), media_type=f"{kind}; charset=utf-8", headers=headers)
 
 
-def _sealed(services: Services, study: str, identity: Identity) -> Seal:
-    with services.database.read() as session:
+def _sealed(database: Database, study: str, identity: Identity) -> Seal:
+    with database.read() as session:
         seal = seal_of(session, find_study(session, study, identity, "view"))
     if seal is None:
         raise NotFound(f"The plan of '{study}' is not sealed.")

@@ -12,8 +12,10 @@ from experiments.files import json_text
 from experiments.manifest import MANIFEST_NAME
 from server.accounts.audit import record
 from server.accounts.identity import OPERATOR, Identity
-from server.context import Services
+from server.core.db import Database
 from server.core.errors import NotFound
+from server.core.locks import Locks
+from server.core.settings import Settings
 from server.core.values import now
 from server.exports.csv_lines import csv_pieces, rating_table
 from server.exports.extract import Extract
@@ -33,12 +35,14 @@ REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; s
 _one_at_a_time = threading.Lock()
 
 
-def start(services: Services, name: str, order: NewReport, identity: Identity) -> ReportOut:
+def start(
+    database: Database, settings: Settings, locks: Locks, name: str, order: NewReport, identity: Identity
+) -> ReportOut:
     """Queue a report and begin it in the background; Conflict where one of this study is under way."""
-    with services.database.write() as session:
+    with database.write() as session:
         study = find_study(session, name, identity, "run")
         job = begun(
-            services,
+            locks,
             session,
             study,
             "report",
@@ -48,24 +52,26 @@ def start(services: Services, name: str, order: NewReport, identity: Identity) -
         )
         record(session, identity, "report asked for", "study", name, **order.model_dump())
         session.flush()
-        report = report_out(services, job)
-    in_background(services, report.id, partial(_build, services, name, report.id, order))
+        report = report_out(settings, locks, job)
+    in_background(database, locks, report.id, partial(_build, database, settings, name, report.id, order))
     return report
 
 
-def reports(services: Services, session: Session, name: str, identity: Identity) -> list[ReportOut]:
+def reports(
+    settings: Settings, locks: Locks, session: Session, name: str, identity: Identity
+) -> list[ReportOut]:
     """The latest reports of a study."""
     study = find_study(session, name, identity, "view")
-    return [report_out(services, job) for job in job_repository.latest_jobs(session, study, "report")]
+    return [report_out(settings, locks, job) for job in job_repository.latest_jobs(session, study, "report")]
 
 
-def report_out(services: Services, job: Job) -> ReportOut:
+def report_out(settings: Settings, locks: Locks, job: Job) -> ReportOut:
     """A report as the page shows it."""
-    folder = report_folder(services, job.public_id)
+    folder = report_folder(settings, job.public_id)
     done = job.status == "done" and folder.is_dir()
     return ReportOut.model_validate(
         {
-            **shown(services, job, "the server was stopped while it was built"),
+            **shown(locks, job, "the server was stopped while it was built"),
             "origin": job.parameters.get("origin") or _origin_of_older(job.parameters),
             "series": job.parameters.get("series"),
             "finished_at": job.finished_at,
@@ -79,13 +85,19 @@ def _origin_of_older(parameters: dict[str, Any]) -> str:
     return "pilot" if parameters.get("phase") == "pilot" else "participant"
 
 
-def report_folder(services: Services, public_id: str) -> Path:
+def report_folder(settings: Settings, public_id: str) -> Path:
     """Where the files of a report lie."""
-    return services.settings.common_folder / "reports" / public_id
+    return settings.common_folder / "reports" / public_id
 
 
 def report_file(
-    services: Services, session: Session, name: str, identity: Identity, public_id: str, file: str
+    settings: Settings,
+    locks: Locks,
+    session: Session,
+    name: str,
+    identity: Identity,
+    public_id: str,
+    file: str,
 ) -> Path:
     """One file of a finished report; NotFound where it is not one of its files.
 
@@ -93,33 +105,33 @@ def report_file(
     """
     study = find_study(session, name, identity, "export")
     job = job_repository.find_job(session, study, "report", public_id)
-    if job is None or file not in report_out(services, job).files:
+    if job is None or file not in report_out(settings, locks, job).files:
         raise NotFound("There is no such report, or it has no such file.")
-    return report_folder(services, public_id) / file
+    return report_folder(settings, public_id) / file
 
 
-def _build(services: Services, name: str, public_id: str, order: NewReport) -> None:
+def _build(database: Database, settings: Settings, name: str, public_id: str, order: NewReport) -> None:
     """The background thread's work."""
-    folder = report_folder(services, public_id)
+    folder = report_folder(settings, public_id)
     inputs = folder.with_name(f".{public_id}.input")
     try:
         with _one_at_a_time:
-            note(services, public_id, status="running", progress=0.05, message="exporting", started_at=now())
-            series = _export(services, name, inputs, order)
-            note(services, public_id, progress=0.2, message="analysing")
+            note(database, public_id, status="running", progress=0.05, message="exporting", started_at=now())
+            series = _export(database, name, inputs, order)
+            note(database, public_id, progress=0.2, message="analysing")
             message = _analyse(inputs, folder, order, series)
             if not message:
-                _add_methods(services, name, folder, order, series)
+                _add_methods(database, name, folder, order, series)
         status = "failed" if message else "done"
-        note(services, public_id, status=status, progress=1.0, message=message, finished_at=now())
+        note(database, public_id, status=status, progress=1.0, message=message, finished_at=now())
     finally:
         shutil.rmtree(inputs, ignore_errors=True)
 
 
-def _export(services: Services, name: str, inputs: Path, order: NewReport) -> int:
+def _export(database: Database, name: str, inputs: Path, order: NewReport) -> int:
     """Write the ratings, the runs and the declaration of a series; return the series."""
     inputs.mkdir(parents=True, exist_ok=True)
-    with services.database.snapshot() as session:  # answers and runs are of one moment
+    with database.snapshot() as session:  # answers and runs are of one moment
         study = find_study(session, name, OPERATOR, "view")
         version = version_of_series(session, study, order.series)
         (inputs / "definition.toml").write_text(version.definition_toml, encoding="utf-8")
@@ -148,8 +160,8 @@ def _analyse(inputs: Path, folder: Path, order: NewReport, series: int) -> str:
     )
 
 
-def _add_methods(services: Services, name: str, folder: Path, order: NewReport, series: int) -> None:
-    with services.database.read() as session:
+def _add_methods(database: Database, name: str, folder: Path, order: NewReport, series: int) -> None:
+    with database.read() as session:
         study = find_study(session, name, OPERATOR, "view")
         methods = methods_of(session, study, order.origin, series, read_results(folder))
     write(folder, methods)

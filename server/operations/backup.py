@@ -21,8 +21,10 @@ from sqlalchemy import Connection, Table
 
 from experiments.errors import InputError
 from experiments.files import check_targets, whole_private_file
-from server.context import Services
+from server.core.db import Database
 from server.core.locks import locked
+from server.core.settings import Settings
+from server.core.storage import ClipStore
 from server.core.values import iso, now
 from server.operations import key_escrow
 from server.operations.key_escrow import KeyFile
@@ -60,7 +62,13 @@ class Description(BaseModel):
 
 
 def back_up(
-    services: Services, path: Path, *, with_clips: bool = True, keys: Path | None = None
+    database: Database,
+    settings: Settings,
+    clips: ClipStore,
+    path: Path,
+    *,
+    with_clips: bool = True,
+    keys: Path | None = None,
 ) -> Description:
     """Write a backup of one moment while the server goes on; mode 600, under its name only once complete.
 
@@ -72,50 +80,50 @@ def back_up(
     InputError
         A folder is missing, or a file cannot be written or holds the keys of another installation.
     """
-    begin_ledger(services.settings)
+    begin_ledger(settings)
     key_path = keys or key_escrow.key_file_of(path)
     check_targets([path, key_path, key_path.parent / LEDGER_NAME])
-    key_escrow.check_replaceable(key_path, services.settings.key)
+    key_escrow.check_replaceable(key_path, settings.key)
     with _written(path) as stream:
-        described, kept = write_backup(services, stream, with_clips=with_clips)
-        _write_keys(services, key_path, kept)
+        described, kept = write_backup(database, settings, clips, stream, with_clips=with_clips)
+        _write_keys(settings, key_path, kept)
     return described
 
 
-def _write_keys(services: Services, path: Path, kept: KeyFile) -> None:
+def _write_keys(settings: Settings, path: Path, kept: KeyFile) -> None:
     """Key file and ledger, by one backup of the installation at a time."""
-    with locked(services.settings.common_folder / "backup-keys.lock"):
-        key_escrow.check_replaceable(path, services.settings.key)
+    with locked(settings.common_folder / "backup-keys.lock"):
+        key_escrow.check_replaceable(path, settings.key)
         key_escrow.write_keys(path, kept)
-        _write_ledger(services, path.parent / LEDGER_NAME, kept.written_at)
+        _write_ledger(settings, path.parent / LEDGER_NAME, kept.written_at)
 
 
-def _write_ledger(services: Services, path: Path, moment: str) -> None:
+def _write_ledger(settings: Settings, path: Path, moment: str) -> None:
     """A copy of the ledger of erasures beside the key file; what it names already stays."""
     there = path.read_bytes() if path.is_file() else b""
     with whole_private_file(path) as stream:
-        stream.write(ledger_for_backup(services.settings, there, moment))
+        stream.write(ledger_for_backup(settings, there, moment))
 
 
 # Decision 0200: Backups hold rows, not database files.
 def write_backup(
-    services: Services, stream: IO[bytes], *, with_clips: bool = True
+    database: Database, settings: Settings, clips: ClipStore, stream: IO[bytes], *, with_clips: bool = True
 ) -> tuple[Description, KeyFile]:
     """Write a backup of one moment into a stream; return what is in it, and the keys that are not."""
     with tarfile.open(fileobj=stream, mode="w|") as tar:
-        with snapshot(services.database) as connection, tempfile.TemporaryDirectory() as folder:
-            described = _describe(connection, services, Path(folder), with_clips)
-            kept = key_escrow.read_keys(connection, services.settings.key, described.created_at)
+        with snapshot(database) as connection, tempfile.TemporaryDirectory() as folder:
+            described = _describe(connection, clips, Path(folder), with_clips)
+            kept = key_escrow.read_keys(connection, settings.key, described.created_at)
             _add_bytes(tar, DESCRIPTION, described.model_dump_json(indent=2).encode())
             for name in described.tables:
                 tar.add(Path(folder) / name, TABLES + name + ".ndjson.gz", filter=_plain)
-        _add_bytes(tar, KEY, services.settings.key)
+        _add_bytes(tar, KEY, settings.key)
         for sha256 in described.clips:
-            _add_clip(tar, services, sha256)
+            _add_clip(tar, clips, sha256)
     return described, kept
 
 
-def _describe(connection: Connection, services: Services, folder: Path, with_clips: bool) -> Description:
+def _describe(connection: Connection, clips: ClipStore, folder: Path, with_clips: bool) -> Description:
     """Dump every table into `folder` and describe what was dumped."""
     revision = MigrationContext.configure(connection).get_current_revision()  # the snapshot begins
     moment = iso(now())
@@ -123,14 +131,14 @@ def _describe(connection: Connection, services: Services, folder: Path, with_cli
         raise InputError("the database has no tables yet; there is nothing to back up")
     dumped = [table for table in tables_of(connection) if table.name != key_escrow.APART]
     tables = {table.name: _dump(connection, table, folder / table.name) for table in dumped}
-    clips = clip_hashes(connection)
+    hashes = clip_hashes(connection)
     return Description(
         program_version=version("palpebra"),
         revision=revision,
         created_at=moment,
         tables={name: TableDescription(rows=c.rows, sha256=c.sha256) for name, c in tables.items()},
         keys_apart=True,
-        clips=[clip for clip in clips if with_clips and services.clips.size(clip) is not None],
+        clips=[clip for clip in hashes if with_clips and clips.size(clip) is not None],
     )
 
 
@@ -144,12 +152,12 @@ def _dump(connection: Connection, table: Table, path: Path) -> Content:
     return digest.content()
 
 
-def _add_clip(tar: tarfile.TarFile, services: Services, sha256: str) -> None:
-    size = services.clips.size(sha256)
+def _add_clip(tar: tarfile.TarFile, clips: ClipStore, sha256: str) -> None:
+    size = clips.size(sha256)
     if size is None:
         raise InputError(f"clip {sha256[:12]}... went away during the backup; run it again")
     with tempfile.SpooledTemporaryFile(max_size=SPOOL_BYTES) as spool:
-        for piece in services.clips.read(sha256, 0, size):
+        for piece in clips.read(sha256, 0, size):
             spool.write(piece)
         spool.seek(0)
         tar.addfile(_entry(f"{CLIPS}{sha256}.mp4", size), spool)

@@ -13,9 +13,9 @@ from pyrage import x25519
 
 from experiments.errors import InputError
 from experiments.files import whole_private_file
-from server.context import Services
+from server.core.db import Database
 from server.core.settings import Settings
-from server.core.storage import s3_client
+from server.core.storage import ClipStore, s3_client
 from server.core.values import iso, now
 from server.operations.backup import ENDING, Description, decrypt, encrypted, write_backup
 from server.operations.key_escrow import NAME, content_of_keys, installation
@@ -218,7 +218,9 @@ class KeptBackup:
 
 # Decision 0742: Backups leave the host as age files.
 def back_up_to(
-    services: Services,
+    database: Database,
+    settings: Settings,
+    clips: ClipStore,
     store: BackupStore,
     name: str,
     recipient: x25519.Recipient,
@@ -242,17 +244,17 @@ def back_up_to(
         The store cannot be written.
     """
     made: list[Description] = []
-    ours = installation(services.settings.key)
+    ours = installation(settings.key)
 
     def write(stream: IO[bytes]) -> None:
-        described, keys = write_backup(services, stream, with_clips=with_clips)
+        described, keys = write_backup(database, settings, clips, stream, with_clips=with_clips)
         _put_newest(store, _Kept(NAME, ours, keys.written_at), content_of_keys(keys), recipient)
         ledger = _Kept(LEDGER_NAME, ours, iso(now()))
-        copy = ledger_for_backup(services.settings, b"", keys.written_at)
+        copy = ledger_for_backup(settings, b"", keys.written_at)
         _put_newest(store, ledger, copy, recipient)
         made.append(described)
 
-    kept_as = f"{name.removesuffix('.tar')}{ending_of(services.settings.key)}"
+    kept_as = f"{name.removesuffix('.tar')}{ending_of(settings.key)}"
     with encrypted(write, recipient) as stream:
         store.put(kept_as, stream)
     return kept_as, made[0]

@@ -107,7 +107,12 @@ def backup(
         raise InputError(f"{path} is there already; name another file, or add --replace to write over it")
     with stored_services() as services:
         described = backups.back_up(
-            services, path, with_clips=not without_clips, keys=keys or services.settings.backup_keys
+            services.database,
+            services.settings,
+            services.clips,
+            path,
+            with_clips=not without_clips,
+            keys=keys or services.settings.backup_keys,
         )
     out.print(f"{path}: {_contents(described)}, {path.stat().st_size / 1e6:.1f} MB")
     for old in superfluous(path.parent.glob("palpebra-*.tar"), keep) if keep else ():
@@ -131,7 +136,9 @@ def _back_up_to(to: str, recipient: str, name: str, *, with_clips: bool, keep: i
     key = recipient_of(public)
     store = backup_store(to, settings)
     with stored_services(settings) as services:
-        kept_as, described = back_up_to(services, store, name, key, with_clips=with_clips)
+        kept_as, described = back_up_to(
+            services.database, services.settings, services.clips, store, name, key, with_clips=with_clips
+        )
         ending = ending_of(settings.key)
     out.print(f"{store.address}/{kept_as}: {_contents(described)}, encrypted")
     ours = [Path(entry.name) for entry in store.entries() if entry.name.endswith(ending)]
@@ -210,7 +217,14 @@ def restore(
             plain = not file.endswith(ENDING)
             keys = keys or (settings.backup_keys if plain else None)
             described = restoring.restore(
-                services, path, out.print, keys=keys, stale_keys=stale_keys, despite_erasures=despite_erasures
+                services.database,
+                services.settings,
+                services.clips,
+                path,
+                out.print,
+                keys=keys,
+                stale_keys=stale_keys,
+                despite_erasures=despite_erasures,
             )
     finally:
         services.database.close()

@@ -118,7 +118,9 @@ def _here(
 def _brought_back(apart: Settings, backup: Path, keys: Path | None) -> DrillResult:
     services = open_services(apart)
     try:
-        described = restore(services, backup, keys=keys, despite_erasures=True)
+        described = restore(
+            services.database, services.settings, services.clips, backup, keys=keys, despite_erasures=True
+        )
         missing = keys is None and not key_file_of(backup).exists()
         failed = [_key_file_missing(backup)] if missing and _needs_key_file(described) else []
         failed += [

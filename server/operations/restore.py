@@ -16,9 +16,10 @@ from sqlalchemy import Connection, Table
 from sqlalchemy.exc import InterfaceError, OperationalError, StatementError
 
 from experiments.errors import InputError, counted
-from server.context import Services
+from server.core.db import Database
 from server.core.migrate import alembic_config, derived_anew, known_revision
 from server.core.settings import Settings, put_key, secret_key_path
+from server.core.storage import ClipStore
 from server.operations.backup import CLIPS, DESCRIPTION, KEY, TABLES, Description
 from server.operations.key_escrow import NAME, KeyFile, check_fits, key_file, key_file_of, put_back
 from server.privacy.erasures import replay
@@ -42,7 +43,9 @@ ELSEWHERE = (
 
 
 def restore(
-    services: Services,
+    database: Database,
+    settings: Settings,
+    clips: ClipStore,
     path: Path,
     told: Callable[[str], None] = lambda _line: None,
     *,
@@ -77,26 +80,26 @@ def restore(
         with tarfile.open(path) as tar:
             described = _description(tar, path)
             key = _content(tar, KEY)
-            _check_key(services.settings, key)
+            _check_key(settings, key)
             apart = _key_file(
                 described, key, keys or key_file_of(path), named=keys is not None, stale=stale_keys
             )
-            covered = _is_covered(services.settings, copied_ledger, described)
+            covered = _is_covered(settings, copied_ledger, described)
             if not covered and not despite_erasures:
-                raise _not_covered(services.settings, copied_ledger, described)
-            _restore_rows(services, tar, described, _Keys(key, apart), told)
+                raise _not_covered(settings, copied_ledger, described)
+            _restore_rows(database, tar, described, _Keys(key, apart), told)
             for sha256 in described.clips:
-                _restore_clip(services, tar, sha256)
+                _restore_clip(clips, tar, sha256)
     except (tarfile.TarError, EOFError, gzip.BadGzipFile) as error:
         raise InputError(f"{path} is damaged or no backup of `server backup`{_reason(error)}") from error
     except OSError as error:
         if error.errno == errno.ENOSPC:
             raise InputError(f"no room left for what {path} holds; make room and restore again") from error
         raise InputError(f"{path} cannot be read: {error.strerror or error}") from error
-    _keep_key(services.settings, key)
-    _take_over_ledger(services.settings, copied_ledger)
+    _keep_key(settings, key)
+    _take_over_ledger(settings, copied_ledger)
     told(f"{len(described.clips)} clips, secret key")
-    _erase_again(services, told, covered=covered)  # last: it must not be lost among tables
+    _erase_again(database, settings, told, covered=covered)  # last: it must not be lost among tables
     return described
 
 
@@ -128,11 +131,13 @@ def _take_over_ledger(settings: Settings, path: Path) -> None:
         add_to_ledger(settings, path.read_bytes())
 
 
-def _erase_again(services: Services, told: Callable[[str], None], *, covered: bool) -> None:
-    path = ledger_path(services.settings)
+def _erase_again(
+    database: Database, settings: Settings, told: Callable[[str], None], *, covered: bool
+) -> None:
+    path = ledger_path(settings)
     if path.is_file():
-        with services.database.write() as session:
-            erased = replay(session, services.settings)
+        with database.write() as session:
+            erased = replay(session, settings)
         told(f"{counted(erased, 'run')} erased again, by {path}")
     if not covered:
         told(
@@ -174,13 +179,13 @@ def _key_file(
 
 
 def _restore_rows(
-    services: Services,
+    database: Database,
     tar: tarfile.TarFile,
     described: Description,
     keys: _Keys,
     told: Callable[[str], None],
 ) -> None:
-    with services.database.write_connection() as connection:
+    with database.write_connection() as connection:
         refuse_unless_empty(connection, "the database", ELSEWHERE)
         with derived_anew(connection):
             command.upgrade(alembic_config(connection), described.revision)
@@ -241,12 +246,12 @@ def _rows(tar: tarfile.TarFile, name: str) -> Iterator[Row]:
             yield json.loads(line)
 
 
-def _restore_clip(services: Services, tar: tarfile.TarFile, sha256: str) -> None:
+def _restore_clip(clips: ClipStore, tar: tarfile.TarFile, sha256: str) -> None:
     # The store checks the hash; only names of the form that we wrote are looked for.
     if not (len(sha256) == 64 and PurePosixPath(sha256).name == sha256):
         raise InputError(f"the backup names a clip '{sha256[:80]}', which is no hash")
     with _member(tar, f"{CLIPS}{sha256}.mp4") as source:
-        services.clips.add(source, sha256)
+        clips.add(source, sha256)
 
 
 def _member(tar: tarfile.TarFile, name: str) -> BinaryIO:

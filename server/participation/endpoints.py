@@ -12,7 +12,9 @@ from sqlalchemy import Connection
 from sqlalchemy.orm import Session
 
 from experiments.kinds import KINDS
-from server.context import Services, ServicesDep
+from server.context import ServicesDep
+from server.core.commit import GroupCommit
+from server.core.db import Database
 from server.core.errors import ERROR_RESPONSES, ApiError, json_response, refused_value
 from server.core.limits import RateLimit
 from server.core.requests import DatabaseDep
@@ -29,6 +31,7 @@ from server.participation.answer_schemas import (
     ViewsIn,
     ViewsSaved,
 )
+from server.participation.intake import Intake
 from server.participation.judgement import judge_waiting
 from server.participation.ratings import RatingDiffers
 from server.participation.refusals import EVIDENCE_REFUSALS, RunClosed, RunUnknown
@@ -51,6 +54,7 @@ from server.participation.run_schemas import (
     Unsupported,
 )
 from server.participation.trial_list import finished_for_page, follow, next_trials
+from server.participation.versions import Versions
 
 # The participant's side of the API: links, runs, forms, events. A run's token is its only credential.
 
@@ -72,9 +76,9 @@ async def _run_token(
 RunToken = Annotated[str, Depends(_run_token)]
 
 
-def _count(services: Services, limit: RateLimit, token: str) -> None:
+def _count(database: Database, limit: RateLimit, token: str) -> None:
     """Count one event of a link that exists: strangers' inventions would take the room of true counts."""
-    with services.database.read() as session:
+    with database.read() as session:
         links.find_link(session, token)
     limit.hit(hash_token(token))
 
@@ -83,7 +87,7 @@ def _count(services: Services, limit: RateLimit, token: str) -> None:
 def get_link(services: ServicesDep, link_token: str) -> LinkState:
     """Where a link leads and whether it is open."""
     with services.database.read() as session:
-        return links.link_state(services, session, link_token)
+        return links.link_state(services.versions, session, link_token)
 
 
 @router.post("/links/{link_token}/runs", status_code=201, responses={200: {"model": RunStarted}})
@@ -91,13 +95,15 @@ async def start_run(
     services: ServicesDep, link_token: str, start: RunStart, response: Response
 ) -> RunStarted:
     """Begin a run (201), or take up the one this browser, person or personal link has (200)."""
-    await run_in_threadpool(_count, services, services.run_starts, link_token)
+    await run_in_threadpool(_count, services.database, services.run_starts, link_token)
     if start.resume_code is not None:
-        await run_in_threadpool(returning.count_code, services, link_token, start.resume_code)
+        await run_in_threadpool(returning.count_code, services.resume_codes, link_token, start.resume_code)
 
     def begin(connection: Connection) -> RunStarted:
         with Session(connection, expire_on_commit=False, info=services.database.carried) as session:
-            started = links.start_run(services, session, link_token, start)
+            started = links.start_run(
+                services.settings, services.versions, services.intake, session, link_token, start
+            )
             session.flush()
         return started
 
@@ -109,7 +115,7 @@ async def start_run(
 @router.post("/unsupported", status_code=202)
 def report_unsupported(services: ServicesDep, report: Unsupported) -> Received:
     """Tell the server that a browser or screen was turned away before a run began."""
-    _count(services, services.unsupported, report.link_token)
+    _count(services.database, services.unsupported, report.link_token)
     with services.database.write() as session:
         runs.save_unsupported(session, report)
     return Received(received=1)
@@ -120,18 +126,23 @@ def get_run(services: ServicesDep, request: Request, token: RunToken) -> RunStat
     """Everything the page needs to begin or to go on."""
     moment = services.time_of(request)
     with services.database.read() as session:
-        state = runs.run_state(services, session, token, moment)
-    if any(trial.series for trial in state.trials) and follow(services, token) is not None:
+        state = runs.run_state(services.settings, services.versions, services.intake, session, token, moment)
+    if (
+        any(trial.series for trial in state.trials)
+        and follow(services.database, services.versions, token) is not None
+    ):
         with services.database.read() as session:
-            state = runs.run_state(services, session, token, moment)
-    return finished_for_page(services, request, token, state)
+            state = runs.run_state(
+                services.settings, services.versions, services.intake, session, token, moment
+            )
+    return finished_for_page(services.database, services.versions, request, token, state)
 
 
 @router.put("/run/consent")
 def put_consent(services: ServicesDep, token: RunToken, consent: Consent) -> Saved:
     """Agree to take part; `agreed: false` ends the run."""
     with services.database.write() as session:
-        return runs.save_consent(services, session, token, consent.agreed)
+        return runs.save_consent(services.versions, session, token, consent.agreed)
 
 
 @router.put("/run/calibration")
@@ -155,8 +166,10 @@ def put_form(services: ServicesDep, request: Request, token: RunToken, name: str
     """Store the answers of a declared form; the one that decides the group gives the run with its trials."""
     moment = services.time_of(request)
     with services.database.write() as session:
-        answer = runs.save_form(services, session, token, name, form.answers, moment)
-    return finished_for_page(services, request, token, answer)
+        answer = runs.save_form(
+            services.settings, services.versions, services.intake, session, token, name, form.answers, moment
+        )
+    return finished_for_page(services.database, services.versions, request, token, answer)
 
 
 @router.put("/run/stage")
@@ -170,7 +183,7 @@ def put_stage(database: DatabaseDep, token: RunToken, change: StageChange) -> Sa
 def put_language(services: ServicesDep, token: RunToken, change: LanguageChange) -> Saved:
     """Change the language."""
     with services.database.write() as session:
-        return runs.save_language(services, session, token, change.language)
+        return runs.save_language(services.versions, session, token, change.language)
 
 
 @router.post("/run/events")
@@ -186,14 +199,14 @@ def complete_run(services: ServicesDep, token: RunToken) -> Completion:
     """Close the run and get the code; refused while trials or required questions are unanswered."""
     judge_waiting(services.database, services.intake, token)
     with services.database.write() as session:
-        return runs.complete_run(services, session, token)
+        return runs.complete_run(services.versions, session, token)
 
 
 @router.post("/run/screen-out")
 def screen_out(services: ServicesDep, token: RunToken, reason: ScreenOut) -> Saved:
     """End the run because browser or screen will not do; refused where the study does not screen devices."""
     with services.database.write() as session:
-        return runs.screen_out_device(services, session, token, reason)
+        return runs.screen_out_device(services.versions, session, token, reason)
 
 
 @router.post("/run/withdraw")
@@ -242,14 +255,18 @@ async def put_rating(
     receipt, is_new = await services.group_commit.run(token, save)
     left_out: dict[str, Any] = {} if receipt.warning else {"receipt": {"warning"}}
     if rating.answer.kind in KINDS and KINDS[rating.answer.kind].adapts:
-        receipt, following = await run_in_threadpool(next_trials, services, token, receipt)
+        receipt, following = await run_in_threadpool(
+            next_trials, services.database, services.versions, token, receipt
+        )
         saved = RatingSaved(receipt=receipt, next=following)
     else:
         saved, left_out["next"] = RatingSaved(receipt=receipt), True
     status = 201 if is_new else 200
     if saved.next is None:
         return json_response(saved, status, left_out)
-    return await run_in_threadpool(finished_for_page, services, request, token, saved, status, left_out)
+    return await run_in_threadpool(
+        finished_for_page, services.database, services.versions, request, token, saved, status, left_out
+    )
 
 
 @rating_router.post("/run/refused", status_code=202)
@@ -258,7 +275,9 @@ async def post_refused(
 ) -> Received:
     """Take a record that was refused for good: stored where it can be, else kept with the reason."""
     received_at = services.time_of(request)
-    refusal = await _stored_after_all(services, token, record, received_at)
+    refusal = await _stored_after_all(
+        services.versions, services.intake, services.group_commit, token, record, received_at
+    )
     if refusal is None:
         return Received(received=1)
     # The server's own reason where it has one: something on the way may have answered in its place.
@@ -272,7 +291,12 @@ async def post_refused(
 
 
 async def _stored_after_all(
-    services: Services, token: str, record: RefusedRecord, received_at: datetime
+    versions: Versions,
+    intake: Intake,
+    group_commit: GroupCommit,
+    token: str,
+    record: RefusedRecord,
+    received_at: datetime,
 ) -> dict[str, Any] | None:
     """None where the record is an answer that can be stored, and now is; else why it cannot."""
     if not record.path.startswith(RATINGS):
@@ -283,11 +307,11 @@ async def _stored_after_all(
         return {"status": 422, "code": "invalid", "message": refused_value(error.errors()[0])}
 
     def save(connection: Connection) -> tuple[Receipt, bool]:
-        work = (services.versions, services.intake, connection, token, str(record.id), rating)
+        work = (versions, intake, connection, token, str(record.id), rating)
         return rating_service.save_rating(*work, received_at)
 
     try:
-        await services.group_commit.run(token, save)
+        await group_commit.run(token, save)
     except RatingDiffers:
         return None
     except ApiError as refusal:

@@ -12,7 +12,7 @@ from experiments.declaration.experiment import Experiment
 from experiments.declaration.tables import Display
 from experiments.errors import did_you_mean
 from experiments.kinds.scales import expected_minutes
-from server.context import Services
+from server.core.settings import Settings
 from server.core.values import derived_token, hash_token, new_public_id, new_token, now
 from server.models import NO_SLOT, Link, Study, StudyRun
 from server.participation import identity_repository as identities
@@ -20,7 +20,7 @@ from server.participation import places, returning, run_repository
 from server.participation.current_run import checked_device, screens_devices
 from server.participation.evidence_repository import awaits_views_without_tickets, has_older_runs
 from server.participation.identity_keys import KnownAs
-from server.participation.intake import ENFORCED_ORIGINS
+from server.participation.intake import ENFORCED_ORIGINS, Intake
 from server.participation.places import assign_slot
 from server.participation.recruiter import (
     Recruiter,
@@ -37,7 +37,7 @@ from server.participation.refusals import (
     StudyPaused,
 )
 from server.participation.run_schemas import Gates, LinkedStudy, LinkState, Origin, RunStart, RunStarted
-from server.participation.versions import LoadedVersion
+from server.participation.versions import LoadedVersion, Versions
 
 RUN_PURPOSE = "run"
 OLD_PAGES_ACCEPTED = timedelta(hours=48)
@@ -73,11 +73,11 @@ def recruiter_of(link: Link) -> Recruiter:
     return stored_recruiter(link.recruiter or link.study.recruiter)
 
 
-def link_state(services: Services, session: Session, token: str) -> LinkState:
+def link_state(versions: Versions, session: Session, token: str) -> LinkState:
     """What a visitor sees before a run begins."""
     link = find_link(session, token)
     version_id = run_repository.active_version_id(session, link.study)
-    experiment = services.versions.get(session, version_id).experiment
+    experiment = versions.get(session, version_id).experiment
     run = run_repository.latest_run(session, link) if link.kind == "personal" else None
     resumable = (
         run is not None and run.status == "active" and returning.refusal_to_resume(experiment, run) is None
@@ -114,27 +114,37 @@ def _gates(display: Display) -> Gates:
     )
 
 
-def start_run(services: Services, session: Session, token: str, start: RunStart) -> RunStarted:
+def start_run(
+    settings: Settings, versions: Versions, intake: Intake, session: Session, token: str, start: RunStart
+) -> RunStarted:
     """Begin a run, or give back the one this browser, person or personal link already has."""
     link = find_link(session, token)
     study = run_repository.lock_study(session, link.study_id)
-    known = returning.known_run(services, session, link, recruiter_of(link), start)
+    known = returning.known_run(settings, versions, session, link, recruiter_of(link), start)
     if known is not None:
-        experiment = services.versions.get(session, known.version_id).experiment
+        experiment = versions.get(session, known.version_id).experiment
         if not returning.restarts(experiment, known):
-            return _resumed(services, experiment, known, start.client_id)
+            return _resumed(settings, experiment, known, start.client_id)
         with session.begin_nested():  # should a new visit be refused, the old one stays as it is
             known.status = "withdrawn"
             known.client_id = f"{known.client_id}:{known.public_id}"
             session.flush()
-            return _begun(services, session, link, study, start)
-    return _begun(services, session, link, study, start)
+            return _begun(settings, versions, intake, session, link, study, start)
+    return _begun(settings, versions, intake, session, link, study, start)
 
 
-def _begun(services: Services, session: Session, link: Link, study: Study, start: RunStart) -> RunStarted:
+def _begun(
+    settings: Settings,
+    versions: Versions,
+    intake: Intake,
+    session: Session,
+    link: Link,
+    study: Study,
+    start: RunStart,
+) -> RunStarted:
     """A new visit, or the reason why there is none."""
     version_id = run_repository.active_version_id(session, study)
-    loaded = services.versions.get(session, version_id)
+    loaded = versions.get(session, version_id)
     places.check_parameter(loaded.experiment, link, start.query)
     status = _status(session, link, study, version_id, loaded.experiment)
     if status != "open":
@@ -145,7 +155,7 @@ def _begun(services: Services, session: Session, link: Link, study: Study, start
     if start.language not in loaded.experiment.languages:
         near = did_you_mean(start.language, loaded.experiment.languages)
         raise LanguageUnknown(f"The study has no texts in '{start.language}'{near}.")
-    run, run_token = _new_run(services, session, link, study, version_id, loaded, start)
+    run, run_token = _new_run(settings, intake, session, link, study, version_id, loaded, start)
     return RunStarted(run_token=run_token, run_id=run.public_id, resumed=False)
 
 
@@ -189,19 +199,20 @@ def _origin(link: Link, study: Study) -> Origin:
     return "participant" if study.status == "live" else "pilot"
 
 
-def _resumed(services: Services, experiment: Experiment, run: StudyRun, client_id: UUID) -> RunStarted:
+def _resumed(settings: Settings, experiment: Experiment, run: StudyRun, client_id: UUID) -> RunStarted:
     refusal = returning.refusal_to_resume(experiment, run)
     if refusal is not None:
         raise refusal
     run.last_seen_at = now()
-    token = derived_token(services.settings.key, RUN_PURPOSE, run.public_id)
+    token = derived_token(settings.key, RUN_PURPOSE, run.public_id)
     run.token_hash = hash_token(token)
     again = run.client_id != str(client_id) or run.consented_at is not None
     return RunStarted(run_token=token, run_id=run.public_id, resumed=again)
 
 
 def _new_run(
-    services: Services,
+    settings: Settings,
+    intake: Intake,
     session: Session,
     link: Link,
     study: Study,
@@ -213,13 +224,13 @@ def _new_run(
     origin, phase = _origin(link, study), "live" if study.status == "live" else "pilot"
     if origin == "preview":
         # Decision 0163: Previews are stored for a day and counted nowhere.
-        keep = timedelta(hours=services.settings.preview_keep_hours)
+        keep = timedelta(hours=settings.preview_keep_hours)
         run_repository.delete_previews(session, study, now() - keep)
     public_id = new_public_id()
-    token = derived_token(services.settings.key, RUN_PURPOSE, public_id)
+    token = derived_token(settings.key, RUN_PURPOSE, public_id)
     recruiter = recruiter_of(link)
     identifier = returning.settled_id(session, link, recruiter, start.query)
-    evidence = _evidence(services, session, origin, start)
+    evidence = _evidence(intake, session, origin, start)
     run = StudyRun(
         public_id=public_id,
         study_id=study.id,
@@ -255,12 +266,12 @@ def _new_run(
 
 
 def _evidence(
-    services: Services, session: Session, origin: Origin, start: RunStart
+    intake: Intake, session: Session, origin: Origin, start: RunStart
 ) -> Literal["none", "older", "asked"]:
     """Whether evidence is asked for: not from a page that was open when this server learned to ask."""
     if start.evidence:
         return "asked"
-    if origin not in ENFORCED_ORIGINS and not services.intake.rehearses:
+    if origin not in ENFORCED_ORIGINS and not intake.rehearses:
         return "none"
     return "older" if has_older_runs(session, now() - OLD_PAGES_ACCEPTED) else "asked"
 

@@ -8,7 +8,8 @@ from datetime import datetime, timedelta
 from sqlalchemy.orm import Session
 
 from experiments.declaration.experiment import Experiment
-from server.context import Services
+from server.core.limits import RateLimit
+from server.core.settings import Settings
 from server.core.values import hash_token, now
 from server.models import NO_SLOT, Link, Study, StudyRun
 from server.participation import identity_repository as identities
@@ -23,6 +24,7 @@ from server.participation.refusals import (
     TakenPartAlready,
 )
 from server.participation.run_schemas import RunStart
+from server.participation.versions import Versions
 
 # Pseudonyms of participants, and the code by which a rater takes up a visit on another device.
 #
@@ -128,24 +130,34 @@ def settled_id(session: Session, link: Link, recruiter: Recruiter, parameters: M
 
 
 def known_run(
-    services: Services, session: Session, link: Link, recruiter: Recruiter, start: RunStart
+    settings: Settings,
+    versions: Versions,
+    session: Session,
+    link: Link,
+    recruiter: Recruiter,
+    start: RunStart,
 ) -> StudyRun | None:
     """The run that this visitor has shown to be theirs; None where one begins."""
     run = run_repository.run_of_client(session, link, str(start.client_id))
     if run is None and start.resume_code is not None:
-        return _run_of_code(services, session, link, start.resume_code)
+        return _run_of_code(settings, session, link, start.resume_code)
     if run is None and link.kind == "personal":
         run = run_repository.latest_run(session, link)
-    return _run_of_id(services, session, link, recruiter, start) if run is None else run
+    return _run_of_id(settings, versions, session, link, recruiter, start) if run is None else run
 
 
 def _run_of_id(
-    services: Services, session: Session, link: Link, recruiter: Recruiter, start: RunStart
+    settings: Settings,
+    versions: Versions,
+    session: Session,
+    link: Link,
+    recruiter: Recruiter,
+    start: RunStart,
 ) -> StudyRun | None:
     """The run of the recruiter's id where the address is signed that it began by; otherwise none."""
     if link.kind == "personal":
         return None
-    signed = is_signed(services.settings.key, link.study.pseudonym_key, recruiter, start.query)
+    signed = is_signed(settings.key, link.study.pseudonym_key, recruiter, start.query)
     if recruiter.kind == "generic" and not signed:
         return None
     identifier = settled_id(session, link, recruiter, start.query)
@@ -156,23 +168,23 @@ def _run_of_id(
     # Who began without a signature may be anybody who knew the id.
     if signed and is_of(recruiter, start.query, run_repository.parameters(session, other)):
         return other
-    _refuse_by_id_alone(services.versions.get(session, other.version_id).experiment, other, start)
+    _refuse_by_id_alone(versions.get(session, other.version_id).experiment, other, start)
     return None
 
 
-def count_code(services: Services, link_token: str, typed: str) -> None:
+def count_code(resume_codes: RateLimit, link_token: str, typed: str) -> None:
     """Count that a resume code was tried; refused where too many were.
 
     Before the transaction of the start, which may be tried again for the sake of others in its group. For
     each visit, so that who guesses at one keeps nobody from another.
     """
-    services.resume_codes.hit(f"{hash_token(link_token)}:{run_prefix(typed)}")
+    resume_codes.hit(f"{hash_token(link_token)}:{run_prefix(typed)}")
 
 
-def _run_of_code(services: Services, session: Session, link: Link, typed: str) -> StudyRun:
+def _run_of_code(settings: Settings, session: Session, link: Link, typed: str) -> StudyRun:
     prefix = run_prefix(typed)
     runs = run_repository.runs_beginning(session, link, prefix) if prefix else ()
-    run = next((run for run in runs if fits(services.settings.key, run.public_id, typed)), None)
+    run = next((run for run in runs if fits(settings.key, run.public_id, typed)), None)
     if run is None:
         raise ResumeCodeWrong(
             "This is the resume code of no visit by this link; please compare it once more."

@@ -13,14 +13,14 @@ from experiments.declaration.forms import Form, is_empty
 from experiments.errors import did_you_mean
 from experiments.kinds import KINDS
 from experiments.rules import ExcludeAttention
-from server.context import Services
 from server.core.repository import insert_once
+from server.core.settings import Settings
 from server.core.values import new_public_id, now, visible
 from server.models import NO_SLOT, Calibration, FormAnswer, RunEvent, Study, StudyRun
 from server.participation import current_run, places, run_repository
 from server.participation.answer_schemas import Tickets
 from server.participation.current_run import find_run, open_run
-from server.participation.intake import issue, tickets
+from server.participation.intake import Intake, issue, tickets
 from server.participation.judgement import judge_run
 from server.participation.links import find_link, recruiter_of
 from server.participation.places import assign_slot
@@ -49,7 +49,7 @@ from server.participation.run_schemas import (
     Unsupported,
 )
 from server.participation.trial_list import shown_checks, trial_list
-from server.participation.versions import LoadedVersion
+from server.participation.versions import LoadedVersion, Versions
 from server.participation.warnings import EVENT, RULE, failed_checks, in_language, waiting
 
 # Check a form's answers against its declaration.
@@ -80,12 +80,12 @@ def checked_answers(form: Form, answers: Mapping[str, Any]) -> dict[str, Any]:
 # The end of a run: complete, or screened out; the code and the way back.
 
 
-def complete_run(services: Services, session: Session, token: str) -> Completion:
+def complete_run(versions: Versions, session: Session, token: str) -> Completion:
     """Close the run once everything is answered, and give the code; asking again gives the same."""
     # The study first, as in a start: two requests that lock in two orders would wait for each other.
     study = run_repository.lock_study_of_run(session, token)
     run = find_run(session, token, lock=True)
-    loaded = services.versions.get(session, run.version_id)
+    loaded = versions.get(session, run.version_id)
     if run.status == "active":
         _need_everything(session, run, loaded)
         run.status, run.stage, run.completed_at = "complete", "debrief", now()
@@ -156,19 +156,21 @@ def _close_when_full(session: Session, study: Study | None, run: StudyRun) -> No
 BEFORE_CONSENT = ("consent",)
 
 
-def run_state(services: Services, session: Session, token: str, moment: datetime) -> RunState:
+def run_state(
+    settings: Settings, versions: Versions, intake: Intake, session: Session, token: str, moment: datetime
+) -> RunState:
     """Everything the page needs to begin or to go on; refused where this run may not be taken up again."""
     run = find_run(session, token)
-    if (
-        refusal := refusal_to_resume(services.versions.get(session, run.version_id).experiment, run)
-    ) is not None:
+    if (refusal := refusal_to_resume(versions.get(session, run.version_id).experiment, run)) is not None:
         raise refusal
-    return state_of(services, session, run, moment)
+    return state_of(settings, versions, intake, session, run, moment)
 
 
-def state_of(services: Services, session: Session, run: StudyRun, moment: datetime) -> RunState:
+def state_of(
+    settings: Settings, versions: Versions, intake: Intake, session: Session, run: StudyRun, moment: datetime
+) -> RunState:
     """The run as the page gets it."""
-    loaded = services.versions.get(session, run.version_id)
+    loaded = versions.get(session, run.version_id)
     experiment = loaded.experiment
     calibration = run_repository.latest_calibration(session, run)
     trials = trial_list(session, run, loaded)
@@ -201,23 +203,21 @@ def state_of(services: Services, session: Session, run: StudyRun, moment: dateti
         completion_code=completion_code(session, run, loaded) if run.status == "complete" else None,
         resumable_until=resumable_until(experiment, run),
         resume_code=shown_code(
-            services.settings.key, experiment, run_repository.link_kind(session, run), run.public_id
+            settings.key, experiment, run_repository.link_kind(session, run), run.public_id
         ),
         server_time=moment,
-        tickets=_tickets(services, run, loaded, moment),
+        tickets=_tickets(intake, run, loaded, moment),
         warning=waiting(session.connection(), run.id, experiment) if run.status == "active" else None,
     )
 
 
-def _tickets(services: Services, run: StudyRun, loaded: LoadedVersion, moment: datetime) -> Tickets | None:
+def _tickets(intake: Intake, run: StudyRun, loaded: LoadedVersion, moment: datetime) -> Tickets | None:
     if run.evidence != "asked" or run.status != "active":
         return None
-    batch = issue(services.intake.key, run.public_id, moment)
-    services.intake.clips.prepare(
-        run.version_id, [(clip.sha256, clip.bytes) for clip in loaded.clips.values()]
-    )
+    batch = issue(intake.key, run.public_id, moment)
+    intake.clips.prepare(run.version_id, [(clip.sha256, clip.bytes) for clip in loaded.clips.values()])
     plays = [1 + loaded.experiment.playback.max_repeats] * run.trials_total
-    return Tickets(batch=batch.text, by_trial=tickets(services.intake.key, batch, plays))
+    return Tickets(batch=batch.text, by_trial=tickets(intake.key, batch, plays))
 
 
 def saved(run: StudyRun) -> Saved:
@@ -225,13 +225,13 @@ def saved(run: StudyRun) -> Saved:
     return Saved(saved_at=now(), stage=run.stage, status=run.status)
 
 
-def save_consent(services: Services, session: Session, token: str, agreed: bool) -> Saved:
+def save_consent(versions: Versions, session: Session, token: str, agreed: bool) -> Saved:
     """Store when the participant agreed; a refusal ends the run."""
     run = open_run(session, token)
     if not agreed:
         run.status = "withdrawn"
     elif run.consented_at is None:
-        experiment = services.versions.get(session, run.version_id).experiment
+        experiment = versions.get(session, run.version_id).experiment
         before = any(form.when == "before" for form in experiment.forms)
         calibrates = experiment.display.calibrate != "off"
         run.consented_at = now()
@@ -255,10 +255,10 @@ def save_device(session: Session, token: str, device: dict[str, Any]) -> Saved:
     return saved(run)
 
 
-def screen_out_device(services: Services, session: Session, token: str, body: ScreenOut) -> Saved:
+def screen_out_device(versions: Versions, session: Session, token: str, body: ScreenOut) -> Saved:
     """End the run because its browser or screen will not do, where the study screens devices."""
     run = open_run(session, token)
-    if not current_run.screens_devices(services.versions.get(session, run.version_id).experiment):
+    if not current_run.screens_devices(versions.get(session, run.version_id).experiment):
         raise ScreeningUndeclared("This study declares no screening by device; the run goes on.")
     current_run.by_device(session, run, body.reason, body.data)
     return saved(run)
@@ -277,10 +277,10 @@ def save_stage(session: Session, token: str, stage: Stage) -> Saved:
     return saved(run)
 
 
-def save_language(services: Services, session: Session, token: str, language: str) -> Saved:
+def save_language(versions: Versions, session: Session, token: str, language: str) -> Saved:
     """Change the language of the run."""
     run = open_run(session, token)
-    languages = services.versions.get(session, run.version_id).experiment.languages
+    languages = versions.get(session, run.version_id).experiment.languages
     if language not in languages:
         raise LanguageUnknown(f"The study has no texts in '{language}'{did_you_mean(language, languages)}.")
     run.language = language
@@ -338,10 +338,17 @@ def withdraw(session: Session, token: str) -> Saved:
 
 
 def save_form(
-    services: Services, session: Session, token: str, name: str, answers: dict[str, Any], moment: datetime
+    settings: Settings,
+    versions: Versions,
+    intake: Intake,
+    session: Session,
+    token: str,
+    name: str,
+    answers: dict[str, Any],
+    moment: datetime,
 ) -> Saved:
     """Store a form's answers once they fit the declaration; sending it again replaces them."""
-    loaded = services.versions.get(session, find_run(session, token).version_id)
+    loaded = versions.get(session, find_run(session, token).version_id)
     asked = deciding(loaded.experiment)
     decides = asked is not None and asked.form == name
     if decides:
@@ -359,7 +366,7 @@ def save_form(
     if not decides or run.status != "active":
         return saved(run)
     session.flush()
-    return saved(run).model_copy(update={"run": state_of(services, session, run, moment)})
+    return saved(run).model_copy(update={"run": state_of(settings, versions, intake, session, run, moment)})
 
 
 def _checked(loaded: LoadedVersion, name: str, answers: Mapping[str, Any]) -> dict[str, Any]:

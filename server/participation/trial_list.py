@@ -12,7 +12,7 @@ from experiments.assignment.order import motion_checks_by_block
 from experiments.checks import CHECK_KINDS, CheckName
 from experiments.declaration.experiment import Experiment
 from experiments.kinds import KINDS
-from server.context import Services
+from server.core.db import Database
 from server.core.errors import Answer, json_response
 from server.core.storage import clip_address
 from server.models import StudyRun
@@ -23,7 +23,7 @@ from server.participation.rating_repository import refused_trials
 from server.participation.run_schemas import ShownCheck, ShownChecks, ShownOtherWay
 from server.participation.series import Outlook
 from server.participation.verdict import is_settled
-from server.participation.versions import LoadedVersion, PlacedClip
+from server.participation.versions import LoadedVersion, PlacedClip, Versions
 from server.participation.view_repository import numbers
 from server.participation.views import unanswered_views
 from server.participation.warnings import in_language
@@ -131,27 +131,29 @@ def _prompt(loaded: LoadedVersion, language: str, row: run_repository.StoredTria
 log = logging.getLogger("palpebra")
 
 
-def next_trials(services: Services, token: str, receipt: Receipt) -> tuple[Receipt, NextTrials | None]:
+def next_trials(
+    database: Database, versions: Versions, token: str, receipt: Receipt
+) -> tuple[Receipt, NextTrials | None]:
     """The receipt with what remains once ended series are closed, and the trials chosen anew."""
-    outlook = follow(services, token)
+    outlook = follow(database, versions, token)
     if outlook is None:
         return receipt, None
     offered = {offer.trial_index for offer in outlook.offers}
-    with services.database.read() as session:
+    with database.read() as session:
         run = find_run(session, token)
-        every = trial_list(session, run, services.versions.get(session, run.version_id))
+        every = trial_list(session, run, versions.get(session, run.version_id))
     trials = [trial for trial in every if trial.trial_index in offered]
     receipt = receipt.model_copy(update={"remaining": outlook.remaining})
     return receipt, NextTrials(trials=trials, closed=list(outlook.closed))
 
 
-def follow(services: Services, token: str) -> Outlook | None:
+def follow(database: Database, versions: Versions, token: str) -> Outlook | None:
     """Bring a run's series up to its answers. What fails here is logged and done again with the next answer.
 
     The answer itself is stored by then, and its receipt must not be lost to a choice that could not be made.
     """
     try:
-        return series.follow(services.database, services.versions, token)
+        return series.follow(database, versions, token)
     except Exception:
         log.exception("the series of a run could not be followed; its page goes on with what it has")
         return None
@@ -167,15 +169,21 @@ _OLD_PAGE_SIZE = ("width_px", "height_px", "width_mm")
 
 
 def finished_for_page(
-    services: Services, request: Request, token: str, answer: Answer, status: int = 200, exclude: Any = None
+    database: Database,
+    versions: Versions,
+    request: Request,
+    token: str,
+    answer: Answer,
+    status: int = 200,
+    exclude: Any = None,
 ) -> Answer:
     """The answer as a response, with addresses and sizes of clips where the page does not know them."""
     if KNOWS_ADDRESSES in request.headers.get("accept", ""):
         return json_response(answer, status, exclude)
     content = answer.model_dump(mode="json", exclude=exclude)
     if trials := list(_trials(content)):
-        with services.database.read() as session:
-            loaded = services.versions.get(session, find_run(session, token).version_id)
+        with database.read() as session:
+            loaded = versions.get(session, find_run(session, token).version_id)
         clips = {clip.sha256: clip for clip in loaded.clips.values()}
         for trial in trials:
             _tell_all(trial, clips, loaded)

@@ -10,7 +10,7 @@ from experiments.errors import InputError
 from experiments.files import check_targets, whole_private_file
 from server.accounts.identity import OPERATOR
 from server.cli_common import out, stored_services
-from server.context import Services
+from server.core.db import Database
 from server.core.values import now
 from server.privacy import retention as retention_service
 from server.privacy.erasures import erase
@@ -127,7 +127,7 @@ def retention(
       server retention exp3
     """
     with stored_services() as services:
-        shown = _previews(services, study)
+        shown = _previews(services.database, study)
         if not shown:
             out.print("no study declares a period; see [retention] of the declaration")
         elif dry_run:
@@ -139,8 +139,8 @@ def retention(
                 out.print(f"{name}: identifiers of {done.identifiers} visits, {done.visits} visits erased")
 
 
-def _previews(services: Services, study: str | None) -> list[RetentionPreview]:
-    with services.database.read() as session:
+def _previews(database: Database, study: str | None) -> list[RetentionPreview]:
+    with database.read() as session:
         names = retention_service.names(session) if study is None else [study]
         known = [find_study(session, name, OPERATOR, "view") for name in names]
         return [retention_service.preview(session, one, now()) for one in known]

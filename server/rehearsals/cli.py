@@ -81,7 +81,9 @@ def simulate(
     if json_file is not None:
         raise InputError("--json goes with --as, which gives the verdicts to write")
     with stored_services(settings) as services:
-        token, raters = link_and_raters(services, study, observer)
+        token, raters = link_and_raters(
+            services.database, services.settings, services.versions, study, observer
+        )
     people = range(seed * 1_000_000, seed * 1_000_000 + participants)
     with (
         _server(settings, url) as address,
@@ -108,7 +110,7 @@ def _as(
     """Simulated people in a manner, with the verdict on each."""
     manner = manner_called(name)
     with stored_services(settings) as services:
-        token, raters = link_and_raters(services, study)
+        token, raters = link_and_raters(services.database, services.settings, services.versions, study)
     everyone = [raters(number, people.start) for number in people]
     runs = act(settings, token, everyone, manner, at_once)
     if json_file is not None:

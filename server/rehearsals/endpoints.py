@@ -19,26 +19,26 @@ router = APIRouter(
 def get_latest_rehearsal(services: ServicesDep, identity: Viewer, study: str) -> RehearsalOut | None:
     """The latest rehearsal, and how far it is; null where there is none."""
     with services.database.read() as session:
-        return service.latest(services, session, study, identity)
+        return service.latest(services.locks, session, study, identity)
 
 
 @router.post("", status_code=202)
 def begin_rehearsal(services: ServicesDep, identity: Writer, study: str, body: NewRehearsal) -> RehearsalOut:
     """Simulate people in a database of their own; it takes the place of the rehearsal before."""
-    return service.start(services, study, body, identity)
+    return service.start(services.database, services.settings, services.locks, study, body, identity)
 
 
 @router.get("/{rehearsal}")
 def get_rehearsal(services: ServicesDep, identity: Viewer, study: str, rehearsal: str) -> RehearsalResult:
     """What a rehearsal showed: orders, times, columns, report and power."""
     with services.database.read() as session:
-        return service.result(services, session, study, identity, rehearsal)
+        return service.result(services.settings, session, study, identity, rehearsal)
 
 
 @router.post("/{rehearsal}/cancel", status_code=204)
 def cancel_rehearsal(services: ServicesDep, identity: Writer, study: str, rehearsal: str) -> None:
     """End a rehearsal that waits or goes on."""
-    service.cancel(services, study, identity, rehearsal)
+    service.cancel(services.database, services.settings, services.locks, study, identity, rehearsal)
 
 
 @router.get("/{rehearsal}/report/{file}", response_class=FileResponse)
@@ -47,7 +47,7 @@ def get_rehearsed_report_file(
 ) -> FileResponse:
     """One file of the report that the simulated people would give."""
     with services.database.read() as session:
-        path = service.report_file(services, session, study, identity, rehearsal, file)
+        path = service.report_file(services.settings, session, study, identity, rehearsal, file)
     kind = "attachment" if path.suffix != ".html" else "inline"
     headers = {"content-security-policy": REPORT_POLICY}
     name = f"{study}-rehearsal-{path.name}"

@@ -15,7 +15,8 @@ from experiments.errors import InputError, did_you_mean
 from experiments.kinds.clip_rating import ShownClipRating
 from server.app import create_app
 from server.cli_common import migrated_services
-from server.context import SIMULATED_TIME, Services
+from server.context import SIMULATED_TIME
+from server.core.db import Database
 from server.core.repository import run_called
 from server.core.settings import Settings
 from server.core.storage import clip_address
@@ -421,11 +422,11 @@ def act(
     with running_server(app) as address, ThreadPoolExecutor(at_once) as pool:
         actors = list(pool.map(lambda rater: one(address, rater), raters))
     with migrated_services(held) as services:
-        return [_record(services, actor) for actor in actors]
+        return [_record(services.database, actor) for actor in actors]
 
 
-def _record(services: Services, actor: Actor) -> dict[str, Any]:
-    with services.database.read() as session:
+def _record(database: Database, actor: Actor) -> dict[str, Any]:
+    with database.read() as session:
         run = run_called(session, actor.run_id)
         if run is None:
             raise InputError(f"a run was not begun: {', '.join(actor.refused) or 'no answer'}")

@@ -17,9 +17,11 @@ from experiments.errors import InputError, did_you_mean
 from experiments.kinds import KINDS
 from experiments.kinds.threshold_grid import Point, model, points_of
 from server.accounts.identity import OPERATOR
-from server.context import Services
+from server.core.db import Database
+from server.core.settings import Settings
 from server.core.values import derived_token
 from server.participation.kinds import served
+from server.participation.versions import Versions
 from server.rehearsals.http import RunApi
 from server.studies.links import PURPOSE, create_link
 from server.studies.lookup import active_version, find_study, must_not_be_archived
@@ -414,7 +416,7 @@ _CALIBRATION = {
 
 
 def link_and_raters(
-    services: Services, name: str, observed: str = "", group: str = ""
+    database: Database, settings: Settings, versions: Versions, name: str, observed: str = "", group: str = ""
 ) -> tuple[str, Callable[[int, int], Rater]]:
     """The token of a new link whose runs are simulated, and the maker of raters (by their number and a seed).
 
@@ -425,7 +427,7 @@ def link_and_raters(
     group : str, optional
         Group of the link, where links decide on groups.
     """
-    with services.database.write() as session:
+    with database.write() as session:
         study = find_study(session, name, OPERATOR, "view")
         must_not_be_archived(study)
         version = active_version(session, study)
@@ -434,18 +436,18 @@ def link_and_raters(
         levels: dict[str, dict[str, str]] = {row.clip_sha256: row.levels for row in rows}
         link = create_link(
             session,
-            services.settings.key,
+            settings.key,
             study,
             "general",
             label="simulation",
             synthetic=True,
             group_name=group,
         )
-        experiment, observer = services.versions.get(session, version.id).experiment, None
+        experiment, observer = versions.get(session, version.id).experiment, None
         if KINDS[experiment.trial.kind].adapts:
             observer = observer_of(experiment, levels, observed)
         elif observed:
             raise InputError(f"--observer: expected a study of thresholds, got {experiment.trial.kind}")
         checks = {check["sha256"]: check["answer"] for check in version.manifest.get("checks", ())}
-        token = derived_token(services.settings.key, PURPOSE, link.public_id)
+        token = derived_token(settings.key, PURPOSE, link.public_id)
     return token, lambda number, seed: Rater(number, seed, levels, observer, blinks, checks)

@@ -19,7 +19,7 @@ from experiments.manifest import Manifest
 from server.accounts.identity import OPERATOR
 from server.app import create_app
 from server.cli_common import migrated_services
-from server.context import Services
+from server.core.db import Database
 from server.core.locks import LONGEST_S
 from server.core.settings import Settings
 from server.exports.csv_lines import csv_pieces, rating_table
@@ -76,9 +76,14 @@ def rehearse(folder: Path, say: Say) -> None:
     say(0.02, "setting up the sandbox")
     with migrated_services(settings) as services:
         manifest = Manifest.model_validate_json((folder / MANIFEST).read_text(encoding="utf-8"))
-        _take_in(services, text, experiment, manifest)
+        _take_in(services.database, text, experiment, manifest)
         groups = names(experiment) if experiment.groups.by == "link" else [""]
-        invited = [link_and_raters(services, experiment.name, group=group) for group in groups]
+        invited = [
+            link_and_raters(
+                services.database, services.settings, services.versions, experiment.name, group=group
+            )
+            for group in groups
+        ]
     with running_server(create_app(settings)) as address:
         for number in range(order.participants):
             say(0.05 + 0.5 * number / order.participants, f"person {number + 1} of {order.participants}")
@@ -107,8 +112,8 @@ def rehearse(folder: Path, say: Say) -> None:
     (folder / RESULT).write_text(result.model_dump_json(indent=1), encoding="utf-8")
 
 
-def _take_in(services: Services, text: str, experiment: Experiment, manifest: Manifest) -> None:
-    with services.database.write() as session:
+def _take_in(database: Database, text: str, experiment: Experiment, manifest: Manifest) -> None:
+    with database.write() as session:
         study = create_study(session, experiment.name, experiment, None)
         add_version(session, study, text, experiment, manifest, None)
         study.status = "live"

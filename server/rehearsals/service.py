@@ -19,9 +19,10 @@ from sqlalchemy.orm import Session
 from experiments.files import json_text
 from server.accounts.audit import record
 from server.accounts.identity import OPERATOR, Identity
-from server.context import Services
+from server.core.db import Database
 from server.core.errors import NotFound
-from server.core.locks import LONGEST_S, locked
+from server.core.locks import LONGEST_S, Locks, locked
+from server.core.settings import Settings
 from server.core.values import now
 from server.models import Job
 from server.rehearsals.schemas import (
@@ -49,78 +50,82 @@ _CANCELLED = "cancelled"
 _LOOK_EVERY_S = 0.2
 
 
-def start(services: Services, name: str, order: NewRehearsal, identity: Identity) -> RehearsalOut:
+def start(
+    database: Database, settings: Settings, locks: Locks, name: str, order: NewRehearsal, identity: Identity
+) -> RehearsalOut:
     """Begin a rehearsal in the background in the place of those before; Conflict where one is under way."""
-    with services.database.write() as session:
+    with database.write() as session:
         study = find_study(session, name, identity, "run")
         version = active_version(session, study)
         parameters = {**order.model_dump(), "version": version.number}
         in_the_way = "A rehearsal of this study goes on already; wait for it."
-        job = begun(services, session, study, "rehearsal", parameters, identity, in_the_way)
+        job = begun(locks, session, study, "rehearsal", parameters, identity, in_the_way)
         record(session, identity, "rehearsal asked for", "study", name, **order.model_dump())
         session.flush()
-        rehearsal = _out(services, job)
+        rehearsal = _out(locks, job)
         before = [one.public_id for one in job_repository.jobs(session, study, "rehearsal") if one is not job]
         for public_id in before:
             job_repository.remove_job(session, study, "rehearsal", public_id)
     for public_id in before:
-        shutil.rmtree(_folder(services, public_id), ignore_errors=True)
-    in_background(services, rehearsal.id, partial(_run, services, name, rehearsal.id, order))
+        shutil.rmtree(_folder(settings, public_id), ignore_errors=True)
+    in_background(database, locks, rehearsal.id, partial(_run, database, settings, name, rehearsal.id, order))
     return rehearsal
 
 
-def latest(services: Services, session: Session, name: str, identity: Identity) -> RehearsalOut | None:
+def latest(locks: Locks, session: Session, name: str, identity: Identity) -> RehearsalOut | None:
     """The rehearsal of a study; None where there is none."""
     study = find_study(session, name, identity, "view")
     jobs = job_repository.latest_jobs(session, study, "rehearsal")
-    return _out(services, jobs[0]) if jobs else None
+    return _out(locks, jobs[0]) if jobs else None
 
 
 def result(
-    services: Services, session: Session, name: str, identity: Identity, public_id: str
+    settings: Settings, session: Session, name: str, identity: Identity, public_id: str
 ) -> RehearsalResult:
     """What a rehearsal showed; NotFound while there is nothing."""
     study = find_study(session, name, identity, "view")
-    path = _folder(services, public_id) / RESULT
+    path = _folder(settings, public_id) / RESULT
     if job_repository.find_job(session, study, "rehearsal", public_id) is None or not path.is_file():
         raise NotFound("There is no such rehearsal, or it is not done; reload the page to see how far it is.")
     return RehearsalResult.model_validate_json(path.read_text(encoding="utf-8"))
 
 
 def report_file(
-    services: Services, session: Session, name: str, identity: Identity, public_id: str, file: str
+    settings: Settings, session: Session, name: str, identity: Identity, public_id: str, file: str
 ) -> Path:
     """A file of the report that simulated people would give."""
-    if file not in result(services, session, name, identity, public_id).report:
+    if file not in result(settings, session, name, identity, public_id).report:
         raise NotFound("There is no such rehearsal, or its report has no such file.")
-    return _folder(services, public_id) / REPORT / file
+    return _folder(settings, public_id) / REPORT / file
 
 
-def _folder(services: Services, public_id: str) -> Path:
-    return services.settings.common_folder / "rehearsals" / public_id
+def _folder(settings: Settings, public_id: str) -> Path:
+    return settings.common_folder / "rehearsals" / public_id
 
 
-def _out(services: Services, job: Job) -> RehearsalOut:
+def _out(locks: Locks, job: Job) -> RehearsalOut:
     return RehearsalOut.model_validate(
         {
-            **shown(services, job, "the server was stopped while it went on"),
+            **shown(locks, job, "the server was stopped while it went on"),
             "version": job.parameters.get("version", 0),
             "participants": job.parameters.get("participants", 0),
         }
     )
 
 
-def cancel(services: Services, name: str, identity: Identity, public_id: str) -> None:
+def cancel(
+    database: Database, settings: Settings, locks: Locks, name: str, identity: Identity, public_id: str
+) -> None:
     """End a rehearsal that waits or goes on, with all that it started; one that is over stays as it is."""
-    with services.database.write() as session:
+    with database.write() as session:
         study = find_study(session, name, identity, "run")
         job = job_repository.find_job(session, study, "rehearsal", public_id)
         if job is None:
             raise NotFound("There is no such rehearsal; reload the page.")
-        if not is_under_way(services, job):
+        if not is_under_way(locks, job):
             return
         # The file first: a rehearsal whose turn comes in between would be shown as running again.
-        folder = _folder(services, public_id)
+        folder = _folder(settings, public_id)
         folder.mkdir(parents=True, exist_ok=True)
         (folder / _CANCELLED).touch()
         job.status, job.message, job.finished_at = "cancelled", "", now()
@@ -133,12 +138,12 @@ def _is_cancelled(folder: Path) -> bool:
 
 
 @contextmanager
-def _turn(services: Services, folder: Path) -> Iterator[bool]:
+def _turn(settings: Settings, folder: Path) -> Iterator[bool]:
     """Wait until no process of this server has a rehearsal going on; false where cancelled meanwhile."""
     while not _is_cancelled(folder):
         with ExitStack() as held:
             try:
-                held.enter_context(locked(services.settings.data_folder / "rehearsals" / _LOCK, wait=False))
+                held.enter_context(locked(settings.data_folder / "rehearsals" / _LOCK, wait=False))
             except BlockingIOError:
                 time.sleep(_LOOK_EVERY_S)
                 continue
@@ -147,35 +152,35 @@ def _turn(services: Services, folder: Path) -> Iterator[bool]:
     yield False
 
 
-def _run(services: Services, name: str, public_id: str, order: NewRehearsal) -> None:
+def _run(database: Database, settings: Settings, name: str, public_id: str, order: NewRehearsal) -> None:
     """The background thread's work."""
-    folder = _folder(services, public_id)
+    folder = _folder(settings, public_id)
     try:
-        _write_inputs(services, name, folder, order)
-        with _turn(services, folder) as mine:
+        _write_inputs(database, name, folder, order)
+        with _turn(settings, folder) as mine:
             # One that was cancelled and replaced before it had a folder has lost its mark with the folder.
-            if not mine or _status(services, public_id) != "queued":
+            if not mine or _status(database, public_id) != "queued":
                 return
-            note(services, public_id, status="running", message="beginning", started_at=now())
-            problem = _in_sandbox(services, public_id, folder)
+            note(database, public_id, status="running", message="beginning", started_at=now())
+            problem = _in_sandbox(database, public_id, folder)
         if _is_cancelled(folder):
             return
         ended = {"status": "failed" if problem else "done", "progress": 1.0, "message": problem}
-        note(services, public_id, finished_at=now(), **ended)
+        note(database, public_id, finished_at=now(), **ended)
     finally:
         shutil.rmtree(folder / "sandbox", ignore_errors=True)
-        if _status(services, public_id) is None:
+        if _status(database, public_id) is None:
             shutil.rmtree(folder, ignore_errors=True)
 
 
-def _status(services: Services, public_id: str) -> str | None:
-    with services.database.read() as session:
+def _status(database: Database, public_id: str) -> str | None:
+    with database.read() as session:
         return job_repository.status_of(session, public_id)
 
 
-def _write_inputs(services: Services, name: str, folder: Path, order: NewRehearsal) -> None:
+def _write_inputs(database: Database, name: str, folder: Path, order: NewRehearsal) -> None:
     folder.mkdir(parents=True, exist_ok=True)
-    with services.database.read() as session:
+    with database.read() as session:
         version = active_version(session, find_study(session, name, OPERATOR, "view"))
         (folder / DEFINITION).write_text(version.definition_toml, encoding="utf-8")
         (folder / MANIFEST).write_text(json_text(version.manifest), encoding="utf-8")
@@ -183,7 +188,7 @@ def _write_inputs(services: Services, name: str, folder: Path, order: NewRehears
     (folder / ORDER).write_text(told.model_dump_json(), encoding="utf-8")
 
 
-def _in_sandbox(services: Services, public_id: str, folder: Path) -> str:
+def _in_sandbox(database: Database, public_id: str, folder: Path) -> str:
     """Rehearse in a process that knows no database but its own; return why it failed, or ''."""
     environment = {name: os.environ[name] for name in _KEPT_VARIABLES if name in os.environ}
     problem = "the rehearsal ended before it was done"
@@ -205,7 +210,7 @@ def _in_sandbox(services: Services, public_id: str, folder: Path) -> str:
                 except ValidationError:  # something else that was printed
                     continue
                 problem = step.problem or problem
-                note(services, public_id, progress=step.share, message=step.step)
+                note(database, public_id, progress=step.share, message=step.step)
             process.wait()
         finally:
             over.set()

@@ -13,7 +13,9 @@ from pydantic import BaseModel, Field
 from server.accounts.access import Eraser, Myself, PersonalReader, Viewer, Writer, identify
 from server.accounts.audit import record
 from server.accounts.identity import Identity, NotAllowed, NotSignedIn, SecondFactorNeeded
-from server.context import Services, ServicesDep
+from server.context import ServicesDep
+from server.core.changes import Changes, Stopping
+from server.core.db import Database
 from server.core.errors import ERROR_RESPONSES, NotFound
 from server.core.values import Number
 from server.participation.run_schemas import Origin
@@ -99,8 +101,8 @@ RETRY_MS = 1000
 """After so long a browser whose stream ended connects again."""
 
 
-def _snapshot(services: Services, name: str, identity: Identity, origin: Origin | None) -> MonitorSnapshot:
-    with services.database.read() as session:
+def _snapshot(database: Database, name: str, identity: Identity, origin: Origin | None) -> MonitorSnapshot:
+    with database.read() as session:
         study, rights = study_with_rights(session, name, identity, "view")
         shown = monitor_service.snapshot(session, study, active_definition(session, study), origin)
     if identity.sees_persons and "export" in rights:
@@ -114,7 +116,7 @@ def get_monitor(
     services: ServicesDep, identity: Viewer, study: str, origin: Origin | None = None
 ) -> MonitorSnapshot:
     """The monitor at this moment, of one origin; that of people now taking part where none is given."""
-    return _snapshot(services, study, identity, origin)
+    return _snapshot(services.database, study, identity, origin)
 
 
 @monitor_router.get("/failing-clips")
@@ -133,7 +135,7 @@ def changes(before: MonitorSnapshot | None, after: MonitorSnapshot) -> str:
     return after.model_copy(update={"runs": changed}).model_dump_json()
 
 
-async def _waited(services: Services, seen: int | None) -> bool:
+async def _waited(changes: Changes, stopping: Stopping, seen: int | None) -> bool:
     """Wait for the next look at the study; False, at once, where the server is to end.
 
     Parameters
@@ -142,9 +144,9 @@ async def _waited(services: Services, seen: int | None) -> bool:
         The number of the change before the last look.
     """
     began = time.monotonic()
-    while not services.stopping:
+    while not stopping:
         waited = time.monotonic() - began
-        is_quiet = seen is not None and services.changes.number == seen
+        is_quiet = seen is not None and changes.number == seen
         if waited >= (QUIET_S if is_quiet else EVERY_S):
             return True
         await asyncio.sleep(LOOK_S)
@@ -163,19 +165,19 @@ async def stream_monitor(
     services.streams.check(identity.account_id)
     seen = services.changes.number
     with services.streams.one(identity.account_id):  # of hundreds asked for at once, most cost no look
-        first = await run_in_threadpool(_snapshot, services, study, identity, origin)
+        first = await run_in_threadpool(_snapshot, services.database, study, identity, origin)
 
     async def changing() -> AsyncIterator[MonitorSnapshot]:
         nonlocal seen
         yield first
         until = time.monotonic() + 60 * services.settings.monitor_stream_minutes
-        while await _waited(services, seen) and time.monotonic() < until:
+        while await _waited(services.changes, services.stopping, seen) and time.monotonic() < until:
             if await request.is_disconnected():
                 return
             seen = services.changes.number
             try:
                 anew = await run_in_threadpool(identify, request, services.database, services.settings)
-                yield await run_in_threadpool(_snapshot, services, study, anew, origin)
+                yield await run_in_threadpool(_snapshot, services.database, study, anew, origin)
             except (NotSignedIn, NotFound, NotAllowed, SecondFactorNeeded):  # or the study was deleted
                 return
 

@@ -16,9 +16,9 @@ from sqlalchemy.orm import Session
 
 from experiments.errors import InputError
 from server.accounts.identity import Identity
-from server.context import Services
+from server.core.db import Database
 from server.core.errors import ApiError, Conflict
-from server.core.locks import LONGEST_S
+from server.core.locks import LONGEST_S, Locks
 from server.core.values import new_public_id, now
 from server.models import Job, Study
 from server.results import job_repository
@@ -67,7 +67,7 @@ WRITE_AGAIN_S = (1, 2, 4, 8, 15, 30, 60)
 
 
 def begun(
-    services: Services,
+    locks: Locks,
     session: Session,
     study: Study,
     kind: JobKind,
@@ -77,7 +77,7 @@ def begun(
 ) -> Job:
     """A new job that waits; Conflict with the words `in_the_way` where one of its kind is under way."""
     job_repository.lock_study(session, study)  # two that ask at once would each see none under way
-    if any(is_under_way(services, job) for job in job_repository.latest_jobs(session, study, kind)):
+    if any(is_under_way(locks, job) for job in job_repository.latest_jobs(session, study, kind)):
         raise Conflict(in_the_way)
     job = Job(
         public_id=new_public_id(),
@@ -91,40 +91,40 @@ def begun(
     return job
 
 
-def in_background(services: Services, public_id: str, work: Callable[[], None]) -> None:
+def in_background(database: Database, locks: Locks, public_id: str, work: Callable[[], None]) -> None:
     """Do a job's work in a thread of its own; an error in it, foreseen or not, ends the job as failed.
 
     While it goes on a lock is held: where a process dies with its jobs, others see it by that.
     """
     held = ExitStack()
-    held.enter_context(services.locks.of_job(public_id))
-    threading.Thread(target=_run, args=(services, public_id, work, held), daemon=True).start()
+    held.enter_context(locks.of_job(public_id))
+    threading.Thread(target=_run, args=(database, public_id, work, held), daemon=True).start()
 
 
-def _run(services: Services, public_id: str, work: Callable[[], None], held: ExitStack) -> None:
+def _run(database: Database, public_id: str, work: Callable[[], None], held: ExitStack) -> None:
     with held:
         try:
             work()
         except FORESEEN as error:
-            _fail(services, public_id, str(error)[:500])
+            _fail(database, public_id, str(error)[:500])
         except Exception:
             LOG.exception("job %s", public_id)
-            _fail(services, public_id, UNFORESEEN)
+            _fail(database, public_id, UNFORESEEN)
 
 
-def _fail(services: Services, public_id: str, message: str) -> None:
+def _fail(database: Database, public_id: str, message: str) -> None:
     for wait_s in WRITE_AGAIN_S:
         try:
-            return note(services, public_id, status="failed", message=message, finished_at=now())
+            return note(database, public_id, status="failed", message=message, finished_at=now())
         except SQLAlchemyError:
             LOG.warning("the end of job %s could not be written; again in %d s", public_id, wait_s)
             time.sleep(wait_s)
-    return note(services, public_id, status="failed", message=message, finished_at=now())
+    return note(database, public_id, status="failed", message=message, finished_at=now())
 
 
-def shown(services: Services, job: Job, stopped: str) -> dict[str, Any]:
+def shown(locks: Locks, job: Job, stopped: str) -> dict[str, Any]:
     """What the page shows of a job of any kind; `stopped` is said where the server was stopped meanwhile."""
-    stale = is_abandoned(services, job)
+    stale = is_abandoned(locks, job)
     return {
         "id": job.public_id,
         "status": "failed" if stale else job.status,
@@ -134,20 +134,20 @@ def shown(services: Services, job: Job, stopped: str) -> dict[str, Any]:
     }
 
 
-def note(services: Services, public_id: str, **values: Any) -> None:
+def note(database: Database, public_id: str, **values: Any) -> None:
     """Write how far a job is, or how it ended; one that has ended stays as it is."""
-    with services.database.write() as session:
+    with database.write() as session:
         job = job_repository.job_called(session, public_id)
         if job is not None and job.status in UNDER_WAY:
             for name, value in values.items():
                 setattr(job, name, value)
 
 
-def is_under_way(services: Services, job: Job) -> bool:
+def is_under_way(locks: Locks, job: Job) -> bool:
     """Whether a job waits or runs."""
-    return job.status in UNDER_WAY and not is_abandoned(services, job)
+    return job.status in UNDER_WAY and not is_abandoned(locks, job)
 
 
-def is_abandoned(services: Services, job: Job) -> bool:
+def is_abandoned(locks: Locks, job: Job) -> bool:
     """Whether the process that did its work has ended before it."""
-    return job.status in UNDER_WAY and services.locks.job_is_left(job)
+    return job.status in UNDER_WAY and locks.job_is_left(job)

@@ -16,7 +16,7 @@ from experiments.schema.canonical import definition_sha256
 from server.accounts.audit import record
 from server.accounts.identity import OPERATOR
 from server.cli_common import migrated_services, out, stored_services
-from server.context import Services
+from server.core.settings import Settings
 from server.core.values import now
 from server.models import Link, Study, StudyVersion
 from server.studies import repository
@@ -95,7 +95,7 @@ def add(
                 out.print(f"note: {note}", markup=False)
             if open_:
                 _set_status(session, study, "live")
-                for group, url in _urls(services, session, study):
+                for group, url in _urls(services.settings, session, study):
                     to = f" of the group {group}" if group else ""
                     out.print(f"link for participants{to}, once the server runs: {url}", soft_wrap=True)
 
@@ -110,9 +110,8 @@ def _same_version(session: Session, study: Study, sha256: str, manifest: Manifes
     return version if version.definition_sha256 == sha256 and known == given else None
 
 
-def _urls(services: Services, session: Session, study: Study) -> list[tuple[str, str]]:
+def _urls(settings: Settings, session: Session, study: Study) -> list[tuple[str, str]]:
     """The group and the address of each of the study's general links."""
-    settings = services.settings
     links = general_links(session, settings.key, study)
     return [(link.group_name, link_url(settings.public_url, settings.key, link.public_id)) for link in links]
 

@@ -14,12 +14,14 @@ from experiments.manifest import FrameRate
 from server.accounts.access import Viewer
 from server.accounts.identity import Identity
 from server.accounts.workspaces import Uploader
-from server.context import Services, ServicesDep
+from server.context import ServicesDep
 from server.core.errors import ERROR_RESPONSES, ApiError, Invalid, NotFound
+from server.core.settings import Settings
 from server.core.storage import CHUNK_BYTES
 from server.studies import uploads
 from server.studies.schemas import AskFrameRate, LeaveOut, UploadOut, UploadProgress
 from server.studies.uploads import Quota
+from server.transcoding.preparing import Preparing
 from server.transcoding.records import ask_rate
 
 # Uploads of own clips, and the originals of those that were converted.
@@ -38,7 +40,7 @@ def upload_clips(
 
     Videos are looked into, and converted where browsers cannot play them, after the answer: see the progress.
     """
-    quota, limit = _quota(services, identity), services.settings.max_upload_bytes
+    quota, limit = _quota(services.settings, identity), services.settings.max_upload_bytes
     identifier, folder = uploads.new_upload(quota, fps)
     try:
         for file in files or []:
@@ -65,7 +67,7 @@ def upload_more(
     """
     folder = uploads.upload_folder(services.settings.upload_folder, upload, identity.account_id)
     uploads.check_room(folder)
-    quota, sent, limit = _quota(services, identity), files or [], services.settings.max_upload_bytes
+    quota, sent, limit = _quota(services.settings, identity), files or [], services.settings.max_upload_bytes
     if replaces is not None:
         if len(sent) != 1:
             raise Invalid(f"Expected one file in the place of '{replaces[:100]}', got {len(sent)}.")
@@ -73,7 +75,7 @@ def upload_more(
         sent = []
     for file in sent:
         uploads.receive_more(folder, file.filename or "", file.file, limit, quota)
-    return _progress(services, upload, identity.account_id)
+    return _progress(services.settings, services.preparing, upload, identity.account_id)
 
 
 @upload_router.get("/uploads/{upload}")
@@ -94,7 +96,7 @@ def get_uploaded_clip(services: ServicesDep, identity: Uploader, upload: str, sh
 @upload_router.get("/uploads/{upload}/progress")
 def upload_progress(services: ServicesDep, identity: Uploader, upload: str) -> UploadProgress:
     """How far an upload has been looked into and converted."""
-    return _progress(services, upload, identity.account_id)
+    return _progress(services.settings, services.preparing, upload, identity.account_id)
 
 
 @upload_router.put("/uploads/{upload}/frame-rate")
@@ -104,7 +106,7 @@ def ask_frame_rate(
     """Ask for one frame rate of all clips, or for each its own; they are looked into again."""
     folder = uploads.upload_folder(services.settings.upload_folder, upload, identity.account_id)
     ask_rate(folder, body.fps)
-    return _progress(services, upload, identity.account_id)
+    return _progress(services.settings, services.preparing, upload, identity.account_id)
 
 
 @upload_router.put("/uploads/{upload}/left-out")
@@ -112,19 +114,18 @@ def leave_file_out(services: ServicesDep, identity: Uploader, upload: str, body:
     """Leave one file of an upload out, or put it back; its bytes stay as long as the upload does."""
     folder = uploads.upload_folder(services.settings.upload_folder, upload, identity.account_id)
     (uploads.leave_out if body.left_out else uploads.put_back)(folder, body.file)
-    return _progress(services, upload, identity.account_id)
+    return _progress(services.settings, services.preparing, upload, identity.account_id)
 
 
-def _quota(services: Services, identity: Identity) -> Quota:
-    settings = services.settings
+def _quota(settings: Settings, identity: Identity) -> Quota:
     return Quota(settings.upload_folder, identity.account_id, settings.max_uploads_bytes)
 
 
-def _progress(services: Services, upload: str, account: int) -> UploadProgress:
-    folder = uploads.upload_folder(services.settings.upload_folder, upload, account)
+def _progress(settings: Settings, preparing: Preparing, upload: str, account: int) -> UploadProgress:
+    folder = uploads.upload_folder(settings.upload_folder, upload, account)
     told = uploads.progress(folder)
     if told.waiting:
-        services.preparing.begin()
+        preparing.begin()
     return told
 
 

@@ -33,9 +33,10 @@ from server.accounts.audit import record
 from server.accounts.identity import Identity
 from server.accounts.workspace_repository import default_workspace
 from server.accounts.workspaces import workspace_for
-from server.context import Services
+from server.core.db import Database
 from server.core.errors import Conflict, Invalid
 from server.core.row_security import every_row
+from server.core.settings import Settings
 from server.core.storage import ClipStore
 from server.models import Right, Study, StudyVersion, Workspace
 from server.studies import own_clips, repository
@@ -301,12 +302,12 @@ def _placed_clips(clip: DesignClip | CheckClip) -> dict[str, Any]:
 # New studies and new versions: definition and clips are checked and stored before the database changes.
 
 
-def shipped(services: Services) -> list[ShippedExperiment]:
+def shipped(settings: Settings) -> list[ShippedExperiment]:
     """The experiments and demonstrations that come with the program, their clips built or not."""
     experiments = []
     for name in (*SHIPPED, *DEMOS):
         text = locate(name).read_text(encoding="utf-8")
-        folder = services.settings.stimuli_folder / name
+        folder = settings.stimuli_folder / name
         experiments.append(
             ShippedExperiment(
                 name=name,
@@ -326,14 +327,16 @@ def _title(text: str) -> str:
     return parse_experiment(text).title
 
 
-def create(services: Services, order: NewStudy, identity: Identity) -> str:
+def create(
+    database: Database, settings: Settings, clips: ClipStore, order: NewStudy, identity: Identity
+) -> str:
     """Create a draft study; everything is checked and every clip stored before the database changes."""
-    with services.database.read() as session:
+    with database.read() as session:
         workspace_for(session, identity, order.workspace)  # refused before anything is stored
-    text, experiment, manifest, folder = _materials(services, order, identity)
+    text, experiment, manifest, folder = _materials(settings, order, identity)
     check_against_design(experiment, manifest)
-    _store(services, manifest, folder)
-    with services.database.write() as session:
+    _store(clips, manifest, folder)
+    with database.write() as session:
         study = create_study(
             session, order.name, experiment, identity, workspace_for(session, identity, order.workspace)
         )
@@ -342,27 +345,27 @@ def create(services: Services, order: NewStudy, identity: Identity) -> str:
     return order.name
 
 
-def _store(services: Services, manifest: Manifest, folder: Path) -> None:
+def _store(clips: ClipStore, manifest: Manifest, folder: Path) -> None:
     """Take the clips of a built set, or of an upload of own clips, into the clip store."""
     if (folder / MANIFEST_NAME).is_file():
-        store_clips(services.clips, manifest, folder)
+        store_clips(clips, manifest, folder)
     else:
-        own_clips.store_prepared(services.clips, manifest, folder)
+        own_clips.store_prepared(clips, manifest, folder)
 
 
 def _materials(
-    services: Services, order: NewStudy, identity: Identity
+    settings: Settings, order: NewStudy, identity: Identity
 ) -> tuple[str, Experiment, Manifest, Path]:
     if order.shipped is not None:
         if order.shipped not in (known := (*SHIPPED, *DEMOS)):
             near = did_you_mean(order.shipped, known)
             raise Invalid(f"There is no shipped experiment '{order.shipped}'{near}")
         text = order.toml or locate(order.shipped).read_text(encoding="utf-8")
-        folder = services.settings.stimuli_folder / order.shipped
+        folder = settings.stimuli_folder / order.shipped
         return text, planned_experiment(text), read_manifest(folder), folder
     if order.upload is None:
         raise Invalid("A study needs clips: choose a shipped experiment or upload clips first.")
-    folder = upload_folder(services.settings.upload_folder, order.upload, identity.account_id)
+    folder = upload_folder(settings.upload_folder, order.upload, identity.account_id)
     if (folder / MANIFEST_NAME).is_file():
         if order.toml is None:
             raise Invalid(
@@ -393,13 +396,15 @@ def _placed(levels: LevelsTable | LevelsPattern | None, folder: Path) -> Placed:
     return levels_from_names(levels.pattern, files)
 
 
-def add_definition(services: Services, name: str, order: NewVersion, identity: Identity) -> None:
+def add_definition(
+    database: Database, settings: Settings, clips: ClipStore, name: str, order: NewVersion, identity: Identity
+) -> None:
     """Store a changed definition as a new version, with the clips there are and those of an upload."""
-    with services.database.read() as session:
+    with database.read() as session:
         find_study(session, name, identity, "edit")  # refused before a clip is stored
     experiment = planned_experiment(order.toml)
-    added = _added_clips(services, order, experiment, identity)
-    with services.database.write() as session:
+    added = _added_clips(settings, clips, order, experiment, identity)
+    with database.write() as session:
         study = for_edit(session, name, order.revision, identity, "edit")
         manifest = Manifest.model_validate(active_version(session, study).manifest)
         if added is not None:
@@ -411,15 +416,15 @@ def add_definition(services: Services, name: str, order: NewVersion, identity: I
 
 
 def _added_clips(
-    services: Services, order: NewVersion, experiment: Experiment, identity: Identity
+    settings: Settings, clips: ClipStore, order: NewVersion, experiment: Experiment, identity: Identity
 ) -> Manifest | None:
     """The manifest of uploaded clips, their bytes in the store; None where none were uploaded."""
     if order.upload is None:
         return None
-    folder = upload_folder(services.settings.upload_folder, order.upload, identity.account_id)
+    folder = upload_folder(settings.upload_folder, order.upload, identity.account_id)
     if (folder / MANIFEST_NAME).is_file():
         manifest = read_manifest(folder)
     else:
         manifest = own_clips.manifest_of(experiment, _placed(order.levels, folder), folder)
-    _store(services, manifest, folder)
+    _store(clips, manifest, folder)
     return manifest

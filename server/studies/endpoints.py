@@ -9,8 +9,9 @@ from fastapi.responses import PlainTextResponse
 from server.accounts.access import Myself, Viewer, Writer
 from server.accounts.audit import record
 from server.accounts.workspaces import Uploader
-from server.context import Services, ServicesDep
+from server.context import ServicesDep
 from server.core.errors import ERROR_RESPONSES
+from server.core.settings import Settings
 from server.core.values import Number, now
 from server.models import Link
 from server.studies import creation, definitions, series, service
@@ -62,7 +63,7 @@ router = APIRouter(prefix="/api/admin", tags=["studies"], responses=ERROR_RESPON
 @router.get("/experiments")
 def list_experiments(services: ServicesDep, _identity: Viewer) -> list[ShippedExperiment]:
     """The experiments that come with the program."""
-    return creation.shipped(services)
+    return creation.shipped(services.settings)
 
 
 @router.post("/definitions/check")
@@ -87,7 +88,7 @@ def list_studies(services: ServicesDep, identity: Viewer) -> list[StudySummary]:
 @router.post("/studies", status_code=201)
 def create_study(services: ServicesDep, identity: Uploader, body: NewStudy) -> StudyDetail:
     """Create a draft from a shipped experiment, a definition, or uploaded clips."""
-    name = creation.create(services, body, identity)
+    name = creation.create(services.database, services.settings, services.clips, body, identity)
     return get_study(services, identity, name)
 
 
@@ -108,7 +109,7 @@ def delete_study(services: ServicesDep, identity: Writer, study: str) -> None:
 @router.post("/studies/{study}/versions", status_code=201)
 def add_version(services: ServicesDep, identity: Writer, study: str, body: NewVersion) -> StudyDetail:
     """Store a changed definition as a new version; runs keep the version they began with."""
-    creation.add_definition(services, study, body, identity)
+    creation.add_definition(services.database, services.settings, services.clips, study, body, identity)
     return get_study(services, identity, study)
 
 
@@ -203,10 +204,10 @@ LINKS_READ_AT_ONCE = 1000
 _SHOWN = ("kind", "label", "group_name", "quota", "expires_at", "created_at", "recruiter")
 
 
-def _link_out(services: Services, row: Link | dict[str, Any], runs: int = 0, complete: int = 0) -> LinkOut:
+def _link_out(settings: Settings, row: Link | dict[str, Any], runs: int = 0, complete: int = 0) -> LinkOut:
     values = row if isinstance(row, dict) else vars(row)
     own = {name: values[name] for name in _SHOWN}
-    url = link_url(services.settings.public_url, services.settings.key, values["public_id"])
+    url = link_url(settings.public_url, settings.key, values["public_id"])
     return LinkOut(id=values["public_id"], url=url, runs=runs, complete=complete, **own)
 
 
@@ -219,7 +220,7 @@ def list_links(
         known = find_study(session, study, identity, "run")
         page = page_of_links(session, known, after, limit)
         return LinkPage(
-            links=[_link_out(services, link, *runs) for link, runs in page.links],
+            links=[_link_out(services.settings, link, *runs) for link, runs in page.links],
             total=page.total,
             next=page.next,
         )
@@ -245,7 +246,7 @@ def create_links(services: ServicesDep, identity: Writer, study: str, body: NewL
         refuse_recruiter(known, body.recruiter, "Links")
         make_links(session, known, body.kind, body.group, rows)
         record(session, identity, "links made", "study", study, links=body.kind, number=len(rows))
-    return [_link_out(services, row) for row in rows]
+    return [_link_out(services.settings, row) for row in rows]
 
 
 @link_router.get("/signing")

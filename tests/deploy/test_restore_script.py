@@ -119,7 +119,12 @@ def test_a_backup_comes_back_onto_a_deployment_in_use(deployment: Deployment, tm
     )
     deployment.fill(elsewhere.database_url, "new")
     services = open_services(elsewhere)
-    back_up(services, deployment.app / "backups" / "palpebra-2026-01-31T030000.tar")
+    back_up(
+        services.database,
+        services.settings,
+        services.clips,
+        deployment.app / "backups" / "palpebra-2026-01-31T030000.tar",
+    )
     services.database.close()
     refused = deployment.restore("palpebra-2026-01-31T030000.tar")
     assert (refused.returncode, deployment.who("palpebra")) == (1, "old")

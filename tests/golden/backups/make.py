@@ -37,7 +37,14 @@ def main() -> None:
             known.start(query={"survey_code": "40177"})
         revision = newest_revision()
         backup = folder / f"{revision}.tar"
-        back_up(services, backup, with_clips=False, keys=GOLDEN / f"{revision}.keys.json")
+        back_up(
+            services.database,
+            services.settings,
+            services.clips,
+            backup,
+            with_clips=False,
+            keys=GOLDEN / f"{revision}.keys.json",
+        )
         keep_backup(backup)
         services.database.close()
 

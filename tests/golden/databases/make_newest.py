@@ -63,7 +63,9 @@ def add_demo(services: Services, client: TestClient, folder: Path, demo: str) ->
     """A shipped study, in which two people and a simulated one took part."""
     text = locate(demo).read_text(encoding="utf-8")
     study = add_study(services, folder / demo, text, frames=6, blinks_s=(0.05, 0.1))
-    simulated_link, rater_of = link_and_raters(services, study.name)
+    simulated_link, rater_of = link_and_raters(
+        services.database, services.settings, services.versions, study.name
+    )
     for number in range(1, PEOPLE + SIMULATED + 1):
         link = study.link_token if number <= PEOPLE else simulated_link
         Person(Api(client), rater_of(number, 7)).take_part(link)
@@ -138,7 +140,7 @@ def keep_files(services: Services, studies: list[str], folder: Path) -> None:
     backup = folder / f"{revision}.tar"
     keys = folder / f"{revision}.keys.json"
     # The ledger of erasures is written beside the keys; a restore without it is what the tests do.
-    back_up(services, backup, with_clips=False, keys=keys)
+    back_up(services.database, services.settings, services.clips, backup, with_clips=False, keys=keys)
     (FOLDER / keys.name).write_bytes(keys.read_bytes())
     keep_packed(f"{revision}.tar", backup.read_bytes())
     keep_packed(f"{revision}.contents.json", json.dumps(contents_of(services.database), indent=1).encode())

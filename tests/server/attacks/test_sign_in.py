@@ -50,7 +50,12 @@ def together(number: int, work) -> list[object]:
 def test_of_six_who_use_one_invitation_one_gets_in(services: Services) -> None:
     _, token = invitations.invite(services.database, "owner", "", None)
     ready = hash_password(PASSWORD, "x")
-    made = together(SIX, lambda n: invitations.accept_invitation(services, token, f"owner{n}", ready, ""))
+    made = together(
+        SIX,
+        lambda n: invitations.accept_invitation(
+            services.database, services.settings, token, f"owner{n}", ready, ""
+        ),
+    )
     assert sum(isinstance(one, str) for one in made) == 1, made
     with services.database.read() as session:
         assert session.query(Account).count() == 1
@@ -62,13 +67,15 @@ def test_of_six_who_use_one_recovery_code_or_one_time_code_one_gets_in(
     setup = owner.send("POST", "/second-factor").json()
     totp = pyotp.TOTP(setup["secret"])
     codes = owner.send("PUT", "/second-factor", {"code": totp.now()}).json()["codes"]
-    stored = signing_in.stored_password(services, owner.name)
+    stored = signing_in.stored_password(services.database, owner.name)
     with services.database.write() as session:
         session.query(Account).update({"totp_last_step": None})
     for code in (codes[0], totp.now()):
         got = together(
             SIX,
-            lambda _, code=code: signing_in.open_session(services, owner.name, Checked(stored), code, ""),
+            lambda _, code=code: signing_in.open_session(
+                services.database, services.settings, services.sign_ins, owner.name, Checked(stored), code, ""
+            ),
         )
         assert sum(token is not None for token, _ in got) == 1, got
     with services.database.read() as session:

@@ -169,7 +169,7 @@ def test_looks_at_persons_and_downloads_are_in_the_log(
 
 def test_the_export_ends_with_the_chains_head(services: Services) -> None:
     write_three(services)
-    lines = [json.loads(line) for line in _lines(services, 1)]
+    lines = [json.loads(line) for line in _lines(services.database, 1)]
     head = verdict(services)
     assert [line["position"] for line in lines[:-1]] == [2, 3]
     assert lines[-1] == {"complete": True, "entries": 2, "head": f"{head.position}:{head.hash}"}

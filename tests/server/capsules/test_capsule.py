@@ -84,7 +84,7 @@ def _take_part(person: Participant, number: int) -> None:
 @pytest.fixture(scope="module")
 def capsule(opened: Services) -> Path:
     target = opened.settings.data_folder / "exp3-capsule.zip"
-    build_capsule(opened, "exp3", CapsuleContents(sensitivity=False), target)
+    build_capsule(opened.database, opened.clips, "exp3", CapsuleContents(sensitivity=False), target)
     return target
 
 
@@ -330,7 +330,9 @@ def test_answers_to_motion_checks_stay_out() -> None:
 
 def test_the_clips_can_stay_out(opened: Services, tmp_path: Path) -> None:
     target = tmp_path / "small.zip"
-    build_capsule(opened, "exp3", CapsuleContents(clips=False, sensitivity=False), target)
+    build_capsule(
+        opened.database, opened.clips, "exp3", CapsuleContents(clips=False, sensitivity=False), target
+    )
     with zipfile.ZipFile(target) as archive:
         assert not [name for name in archive.namelist() if name.endswith(".mp4")]
         assert len(json.loads(archive.read("materials/manifest.json"))["clips"][0]["sha256"]) == 64
@@ -339,7 +341,9 @@ def test_the_clips_can_stay_out(opened: Services, tmp_path: Path) -> None:
 
 def test_a_study_without_answers_has_no_capsule(opened: Services, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="the report, which could not be made"):
-        build_capsule(opened, "exp3", CapsuleContents(origin="pilot"), tmp_path / "none.zip")
+        build_capsule(
+            opened.database, opened.clips, "exp3", CapsuleContents(origin="pilot"), tmp_path / "none.zip"
+        )
     assert list(tmp_path.iterdir()) == []
 
 
@@ -358,13 +362,19 @@ def test_a_capsule_of_an_earlier_series_holds_its_definition(opened: Services, t
             manifest = Manifest.model_validate(first.manifest)
             assert add_version(session, study, text, parse_experiment(text), manifest, None).series == 2
         target = tmp_path / "first.zip"
-        build_capsule(services, "exp3", CapsuleContents(clips=False, sensitivity=False, series=1), target)
+        build_capsule(
+            services.database,
+            services.clips,
+            "exp3",
+            CapsuleContents(clips=False, sensitivity=False, series=1),
+            target,
+        )
         with zipfile.ZipFile(target) as archive:
             assert b"maximum = 5" not in archive.read("materials/exp3.toml")
             assert json.loads(archive.read(CAPSULE_FILE))["report"]["series"] == 1
         assert verify(target)[0] == 0
         with pytest.raises(NotFound, match="no data series 3; there is series 1"):
-            build_capsule(services, "exp3", CapsuleContents(series=3), target)
+            build_capsule(services.database, services.clips, "exp3", CapsuleContents(series=3), target)
     finally:
         services.database.close()
 

@@ -44,7 +44,7 @@ def test_a_capsule_that_is_being_made_is_left_alone(
     path = add(services, 1, "running")
     refused = experimenter.send("DELETE", f"{PATH}/{1:032x}")
     assert (refused.status_code, path.exists()) == (409, True)
-    remove_old(services, "short")
+    remove_old(services.database, services.settings, services.locks, "short")
     assert numbers(experimenter) == [1]
 
 
@@ -52,7 +52,7 @@ def test_too_many_and_too_old_ones_go_when_another_is_done(
     services: Services, experimenter: Admin, owner: Admin, study: StudyInDatabase
 ) -> None:
     paths = [add(services, number, days=100 if number in (6, 7) else 0) for number in range(1, 9)]
-    remove_old(services, "short")
+    remove_old(services.database, services.settings, services.locks, "short")
     assert numbers(experimenter) == [8, 5, 4, 3, 2]
     assert [path.exists() for path in paths] == [False, True, True, True, True, False, False, True]
     removed = [entry for entry in owner.get("/audit").json() if entry["action"] == "capsule removed"]
@@ -67,7 +67,7 @@ def test_attempts_that_failed_push_no_capsule_out(
     for number in range(6, 12):
         add(services, number, "failed", days=100 if number == 6 else 0)
     add(services, 12, "running", days=1)
-    remove_old(services, "short")
+    remove_old(services.database, services.settings, services.locks, "short")
     assert numbers(experimenter) == [12, 11, 10, 9, 8, 7, 5, 4, 3, 2, 1]
     assert all(path.exists() for path in paths)
 

@@ -50,7 +50,7 @@ def ids(services: Services) -> dict[str, str]:
 
 def restored(backup: Path, url: str, folder: Path) -> tuple[Services, list[str]]:
     services, lines = open_services(Settings(database_url=url, data_folder=folder)), list[str]()
-    restore(services, backup, lines.append, despite_erasures=True)
+    restore(services.database, services.settings, services.clips, backup, lines.append, despite_erasures=True)
     return services, lines
 
 
@@ -65,12 +65,12 @@ def test_an_erased_person_is_gone_from_older_backups_too(
 ) -> None:
     """Without the ledger of erasures: the key alone decides."""
     older = tmp_path / "older.tar"
-    back_up(services, older, with_clips=False)
+    back_up(services.database, services.settings, services.clips, older, with_clips=False)
     erased, other = (person.run_id for person in people)
     path = f"/studies/short/runs/{erased}/erase"
     assert experimenter.send("POST", path, {"confirm": erased}).status_code == 200
     assert ids(services) == {other: CODES[1]}
-    back_up(services, tmp_path / "newer.tar", with_clips=False)
+    back_up(services.database, services.settings, services.clips, tmp_path / "newer.tar", with_clips=False)
     again, lines = restored(older, empty_database_url, tmp_path / "new")
     assert ids(again) == {other: CODES[1]}
     assert "1 recruiters' ids; of 1 there is no key any more" in lines
@@ -87,7 +87,7 @@ def test_a_backup_without_its_key_file_opens_no_id_and_says_so(
     backup, keys = tmp_path / "a" / "b.tar", tmp_path / "safe" / "keys.json"
     for path in (backup, keys):
         path.parent.mkdir()
-    back_up(services, backup, with_clips=False, keys=keys)
+    back_up(services.database, services.settings, services.clips, backup, with_clips=False, keys=keys)
     assert not (tmp_path / "a" / NAME).exists()
     assert keys.stat().st_mode & 0o077 == 0
     with services.database.read() as session:
@@ -130,7 +130,14 @@ def test_with_the_key_file_ids_and_pseudonyms_are_as_before(
 ) -> None:
     keys = tmp_path / "keys.json"
     (tmp_path / "a").mkdir()
-    back_up(services, tmp_path / "a" / "b.tar", with_clips=False, keys=keys)
+    back_up(
+        services.database,
+        services.settings,
+        services.clips,
+        tmp_path / "a" / "b.tar",
+        with_clips=False,
+        keys=keys,
+    )
     settings = Settings(database_url=empty_database_url, data_folder=tmp_path / "new")
     done = run_server_command(
         settings, "restore", "--despite-erasures", str(tmp_path / "a" / "b.tar"), "--keys", str(keys)
@@ -181,9 +188,9 @@ def test_a_changed_secret_key_is_told_in_a_line_and_mended(
     assert done.stdout.startswith("2 keys wrapped anew; 0 are not under that key\n"), done.stderr
     assert sorted(ids(changed).values()) == list(CODES)
     assert run_server_command(settings, "database", "rewrap", str(tmp_path / "none")).returncode == 2
-    back_up(services, tmp_path / "b.tar", with_clips=False)
+    back_up(services.database, services.settings, services.clips, tmp_path / "b.tar", with_clips=False)
     with pytest.raises(InputError, match="the keys of another installation or secret key"):
-        back_up(changed, tmp_path / "c.tar", with_clips=False)
+        back_up(changed.database, changed.settings, changed.clips, tmp_path / "c.tar", with_clips=False)
     changed.database.close()
 
 
@@ -196,14 +203,14 @@ def test_what_is_no_key_file(
     services: Services, people: list[Participant], content: str, said: str, tmp_path: Path
 ) -> None:
     backup = tmp_path / "b.tar"
-    back_up(services, backup, with_clips=False)
+    back_up(services.database, services.settings, services.clips, backup, with_clips=False)
     keys = tmp_path / NAME
     newer = json.dumps(json.loads(keys.read_text()) | {"format": 2})
     keys.write_text(newer if content == "newer" else content)
     empty = Settings(database_url=f"sqlite:///{tmp_path / 'x.sqlite'}", data_folder=tmp_path / "new")
     target = open_services(empty)
     with pytest.raises(InputError, match=said):
-        restore(target, backup, despite_erasures=True)
+        restore(target.database, target.settings, target.clips, backup, despite_erasures=True)
     target.database.close()
 
 
@@ -212,7 +219,7 @@ def test_a_drill_without_the_key_file_fails(
     services: Services, people: list[Participant], tmp_path: Path
 ) -> None:
     backup = tmp_path / "b.tar"
-    back_up(services, backup, with_clips=False)
+    back_up(services.database, services.settings, services.clips, backup, with_clips=False)
     assert drill(services.settings, backup).said == ""
     (tmp_path / NAME).unlink()
     result = drill(services.settings, backup)
@@ -234,10 +241,12 @@ def test_the_ledger_goes_along_so_that_a_new_machine_erases_again(
 ) -> None:
     older = tmp_path / "b" / "older.tar"
     older.parent.mkdir()
-    back_up(services, older, with_clips=False)
+    back_up(services.database, services.settings, services.clips, older, with_clips=False)
     run = people[0].run_id
     experimenter.send("POST", f"/studies/short/runs/{run}/erase", {"confirm": run})
-    back_up(services, tmp_path / "b" / "newer.tar", with_clips=False)
+    back_up(
+        services.database, services.settings, services.clips, tmp_path / "b" / "newer.tar", with_clips=False
+    )
     again, lines = restored(older, f"sqlite:///{tmp_path / 'x.sqlite'}", tmp_path / "new")
     assert any(line.startswith("1 run erased again") for line in lines)
     with again.database.read() as session:
@@ -246,7 +255,9 @@ def test_the_ledger_goes_along_so_that_a_new_machine_erases_again(
     again.database.close()
     # An installation that lost its ledger does not take it from the backups.
     ledger_path(services.settings).unlink()
-    back_up(services, tmp_path / "b" / "newest.tar", with_clips=False)
+    back_up(
+        services.database, services.settings, services.clips, tmp_path / "b" / "newest.tar", with_clips=False
+    )
     assert run in (tmp_path / "b" / LEDGER_NAME).read_text()
 
 

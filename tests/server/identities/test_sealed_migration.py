@@ -22,7 +22,14 @@ def golden(tmp_path: Path) -> Services:
     """A database with recruiters' ids."""
     url = f"sqlite:///{tmp_path / 'x.sqlite'}"
     services = open_services(Settings(database_url=url, data_folder=tmp_path / "data"))
-    restore(services, golden_backup(SEALED, tmp_path), keys=golden_keys(SEALED), despite_erasures=True)
+    restore(
+        services.database,
+        services.settings,
+        services.clips,
+        golden_backup(SEALED, tmp_path),
+        keys=golden_keys(SEALED),
+        despite_erasures=True,
+    )
     return services
 
 

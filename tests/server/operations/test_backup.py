@@ -95,18 +95,18 @@ def test_a_backup_comes_back_whole_on_either_database(
     with_data: Services, settings: Settings, empty_database_url: str, tmp_path: Path
 ) -> None:
     path = tmp_path / "b.tar"
-    described = back_up(with_data, path)
+    described = back_up(with_data.database, with_data.settings, with_data.clips, path)
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
     assert [entry.name for entry in tmp_path.glob("*.tar*")] == ["b.tar"]
     target = another(settings, empty_database_url, tmp_path / "new")
-    restore(target, path, despite_erasures=True)
+    restore(target.database, target.settings, target.clips, path, despite_erasures=True)
     assert contents(empty_database_url) == contents(settings.database_url)
     for sha256 in described.clips:
         assert target.clips.size(sha256) == with_data.clips.size(sha256) is not None
     assert target.settings.key == settings.key
     assert stat.S_IMODE((tmp_path / "new" / "secret_key").stat().st_mode) == 0o600
     with pytest.raises(InputError, match=r"already holds rows .*name a new folder in PALPEBRA_DATA_FOLDER"):
-        restore(target, path, despite_erasures=True)
+        restore(target.database, target.settings, target.clips, path, despite_erasures=True)
     target.database.close()
 
 
@@ -116,17 +116,17 @@ class TestRefusals:
     def test_another_secret_key(
         self, with_data: Services, settings: Settings, empty_database_url: str, tmp_path: Path
     ) -> None:
-        back_up(with_data, tmp_path / "b.tar", with_clips=False)
+        back_up(with_data.database, with_data.settings, with_data.clips, tmp_path / "b.tar", with_clips=False)
         target = another(settings, empty_database_url, tmp_path / "new", key="another key")
         with pytest.raises(InputError, match="another secret key"):
-            restore(target, tmp_path / "b.tar", despite_erasures=True)
+            restore(target.database, target.settings, target.clips, tmp_path / "b.tar", despite_erasures=True)
         target.database.close()
 
     def test_a_damaged_file_restores_nothing(
         self, with_data: Services, settings: Settings, empty_database_url: str, tmp_path: Path
     ) -> None:
         whole, changed = tmp_path / "b.tar", tmp_path / "c.tar"
-        back_up(with_data, whole)
+        back_up(with_data.database, with_data.settings, with_data.clips, whole)
         with tarfile.open(whole) as source, tarfile.open(changed, "w") as target_tar:
             for entry in source:
                 content = source.extractfile(entry).read()  # type: ignore[union-attr]
@@ -138,16 +138,24 @@ class TestRefusals:
                 target_tar.addfile(entry, io.BytesIO(content))
         target = another(settings, empty_database_url, tmp_path / "new")
         with pytest.raises(InputError, match="the backup is damaged, nothing was restored"):
-            restore(target, changed, despite_erasures=True)
+            restore(target.database, target.settings, target.clips, changed, despite_erasures=True)
         cut = tmp_path / "cut.tar"
         cut.write_bytes(whole.read_bytes()[: whole.stat().st_size // 3])
         with pytest.raises(InputError):
-            restore(target, cut, despite_erasures=True)
+            restore(target.database, target.settings, target.clips, cut, despite_erasures=True)
         (tmp_path / "text.tar").write_text("hello")
         with pytest.raises(InputError, match=r"no backup of `server backup`; name a file that it wrote$"):
-            restore(target, tmp_path / "text.tar", despite_erasures=True)
+            restore(
+                target.database, target.settings, target.clips, tmp_path / "text.tar", despite_erasures=True
+            )
         with pytest.raises(InputError, match="cannot be read"):
-            restore(target, tmp_path / "nothing.tar", despite_erasures=True)
+            restore(
+                target.database,
+                target.settings,
+                target.clips,
+                tmp_path / "nothing.tar",
+                despite_erasures=True,
+            )
         assert contents(empty_database_url) == {}
         assert not (tmp_path / "new" / "secret_key").exists()
         target.database.close()
@@ -160,7 +168,13 @@ class TestRefusals:
     ) -> None:
         (tmp_path / "file").write_text("")
         with pytest.raises(InputError, match=r"the folder .*(no|file) does not exist; make it first$"):
-            back_up(services, tmp_path / path, keys=tmp_path / keys if keys else None)
+            back_up(
+                services.database,
+                services.settings,
+                services.clips,
+                tmp_path / path,
+                keys=tmp_path / keys if keys else None,
+            )
         assert not (tmp_path / "no").exists()
         assert not (tmp_path / "b.tar").exists(), "no backup without its keys"
 
@@ -172,5 +186,11 @@ class TestRefusals:
     ) -> None:
         """Backup, key file and the copy of the ledger of erasures beside that are three files."""
         with pytest.raises(InputError, match="already in use in this call"):
-            back_up(services, tmp_path / path, keys=tmp_path / keys if keys else None)
+            back_up(
+                services.database,
+                services.settings,
+                services.clips,
+                tmp_path / path,
+                keys=tmp_path / keys if keys else None,
+            )
         assert not (tmp_path / path).exists()

@@ -39,7 +39,7 @@ def watched(services: Services, participant: Participant, tmp_path: Path) -> Set
     participant.rate_all()
     folder = tmp_path / "backups"
     folder.mkdir()
-    back_up(services, folder / "palpebra-2026-03-01.tar")
+    back_up(services.database, services.settings, services.clips, folder / "palpebra-2026-03-01.tar")
     return services.settings.model_copy(update={"backup_folder": str(folder)})
 
 

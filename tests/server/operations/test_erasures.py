@@ -68,15 +68,15 @@ def test_a_restore_does_not_bring_an_erased_person_back(
 ) -> None:
     participant.agree().rate_all()
     backup = tmp_path / "before.tar"
-    back_up(services, backup, with_clips=False)
+    back_up(services.database, services.settings, services.clips, backup, with_clips=False)
     run = participant.run_id
     assert experimenter.send("POST", f"{RUNS}/{run}/erase", {"confirm": run}).status_code == 200
     folder = tmp_path / "new"
     settings = Settings(database_url=empty_database_url, data_folder=folder)
     restored, lines = open_services(settings), list[str]()
     with pytest.raises(InputError, match="newer than the backup"):  # its own ledger is as old as it
-        restore(restored, backup, lines.append)
-    restore(restored, backup, lines.append, despite_erasures=True)
+        restore(restored.database, restored.settings, restored.clips, backup, lines.append)
+    restore(restored.database, restored.settings, restored.clips, backup, lines.append, despite_erasures=True)
     assert lines[-1].startswith(f"WARNING: no ledger of erasures at {folder}")
     assert erased_runs(restored) == set()
     shutil.copy(ledger_path(services.settings), ledger_path(settings))
@@ -92,12 +92,12 @@ def test_a_ledger_begun_after_the_backup_knows_of_no_erasure_before_it(
 ) -> None:
     """As where the old ledger was lost with its disk, and a server has been started since."""
     participant.agree()
-    back_up(services, tmp_path / "before.tar", with_clips=False)
+    back_up(services.database, services.settings, services.clips, tmp_path / "before.tar", with_clips=False)
     settings = Settings(database_url=f"sqlite:///{tmp_path / 'x.sqlite'}", data_folder=tmp_path / "new")
     begin_ledger(settings)
     restored = open_services(settings)
     with pytest.raises(InputError, match="newer than the backup"):
-        restore(restored, tmp_path / "before.tar")
+        restore(restored.database, restored.settings, restored.clips, tmp_path / "before.tar")
     restored.database.close()
 
 
@@ -107,13 +107,13 @@ def test_a_restore_replays_the_ledger_that_is_there(
 ) -> None:
     participant.agree()
     backup = tmp_path / "before.tar"
-    back_up(services, backup, with_clips=False)
+    back_up(services.database, services.settings, services.clips, backup, with_clips=False)
     settings = Settings(database_url=f"sqlite:///{tmp_path / 'x.sqlite'}", data_folder=tmp_path / "new")
     note_erased(settings, [participant.run_id, "of another installation"])
     with ledger_path(settings).open("a") as stream:
         stream.write('{"run": "cut o')
     restored, lines = open_services(settings), list[str]()
-    restore(restored, backup, lines.append)
+    restore(restored.database, restored.settings, restored.clips, backup, lines.append)
     assert f"1 run erased again, by {ledger_path(settings)}" in lines
     assert erased_runs(restored) == {participant.run_id}
     assert ledger_path(settings).stat().st_mode & 0o077 == 0
@@ -127,10 +127,10 @@ def test_a_ledger_as_old_as_the_backup_is_named_after_a_restore_despite_it(
     participant.agree()
     note_erased(services.settings, ["somebody erased long before"])
     backup = tmp_path / "before.tar"
-    back_up(services, backup, with_clips=False)
+    back_up(services.database, services.settings, services.clips, backup, with_clips=False)
     folder = tmp_path / "new"
     settings = Settings(database_url=f"sqlite:///{tmp_path / 'x.sqlite'}", data_folder=folder)
     restored, lines = open_services(settings), list[str]()
-    restore(restored, backup, lines.append, despite_erasures=True)
+    restore(restored.database, restored.settings, restored.clips, backup, lines.append, despite_erasures=True)
     assert lines[-1].startswith(f"WARNING: no ledger of erasures at {folder}")
     restored.database.close()

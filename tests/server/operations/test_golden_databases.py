@@ -96,7 +96,14 @@ def test_a_restored_backup_has_every_row(revision: str, empty_database_url: str,
     services = opened(empty_database_url, tmp_path)
     backup = tmp_path / f"{revision}.tar"
     backup.write_bytes(gzip.decompress((FOLDER / f"{revision}.tar.gz").read_bytes()))
-    restore(services, backup, keys=FOLDER / f"{revision}.keys.json", despite_erasures=True)
+    restore(
+        services.database,
+        services.settings,
+        services.clips,
+        backup,
+        keys=FOLDER / f"{revision}.keys.json",
+        despite_erasures=True,
+    )
     check_complete(services, revision)
     services.database.close()
 

@@ -3,7 +3,6 @@
 import io
 import shutil
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import IO, Any, cast
 
@@ -87,9 +86,9 @@ class DuringTheClips:
         return self._clips.read(sha256, start, size)
 
 
-def overtaken(services: Services, event: Callable[[], None]) -> Services:
-    """Services whose next backup is overtaken by an event, after its rows and before its clips."""
-    return replace(services, clips=cast(ClipStore, DuringTheClips(services.clips, event)))
+def overtaken(clips: ClipStore, event: Callable[[], None]) -> ClipStore:
+    """A clip store by which the next backup is overtaken by an event, after its rows and before its clips."""
+    return cast(ClipStore, DuringTheClips(clips, event))
 
 
 def test_a_key_file_older_than_the_backup_fails_drill_and_restore(
@@ -97,10 +96,10 @@ def test_a_key_file_older_than_the_backup_fails_drill_and_restore(
 ) -> None:
     folder = tmp_path / "b"
     folder.mkdir()
-    back_up(services, folder / "older.tar", with_clips=False)
+    back_up(services.database, services.settings, services.clips, folder / "older.tar", with_clips=False)
     shutil.copy(folder / NAME, tmp_path / "stale.json")
     came(client, link, "40178")
-    back_up(services, folder / "newer.tar", with_clips=False)
+    back_up(services.database, services.settings, services.clips, folder / "newer.tar", with_clips=False)
     assert drill(services.settings, folder / "newer.tar").said == ""
     assert drill(services.settings, folder / "older.tar").said == "", "a newer key file is by design"
     shutil.copy(tmp_path / "stale.json", folder / NAME)
@@ -111,7 +110,7 @@ def test_a_key_file_older_than_the_backup_fails_drill_and_restore(
     arguments = ("restore", "--despite-erasures", str(folder / "newer.tar"))
     target = empty(new)
     with pytest.raises(InputError, match="is older than the backup"):
-        restore(target, folder / "newer.tar", despite_erasures=True)
+        restore(target.database, target.settings, target.clips, folder / "newer.tar", despite_erasures=True)
     target.database.close()
     refused = run_server_command(target.settings, *arguments)
     assert refused.returncode == 2
@@ -138,10 +137,17 @@ def test_the_keys_stand_there_before_the_backup(
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(key_escrow, "write_keys", _killed)
             with pytest.raises(KeyboardInterrupt):
-                back_up(services, tmp_path / "b" / TAR)
+                back_up(services.database, services.settings, services.clips, tmp_path / "b" / TAR)
         assert list((tmp_path / "b").glob("*.tar")) == []
         return
-    back_up_to(services, Watched(tmp_path / "b"), TAR, recipient_of(safe[0]))
+    back_up_to(
+        services.database,
+        services.settings,
+        services.clips,
+        Watched(tmp_path / "b"),
+        TAR,
+        recipient_of(safe[0]),
+    )
     for names in seen:
         if any(name.endswith(".tar.age") for name in names):
             assert any(name.startswith("palpebra-keys-") for name in names)
@@ -166,9 +172,14 @@ def test_a_backup_that_is_overtaken_brings_no_key_back(
     def event() -> None:
         erase(experimenter, first.run_id)
         came(client, link, "40178")
-        back_up(services, folder / "second.tar")
+        back_up(services.database, services.settings, services.clips, folder / "second.tar")
 
-    back_up(overtaken(services, event), folder / "first.tar")
+    back_up(
+        services.database,
+        services.settings,
+        overtaken(services.clips, event),
+        folder / "first.tar",
+    )
     with services.database.read() as session:
         runs = set(session.scalars(select(StudyRun.public_id).join(IdentityKey)))
     assert len(runs) == 1
@@ -190,9 +201,23 @@ def test_one_that_is_overtaken_off_the_host_brings_no_key_back(
     def event() -> None:
         erase(experimenter, first.run_id)
         came(client, link, "40178")
-        back_up_to(services, store, "palpebra-2026-03-02T030000.tar", public)
+        back_up_to(
+            services.database,
+            services.settings,
+            services.clips,
+            store,
+            "palpebra-2026-03-02T030000.tar",
+            public,
+        )
 
-    back_up_to(overtaken(services, event), store, TAR, public)
+    back_up_to(
+        services.database,
+        services.settings,
+        overtaken(services.clips, event),
+        store,
+        TAR,
+        public,
+    )
     [keys] = [entry.name for entry in store.entries() if entry.name.startswith("palpebra-keys-")]
     target = io.BytesIO()
     with store.open(keys) as source:
@@ -207,11 +232,11 @@ def test_a_key_file_of_the_future_is_replaced(
     services: Services, first: Participant, experimenter: Admin, tmp_path: Path
 ) -> None:
     """A clock that was wrong once does not keep erasures from older backups for ever."""
-    back_up(services, tmp_path / "a.tar", with_clips=False)
+    back_up(services.database, services.settings, services.clips, tmp_path / "a.tar", with_clips=False)
     keys = key_file(tmp_path / NAME).model_copy(update={"written_at": "2999-01-01T00:00:00.000000Z"})
     (tmp_path / NAME).write_text(keys.model_dump_json())
     erase(experimenter, first.run_id)
-    back_up(services, tmp_path / "b.tar", with_clips=False)
+    back_up(services.database, services.settings, services.clips, tmp_path / "b.tar", with_clips=False)
     assert key_file(tmp_path / NAME).runs == {}
 
 
@@ -220,13 +245,20 @@ def test_a_restore_takes_no_keys_of_another_installation(
 ) -> None:
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
-    back_up(services, tmp_path / "a" / TAR, with_clips=False)
+    back_up(services.database, services.settings, services.clips, tmp_path / "a" / TAR, with_clips=False)
     other = with_secret(services, "another installation of this machine")
-    back_up(other, tmp_path / "b" / TAR, with_clips=False)
+    back_up(other.database, other.settings, other.clips, tmp_path / "b" / TAR, with_clips=False)
     other.database.close()
     target = empty(tmp_path / "new")
     with pytest.raises(InputError, match="keys of another installation or secret key than the backup"):
-        restore(target, tmp_path / "a" / TAR, keys=tmp_path / "b" / NAME, despite_erasures=True)
+        restore(
+            target.database,
+            target.settings,
+            target.clips,
+            tmp_path / "a" / TAR,
+            keys=tmp_path / "b" / NAME,
+            despite_erasures=True,
+        )
     target.database.close()
     again = run_server_command(
         target.settings,
@@ -244,17 +276,23 @@ def test_after_a_change_of_the_secret_key_older_backups_keep_their_keys(
 ) -> None:
     folder, old = tmp_path / "b", tmp_path / "old_key"
     folder.mkdir()
-    back_up(services, folder / "older.tar", with_clips=False)
+    back_up(services.database, services.settings, services.clips, folder / "older.tar", with_clips=False)
     old.write_bytes(services.settings.key)
     changed = with_secret(services, "another key of this installation")
     done = run_server_command(changed.settings, "database", "rewrap", str(old))
     assert "keep it with the backups made so far" in done.stdout, done.stderr
     shutil.move(folder / NAME, folder / "keys-of-before.json")
-    back_up(changed, folder / "newer.tar", with_clips=False)
+    back_up(changed.database, changed.settings, changed.clips, folder / "newer.tar", with_clips=False)
     target = empty(tmp_path / "new")
     with pytest.raises(InputError, match="another installation or secret key than the backup"):
-        restore(target, folder / "older.tar", despite_erasures=True)
-    restore(target, folder / "older.tar", keys=folder / "keys-of-before.json")
+        restore(target.database, target.settings, target.clips, folder / "older.tar", despite_erasures=True)
+    restore(
+        target.database,
+        target.settings,
+        target.clips,
+        folder / "older.tar",
+        keys=folder / "keys-of-before.json",
+    )
     assert ids(target) == ["40177"]
     with target.database.read() as one, services.database.read() as two:
         query = select(Study.pseudonym_key)
@@ -269,7 +307,15 @@ def test_two_installations_share_a_store_without_the_private_key(
     folder = tmp_path / "b"
     store, public = FolderOfBackups(folder), recipient_of(safe[0])
     for day in (1, 2):
-        back_up_to(services, store, f"palpebra-2026-01-0{day}T030000.tar", public, with_clips=False)
+        back_up_to(
+            services.database,
+            services.settings,
+            services.clips,
+            store,
+            f"palpebra-2026-01-0{day}T030000.tar",
+            public,
+            with_clips=False,
+        )
     ours = {entry.name for entry in store.entries()}
     other = with_secret(services, "another installation of this machine")
     made = run_server_command(
@@ -296,10 +342,24 @@ def test_a_plain_and_an_encrypted_backup_in_one_folder_have_their_own_keys(
     tmp_path: Path,
 ) -> None:
     store = FolderOfBackups(tmp_path / "b")
-    back_up_to(services, store, TAR, recipient_of(safe[0]), with_clips=False)
+    back_up_to(
+        services.database,
+        services.settings,
+        services.clips,
+        store,
+        TAR,
+        recipient_of(safe[0]),
+        with_clips=False,
+    )
     [encrypted] = backups_in(store)
     came(client, link, "40178")
-    back_up(services, tmp_path / "b" / "palpebra-2026-03-02.tar", with_clips=False)
+    back_up(
+        services.database,
+        services.settings,
+        services.clips,
+        tmp_path / "b" / "palpebra-2026-03-02.tar",
+        with_clips=False,
+    )
     for name in (encrypted.name, "palpebra-2026-03-02.tar"):
         assert drill(services.settings, KeptBackup(store, name), identity_in(safe[1])).said == ""
     # The plain one needs no private key for a key file that is not its own.

@@ -40,15 +40,17 @@ def with_phone(services: Services, name: str) -> Phone:
     with services.database.write() as session:
         account = service.create_account(session, name, "correct horse battery", "owner")
     me = Identity(account.id, name, "owner")
-    phone = Phone(name, service.start_second_factor(services, me))
-    service.confirm_second_factor(services, me, phone.code(-1))
+    phone = Phone(name, service.start_second_factor(services.database, services.settings, me))
+    service.confirm_second_factor(services.database, services.settings, me, phone.code(-1))
     return phone
 
 
 def failure(services: Services, phone: Phone, code: str) -> ApiError | None:
     with services.database.read() as session:
         stored = session.scalars(select(Account).where(Account.name == phone.name)).one().password_hash
-    _, failed = signing_in.open_session(services, phone.name, Checked(stored), code, "")
+    _, failed = signing_in.open_session(
+        services.database, services.settings, services.sign_ins, phone.name, Checked(stored), code, ""
+    )
     return failed
 
 
@@ -159,8 +161,8 @@ def test_a_phone_whose_set_up_is_the_first_entry_under_the_new_key_goes_on(
         account = service.create_account(session, "eva", "correct horse battery", "owner")
     again = open_services(changed)
     me = Identity(account.id, "eva", "owner")
-    eva = Phone("eva", service.start_second_factor(again, me))
-    service.confirm_second_factor(again, me, eva.code(-1))
+    eva = Phone("eva", service.start_second_factor(again.database, again.settings, me))
+    service.confirm_second_factor(again.database, again.settings, me, eva.code(-1))
     called = rewrap(changed, old_key)
     assert (called.returncode, "0 second factors" in called.stdout) == (0, True), called.stderr
     assert failure(again, eva, eva.code()) is None

@@ -83,7 +83,9 @@ def rated(client: TestClient, services: Services, study: StudyInDatabase) -> Ser
 
 
 def backed_up(services: Services, store: BackupStore, public: str, name: str = BACKUP) -> KeptBackup:
-    kept_as, _ = back_up_to(services, store, name, recipient_of(public))
+    kept_as, _ = back_up_to(
+        services.database, services.settings, services.clips, store, name, recipient_of(public)
+    )
     return KeptBackup(store, kept_as)
 
 
@@ -182,7 +184,7 @@ def test_what_leaves_the_host_opens_with_the_private_key_alone(
     folder = tmp_path / "elsewhere"
     backed_up(rated, backup_store(str(folder), rated.settings), public)
     plain = tmp_path / "plain.tar"
-    back_up(rated, plain)
+    back_up(rated.database, rated.settings, rated.clips, plain)
     for path in folder.iterdir():
         assert stat.S_IMODE(path.stat().st_mode) == 0o600
         content = path.read_bytes()
@@ -284,7 +286,7 @@ def test_days_are_kept_in_a_store_too(rated: Services, keys: tuple[str, Path], t
 
 def test_the_plain_folder_of_before_is_drilled_as_before(rated: Services, tmp_path: Path) -> None:
     (tmp_path / "b").mkdir()
-    back_up(rated, tmp_path / "b" / "palpebra-2026-03-01.tar")
+    back_up(rated.database, rated.settings, rated.clips, tmp_path / "b" / "palpebra-2026-03-01.tar")
     called = run_server_command(rated.settings, "drill", str(tmp_path / "b"))
     assert "came back whole" in called.stdout, called.stderr
 

@@ -27,7 +27,14 @@ def test_a_released_revision_is_migrated_with_its_rows(
     settings = Settings(database_url=empty_database_url, data_folder=tmp_path / "data")
     services = open_services(settings)
     keys = golden_keys(revision)
-    described = restore(services, golden_backup(revision, tmp_path), keys=keys, despite_erasures=True)
+    described = restore(
+        services.database,
+        services.settings,
+        services.clips,
+        golden_backup(revision, tmp_path),
+        keys=keys,
+        despite_erasures=True,
+    )
     assert described.revision == revision
     assert current_revision(services.database) == newest_revision()
 

@@ -50,7 +50,7 @@ def recognised(subject: str, *groups: str) -> Recognised:
 def sign_in(services: Services, subject: str, *groups: str) -> provider_sign_in.Finished:
     attempt = LoginAttempt(provider="uni", purpose="sign in", next_page="/", expires_at=now())
     return provider_sign_in.finish_sign_in(
-        services, "uni", attempt, recognised(subject, *groups), "a browser"
+        services.database, services.settings, "uni", attempt, recognised(subject, *groups), "a browser"
     )
 
 
@@ -64,8 +64,8 @@ def identity(services: Services, name: str) -> Identity:
 def with_second_factor(services: Services, name: str) -> tuple[str, list[str]]:
     """Give an account a second factor; the authenticator's next code, and the recovery codes."""
     me = identity(services, name)
-    totp = pyotp.TOTP(account_service.start_second_factor(services, me))
-    recovery = account_service.confirm_second_factor(services, me, totp.now())
+    totp = pyotp.TOTP(account_service.start_second_factor(services.database, services.settings, me))
+    recovery = account_service.confirm_second_factor(services.database, services.settings, me, totp.now())
     return totp.at(int(time.time()) + 30), recovery
 
 
@@ -124,7 +124,7 @@ def reset_by_command_line(services: Services) -> None:
 
 
 def removed_by_herself(services: Services) -> None:
-    account_service.remove_second_factor(services, identity(services, "ada"))
+    account_service.remove_second_factor(services.database, services.settings, identity(services, "ada"))
 
 
 @pytest.mark.parametrize("taken_off", [reset_by_command_line, removed_by_herself])
@@ -136,7 +136,9 @@ def test_a_waiting_sign_in_ends_with_the_second_factor(
     cookie = asked_for_code(services, "ada")
     taken_off(services)
     with pytest.raises(NotRecognised):
-        provider_sign_in.finish_with_code(services, cookie, "000000", "a browser")
+        provider_sign_in.finish_with_code(
+            services.database, services.settings, services.sign_ins, cookie, "000000", "a browser"
+        )
     with services.database.read() as session:
         assert session.query(LoginAttempt).count() == 0
 
@@ -151,7 +153,9 @@ def test_without_a_second_factor_no_code_signs_in(services: Services) -> None:
         assert account is not None
         account.totp_secret = account.totp_confirmed_at = None
     with pytest.raises(NotRecognised):
-        provider_sign_in.finish_with_code(services, cookie, "000000", "a browser")
+        provider_sign_in.finish_with_code(
+            services.database, services.settings, services.sign_ins, cookie, "000000", "a browser"
+        )
 
 
 def test_what_nobody_began_takes_no_turn_to_write(
@@ -159,7 +163,7 @@ def test_what_nobody_began_takes_no_turn_to_write(
 ) -> None:
     monkeypatch.setattr(services.database, "write", None)
     with pytest.raises(NotRecognised):
-        provider_sign_in.take_attempt(services, "uni", "a state", "a cookie")
+        provider_sign_in.take_attempt(services.database, "uni", "a state", "a cookie")
 
 
 @pytest.mark.postgres
@@ -173,7 +177,12 @@ def test_one_code_lets_one_of_two_in(services: Services, kind: str) -> None:
     with services.database.write() as session:
         accounts.account_named(session, "ada", lock=True)
         threads, ends = at_once(
-            *(lambda one=one: provider_sign_in.finish_with_code(services, one, code, "x") for one in cookies)
+            *(
+                lambda one=one: provider_sign_in.finish_with_code(
+                    services.database, services.settings, services.sign_ins, one, code, "x"
+                )
+                for one in cookies
+            )
         )
         wait_for_locks(services, 2, threads)
     joined(threads)

@@ -171,7 +171,7 @@ def test_one_that_was_replaced_before_it_had_a_folder_never_begins(
     services: Services, experimenter: Admin, study: StudyInDatabase, program: Callable[[str], None]
 ) -> None:
     program(BEGINS_A_CHILD)
-    service._run(services, "short", "replaced", NewRehearsal())
+    service._run(services.database, services.settings, "short", "replaced", NewRehearsal())
     assert not (folder_of(services) / "replaced").exists()
 
 
@@ -215,7 +215,7 @@ def test_of_two_who_ask_at_once_one_is_refused(
         try:
             with services.database.write() as session:
                 asked = find_study(session, "short", OPERATOR, "run")
-                begun(services, session, asked, "rehearsal", {}, somebody, "it goes on already")
+                begun(services.locks, session, asked, "rehearsal", {}, somebody, "it goes on already")
             outcomes.append("begun")
         except Conflict as error:
             outcomes.append(str(error))
@@ -223,7 +223,7 @@ def test_of_two_who_ask_at_once_one_is_refused(
     second = threading.Thread(target=ask)
     with services.database.write() as session:
         first = find_study(session, "short", OPERATOR, "run")
-        begun(services, session, first, "rehearsal", {}, somebody, "it goes on already")
+        begun(services.locks, session, first, "rehearsal", {}, somebody, "it goes on already")
         session.flush()
         second.start()
         second.join(0.5)

@@ -39,7 +39,7 @@ def job(services: Services, study: StudyInDatabase) -> str:
     """The public id of a report that waits."""
     with services.database.write() as session:
         known = find_study(session, "short", OPERATOR, "run")
-        return jobs.begun(services, session, known, "report", {}, OPERATOR, "").public_id
+        return jobs.begun(services.locks, session, known, "report", {}, OPERATOR, "").public_id
 
 
 def ended(services: Services, public_id: str) -> tuple[str, str]:
@@ -67,7 +67,7 @@ def test_any_error_ends_a_job_and_is_told_or_logged(
     services: Services, job: str, caplog: pytest.LogCaptureFixture, error: Exception, told: str
 ) -> None:
     with caplog.at_level(logging.ERROR):
-        jobs.in_background(services, job, raising(error))
+        jobs.in_background(services.database, services.locks, job, raising(error))
         assert ended(services, job) == ("failed", told)
     assert ("KeyError: 'series'" in caplog.text) == isinstance(error, KeyError)
 
@@ -84,13 +84,13 @@ def test_the_end_is_written_once_the_database_takes_it(
 
     monkeypatch.setattr(jobs, "note", away_at_first)
     monkeypatch.setattr(jobs, "WRITE_AGAIN_S", (0, 0, 0, 0))
-    jobs.in_background(services, job, raising(OSError("disk full")))
+    jobs.in_background(services.database, services.locks, job, raising(OSError("disk full")))
     assert ended(services, job) == ("failed", "disk full")
 
 
 def test_what_has_ended_stays_as_it_ended(services: Services, job: str) -> None:
-    jobs.note(services, job, status="cancelled", message="")
-    jobs.note(services, job, status="done", message="late")
+    jobs.note(services.database, job, status="cancelled", message="")
+    jobs.note(services.database, job, status="done", message="late")
     assert ended(services, job) == ("cancelled", "")
 
 

@@ -76,7 +76,7 @@ def test_answers_and_runs_of_a_report_are_of_one_moment(
 
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(reports, "runs_csv", after_another_began)
-        reports._export(services, study.name, tmp_path / "inputs", NewReport())
+        reports._export(services.database, study.name, tmp_path / "inputs", NewReport())
     lines = (tmp_path / "inputs" / "runs.csv").read_text(encoding="utf-8").splitlines()
     assert len(lines) == 2
     with services.database.read() as session:

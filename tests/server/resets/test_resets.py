@@ -334,7 +334,7 @@ def test_no_link_is_kept_for_a_session_that_has_just_ended(ada: Admin, services:
         )
         end_everything(session, account.id)
     with pytest.raises(NotSignedIn):
-        resets.ask_to_confirm(services, asking, "eve@evil.example")
+        resets.ask_to_confirm(services.database, services.settings, asking, "eve@evil.example")
 
 
 def test_the_address_before_is_told_of_a_change(ada: Admin, stranger: TestClient, box: Letterbox) -> None:
@@ -398,11 +398,13 @@ def asking_from(number: int, device: str | None = None) -> Asking:
 def test_an_account_gets_so_many_letters_a_day(ada: Admin, services: Services, box: Letterbox) -> None:
     own = ada.client.cookies[DEVICE_COOKIE]
     for number in range(MAX_RESET_LETTERS_A_DAY + 2):
-        resets.write_to_who_forgot(services, "ada", asking_from(number, own))
+        resets.write_to_who_forgot(
+            services.database, services.settings, services.sign_ins, "ada", asking_from(number, own)
+        )
         _hours_pass(services, 1)
     assert len(box.letters) == MAX_RESET_LETTERS_A_DAY
     _hours_pass(services, 24)
-    resets.write_to_who_forgot(services, "ada", asking_from(1))
+    resets.write_to_who_forgot(services.database, services.settings, services.sign_ins, "ada", asking_from(1))
     assert len(box.letters) == MAX_RESET_LETTERS_A_DAY + 1
 
 
@@ -410,7 +412,9 @@ def test_strangers_do_not_use_up_the_letters_of_a_day(
     ada: Admin, services: Services, box: Letterbox, stranger: TestClient
 ) -> None:
     for number in range(3 * MAX_RESET_LETTERS_A_DAY):
-        resets.write_to_who_forgot(services, "ada", asking_from(number, "made.up"))
+        resets.write_to_who_forgot(
+            services.database, services.settings, services.sign_ins, "ada", asking_from(number, "made.up")
+        )
         _hours_pass(services, 0.55)
     assert len(box.letters) == MAX_RESET_LETTERS_A_DAY - RESERVED_LETTERS
     ada.client.post(
@@ -424,10 +428,12 @@ def test_a_range_of_addresses_gets_an_account_so_many_letters(
     ada: Admin, services: Services, box: Letterbox
 ) -> None:
     for last in range(2 * LETTERS_FROM_A_RANGE):
-        resets.write_to_who_forgot(services, "ada", Asking(f"198.51.100.{last}", None))
+        resets.write_to_who_forgot(
+            services.database, services.settings, services.sign_ins, "ada", Asking(f"198.51.100.{last}", None)
+        )
         _hours_pass(services, 1)
     assert len(box.letters) == LETTERS_FROM_A_RANGE
-    resets.write_to_who_forgot(services, "ada", asking_from(1))
+    resets.write_to_who_forgot(services.database, services.settings, services.sign_ins, "ada", asking_from(1))
     assert len(box.letters) == LETTERS_FROM_A_RANGE + 1
 
 
@@ -435,7 +441,15 @@ def test_open_links_of_strangers_leave_one_for_an_own_browser(
     ada: Admin, services: Services, box: Letterbox
 ) -> None:
     for number in range(MAX_OPEN_LINKS + 2):
-        resets.write_to_who_forgot(services, "ada", asking_from(number))
+        resets.write_to_who_forgot(
+            services.database, services.settings, services.sign_ins, "ada", asking_from(number)
+        )
     assert len(box.letters) == MAX_OPEN_LINKS
-    resets.write_to_who_forgot(services, "ada", asking_from(9, ada.client.cookies[DEVICE_COOKIE]))
+    resets.write_to_who_forgot(
+        services.database,
+        services.settings,
+        services.sign_ins,
+        "ada",
+        asking_from(9, ada.client.cookies[DEVICE_COOKIE]),
+    )
     assert len(box.letters) == MAX_OPEN_LINKS + 1

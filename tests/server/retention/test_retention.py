@@ -117,14 +117,14 @@ class TestOnSqlite:
     ) -> None:
         """With the keys of before: what the key file would have done the ledger does as well."""
         unnamed, erased = came(client, kept, 91), came(client, kept, 31, completed=False)
-        back_up(services, tmp_path / "b.tar", with_clips=False)
+        back_up(services.database, services.settings, services.clips, tmp_path / "b.tar", with_clips=False)
         carry_out(services.database, services.settings, "short")
         folder = tmp_path / "new"
         folder.mkdir()
         new = Settings(database_url=f"sqlite:///{folder / 'x.sqlite'}", data_folder=folder)
         ledger_path(new).write_bytes(ledger_path(services.settings).read_bytes())
         again = open_services(new)
-        restore(again, tmp_path / "b.tar", despite_erasures=True)
+        restore(again.database, again.settings, again.clips, tmp_path / "b.tar", despite_erasures=True)
         assert state(again) == {unnamed: "unnamed", erased: "erased"}
         again.database.close()
 
