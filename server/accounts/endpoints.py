@@ -47,6 +47,7 @@ from server.accounts.workspaces import own_workspaces
 from server.context import ServicesDep
 from server.core.db import Database
 from server.core.errors import ERROR_RESPONSES
+from server.core.requests import DatabaseDep, SettingsDep
 from server.core.settings import Settings
 from server.core.values import Number, now
 from server.models import Account
@@ -96,13 +97,13 @@ def _set_device(response: Response, settings: Settings, name: str) -> None:
 
 
 @router.get("/session")
-def get_session(request: Request, services: ServicesDep) -> Me:
+def get_session(request: Request, database: DatabaseDep, settings: SettingsDep) -> Me:
     """Who is signed in here."""
     try:
-        identity: Identity | None = identify(request, services.database, services.settings)
+        identity: Identity | None = identify(request, database, settings)
     except NotSignedIn:
         identity = None
-    with services.database.read() as session:
+    with database.read() as session:
         if identity is None:
             return Me(account=None, accounts_exist=service.accounts_exist(session))
         return _me(session, account_of(session, identity), second_factor=identity.second_factor)
@@ -212,16 +213,16 @@ def _just_signed_in(database: Database, token: str) -> Me:
 
 
 @router.delete("/session", status_code=204)
-def sign_out(services: ServicesDep, me: Myself, response: Response) -> None:
+def sign_out(database: DatabaseDep, me: Myself, response: Response) -> None:
     """End this session."""
-    service.revoke_session(services.database, me, me.session_id)
+    service.revoke_session(database, me, me.session_id)
     response.delete_cookie(COOKIE, path="/api/admin")
 
 
 @router.get("/invitations/{token}/state")
-def get_invitation(services: ServicesDep, token: str) -> InvitationState:
+def get_invitation(database: DatabaseDep, token: str) -> InvitationState:
     """Whether a one-time link still works, and as what."""
-    with services.database.read() as session:
+    with database.read() as session:
         invitation = invitations.find_invitation(session, token)
         expired = "expired" if invitation.expires_at <= now() else "open"
         return InvitationState.model_validate(
@@ -259,9 +260,9 @@ async def accept_invitation(
 
 
 @router.get("/sessions")
-def list_sessions(services: ServicesDep, me: Myself) -> list[SessionOut]:
+def list_sessions(database: DatabaseDep, settings: SettingsDep, me: Myself) -> list[SessionOut]:
     """One's own signed-in browsers, the latest first."""
-    with services.database.read() as session:
+    with database.read() as session:
         return [
             SessionOut(
                 id=row.id,
@@ -271,14 +272,14 @@ def list_sessions(services: ServicesDep, me: Myself) -> list[SessionOut]:
                 last_seen_at=row.last_seen_at,
                 expires_at=row.expires_at,
             )
-            for row in service.open_sessions(session, me, services.settings.session_idle)
+            for row in service.open_sessions(session, me, settings.session_idle)
         ]
 
 
 @router.delete("/sessions/{session_id}", status_code=204)
-def revoke_session(services: ServicesDep, me: Myself, session_id: Number) -> None:
+def revoke_session(database: DatabaseDep, me: Myself, session_id: Number) -> None:
     """Sign another of one's own browsers out."""
-    service.revoke_session(services.database, me, session_id)
+    service.revoke_session(database, me, session_id)
 
 
 # Endpoints for owners: accounts, invitations and the audit log.
@@ -287,37 +288,37 @@ people_router = APIRouter(prefix="/api/admin", tags=["people"], responses=ERROR_
 
 
 @people_router.get("/accounts")
-def list_accounts(services: ServicesDep, _identity: Owner) -> list[AccountOut]:
+def list_accounts(database: DatabaseDep, _identity: Owner) -> list[AccountOut]:
     """Every account."""
-    with services.database.read() as session:
+    with database.read() as session:
         return [account_out(row) for row in service.accounts(session)]
 
 
 @people_router.patch("/accounts/{account_id}")
 def change_account(
-    services: ServicesDep, identity: FreshOwner, account_id: Number, body: ChangeAccount
+    database: DatabaseDep, identity: FreshOwner, account_id: Number, body: ChangeAccount
 ) -> AccountOut:
     """Change a role, or disable an account."""
-    return account_out(
-        service.change_account(services.database, identity, account_id, body.role, body.disabled)
-    )
+    return account_out(service.change_account(database, identity, account_id, body.role, body.disabled))
 
 
 @people_router.get("/invitations")
-def list_invitations(services: ServicesDep, _identity: Owner) -> list[InvitationOut]:
+def list_invitations(database: DatabaseDep, _identity: Owner) -> list[InvitationOut]:
     """Invitations that have neither been used nor expired."""
-    with services.database.read() as session:
+    with database.read() as session:
         return [InvitationOut.model_validate(row) for row in invitations.open_invitations(session)]
 
 
 @people_router.post("/invitations", status_code=201)
-def create_invitation(services: ServicesDep, identity: FreshOwner, body: NewInvitation) -> NewInvitationOut:
+def create_invitation(
+    database: DatabaseDep, settings: SettingsDep, identity: FreshOwner, body: NewInvitation
+) -> NewInvitationOut:
     """Invite somebody by a one-time link, shown this once."""
     invitation, token = invitations.invite(
-        services.database, body.role, body.label, identity, body.workspace, body.workspace_role
+        database, body.role, body.label, identity, body.workspace, body.workspace_role
     )
     shown = InvitationOut.model_validate(invitation)
-    return NewInvitationOut(**shown.model_dump(), url=invitation_url(services.settings.public_url, token))
+    return NewInvitationOut(**shown.model_dump(), url=invitation_url(settings.public_url, token))
 
 
 def invitation_url(public_url: str, token: str) -> str:
@@ -326,20 +327,20 @@ def invitation_url(public_url: str, token: str) -> str:
 
 
 @people_router.delete("/invitations/{invitation_id}", status_code=204)
-def revoke_invitation(services: ServicesDep, identity: Owner, invitation_id: Number) -> None:
+def revoke_invitation(database: DatabaseDep, identity: Owner, invitation_id: Number) -> None:
     """Take an invitation back."""
-    invitations.revoke_invitation(services.database, identity, invitation_id)
+    invitations.revoke_invitation(database, identity, invitation_id)
 
 
 @people_router.get("/audit")
 def list_audit(
-    services: ServicesDep,
+    database: DatabaseDep,
     _identity: Owner,
     before: Annotated[int | None, Query(ge=1, le=2**62)] = None,
     limit: Annotated[int, Query(ge=1, le=500)] = 100,
 ) -> list[AuditOut]:
     """The audit log, newest first; `before` pages on."""
-    with services.database.read() as session:
+    with database.read() as session:
         return [AuditOut.model_validate(row) for row in audit.latest(session, before, limit)]
 
 
@@ -362,22 +363,20 @@ async def change_password(
 
 
 @credential_router.post("/second-factor")
-def start_second_factor(services: ServicesDep, me: FreshMyself) -> SecondFactorSetup:
+def start_second_factor(database: DatabaseDep, settings: SettingsDep, me: FreshMyself) -> SecondFactorSetup:
     """Begin the set-up of a second factor: a secret for an authenticator app."""
-    secret = service.start_second_factor(services.database, services.settings, me)
+    secret = service.start_second_factor(database, settings, me)
     uri = credentials.provisioning_uri(secret, me.name)
     return SecondFactorSetup(secret=secret, uri=uri, qr_svg=credentials.qr_svg(uri))
 
 
 @credential_router.put("/second-factor")
 def confirm_second_factor(
-    services: ServicesDep, me: FreshMyself, body: ConfirmCode, after: BackgroundTasks
+    database: DatabaseDep, settings: SettingsDep, me: FreshMyself, body: ConfirmCode, after: BackgroundTasks
 ) -> RecoveryCodes:
     """Turn the second factor on with the app's first code; gives the recovery codes, this once."""
-    codes = service.confirm_second_factor(services.database, services.settings, me, body.code)
-    after.add_task(
-        letters.send_notice, services.database, services.settings, me.account_id, letters.SECOND_FACTOR_ADDED
-    )
+    codes = service.confirm_second_factor(database, settings, me, body.code)
+    after.add_task(letters.send_notice, database, settings, me.account_id, letters.SECOND_FACTOR_ADDED)
     return RecoveryCodes(codes=codes)
 
 
@@ -400,21 +399,21 @@ async def remove_second_factor(
 
 
 @credential_router.get("/tokens")
-def list_tokens(services: ServicesDep, me: Myself) -> list[TokenOut]:
+def list_tokens(database: DatabaseDep, me: Myself) -> list[TokenOut]:
     """One's own API tokens."""
-    with services.database.read() as session:
+    with database.read() as session:
         return [TokenOut.model_validate(row) for row in service.open_tokens(session, me)]
 
 
 @credential_router.post("/tokens", status_code=201)
-def create_token(services: ServicesDep, me: FreshMyself, body: NewToken) -> NewTokenOut:
+def create_token(database: DatabaseDep, me: FreshMyself, body: NewToken) -> NewTokenOut:
     """Make an API token; its secret is shown this once. It can do no more than the account."""
-    with services.database.write() as session:
+    with database.write() as session:
         row, secret = service.create_token(session, me, body.name, list(body.scopes), body.days_granted)
         return NewTokenOut(**TokenOut.model_validate(row).model_dump(), token=secret)
 
 
 @credential_router.delete("/tokens/{token_id}", status_code=204)
-def revoke_token(services: ServicesDep, me: Myself, token_id: Number) -> None:
+def revoke_token(database: DatabaseDep, me: Myself, token_id: Number) -> None:
     """Revoke one's own API token."""
-    service.revoke_token(services.database, me, token_id)
+    service.revoke_token(database, me, token_id)

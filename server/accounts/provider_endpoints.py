@@ -25,6 +25,7 @@ from server.accounts.throttle import SignInThrottle
 from server.context import ServicesDep
 from server.core.db import Database
 from server.core.errors import ERROR_RESPONSES, ApiError
+from server.core.requests import DatabaseDep, SettingsDep
 from server.core.settings import ProviderId, Settings
 from server.core.values import Number
 
@@ -56,11 +57,11 @@ async def _enter(sign_ins: SignInThrottle, request: Request, what: str) -> None:
 
 
 @router.get("/session/ways")
-async def ways_in(services: ServicesDep) -> WaysIn:
+async def ways_in(settings: SettingsDep) -> WaysIn:
     """How one can sign in here, besides by name and password."""
-    declared = services.settings.oidc
+    declared = settings.oidc
     shown = [ProviderOut(id=name, label=one.label) for name, one in declared.items()]
-    return WaysIn(providers=shown, resets_by_mail=can_send(services.settings))
+    return WaysIn(providers=shown, resets_by_mail=can_send(settings))
 
 
 @router.post("/session/providers/{provider}")
@@ -226,16 +227,16 @@ def _go_on(
 
 
 @router.get("/logins")
-def list_logins(services: ServicesDep, me: Myself) -> list[LoginOut]:
+def list_logins(database: DatabaseDep, me: Myself) -> list[LoginOut]:
     """One's own logins with providers."""
-    with services.database.read() as session:
+    with database.read() as session:
         return [LoginOut.model_validate(row) for row in provider_sign_in.own_logins(session, me)]
 
 
 @router.delete("/logins/{login_id}", status_code=204)
-def remove_login(services: ServicesDep, me: FreshMyself, login_id: Number, after: BackgroundTasks) -> None:
+def remove_login(
+    database: DatabaseDep, settings: SettingsDep, me: FreshMyself, login_id: Number, after: BackgroundTasks
+) -> None:
     """Take a login off one's own account."""
-    provider_sign_in.remove_login(services.database, me, login_id)
-    after.add_task(
-        letters.send_notice, services.database, services.settings, me.account_id, letters.LOGIN_REMOVED
-    )
+    provider_sign_in.remove_login(database, me, login_id)
+    after.add_task(letters.send_notice, database, settings, me.account_id, letters.LOGIN_REMOVED)

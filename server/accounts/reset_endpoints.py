@@ -22,6 +22,7 @@ from server.accounts.schemas import (
 from server.accounts.throttle import DEVICE_COOKIE, SignInThrottle
 from server.context import ServicesDep
 from server.core.errors import ERROR_RESPONSES, NotFound
+from server.core.requests import DatabaseDep
 from server.core.settings import Settings
 
 router = APIRouter(prefix="/api/admin", tags=["account"], responses=ERROR_RESPONSES)
@@ -74,9 +75,9 @@ async def set_password(
 
 
 @router.get("/mail")
-def own_address(services: ServicesDep, me: Myself) -> OwnAddress:
+def own_address(database: DatabaseDep, me: Myself) -> OwnAddress:
     """Where a link for a new password goes."""
-    with services.database.read() as session:
+    with database.read() as session:
         return OwnAddress(address=account_of(session, me).email)
 
 

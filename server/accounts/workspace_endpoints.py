@@ -14,8 +14,8 @@ from server.accounts.schemas import (
     SetMember,
     WorkspaceOut,
 )
-from server.context import ServicesDep
 from server.core.errors import ERROR_RESPONSES
+from server.core.requests import DatabaseDep
 from server.studies.lookup import find_study
 
 # Workspaces and their members.
@@ -24,57 +24,57 @@ workspace_router = APIRouter(prefix="/api/admin/workspaces", tags=["workspaces"]
 
 
 @workspace_router.get("")
-def list_workspaces(services: ServicesDep, identity: Myself) -> list[WorkspaceOut]:
+def list_workspaces(database: DatabaseDep, identity: Myself) -> list[WorkspaceOut]:
     """The workspaces one belongs to; all of them for who manages the server."""
-    with services.database.read() as session:
+    with database.read() as session:
         return workspaces.listed(session, identity)
 
 
 @workspace_router.post("", status_code=201)
-def create_workspace(services: ServicesDep, identity: Founder, body: NewWorkspace) -> list[WorkspaceOut]:
+def create_workspace(database: DatabaseDep, identity: Founder, body: NewWorkspace) -> list[WorkspaceOut]:
     """Make a workspace and own it; gives the list with it."""
-    with services.database.write() as session:
+    with database.write() as session:
         workspaces.create(session, body.name, body.title, identity)
-    return list_workspaces(services, identity)
+    return list_workspaces(database, identity)
 
 
 @workspace_router.put("/{workspace}", status_code=204)
-def change_workspace(services: ServicesDep, identity: Myself, workspace: str, body: ChangeWorkspace) -> None:
+def change_workspace(database: DatabaseDep, identity: Myself, workspace: str, body: ChangeWorkspace) -> None:
     """Change the title, or whether a second factor is asked for."""
-    with services.database.write() as session:
+    with database.write() as session:
         known = workspaces.managed(session, workspace, identity)
         workspaces.change(session, known, body.title, body.second_factor_required, identity)
 
 
 @workspace_router.delete("/{workspace}", status_code=204)
-def delete_workspace(services: ServicesDep, identity: Owner, workspace: str) -> None:
+def delete_workspace(database: DatabaseDep, identity: Owner, workspace: str) -> None:
     """Remove a workspace without studies."""
-    with services.database.write() as session:
+    with database.write() as session:
         workspaces.delete(session, workspaces.managed(session, workspace, identity), identity)
 
 
 @workspace_router.get("/{workspace}/members")
-def list_members(services: ServicesDep, identity: Myself, workspace: str) -> list[MemberOut]:
+def list_members(database: DatabaseDep, identity: Myself, workspace: str) -> list[MemberOut]:
     """Who belongs to a workspace; for its owners."""
-    with services.database.write() as session:
+    with database.write() as session:
         return workspaces.members(session, workspaces.managed(session, workspace, identity))
 
 
 @workspace_router.put("/{workspace}/members/{account}", status_code=204)
 def set_member(
-    services: ServicesDep, identity: FreshMyself, workspace: str, account: str, body: SetMember
+    database: DatabaseDep, identity: FreshMyself, workspace: str, account: str, body: SetMember
 ) -> None:
     """Take an account into a workspace, or change its role there."""
-    with services.database.write() as session:
+    with database.write() as session:
         workspaces.set_member(
             session, workspaces.managed(session, workspace, identity), account, body.role, identity
         )
 
 
 @workspace_router.delete("/{workspace}/members/{account}", status_code=204)
-def remove_member(services: ServicesDep, identity: Myself, workspace: str, account: str) -> None:
+def remove_member(database: DatabaseDep, identity: Myself, workspace: str, account: str) -> None:
     """Take an account out of a workspace; rights granted on single studies stay."""
-    with services.database.write() as session:
+    with database.write() as session:
         workspaces.set_member(
             session, workspaces.managed(session, workspace, identity), account, None, identity
         )
@@ -86,22 +86,22 @@ grant_router = APIRouter(prefix="/api/admin/studies/{study}", tags=["workspaces"
 
 
 @grant_router.get("/grants")
-def list_grants(services: ServicesDep, identity: Myself, study: str) -> list[GrantOut]:
+def list_grants(database: DatabaseDep, identity: Myself, study: str) -> list[GrantOut]:
     """The rights granted on a study."""
-    with services.database.read() as session:
+    with database.read() as session:
         return workspaces.grants_on(session, find_study(session, study, identity, "own"))
 
 
 @grant_router.put("/grants/{account}", status_code=204)
-def set_grant(services: ServicesDep, identity: FreshMyself, study: str, account: str, body: SetGrant) -> None:
+def set_grant(database: DatabaseDep, identity: FreshMyself, study: str, account: str, body: SetGrant) -> None:
     """Grant an account rights on a study, beside those it has by its role; an empty list takes them back."""
-    with services.database.write() as session:
+    with database.write() as session:
         workspaces.grant(session, find_study(session, study, identity, "own"), account, body.rights, identity)
 
 
 @grant_router.put("/workspace", status_code=204)
-def move_study(services: ServicesDep, identity: FreshMyself, study: str, body: MoveStudy) -> None:
+def move_study(database: DatabaseDep, identity: FreshMyself, study: str, body: MoveStudy) -> None:
     """Put a study into another workspace in which one may make studies."""
-    with services.database.write() as session:
+    with database.write() as session:
         known = find_study(session, study, identity, "own")
         workspaces.move(session, known, workspaces.workspace_for(session, identity, body.workspace), identity)

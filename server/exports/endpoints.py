@@ -20,6 +20,7 @@ from server.accounts.identity import Identity
 from server.context import Services, ServicesDep
 from server.core.db import Database
 from server.core.errors import ERROR_RESPONSES, Conflict, NotFound
+from server.core.requests import DatabaseDep, SettingsDep
 from server.core.values import Number, encoded
 from server.exports import capsules as capsule_service
 from server.exports import reports as report_service
@@ -176,10 +177,10 @@ def download_runs(asked: AskedAsCsv) -> StreamingResponse:
 
 @router.get("/analysis.{language}", response_class=Response)
 def download_script(
-    services: ServicesDep, identity: Viewer, study: str, language: ScriptLanguage
+    database: DatabaseDep, identity: Viewer, study: str, language: ScriptLanguage
 ) -> Response:
     """A script that analyses the long CSV, saved beside it under its own name: for R, or for Python."""
-    with services.database.read() as session:
+    with database.read() as session:
         text = script(
             active_definition(session, find_study(session, study, identity, "view")),
             language,
@@ -208,9 +209,9 @@ def download_identities(services: ServicesDep, identity: Myself, study: str) -> 
 
 
 @router.get("/codebook.md", response_class=Response)
-def download_codebook(services: ServicesDep, identity: Viewer, study: str) -> Response:
+def download_codebook(database: DatabaseDep, identity: Viewer, study: str) -> Response:
     """What every column means."""
-    with services.database.read() as session:
+    with database.read() as session:
         text = b"".join(
             FORMATS["codebook"](session, find_study(session, study, identity, "view"), EVERYTHING)
         )
@@ -269,10 +270,12 @@ def build_study_capsule(services: ServicesDep, identity: Writer, study: str, bod
 
 
 @capsule_router.get("/{capsule}.zip", response_class=FileResponse)
-def get_capsule(services: ServicesDep, identity: ReportReader, study: str, capsule: str) -> FileResponse:
+def get_capsule(
+    database: DatabaseDep, settings: SettingsDep, identity: ReportReader, study: str, capsule: str
+) -> FileResponse:
     """A finished capsule. Anybody can verify it with `analysis verify`."""
-    with services.database.read() as session:
-        path = capsule_service.capsule_file(services.settings, session, study, identity, capsule)
+    with database.read() as session:
+        path = capsule_service.capsule_file(settings, session, study, identity, capsule)
     return FileResponse(path, filename=f"{study}-capsule.zip", media_type="application/zip")
 
 
@@ -341,9 +344,9 @@ class SealOut(BaseModel):
 
 
 @seal_router.get("")
-def get_seal(services: ServicesDep, identity: Viewer, study: str) -> SealOut:
+def get_seal(database: DatabaseDep, identity: Viewer, study: str) -> SealOut:
     """Whether there is a sealed plan."""
-    with services.database.read() as session:
+    with database.read() as session:
         known = find_study(session, study, identity, "view")
         return _out(seal_of(session, known), people_begun(session, known))
 
@@ -361,9 +364,9 @@ def _out(seal: Seal | None, people: int) -> SealOut:
 
 
 @seal_router.post("", status_code=201)
-def seal_study(services: ServicesDep, identity: Writer, study: str, body: NewSeal) -> SealOut:
+def seal_study(database: DatabaseDep, identity: Writer, study: str, body: NewSeal) -> SealOut:
     """Seal design, exclusions, analysis plan and power, once, before the first participant."""
-    with services.database.write() as session:
+    with database.write() as session:
         # Nobody has begun: else it would not be sealed.
         return _out(
             seal_plan(session, find_study(session, study, identity, "edit"), identity, body.power), people=0
@@ -372,10 +375,10 @@ def seal_study(services: ServicesDep, identity: Writer, study: str, body: NewSea
 
 @seal_router.get("/plan.{ending}", response_class=Response)
 def download_seal(
-    services: ServicesDep, identity: Viewer, study: str, ending: Literal["json", "html"]
+    database: DatabaseDep, identity: Viewer, study: str, ending: Literal["json", "html"]
 ) -> Response:
     """The sealed file, or a page of it that prints well."""
-    seal = _sealed(services.database, study, identity)
+    seal = _sealed(database, study, identity)
     text, kind = (seal.text(), "application/json") if ending == "json" else (page(seal), "text/html")
     headers = {"content-disposition": f'attachment; filename="{study}-seal.{ending}"'}
     return Response(encoded(text), media_type=f"{kind}; charset=utf-8", headers=headers)

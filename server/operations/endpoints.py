@@ -8,8 +8,8 @@ from pydantic import BaseModel, Field
 
 from experiments.errors import InputError
 from server.accounts.access import Owner
-from server.context import ServicesDep
 from server.core.errors import ERROR_RESPONSES, ApiError
+from server.core.requests import DatabaseDep, SettingsDep
 from server.core.settings import Settings
 from server.operations.metrics import exposition
 from server.operations.watched_backups import (
@@ -73,20 +73,20 @@ class MetricsNotForYou(ApiError):
 
 
 @router.get("/metrics")
-def metrics(request: Request, services: ServicesDep) -> Response:
+def metrics(request: Request, database: DatabaseDep, settings: SettingsDep) -> Response:
     """Counts and times in Prometheus' text format."""
-    if not _allowed(request, services.settings.metrics_token):
+    if not _allowed(request, settings.metrics_token):
         raise MetricsNotForYou(
             "Metrics need `Authorization: Bearer` with PALPEBRA_METRICS_TOKEN; "
             "without that setting they are given to this machine alone."
         )
-    return Response(exposition(services.database, services.settings), media_type=CONTENT_TYPE_LATEST)
+    return Response(exposition(database, settings), media_type=CONTENT_TYPE_LATEST)
 
 
 @admin_router.get("/backups")
-def get_backups(services: ServicesDep, _identity: Owner) -> BackupsOut:
+def get_backups(settings: SettingsDep, _identity: Owner) -> BackupsOut:
     """How old the newest backup is, and how the last restore drill went."""
-    return backups_out(services.settings)
+    return backups_out(settings)
 
 
 def _allowed(request: Request, token: str) -> bool:

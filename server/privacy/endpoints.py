@@ -3,8 +3,8 @@
 from fastapi import APIRouter, Response
 
 from server.accounts.access import Myself
-from server.context import ServicesDep
 from server.core.errors import ERROR_RESPONSES
+from server.core.requests import DatabaseDep
 from server.core.values import now
 from server.privacy import persons as person_service
 from server.privacy import retention as retention_service
@@ -19,9 +19,9 @@ person_router = APIRouter(
 
 
 @person_router.get("/{run}/subject-access", response_class=Response)
-def get_subject_access(services: ServicesDep, identity: Myself, study: str, run: str) -> Response:
+def get_subject_access(database: DatabaseDep, identity: Myself, study: str, run: str) -> Response:
     """Everything stored of one person in the study, as JSON; for owners, and in the audit log."""
-    with services.database.write() as session:
+    with database.write() as session:
         known = find_study(session, study, identity, "own")
         visits = person_service.visits_of(session, known, run, "")
         told = person_service.subject_access(session, known, visits, identity)
@@ -37,7 +37,7 @@ retention_router = APIRouter(
 
 
 @retention_router.get("")
-def get_retention(services: ServicesDep, identity: Myself, study: str) -> RetentionPreview:
+def get_retention(database: DatabaseDep, identity: Myself, study: str) -> RetentionPreview:
     """The periods that the study declares, what is due by them now, and when something is due next."""
-    with services.database.read() as session:
+    with database.read() as session:
         return retention_service.preview(session, find_study(session, study, identity, "view"), now())

@@ -6,6 +6,7 @@ from fastapi.responses import FileResponse
 from server.accounts.access import Viewer, Writer
 from server.context import ServicesDep
 from server.core.errors import ERROR_RESPONSES
+from server.core.requests import DatabaseDep, SettingsDep
 from server.exports.reports import REPORT_POLICY
 from server.rehearsals import service
 from server.rehearsals.schemas import NewRehearsal, RehearsalOut, RehearsalResult
@@ -29,10 +30,12 @@ def begin_rehearsal(services: ServicesDep, identity: Writer, study: str, body: N
 
 
 @router.get("/{rehearsal}")
-def get_rehearsal(services: ServicesDep, identity: Viewer, study: str, rehearsal: str) -> RehearsalResult:
+def get_rehearsal(
+    database: DatabaseDep, settings: SettingsDep, identity: Viewer, study: str, rehearsal: str
+) -> RehearsalResult:
     """What a rehearsal showed: orders, times, columns, report and power."""
-    with services.database.read() as session:
-        return service.result(services.settings, session, study, identity, rehearsal)
+    with database.read() as session:
+        return service.result(settings, session, study, identity, rehearsal)
 
 
 @router.post("/{rehearsal}/cancel", status_code=204)
@@ -43,11 +46,11 @@ def cancel_rehearsal(services: ServicesDep, identity: Writer, study: str, rehear
 
 @router.get("/{rehearsal}/report/{file}", response_class=FileResponse)
 def get_rehearsed_report_file(
-    services: ServicesDep, identity: Viewer, study: str, rehearsal: str, file: str
+    database: DatabaseDep, settings: SettingsDep, identity: Viewer, study: str, rehearsal: str, file: str
 ) -> FileResponse:
     """One file of the report that the simulated people would give."""
-    with services.database.read() as session:
-        path = service.report_file(services.settings, session, study, identity, rehearsal, file)
+    with database.read() as session:
+        path = service.report_file(settings, session, study, identity, rehearsal, file)
     kind = "attachment" if path.suffix != ".html" else "inline"
     headers = {"content-security-policy": REPORT_POLICY}
     name = f"{study}-rehearsal-{path.name}"

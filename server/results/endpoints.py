@@ -17,6 +17,7 @@ from server.context import ServicesDep
 from server.core.changes import Changes, Stopping
 from server.core.db import Database
 from server.core.errors import ERROR_RESPONSES, NotFound
+from server.core.requests import DatabaseDep, SettingsDep
 from server.core.values import Number
 from server.participation.run_schemas import Origin
 from server.privacy.erasures import erase
@@ -113,18 +114,18 @@ def _snapshot(database: Database, name: str, identity: Identity, origin: Origin 
 
 @monitor_router.get("/monitor")
 def get_monitor(
-    services: ServicesDep, identity: Viewer, study: str, origin: Origin | None = None
+    database: DatabaseDep, identity: Viewer, study: str, origin: Origin | None = None
 ) -> MonitorSnapshot:
     """The monitor at this moment, of one origin; that of people now taking part where none is given."""
-    return _snapshot(services.database, study, identity, origin)
+    return _snapshot(database, study, identity, origin)
 
 
 @monitor_router.get("/failing-clips")
 def list_failing_clips(
-    services: ServicesDep, identity: Viewer, study: str, origin: Origin | None = None
+    database: DatabaseDep, identity: Viewer, study: str, origin: Origin | None = None
 ) -> list[FailingClip]:
     """The clips that people could not see in the latest runs, those that raise an alarm first."""
-    with services.database.read() as session:
+    with database.read() as session:
         return failing_clips(session, find_study(session, study, identity, "view"), origin)
 
 
@@ -203,7 +204,7 @@ run_router = APIRouter(
 
 @run_router.get("")
 def list_runs(
-    services: ServicesDep,
+    database: DatabaseDep,
     identity: PersonalReader,
     study: str,
     show: Show = "everybody",
@@ -213,50 +214,52 @@ def list_runs(
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
 ) -> RunPage:
     """The runs, the latest first, a page at a time: go on with `before` = `next`."""
-    with services.database.read() as session:
+    with database.read() as session:
         known = find_study(session, study, identity, "export")
         shown = run_service.page(session, known, show, search, before, limit, simulated=simulated)
-    with services.database.write() as session:
+    with database.write() as session:
         record(session, identity, "participants listed", "study", study, number=len(shown.runs))
     return shown
 
 
 @run_router.get("/{run}")
-def get_timeline(services: ServicesDep, identity: PersonalReader, study: str, run: str) -> Timeline:
+def get_timeline(database: DatabaseDep, identity: PersonalReader, study: str, run: str) -> Timeline:
     """One run: each trial with its frames and rating, forms, calibrations, events."""
-    with services.database.write() as session:
+    with database.write() as session:
         timeline = run_service.timeline(session, find_study(session, study, identity, "export"), run)
         record(session, identity, "personal data read", "run", run, study=study)
         return timeline
 
 
 @run_router.get("/{run}/identity")
-def get_identity(services: ServicesDep, identity: Myself, study: str, run: str) -> RunIdentity:
+def get_identity(database: DatabaseDep, identity: Myself, study: str, run: str) -> RunIdentity:
     """Who the participant is to the recruiter; for owners of the study, and each look is in the audit log."""
-    with services.database.write() as session:
+    with database.write() as session:
         return run_service.identity(session, find_study(session, study, identity, "own"), run, identity)
 
 
 @run_router.put("/{run}/exclusion", status_code=204)
-def exclude_run(services: ServicesDep, identity: Writer, study: str, run: str, body: Exclude) -> None:
+def exclude_run(database: DatabaseDep, identity: Writer, study: str, run: str, body: Exclude) -> None:
     """Exclude a run from exports' `excluded = 0` and from the analysis; its data stay."""
-    with services.database.write() as session:
+    with database.write() as session:
         run_service.exclude(session, find_study(session, study, identity, "run"), run, body.reason, identity)
 
 
 @run_router.delete("/{run}/exclusion", status_code=204)
-def include_run(services: ServicesDep, identity: Writer, study: str, run: str) -> None:
+def include_run(database: DatabaseDep, identity: Writer, study: str, run: str) -> None:
     """Undo an exclusion."""
-    with services.database.write() as session:
+    with database.write() as session:
         run_service.include(session, find_study(session, study, identity, "run"), run, identity)
 
 
 @run_router.post("/{run}/erase")
-def erase_run(services: ServicesDep, identity: Eraser, study: str, run: str, body: Erase) -> Erased:
+def erase_run(
+    database: DatabaseDep, settings: SettingsDep, identity: Eraser, study: str, run: str, body: Erase
+) -> Erased:
     """Delete one person's data for good (a request under data protection law)."""
-    with services.database.write() as session:
+    with database.write() as session:
         known = find_study(session, study, identity, "edit")
-        return erase(session, services.settings, known, run, body.confirm, identity)
+        return erase(session, settings, known, run, body.confirm, identity)
 
 
 # A run as it was shown: its trials, and each with its frame logs. Both are looks at one person's data.
@@ -267,9 +270,9 @@ replay_router = APIRouter(
 
 
 @replay_router.get("")
-def get_replay(services: ServicesDep, identity: PersonalReader, study: str, run: str) -> Replay:
+def get_replay(database: DatabaseDep, identity: PersonalReader, study: str, run: str) -> Replay:
     """The trials of a run that can be played back, and how they were to look."""
-    with services.database.write() as session:
+    with database.write() as session:
         replay = replay_service.replay(session, find_study(session, study, identity, "export"), run)
         record(session, identity, "personal data read", "run", run, study=study, part="replay")
         return replay
@@ -277,14 +280,14 @@ def get_replay(services: ServicesDep, identity: PersonalReader, study: str, run:
 
 @replay_router.get("/trials/{trial_index}")
 def get_replayed_trial(
-    services: ServicesDep,
+    database: DatabaseDep,
     identity: PersonalReader,
     study: str,
     run: str,
     trial_index: Annotated[int, Path(ge=0, le=1_000_000)],
 ) -> ReplayedTrial:
     """One trial: each view's frames and when they were drawn, its answers and events."""
-    with services.database.write() as session:
+    with database.write() as session:
         known = find_study(session, study, identity, "export")
         trial = replay_service.replayed_trial(session, known, run, trial_index)
         record(session, identity, "personal data read", "run", run, study=study, part=f"trial {trial_index}")
@@ -319,14 +322,14 @@ class MethodsOut(BaseModel):
 
 @methods_router.get("")
 def get_methods(
-    services: ServicesDep,
+    database: DatabaseDep,
     identity: Viewer,
     study: str,
     origin: MethodsOrigin = "participant",
     series: Number | None = None,
 ) -> MethodsOut:
     """Recruitment, screening, checks, exclusions, display and automated answers, in sentences with counts."""
-    with services.database.read() as session:
+    with database.read() as session:
         methods = methods_service.methods_of(
             session, find_study(session, study, identity, "view"), origin, series
         )
@@ -338,14 +341,14 @@ def get_methods(
 
 @methods_router.get("/methods.txt", response_class=Response)
 def get_methods_text(
-    services: ServicesDep,
+    database: DatabaseDep,
     identity: Viewer,
     study: str,
     origin: MethodsOrigin = "participant",
     series: Number | None = None,
 ) -> Response:
     """The paragraph as plain text, with the query of each number below it."""
-    with services.database.read() as session:
+    with database.read() as session:
         methods = methods_service.methods_of(
             session, find_study(session, study, identity, "view"), origin, series
         )

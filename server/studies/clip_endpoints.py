@@ -16,6 +16,7 @@ from server.accounts.identity import Identity
 from server.accounts.workspaces import Uploader
 from server.context import ServicesDep
 from server.core.errors import ERROR_RESPONSES, ApiError, Invalid, NotFound
+from server.core.requests import DatabaseDep, SettingsDep
 from server.core.settings import Settings
 from server.core.storage import CHUNK_BYTES
 from server.studies import uploads
@@ -79,16 +80,16 @@ def upload_more(
 
 
 @upload_router.get("/uploads/{upload}")
-def get_upload(services: ServicesDep, identity: Uploader, upload: str) -> UploadOut:
+def get_upload(settings: SettingsDep, identity: Uploader, upload: str) -> UploadOut:
     """Every file of an upload: what it is, how it was changed, or why it cannot be used."""
-    folder = uploads.upload_folder(services.settings.upload_folder, upload, identity.account_id)
+    folder = uploads.upload_folder(settings.upload_folder, upload, identity.account_id)
     return uploads.describe(upload, folder)
 
 
 @upload_router.get("/uploads/{upload}/clips/{sha256}", response_class=FileResponse)
-def get_uploaded_clip(services: ServicesDep, identity: Uploader, upload: str, sha256: str) -> FileResponse:
+def get_uploaded_clip(settings: SettingsDep, identity: Uploader, upload: str, sha256: str) -> FileResponse:
     """A clip of an upload as participants would get it, so that the experimenter's browser can try it."""
-    folder = uploads.upload_folder(services.settings.upload_folder, upload, identity.account_id)
+    folder = uploads.upload_folder(settings.upload_folder, upload, identity.account_id)
     headers = {"content-disposition": "attachment", "cache-control": "private, no-store"}
     return FileResponse(uploads.find_clip(folder, sha256), 200, headers, "application/octet-stream")
 
@@ -144,9 +145,9 @@ def get_original(services: ServicesDep, identity: Viewer, study: str, sha256: st
 
 
 @upload_router.get("/studies/{study}/originals/{sha256}/frame-map.csv", response_class=PlainTextResponse)
-def get_frame_map(services: ServicesDep, identity: Viewer, study: str, sha256: str) -> PlainTextResponse:
+def get_frame_map(database: DatabaseDep, identity: Viewer, study: str, sha256: str) -> PlainTextResponse:
     """For each frame of a converted clip the frame of its original that it shows, both from 0."""
-    with services.database.read() as session:
+    with database.read() as session:
         source = uploads.find_source(session, study, sha256, identity)
     shown = source.frame_map or range(source.frames)
     headers = {"content-disposition": uploads.content_disposition(f"{source.file}.frame-map.csv")}

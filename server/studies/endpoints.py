@@ -11,6 +11,7 @@ from server.accounts.audit import record
 from server.accounts.workspaces import Uploader
 from server.context import ServicesDep
 from server.core.errors import ERROR_RESPONSES
+from server.core.requests import DatabaseDep, SettingsDep
 from server.core.settings import Settings
 from server.core.values import Number, now
 from server.models import Link
@@ -61,9 +62,9 @@ router = APIRouter(prefix="/api/admin", tags=["studies"], responses=ERROR_RESPON
 
 
 @router.get("/experiments")
-def list_experiments(services: ServicesDep, _identity: Viewer) -> list[ShippedExperiment]:
+def list_experiments(settings: SettingsDep, _identity: Viewer) -> list[ShippedExperiment]:
     """The experiments that come with the program."""
-    return creation.shipped(services.settings)
+    return creation.shipped(settings)
 
 
 @router.post("/definitions/check")
@@ -79,9 +80,9 @@ def edit_definition(_identity: Viewer, body: EditDefinition) -> EditedDefinition
 
 
 @router.get("/studies")
-def list_studies(services: ServicesDep, identity: Viewer) -> list[StudySummary]:
+def list_studies(database: DatabaseDep, identity: Viewer) -> list[StudySummary]:
     """The studies that are open to the account, the latest first."""
-    with services.database.read() as session:
+    with database.read() as session:
         return service.summaries(session, identity)
 
 
@@ -89,20 +90,20 @@ def list_studies(services: ServicesDep, identity: Viewer) -> list[StudySummary]:
 def create_study(services: ServicesDep, identity: Uploader, body: NewStudy) -> StudyDetail:
     """Create a draft from a shipped experiment, a definition, or uploaded clips."""
     name = creation.create(services.database, services.settings, services.clips, body, identity)
-    return get_study(services, identity, name)
+    return get_study(services.database, identity, name)
 
 
 @router.get("/studies/{study}")
-def get_study(services: ServicesDep, identity: Viewer, study: str) -> StudyDetail:
+def get_study(database: DatabaseDep, identity: Viewer, study: str) -> StudyDetail:
     """One study with its declaration."""
-    with services.database.read() as session:
+    with database.read() as session:
         return service.detail(session, study, identity)
 
 
 @router.delete("/studies/{study}", status_code=204)
-def delete_study(services: ServicesDep, identity: Writer, study: str) -> None:
+def delete_study(database: DatabaseDep, identity: Writer, study: str) -> None:
     """Delete a draft that nobody has taken part in."""
-    with services.database.write() as session:
+    with database.write() as session:
         service.delete(session, study, identity)
 
 
@@ -110,50 +111,50 @@ def delete_study(services: ServicesDep, identity: Writer, study: str) -> None:
 def add_version(services: ServicesDep, identity: Writer, study: str, body: NewVersion) -> StudyDetail:
     """Store a changed definition as a new version; runs keep the version they began with."""
     creation.add_definition(services.database, services.settings, services.clips, study, body, identity)
-    return get_study(services, identity, study)
+    return get_study(services.database, identity, study)
 
 
 @router.post("/studies/{study}/versions/check")
-def judge_version(services: ServicesDep, identity: Viewer, study: str, body: DefinitionText) -> JudgedEdit:
+def judge_version(database: DatabaseDep, identity: Viewer, study: str, body: DefinitionText) -> JudgedEdit:
     """Say, before a changed definition is saved, what changes and whether a new data series would begin."""
-    with services.database.read() as session:
+    with database.read() as session:
         return definitions.judge_edit(session, study, body.toml, identity)
 
 
 @router.get("/studies/{study}/versions/{number}", response_class=PlainTextResponse)
-def get_version(services: ServicesDep, identity: Viewer, study: str, number: Number) -> str:
+def get_version(database: DatabaseDep, identity: Viewer, study: str, number: Number) -> str:
     """The TOML of one version."""
-    with services.database.read() as session:
+    with database.read() as session:
         return service.version_text(session, study, number, identity)
 
 
 @router.put("/studies/{study}/status")
-def change_status(services: ServicesDep, identity: Writer, study: str, body: ChangeStatus) -> StudyDetail:
+def change_status(database: DatabaseDep, identity: Writer, study: str, body: ChangeStatus) -> StudyDetail:
     """draft -> pilot -> live -> closed."""
-    with services.database.write() as session:
+    with database.write() as session:
         service.change_status(session, study, body.revision, body.status, identity)
-    return get_study(services, identity, study)
+    return get_study(database, identity, study)
 
 
 @router.get("/studies/{study}/launch-checks")
-def list_launch_checks(services: ServicesDep, identity: Viewer, study: str) -> list[LaunchCheck]:
+def list_launch_checks(database: DatabaseDep, identity: Viewer, study: str) -> list[LaunchCheck]:
     """What to look at before the study goes live."""
-    with services.database.read() as session:
+    with database.read() as session:
         return launch_checks(session, study, identity)
 
 
 @router.put("/studies/{study}/settings")
-def change_settings(services: ServicesDep, identity: Writer, study: str, body: ChangeSettings) -> StudyDetail:
+def change_settings(database: DatabaseDep, identity: Writer, study: str, body: ChangeSettings) -> StudyDetail:
     """Pause, quota and recruiter."""
-    with services.database.write() as session:
+    with database.write() as session:
         service.change_settings(session, study, body, identity)
-    return get_study(services, identity, study)
+    return get_study(database, identity, study)
 
 
 @router.get("/studies/{study}/clips")
-def list_clips(services: ServicesDep, identity: Viewer, study: str) -> list[ClipOut]:
+def list_clips(database: DatabaseDep, identity: Viewer, study: str) -> list[ClipOut]:
     """Every clip of the active version with the closure curve it shows."""
-    with services.database.read() as session:
+    with database.read() as session:
         return service.clips(session, study, identity)
 
 
@@ -163,26 +164,26 @@ life_router = APIRouter(prefix="/api/admin/studies/{study}", tags=["studies"], r
 
 
 @life_router.post("/copies", status_code=201)
-def clone_study(services: ServicesDep, identity: Writer, study: str, body: CloneStudy) -> StudyDetail:
+def clone_study(database: DatabaseDep, identity: Writer, study: str, body: CloneStudy) -> StudyDetail:
     """Copy a version's declaration and clips into a new draft; links, quota and recruiter are not copied."""
-    with services.database.write() as session:
+    with database.write() as session:
         service.clone_study(session, study, body, identity)
-    with services.database.read() as session:
+    with database.read() as session:
         return service.detail(session, body.name, identity)
 
 
 @life_router.put("/archive")
-def archive_study(services: ServicesDep, identity: Writer, study: str, body: ArchiveStudy) -> StudyDetail:
+def archive_study(database: DatabaseDep, identity: Writer, study: str, body: ArchiveStudy) -> StudyDetail:
     """Put a draft or closed study into the archive, where it can be read but not changed, or take it out."""
-    with services.database.write() as session:
+    with database.write() as session:
         service.archive_study(session, study, body, identity)
-    with services.database.read() as session:
+    with database.read() as session:
         return service.detail(session, study, identity)
 
 
 @life_router.get("/comparison")
 def compare_versions(
-    services: ServicesDep,
+    database: DatabaseDep,
     identity: Viewer,
     study: str,
     old: Number,
@@ -190,7 +191,7 @@ def compare_versions(
     other: Annotated[str | None, Query(description="The study that `old` is a version of.")] = None,
 ) -> Comparison:
     """What differs between two versions: keys of the declaration, word by word, and clips."""
-    with services.database.read() as session:
+    with database.read() as session:
         return series.compare_versions(session, (other or study, old), (study, new), identity)
 
 
@@ -213,21 +214,28 @@ def _link_out(settings: Settings, row: Link | dict[str, Any], runs: int = 0, com
 
 @link_router.get("")
 def list_links(
-    services: ServicesDep, identity: Writer, study: str, after: str | None = None, limit: Limit = 100
+    database: DatabaseDep,
+    settings: SettingsDep,
+    identity: Writer,
+    study: str,
+    after: str | None = None,
+    limit: Limit = 100,
 ) -> LinkPage:
     """The links of a study in the order they were made, a page at a time: go on with `after` = `next`."""
-    with services.database.read() as session:
+    with database.read() as session:
         known = find_study(session, study, identity, "run")
         page = page_of_links(session, known, after, limit)
         return LinkPage(
-            links=[_link_out(services.settings, link, *runs) for link, runs in page.links],
+            links=[_link_out(settings, link, *runs) for link, runs in page.links],
             total=page.total,
             next=page.next,
         )
 
 
 @link_router.post("", status_code=201)
-def create_links(services: ServicesDep, identity: Writer, study: str, body: NewLinks) -> list[LinkOut]:
+def create_links(
+    database: DatabaseDep, settings: SettingsDep, identity: Writer, study: str, body: NewLinks
+) -> list[LinkOut]:
     """Make a general or preview link, or many personal ones: by their labels, or `count` numbered ones."""
     labels = [body.label]
     if body.kind == "personal":
@@ -240,18 +248,19 @@ def create_links(services: ServicesDep, identity: Writer, study: str, body: NewL
         recruiter=body.recruiter.model_dump() if body.recruiter else None,
         created_by=identity.account_id,
     )
-    rows = prepared_links(services.settings.key, options, labels)
-    with services.database.write() as session:
+    rows = prepared_links(settings.key, options, labels)
+    with database.write() as session:
         known = find_study(session, study, identity, "run")
         refuse_recruiter(known, body.recruiter, "Links")
         make_links(session, known, body.kind, body.group, rows)
         record(session, identity, "links made", "study", study, links=body.kind, number=len(rows))
-    return [_link_out(services.settings, row) for row in rows]
+    return [_link_out(settings, row) for row in rows]
 
 
 @link_router.get("/signing")
 def get_signing(
-    services: ServicesDep,
+    database: DatabaseDep,
+    settings: SettingsDep,
     identity: Myself,
     study: str,
     secret_name: Label | None = None,
@@ -261,31 +270,33 @@ def get_signing(
 
     Where a link has a recruiter of its own, give its id as `link`; the study's recruiter counts without.
     """
-    with services.database.write() as session:
+    with database.write() as session:
         known = find_study(session, study, identity, "own")
         of_link = None if link is None else link_in_use(session, known, link)
-        return signing(session, services.settings.key, known, secret_name, identity, of_link)
+        return signing(session, settings.key, known, secret_name, identity, of_link)
 
 
 @link_router.get("/personal.csv", response_class=Response)
-def download_personal_links(services: ServicesDep, identity: Writer, study: str) -> Response:
+def download_personal_links(
+    database: DatabaseDep, settings: SettingsDep, identity: Writer, study: str
+) -> Response:
     """The personal links as CSV: label, link, runs, complete, group."""
     rows: list[tuple[Any, ...]] = [("label", "url", "runs", "complete", "group")]
-    with services.database.read() as session:
+    with database.read() as session:
         known = find_study(session, study, identity, "run")
         for link, runs, complete in links_with_runs(session, known, LINKS_READ_AT_ONCE, "personal"):
-            url = link_url(services.settings.public_url, services.settings.key, link.public_id)
+            url = link_url(settings.public_url, settings.key, link.public_id)
             rows.append((link.label, url, runs, complete, link.group_name))
-    with services.database.write() as session:
+    with database.write() as session:
         record(session, identity, "personal links downloaded", "study", study)
     headers = {"content-disposition": f'attachment; filename="{study}-links.csv"'}
     return Response(guarded_table(rows), media_type="text/csv; charset=utf-8", headers=headers)
 
 
 @link_router.delete("/{link}", status_code=204)
-def revoke_link(services: ServicesDep, identity: Writer, study: str, link: str) -> None:
+def revoke_link(database: DatabaseDep, identity: Writer, study: str, link: str) -> None:
     """Withdraw a link; runs that began with it go on."""
-    with services.database.write() as session:
+    with database.write() as session:
         known = find_study(session, study, identity, "run")
         withdrawn = withdraw(session, known, link)
         # A personal link's label is a person's name, which an erasure could not take out of the log's chain.

@@ -10,8 +10,8 @@ from fastapi import APIRouter, Response
 from pydantic import BaseModel, Field, ValidationError
 
 from server.accounts.access import Viewer
-from server.context import ServicesDep
 from server.core.errors import ERROR_RESPONSES, NotFound
+from server.core.requests import SettingsDep
 from table_files.delimited import delimited_table
 
 # The shipped blinks, recorded and modelled, read from the files that come with `stimuli`.
@@ -45,9 +45,9 @@ class BlinkLibrary(BaseModel):
 
 
 @blink_router.get("/library")
-def get_library(services: ServicesDep, _identity: Viewer) -> BlinkLibrary:
+def get_library(settings: SettingsDep, _identity: Viewer) -> BlinkLibrary:
     """Recorded profiles and the PCA model."""
-    folder = services.settings.library_folder
+    folder = settings.library_folder
     if not (folder / "profiles.csv").is_file():
         raise NotFound("The blink library is not on this server.")
     return _library(folder, (folder / "profiles.csv").stat().st_mtime_ns)
@@ -88,16 +88,16 @@ class Strips(BaseModel):
 
 
 @strip_router.get("")
-def get_strips(services: ServicesDep, _identity: Viewer) -> Strips:
+def get_strips(settings: SettingsDep, _identity: Viewer) -> Strips:
     """What strips there are; none where they have not been made on this server."""
-    strips = _declared(services.settings.strips_folder)
+    strips = _declared(settings.strips_folder)
     return strips or Strips(width_px=1, height_px=1, closures=[], characters=[])
 
 
 @strip_router.get("/{name}.webp", response_class=Response)
-def get_strip(services: ServicesDep, _identity: Viewer, name: str) -> Response:
+def get_strip(settings: SettingsDep, _identity: Viewer, name: str) -> Response:
     """The strip of one character."""
-    folder = services.settings.strips_folder
+    folder = settings.strips_folder
     strips = _declared(folder)
     if strips is None or name not in strips.characters:
         raise NotFound(

@@ -1,7 +1,27 @@
-"""No module imports itself by a detour: every chain of imports ends."""
+"""No module imports itself by a detour, and every chain of imports ends after a few modules."""
+
+import ast
 
 import grimp
 import pytest
+
+from tests.conftest import REPOSITORY
+from tools.house.graphs import longest_chain, python_graph
+
+MAX_CHAIN = 15
+"""Modules of which each imports the next; where there are more, nobody follows a call to its end."""
+KNOW_EVERY_PART = {
+    "app",
+    "cli",
+    "cli_common",
+    "cli_backups",
+    "request_limits",
+    "web",
+    "doctor",
+    "drill",
+    "manners",
+}
+"""What starts, examines or guards the whole server; all else receives the parts that it uses."""
 
 
 @pytest.fixture(scope="module")
@@ -21,6 +41,21 @@ def test_no_module_imports_itself_by_a_detour(graph: grimp.ImportGraph) -> None:
             break
         left = {module: imported for module, imported in left.items() if module not in done}
     assert sorted(left) == []
+
+
+def test_the_longest_chain_of_imports_is_short() -> None:
+    """As `make house` counts: every import, in functions and under TYPE_CHECKING too."""
+    paths = sorted((REPOSITORY / "server").rglob("*.py"))
+    trees = {path.relative_to(REPOSITORY): ast.parse(path.read_text(encoding="utf-8")) for path in paths}
+    chain = longest_chain(python_graph(trees), "server")
+    assert len(chain) > 5
+    assert len(chain) <= MAX_CHAIN, " > ".join(" = ".join(group) for group in chain)
+
+
+def test_only_endpoints_and_what_runs_the_server_know_the_whole_context(graph: grimp.ImportGraph) -> None:
+    importers = graph.find_modules_that_directly_import("server.context")
+    names = {module.rsplit(".", 1)[-1] for module in importers - _called(graph, "endpoints")}
+    assert names <= KNOW_EVERY_PART
 
 
 @pytest.mark.parametrize(
