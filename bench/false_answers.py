@@ -29,7 +29,7 @@ from typing import Any
 from server.core.values import now
 from server.participation.clip_bytes import clip_digest, clip_hash
 from server.participation.intake import evidence_key, issue, ticket
-from server.rehearsals.http import JsonClient, Refused
+from server.rehearsals.http import JsonClient, RefusedRequest
 from server.rehearsals.person import Person, Rater
 from tests.browser.server_process import ServerProcess
 from tests.helpers.studies import SHORT
@@ -194,7 +194,7 @@ def attack(target: Target, seconds: float) -> tuple[dict[str, dict[str, int]], f
             path = f"{path}/{uuid.uuid4()}"
         try:
             said = f"{visit.http.call(method, path, body)[0]} taken"
-        except Refused as refusal:
+        except RefusedRequest as refusal:
             said = f"{refusal.status} {refusal.code}"
         answers.setdefault(kind, Counter())[said] += 1
     lasted = time.monotonic() - begun
@@ -247,7 +247,7 @@ def rate_honestly(address: str, link: str, number: int, end: float) -> tuple[int
                 try:
                     visit.http.call(*call)
                     taken += 1
-                except Refused as refusal:
+                except RefusedRequest as refusal:
                     refused[f"{refusal.status} {refusal.code}"] += 1
                 slowest = max(slowest, 1000 * (time.monotonic() - begun))
         visit.http.close()

@@ -14,7 +14,7 @@ from server.accounts import endpoints as accounts
 from server.accounts import provider_endpoints, reset_endpoints, workspace_endpoints
 from server.accounts.audit import RefusalLog
 from server.context import open_services
-from server.core.changes import ChangesTold
+from server.core.changes import ChangeNotifier
 from server.core.error_handlers import install_error_handlers
 from server.core.settings import Settings
 from server.exports import endpoints as exports
@@ -27,7 +27,7 @@ from server.participation.judgement import digests_judged_later
 from server.privacy import endpoints as privacy
 from server.privacy.retention import hourly_retention
 from server.rehearsals import endpoints as rehearsals
-from server.request_limits import Door, ExperimentersLane
+from server.request_limits import ConcurrencyLimit, RequestLimits
 from server.results import endpoints as results
 from server.results.counting import results_counted_ahead
 from server.studies import clip_endpoints, library
@@ -140,10 +140,10 @@ def create_app(settings: Settings | None = None, *, rehearses: bool = False) -> 
     app.router.routes.extend(every_route())
     refusals = RefusalLog(services.database, known=services.refusals, strangers=services.strangers)
     install_error_handlers(app, refusals.note)
-    app.add_middleware(ChangesTold, changes=services.changes)
-    app.add_middleware(ExperimentersLane)  # inside the door: a body that comes slowly holds no place
-    app.add_middleware(Door, settings=services.settings)
-    app.add_middleware(RowSecurity)  # outside the door, which recognises accounts too
+    app.add_middleware(ChangeNotifier, changes=services.changes)
+    app.add_middleware(ConcurrencyLimit)  # inside the limits: a body that comes slowly holds no place
+    app.add_middleware(RequestLimits, settings=services.settings)
+    app.add_middleware(RowSecurity)  # outside the limits, which recognise accounts too
     app.add_middleware(SecurityHeaders, settings=services.settings, clips_from=services.clips.origin())
     app.add_middleware(Observer, settings=services.settings)
     app.add_middleware(ProxyWatch, settings=services.settings)

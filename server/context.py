@@ -21,7 +21,7 @@ from server.participation.clip_bytes import ClipBytes
 from server.participation.intake import Intake
 from server.participation.versions import Versions
 from server.results.cache import ResultsCache
-from server.transcoding.preparing import Preparing
+from server.transcoding.preparing import UploadPreparation
 
 SIMULATED_TIME = "x-palpebra-simulated-time"
 REFUSALS_PER_MINUTE, REFUSALS_OF_A_KIND = 20, 3
@@ -50,7 +50,7 @@ class Services:
     results: ResultsCache
     intake: Intake
     resume_codes: RateLimit
-    preparing: Preparing
+    preparing: UploadPreparation
     providers: Providers
     streams: OpenStreams
     locks: Locks
@@ -90,7 +90,7 @@ def open_services(settings: Settings, *, rehearses: bool = False) -> Services:
         results=ResultsCache(),
         intake=Intake(settings, ClipBytes(clips), rehearses=rehearses),
         resume_codes=RateLimit(RESUME_CODES_PER_MINUTE, name="resume codes", shared=shared),
-        preparing=Preparing(settings.upload_folder, locks),
+        preparing=UploadPreparation(settings.upload_folder, locks),
         providers=Providers(settings),
         streams=OpenStreams(),
         locks=locks,

@@ -82,7 +82,7 @@ class Busy(ApiError):
     code = "busy"
 
 
-class _Gone(Exception):
+class _ClientGone(Exception):
     """The client went away before its request was complete."""
 
 
@@ -110,7 +110,7 @@ class _Body:
     held: int = 0
 
 
-class Door:
+class RequestLimits:
     """Collect JSON bodies within their limits, let uploads of known senders stream, cut those who stall."""
 
     def __init__(self, app: ASGIApp, settings: Settings) -> None:
@@ -131,7 +131,7 @@ class Door:
                 inner = await self._upload(scope, receive)
             else:
                 inner = await self._collected(scope, receive)
-        except _Gone:
+        except _ClientGone:
             return
         except ApiError as refusal:
             # The rest of the body is not waited for.
@@ -169,7 +169,7 @@ class Door:
         while more:
             message = await receive()
             if message["type"] == "http.disconnect":
-                raise _Gone
+                raise _ClientGone
             body.content += message.get("body", b"")
             more = message.get("more_body", False)
             if len(body.content) > body.limit:
@@ -261,7 +261,7 @@ until all of them were done, which took four tenths of a second.
 """
 
 
-class ExperimentersLane:
+class ConcurrencyLimit:
     """Let few requests of experimenters in at a time, each until its answer begins.
 
     What streams on after that, as the monitor does, holds nobody up. Signing in is bounded elsewhere and

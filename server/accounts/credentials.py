@@ -86,7 +86,7 @@ def hash_password(password: str, name: str) -> str:
 
 
 @dataclass(frozen=True)
-class Checked:
+class PasswordCheck:
     """The hash that a password fits.
 
     Attributes
@@ -101,10 +101,10 @@ class Checked:
     renewed: str | None = None
 
 
-def checked_password(password: str, stored: str | None) -> Checked:
+def checked_password(password: str, stored: str | None) -> PasswordCheck:
     """Compare a password with the hash `stored`; takes as long where there is none."""
     fits, renewed = _hasher().verify_and_update(password, stored or _nobody())
-    return Checked(stored, renewed) if fits and stored else Checked(None)
+    return PasswordCheck(stored, renewed) if fits and stored else PasswordCheck(None)
 
 
 def password_fits(password: str, stored: str) -> bool:

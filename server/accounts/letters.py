@@ -126,7 +126,7 @@ NEW_BROWSER = Notice(
 
 
 @dataclass(frozen=True)
-class Told:
+class NoticeRecipient:
     """A notice, and the number of the account it is for."""
 
     account_id: int

@@ -34,7 +34,7 @@ LOGIN_COOKIE = "palpebra_login"
 COOKIE_PATH = "/api/admin/session"
 UserAgent = Annotated[str, Header(include_in_schema=False)]
 LoginCookie = Annotated[str, Cookie(alias=LOGIN_COOKIE, include_in_schema=False, max_length=100)]
-Told = Annotated[str, Query(max_length=2000)]
+ProviderParameter = Annotated[str, Query(max_length=2000)]
 
 
 def _set_login_cookie(response: Response, settings: Settings, token: str) -> None:
@@ -116,8 +116,8 @@ async def come_back(
     services: ServicesDep,
     provider: ProviderId,
     after: BackgroundTasks,
-    state: Told = "",
-    code: Told = "",
+    state: ProviderParameter = "",
+    code: ProviderParameter = "",
     iss: Annotated[str | None, Query(max_length=300)] = None,
     user_agent: UserAgent = "",
     browser: LoginCookie = "",
@@ -211,7 +211,7 @@ def _go_on(
     response: Response,
     database: Database,
     settings: Settings,
-    finished: provider_sign_in.Finished,
+    finished: provider_sign_in.SignInOutcome,
     after: BackgroundTasks,
 ) -> None:
     if finished.told is not None:

@@ -124,7 +124,7 @@ MALFORMED = (httpx2.HTTPError, httpx2.InvalidURL, ValueError, RecursionError)
 """What reading an answer as JSON raises where it is none."""
 
 
-class Bounded(httpx2.AsyncBaseTransport):
+class BoundedTransport(httpx2.AsyncBaseTransport):
     """Reads a whole answer within its bounds. A timeout of the client's is one of each read alone."""
 
     async def handle_async_request(self, request: httpx2.Request) -> httpx2.Response:
@@ -174,7 +174,9 @@ async def json_object(address: str) -> dict[str, Any]:
         Nothing answers there within the bounds, or no JSON object.
     """
     try:
-        async with httpx2.AsyncClient(transport=Bounded(), timeout=WHOLE_S, follow_redirects=False) as client:
+        async with httpx2.AsyncClient(
+            transport=BoundedTransport(), timeout=WHOLE_S, follow_redirects=False
+        ) as client:
             answer = await client.get(address, headers={"accept": "application/json"})
         answer.raise_for_status()
         told = answer.json()
@@ -207,7 +209,7 @@ LOGOUT_TOKEN_S = 300
 
 
 @dataclass(frozen=True)
-class Recognised:
+class ProviderIdentity:
     """Whom a provider has signed in: a subject of an issuer, and what is said of it."""
 
     issuer: str
@@ -217,7 +219,7 @@ class Recognised:
 
 
 @dataclass(frozen=True)
-class SignedOut:
+class ProviderSignOut:
     """Who signed out at her provider, by a token of this name (`jti`)."""
 
     issuer: str
@@ -266,7 +268,7 @@ class ProviderClient:
             asked["claims"] = json.dumps({"id_token": {"amr": None}})
         return asked
 
-    async def recognise(self, code: str, issuer: str | None, secrets: Secrets) -> Recognised:
+    async def recognise(self, code: str, issuer: str | None, secrets: Secrets) -> ProviderIdentity:
         """Exchange a code and check everything that its ID token says.
 
         Parameters
@@ -282,14 +284,14 @@ class ProviderClient:
             token = await self._token(client, metadata, code, secrets.verifier)
             claims = await self._claims(metadata, token, secrets.nonce)
             more = await self._user_info(client, metadata, claims)
-        return Recognised(
+        return ProviderIdentity(
             issuer=self.provider.issuer,
             subject=str(claims["sub"]),
             claims={**more, **claims},
             second_factor=self._has_second_factor(claims),
         )
 
-    async def signed_out(self, logout_token: str) -> SignedOut:
+    async def signed_out(self, logout_token: str) -> ProviderSignOut:
         """Check a logout token, which the provider itself sends.
 
         One that names a session alone (`sid`) is refused: sessions here are known by their subject.
@@ -307,13 +309,13 @@ class ProviderClient:
             raise no_logout("it says nothing of signing out, or has a nonce")
         if claims["iat"] < time.time() - LOGOUT_TOKEN_S:
             raise no_logout("it is too old")
-        return SignedOut(self.provider.issuer, str(claims["sub"]), str(claims["jti"]))
+        return ProviderSignOut(self.provider.issuer, str(claims["sub"]), str(claims["jti"]))
 
-    def has_handled(self, ended: SignedOut) -> bool:
+    def has_handled(self, ended: ProviderSignOut) -> bool:
         """Whether this logout token ended sessions before, in this worker."""
         return ended.token in self._handled
 
-    def handled(self, ended: SignedOut) -> None:
+    def handled(self, ended: ProviderSignOut) -> None:
         """Remember a logout token for as long as it could come again."""
         moment = time.monotonic()
         kept = {token: until for token, until in self._handled.items() if until > moment}
@@ -338,7 +340,7 @@ class ProviderClient:
             redirect_uri=self._redirect_uri,
             code_challenge_method="S256",
             timeout=WHOLE_S,
-            transport=Bounded(),
+            transport=BoundedTransport(),
             follow_redirects=False,
         )
 

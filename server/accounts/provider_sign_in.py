@@ -21,8 +21,8 @@ from server.accounts.audit import NOBODY, record
 from server.accounts.credentials import is_recovery_code
 from server.accounts.identity import OPERATOR, Identity
 from server.accounts.invitations import check_invitation, find_invitation, invited_account
-from server.accounts.letters import LOGIN_ADDED, RECOVERY_CODE_USED, Told
-from server.accounts.provider_protocol import NotRecognised, Recognised, Secrets, SignedOut
+from server.accounts.letters import LOGIN_ADDED, RECOVERY_CODE_USED, NoticeRecipient
+from server.accounts.provider_protocol import NotRecognised, ProviderIdentity, ProviderSignOut, Secrets
 from server.accounts.service import add_account
 from server.accounts.signing_in import begin_session, identity_of, record_failure
 from server.accounts.signing_in import second_factor_failure as code_failure
@@ -50,7 +50,7 @@ ATTEMPT_MINUTES = 10
 
 
 @dataclass(frozen=True)
-class Begun:
+class SignInAttempt:
     """A sign-in under way: what goes to the provider, and what the browser keeps in its cookie."""
 
     secrets: Secrets
@@ -80,7 +80,7 @@ def begin_attempt(
     next_page: str,
     asking: Identity | None = None,
     invitation_hash: str | None = None,
-) -> Begun:
+) -> SignInAttempt:
     """Keep a sign-in that a browser begins.
 
     Parameters
@@ -94,7 +94,7 @@ def begin_attempt(
     with database.write() as session:
         repository.forget_old_attempts(session)
         keep(session, provider_id, purpose, state, browser, next_page, asking, invitation_hash)
-    return Begun(secrets_of(settings.key, browser, state), browser)
+    return SignInAttempt(secrets_of(settings.key, browser, state), browser)
 
 
 def keep(
@@ -150,7 +150,7 @@ NO_PASSWORD = ""
 """Stored where an account has none: no password has this hash."""
 
 
-def add_login(session: Session, provider_id: str, account: Account, whom: Recognised) -> None:
+def add_login(session: Session, provider_id: str, account: Account, whom: ProviderIdentity) -> None:
     """Let a subject sign in to this account; Conflict where it got one elsewhere at this very moment."""
     label = whom.claims.get("name") or whom.claims.get("preferred_username") or whom.subject
     login = AccountLogin(
@@ -172,7 +172,7 @@ def add_login(session: Session, provider_id: str, account: Account, whom: Recogn
     )  # fmt: skip
 
 
-def link(database: Database, provider_id: str, attempt: LoginAttempt, whom: Recognised) -> None:
+def link(database: Database, provider_id: str, attempt: LoginAttempt, whom: ProviderIdentity) -> None:
     """Give the account whose open session asked for it a login, unless the subject is somebody's already."""
     with database.write() as session:
         accounts.hold(session, attempt.account_id or 0)
@@ -308,7 +308,11 @@ class NotAdmitted(ApiError):
 
 
 def new_account(
-    session: Session, provider_id: str, provider: Provider, whom: Recognised, held: Mapping[str, Workspace]
+    session: Session,
+    provider_id: str,
+    provider: Provider,
+    whom: ProviderIdentity,
+    held: Mapping[str, Workspace],
 ) -> Account:
     """The account of somebody new, where a rule gives her a place; NotAdmitted where none does."""
     given = roles_by_claims(provider, whom.claims)
@@ -326,7 +330,7 @@ def account_by_invitation(
     provider_id: str,
     provider: Provider,
     invitation_hash: str,
-    whom: Recognised,
+    whom: ProviderIdentity,
     login: AccountLogin | None,
 ) -> Account:
     """The account that somebody makes by her invitation, without a password."""
@@ -370,22 +374,22 @@ def _free_name(session: Session, claims: Mapping[str, Any], otherwise: str) -> s
 
 
 @dataclass(frozen=True)
-class Finished:
+class SignInOutcome:
     """Where the browser goes on, with the session's cookie or the one that asks for a second factor.
 
     Attributes
     ----------
-    told : Told or None
+    told : NoticeRecipient or None
         What its account is told by mail.
     """
 
     page: str
     session: str | None = None
     asks_code: str | None = None
-    told: Told | None = None
+    told: NoticeRecipient | None = None
 
 
-def begin_invited(database: Database, settings: Settings, provider_id: str, token: str) -> Begun:
+def begin_invited(database: Database, settings: Settings, provider_id: str, token: str) -> SignInAttempt:
     """Keep a sign-in that is to make an invited account; NotFound or Conflict where it cannot."""
     check_invitation(database, token)
     with database.read() as session:
@@ -399,13 +403,13 @@ def finish_sign_in(
     settings: Settings,
     provider_id: str,
     attempt: LoginAttempt,
-    whom: Recognised,
+    whom: ProviderIdentity,
     user_agent: str,
-) -> Finished:
+) -> SignInOutcome:
     """Let in whom the provider recognised, or give the account that asked for it a login."""
     if attempt.purpose == "link":
         link(database, provider_id, attempt, whom)
-        return Finished("/account", told=Told(attempt.account_id or 0, LOGIN_ADDED))
+        return SignInOutcome("/account", told=NoticeRecipient(attempt.account_id or 0, LOGIN_ADDED))
     provider = provider_of(settings, provider_id)
     with database.write() as session:
         held = held_workspaces(session, provider)
@@ -426,17 +430,17 @@ def finish_sign_in(
         if account.totp_confirmed_at is not None and not whom.second_factor:
             state = new_token()
             keep(session, provider_id, "code", state, state, attempt.next_page, identity_of(account))
-            return Finished("/sign-in?code=asked", asks_code=state)
+            return SignInOutcome("/sign-in?code=asked", asks_code=state)
         token = begin_session(
             settings, session, account, user_agent, second_factor=whom.second_factor, provider=provider_id
         )
         record(session, identity_of(account), "signed in", "account", account.name, provider=provider_id)
-    return Finished(attempt.next_page, session=token)
+    return SignInOutcome(attempt.next_page, session=token)
 
 
 def finish_with_code(
     database: Database, settings: Settings, sign_ins: SignInThrottle, browser: str, code: str, user_agent: str
-) -> Finished:
+) -> SignInOutcome:
     """After the provider: the account's own second factor, which its session then has.
 
     Wrong codes are counted outside of the transaction: on PostgreSQL a count is a transaction of its own.
@@ -466,7 +470,7 @@ def _no_code_asked() -> NotRecognised:
 
 def _finish_held(
     database: Database, settings: Settings, sign_ins: SignInThrottle, browser: str, code: str, user_agent: str
-) -> tuple[Finished | None, ApiError | None]:
+) -> tuple[SignInOutcome | None, ApiError | None]:
     """With the account held, so that a code works once however many ask at once.
 
     Where it has no second factor any more, no code is one. Failures are written down too.
@@ -484,13 +488,13 @@ def _finish_held(
             record(
                 session, identity_of(account), "signed in", "account", account.name, provider=attempt.provider
             )
-            told = Told(account.id, RECOVERY_CODE_USED) if is_recovery_code(code) else None
-            return Finished(attempt.next_page, session=token, told=told), None
+            told = NoticeRecipient(account.id, RECOVERY_CODE_USED) if is_recovery_code(code) else None
+            return SignInOutcome(attempt.next_page, session=token, told=told), None
         record_failure(sign_ins, session, account)
     return None, failure
 
 
-def sign_out(database: Database, provider_id: str, ended: SignedOut) -> None:
+def sign_out(database: Database, provider_id: str, ended: ProviderSignOut) -> None:
     """End the sessions that a provider began for a subject that signed out there."""
     with database.write() as session:
         login = repository.find_login(session, ended.issuer, ended.subject)

@@ -10,7 +10,7 @@ from server.accounts.access import Myself, account_of, check_origin
 from server.accounts.credentials import hash_password
 from server.accounts.endpoints import address_of
 from server.accounts.invitations import must_fit, must_prove
-from server.accounts.resets import Asking
+from server.accounts.resets import LetterRequest
 from server.accounts.schemas import (
     ConfirmAddress,
     ConfirmPassword,
@@ -57,7 +57,7 @@ async def forgot_password(
         services.settings,
         services.sign_ins,
         body.name,
-        Asking(address_of(request), device_cookie),
+        LetterRequest(address_of(request), device_cookie),
     )
 
 

@@ -36,7 +36,7 @@ class LinkOver(Conflict):
 
 
 @dataclass(frozen=True)
-class Asking:
+class LetterRequest:
     """Who asks for a letter.
 
     Attributes
@@ -67,7 +67,7 @@ def post(settings: Settings, letter: Letter | None) -> None:
 
 
 def write_to_who_forgot(
-    database: Database, settings: Settings, sign_ins: SignInThrottle, name: str, asking: Asking
+    database: Database, settings: Settings, sign_ins: SignInThrottle, name: str, asking: LetterRequest
 ) -> None:
     """Send links for a new password to the accounts of this name or address; nothing where there are none.
 
@@ -87,7 +87,7 @@ def write_to_who_forgot(
 
 
 def _may_have_one(
-    settings: Settings, sign_ins: SignInThrottle, session: Session, account: Account, asking: Asking
+    settings: Settings, sign_ins: SignInThrottle, session: Session, account: Account, asking: LetterRequest
 ) -> bool:
     """Whether one more letter goes out: a share is kept for browsers of the account's own."""
     own = known_device(settings.key, account.name, asking.device) is not None

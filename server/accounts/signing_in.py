@@ -6,7 +6,7 @@ from sqlalchemy.orm import Session
 
 from server.accounts import credentials, repository
 from server.accounts.audit import NOBODY, record
-from server.accounts.credentials import Checked
+from server.accounts.credentials import PasswordCheck
 from server.accounts.identity import Identity
 from server.accounts.throttle import SignInThrottle
 from server.core.db import Database
@@ -58,7 +58,7 @@ def open_session(
     settings: Settings,
     sign_ins: SignInThrottle,
     name: str,
-    checked: Checked,
+    checked: PasswordCheck,
     code: str | None,
     user_agent: str,
 ) -> tuple[str | None, ApiError | None]:
@@ -66,7 +66,7 @@ def open_session(
 
     Parameters
     ----------
-    checked : Checked
+    checked : PasswordCheck
         The stored hash that the password fitted. The account is held meanwhile, so that a code works once
         however many ask at once; failures are written down too.
     """

@@ -121,7 +121,7 @@ class Changes:
             self._ends.wait(AGAIN_S)
 
 
-class ChangesTold:
+class ChangeNotifier:
     """Plain ASGI: whatever was asked for by a method that writes, and was not refused, may have written."""
 
     def __init__(self, app: ASGIApp, changes: Changes) -> None:
@@ -186,7 +186,7 @@ Stopped = Callable[[], bool]
 
 
 @asynccontextmanager
-async def watched(watch: Callable[[Stopped], Coroutine[Any, Any, None]]) -> AsyncIterator[None]:
+async def background_task(watch: Callable[[Stopped], Coroutine[Any, Any, None]]) -> AsyncIterator[None]:
     """Run a watch that never ends by itself beside what is within; its thread ends with its current piece.
 
     Parameters

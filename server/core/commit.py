@@ -194,7 +194,7 @@ def _tell(loop: asyncio.AbstractEventLoop, batch: list[_Work]) -> None:
 
 Row = TypeVar("Row", bound=tuple[Any, ...])
 _Change = Callable[[Any], Any]
-_WaysOut = tuple[tuple[int, _Change], ...]
+_ResultProcessors = tuple[tuple[int, _Change], ...]
 """Columns by their numbers, and what makes a value of that which the driver gives."""
 
 
@@ -306,18 +306,18 @@ class Query(Prepared, Generic[Row]):
         super().__init__(statement)
         self._types = [column.type for column in statement.selected_columns]
         self._make = make
-        self._ways_out: dict[str, _WaysOut] = {}
+        self._processors: dict[str, _ResultProcessors] = {}
 
     def all(self, connection: Connection, values: Mapping[str, Any]) -> list[Row]:
         """Every row; raises as `run`."""
         dialect = connection.dialect
         cursor = self._cursor(connection, values)
-        if dialect.name not in self._ways_out:
-            self._ways_out[dialect.name] = _ways_out(self._types, dialect, cursor.description)
-        rows, ways_out = cursor.fetchall(), self._ways_out[dialect.name]
+        if dialect.name not in self._processors:
+            self._processors[dialect.name] = _result_processors(self._types, dialect, cursor.description)
+        rows, processors = cursor.fetchall(), self._processors[dialect.name]
         cursor.close()
-        if ways_out:
-            rows = [_changed(row, ways_out) for row in rows]
+        if processors:
+            rows = [_changed(row, processors) for row in rows]
         return list(map(self._make, rows))
 
     def one_or_none(self, connection: Connection, values: Mapping[str, Any]) -> Row | None:
@@ -339,7 +339,9 @@ def _compiled(statement: Any, dialect: Dialect, columns: list[str]) -> _Compiled
     )
 
 
-def _ways_out(types: Sequence[TypeEngine[Any]], dialect: Dialect, described: Sequence[Any]) -> _WaysOut:
+def _result_processors(
+    types: Sequence[TypeEngine[Any]], dialect: Dialect, described: Sequence[Any]
+) -> _ResultProcessors:
     """What is to be changed of what the driver gives in these columns, which it has described."""
     changes = [
         kind.dialect_impl(dialect).result_processor(dialect, column[1])
@@ -348,9 +350,9 @@ def _ways_out(types: Sequence[TypeEngine[Any]], dialect: Dialect, described: Seq
     return tuple((index, change) for index, change in enumerate(changes) if change is not None)
 
 
-def _changed(row: Sequence[Any], ways_out: _WaysOut) -> list[Any]:
+def _changed(row: Sequence[Any], processors: _ResultProcessors) -> list[Any]:
     values = list(row)
-    for index, change in ways_out:
+    for index, change in processors:
         values[index] = change(values[index])
     return values
 

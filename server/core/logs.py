@@ -68,7 +68,7 @@ class PlainLines(logging.Formatter):
         return line
 
 
-class Needless(logging.Filter):
+class UvicornFilter(logging.Filter):
     """Leave out what uvicorn says beside our own lines."""
 
     def filter(self, record: logging.LogRecord) -> bool:
@@ -100,7 +100,7 @@ def logging_configuration(settings: Settings) -> dict[str, Any]:
         "version": 1,
         "disable_existing_loggers": False,
         "formatters": {"lines": {"()": formatter}},
-        "filters": {"needless": {"()": Needless}},
+        "filters": {"needless": {"()": UvicornFilter}},
         "handlers": {
             "stderr": {
                 "class": "logging.StreamHandler",

@@ -31,7 +31,7 @@ _OWNER_AGAIN = "SET LOCAL ROLE NONE"
 
 
 @dataclass
-class Acting:
+class ActingAccount:
     """For whom a request acts, once that is known; its threads share it.
 
     Attributes
@@ -43,13 +43,13 @@ class Acting:
     account_id: int | None = None
 
 
-_acting: ContextVar[Acting | None] = ContextVar("acting", default=None)
+_acting: ContextVar[ActingAccount | None] = ContextVar("acting", default=None)
 
 
 @contextmanager
 def acting() -> Iterator[None]:
     """What is within is one request: it acts for nobody until an account is recognised."""
-    before = _acting.set(Acting())
+    before = _acting.set(ActingAccount())
     try:
         yield
     finally:

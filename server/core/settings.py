@@ -116,11 +116,11 @@ ProviderId = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]{0,29}$")
 LOCAL_HOSTS = ("localhost", "127.0.0.1", "::1")
 
 
-class _Declared(BaseModel):
+class _DeclaredTable(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class RoleRule(_Declared):
+class RoleRule(_DeclaredTable):
     """Who belongs to a workspace by what the provider says of her.
 
     Without a claim it holds for everybody whom the provider signs in.
@@ -140,7 +140,7 @@ class RoleRule(_Declared):
         return self
 
 
-class Provider(_Declared):
+class Provider(_DeclaredTable):
     """A service that signs people in; declared as PALPEBRA_OIDC__NAME__KEY."""
 
     label: Annotated[str, StringConstraints(min_length=1, max_length=60)] = Field(

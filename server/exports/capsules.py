@@ -51,7 +51,7 @@ from server.exports.seals import seal_of
 from server.models import Job, Study, StudyVersion
 from server.results import job_repository
 from server.results.jobs import begun, in_background, is_under_way, note, run_analysis, shown
-from server.results.methods import Counted, counted, paragraph_of, read_results, write_beside
+from server.results.methods import MethodsFigures, methods_figures, paragraph_of, read_results, write_beside
 from server.studies.lookup import definition_of, find_study
 from server.studies.series import version_of_series
 
@@ -216,7 +216,7 @@ def build_capsule(
             version = version_of_series(session, study, contents.series)
             source = _write_study(session, study, version, folder, made, contents)
             experiment, manifest = definition_of(version), Manifest.model_validate(version.manifest)
-            known = counted(session, study, source.origin, source.series)
+            known = methods_figures(session, study, source.origin, source.series)
         # The snapshot has ended: what follows may take an hour, and the database must not wait for it.
         if contents.clips:
             progress(0.15, "copying clips")
@@ -290,7 +290,7 @@ def _copy_clips(store: ClipStore, manifest: Manifest, folder: Path) -> None:
                 stream.write(piece)
 
 
-def _report(known: Counted, source: ReportSource, folder: Path, work: Path) -> ReportSource:
+def _report(known: MethodsFigures, source: ReportSource, folder: Path, work: Path) -> ReportSource:
     """Make the report from the capsule's own table, so that it can be made from it again."""
     answers, results = work / ANSWERS, folder / REPORT_FOLDER
     report_input(folder / source.answers, answers, source.renamed)

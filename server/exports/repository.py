@@ -22,7 +22,7 @@ from server.models import (
     StudyRun,
     StudyVersion,
 )
-from server.participation.identity_keys import KnownAs, Sealed, unseal
+from server.participation.identity_keys import ParticipantIdentity, Sealed, unseal
 
 # What exports read of the database: a study's runs and all they stored, batch by batch.
 
@@ -40,7 +40,7 @@ class KnownPerson(NamedTuple):
     participant: str
     link_kind: str
     label: str
-    known_as: KnownAs
+    known_as: ParticipantIdentity
 
 
 def runs_by_origin(session: Session, study: Study) -> dict[str, int]:
@@ -187,7 +187,9 @@ def known_people(session: Session, study: Study) -> Iterator[KnownPerson]:
     query = _known_people(study).execution_options(yield_per=IDENTITIES_AT_ONCE)
     secret = session.info[SIGNING_KEY]()
     for run, participant, kind, label, content, wrapped in session.execute(query):
-        known = unseal(secret, run, Sealed(content, wrapped)) if content and wrapped else KnownAs()
+        known = (
+            unseal(secret, run, Sealed(content, wrapped)) if content and wrapped else ParticipantIdentity()
+        )
         yield KnownPerson(run, participant, kind, label, known)
 
 

@@ -203,7 +203,7 @@ _INSTALLATION = re.compile(r"-([0-9a-f]{16})\.tar\.age$")
 
 
 @dataclass(frozen=True)
-class KeptBackup:
+class StoredBackup:
     """One backup of a store.
 
     Attributes
@@ -248,8 +248,8 @@ def back_up_to(
 
     def write(stream: IO[bytes]) -> None:
         described, keys = write_backup(database, settings, clips, stream, with_clips=with_clips)
-        _put_newest(store, _Kept(NAME, ours, keys.written_at), content_of_keys(keys), recipient)
-        ledger = _Kept(LEDGER_NAME, ours, iso(now()))
+        _put_newest(store, _CompanionFile(NAME, ours, keys.written_at), content_of_keys(keys), recipient)
+        ledger = _CompanionFile(LEDGER_NAME, ours, iso(now()))
         copy = ledger_for_backup(settings, b"", keys.written_at)
         _put_newest(store, ledger, copy, recipient)
         made.append(described)
@@ -272,7 +272,7 @@ def installation_of(name: str) -> str | None:
 
 
 @dataclass(frozen=True)
-class _Kept:
+class _CompanionFile:
     """What is kept beside encrypted backups, of an installation and a moment."""
 
     name: str
@@ -284,7 +284,9 @@ class _Kept:
         return f"{stem}-{self.installation}-{re.sub('[-:]', '', self.moment)}.{suffix}{ENDING}"
 
 
-def _put_newest(store: BackupStore, kept: _Kept, content: bytes, recipient: x25519.Recipient) -> None:
+def _put_newest(
+    store: BackupStore, kept: _CompanionFile, content: bytes, recipient: x25519.Recipient
+) -> None:
     """Put a file and remove the older ones; where a newer one is there that one stays."""
     with encrypted(lambda stream: _write(stream, content), recipient) as stream:
         store.put(str(kept), stream)
@@ -309,7 +311,7 @@ def _write(stream: IO[bytes], content: bytes) -> None:
 
 
 @contextmanager
-def brought_here(kept: KeptBackup, folder: Path, identity: x25519.Identity | None) -> Iterator[Path]:
+def brought_here(kept: StoredBackup, folder: Path, identity: x25519.Identity | None) -> Iterator[Path]:
     """The backup in the open, as a file in `folder` with key file and ledger beside, removed afterwards.
 
     Raises
@@ -329,7 +331,7 @@ def brought_here(kept: KeptBackup, folder: Path, identity: x25519.Identity | Non
             file.unlink(missing_ok=True)
 
 
-def _beside(kept: KeptBackup) -> Iterator[tuple[str, str]]:
+def _beside(kept: StoredBackup) -> Iterator[tuple[str, str]]:
     """Key file and ledger of a backup: as they are stored, and as they are called beside it."""
     whose = installation_of(kept.name) or ""
     for name in (NAME, LEDGER_NAME):

@@ -22,7 +22,7 @@ from server.operations import restore as restoring
 from server.operations.backup import ENDING, identity_in, make_identity, recipient_of
 from server.operations.backup_stores import (
     SCHEME,
-    KeptBackup,
+    StoredBackup,
     back_up_to,
     backup_store,
     brought_here,
@@ -238,7 +238,7 @@ def _in_the_open(file: str, settings: Settings, identity: x25519.Identity | None
     folder, _, name = file.rpartition("/")
     settings.data_folder.mkdir(parents=True, exist_ok=True)
     beside = held.enter_context(tempfile.TemporaryDirectory(prefix=".restore-", dir=settings.data_folder))
-    kept = KeptBackup(backup_store(folder or ".", settings), name)
+    kept = StoredBackup(backup_store(folder or ".", settings), name)
     return held.enter_context(brought_here(kept, Path(beside), identity))
 
 
@@ -290,7 +290,7 @@ def drill(
     )
 
 
-def _backup_of(address: str, settings: Settings) -> Path | KeptBackup:
+def _backup_of(address: str, settings: Settings) -> Path | StoredBackup:
     """The file itself, or the newest of a folder or bucket."""
     if not address:
         raise InputError("expected a backup or a folder of backups; name one, or set PALPEBRA_BACKUP_FOLDER")
@@ -299,7 +299,7 @@ def _backup_of(address: str, settings: Settings) -> Path | KeptBackup:
     if address.endswith((".tar", ENDING)):
         folder, _, name = address.rpartition("/")
         store = backup_store(folder or ".", settings)
-        backup = next((KeptBackup(store, one.name) for one in store.entries() if one.name == name), None)
+        backup = next((StoredBackup(store, one.name) for one in store.entries() if one.name == name), None)
     else:
         backup = newest_backup(backup_store(address, settings))
     if backup is None:

@@ -106,7 +106,7 @@ def _check_revision(source: Database) -> None:
 
 
 @dataclass(frozen=True)
-class CarriedOver:
+class RekeyedSecrets:
     """What is under the key of now.
 
     Attributes
@@ -125,7 +125,7 @@ class CarriedOver:
     broken: str | None
 
 
-def carry_over(session: Session, old: bytes, secret: bytes) -> CarriedOver:
+def carry_over(session: Session, old: bytes, secret: bytes) -> RekeyedSecrets:
     """Wrap recruiters' ids and second factors under the key of now, and make the audit log's chain by it.
 
     A log that fits neither key is left as it is: it must not become whole by this. So are second factors
@@ -147,12 +147,12 @@ def carry_over(session: Session, old: bytes, secret: bytes) -> CarriedOver:
             "before"
         )
     if before.broken is not None:
-        return CarriedOver(done, left, 0, before.broken)
+        return RekeyedSecrets(done, left, 0, before.broken)
     factors = _carry_factors(session, old, secret)
     reseal(session, secret)
     head = f"{before.position}:{before.hash}"
     record(session, OPERATOR, "secret key changed", "", "", head_before=head)
-    return CarriedOver(done, left, factors, None)
+    return RekeyedSecrets(done, left, factors, None)
 
 
 def _carry_factors(session: Session, old: bytes, secret: bytes) -> int:

@@ -17,13 +17,13 @@ from pyrage import x25519
 from experiments.errors import InputError
 from experiments.files import whole_file
 from server.context import Services, open_services
-from server.core.changes import watched
+from server.core.changes import background_task
 from server.core.db import open_database
 from server.core.locks import LockTaken, locked, open_locks
 from server.core.settings import Settings
 from server.core.values import now
 from server.operations.backup import ENDING, TABLES, Description, identity_in
-from server.operations.backup_stores import KeptBackup, backup_store, brought_here
+from server.operations.backup_stores import StoredBackup, backup_store, brought_here
 from server.operations.doctor import Finding, counts, database, identities
 from server.operations.key_escrow import key_file_of
 from server.operations.restore import restore
@@ -49,7 +49,7 @@ class DrillUnderWayError(InputError):
 
 def drill(
     settings: Settings,
-    backup: Path | KeptBackup,
+    backup: Path | StoredBackup,
     identity: x25519.Identity | None = None,
     keys: Path | None = None,
 ) -> DrillResult:
@@ -74,7 +74,7 @@ def drill(
 
 def _drill(
     settings: Settings,
-    backup: Path | KeptBackup,
+    backup: Path | StoredBackup,
     identity: x25519.Identity | None,
     keys: Path | None = None,
 ) -> DrillResult:
@@ -103,7 +103,7 @@ def _drill(
 
 @contextmanager
 def _here(
-    settings: Settings, backup: Path | KeptBackup, folder: Path, identity: x25519.Identity | None
+    settings: Settings, backup: Path | StoredBackup, folder: Path, identity: x25519.Identity | None
 ) -> Iterator[Path]:
     """The backup as a file of this machine, in the open."""
     if isinstance(backup, Path):
@@ -274,7 +274,7 @@ async def weekly_drill(settings: Settings, first_look_s: float = FIRST_LOOK_S) -
         yield
         return
     await asyncio.to_thread(sweep, settings)
-    async with watched(lambda _: _watch_drills(settings, first_look_s)):
+    async with background_task(lambda _: _watch_drills(settings, first_look_s)):
         yield
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from experiments.errors import InputError, counted
 from server.accounts.audit import record
-from server.core.changes import watched
+from server.core.changes import background_task
 from server.core.db import Database, checked_url, open_database
 from server.core.locks import locked
 from server.core.migrate import upgrade
@@ -343,7 +343,7 @@ def snapshots_taken(
     url = checked_url(settings.resolved_database_url)
     if not settings.snapshot_minutes or url.get_backend_name() != "sqlite":
         return nullcontext()
-    return watched(lambda _: _watch(settings, look_every_s))
+    return background_task(lambda _: _watch(settings, look_every_s))
 
 
 async def _watch(settings: Settings, look_every_s: float) -> None:

@@ -18,7 +18,7 @@ from server.operations.backup_stores import (
     SCHEME,
     BackupStore,
     Entry,
-    KeptBackup,
+    StoredBackup,
     backup_store,
     backups_in,
     installation_of,
@@ -125,7 +125,7 @@ def own_backups(store: BackupStore, secret: bytes) -> list[Entry]:
     return [one for one in backups_in(store) if installation_of(one.name) in (None, installation(secret))]
 
 
-def newest_backup(store: BackupStore, secret: bytes | None = None) -> KeptBackup | None:
+def newest_backup(store: BackupStore, secret: bytes | None = None) -> StoredBackup | None:
     """The backup written last; None where there is none.
 
     Parameters
@@ -134,7 +134,7 @@ def newest_backup(store: BackupStore, secret: bytes | None = None) -> KeptBackup
         The secret key of the installation whose backups count; any where not given.
     """
     backups = backups_in(store) if secret is None else own_backups(store, secret)
-    return KeptBackup(store, backups[-1].name) if backups else None
+    return StoredBackup(store, backups[-1].name) if backups else None
 
 
 def drill_file(settings: Settings) -> Path:

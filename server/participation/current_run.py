@@ -121,15 +121,15 @@ def _depth(value: Any) -> int:
 # Screening: a run ends as screened out where a declared rule says so. Its slot is then free again.
 
 
-class _Declared(NamedTuple):
+class _ScreeningRules(NamedTuple):
     """The rules of an experiment by the moment at which they are looked at."""
 
     answers: list[ScreenFormAnswer]
     devices: list[ScreenDevice]
 
 
-def _declared(experiment: Experiment) -> _Declared:
-    declared = _Declared([], [])
+def _declared(experiment: Experiment) -> _ScreeningRules:
+    declared = _ScreeningRules([], [])
     for rule in experiment.screening:
         match rule:
             case ScreenFormAnswer():

@@ -27,15 +27,15 @@ from server.models import (
 # Reads and writes of evidence, in as few statements as it takes.
 
 
-class Refusable(NamedTuple):
+class RefusalEvents(NamedTuple):
     """Events of a run that had something refused, and that had it refused for the age of its ticket alone."""
 
     refused: str
     expired: str
 
 
-ANSWER = Refusable("answer_refused", "answer_expired")
-VIEW = Refusable("view_refused", "view_expired")
+ANSWER = RefusalEvents("answer_refused", "answer_expired")
+VIEW = RefusalEvents("view_refused", "view_expired")
 
 _evidence = cast(Table, AnswerEvidence.__table__)
 _INSERT = Prepared(insert(_evidence).inline(), _evidence.c.keys())
@@ -44,7 +44,7 @@ _views = cast(Table, View.__table__)
 _as_young = case((_views.c.issued_at >= bindparam("since"), _views.c.clip_ms), else_=0.0)
 
 
-class Spent(NamedTuple):
+class ViewTime(NamedTuple):
     """Clip time in ms of a run's views, and by tickets as young as one; when the first was issued."""
 
     run_ms: float
@@ -58,7 +58,7 @@ _SPENT_BY_VIEWS = Query(
         func.coalesce(func.sum(_as_young), 0.0),
         func.min(_views.c.issued_at),
     ).where(_views.c.study_run_id == bindparam("run"), _views.c.issued_at.is_not(None)),
-    Spent._make,
+    ViewTime._make,
 )
 
 
@@ -70,7 +70,7 @@ def first_view(connection: Connection, run: int, trial_index: int, play: int) ->
     return connection.scalar(query)
 
 
-def spent_by_views(connection: Connection, run: int, since: datetime) -> Spent:
+def spent_by_views(connection: Connection, run: int, since: datetime) -> ViewTime:
     """What the views of a run that were shown to their end took, by tickets issued from `since` on apart."""
     (spent,) = _SPENT_BY_VIEWS.all(connection, {"run": run, "since": since})
     return spent

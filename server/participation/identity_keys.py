@@ -29,7 +29,7 @@ KEY_BYTES, NONCE_BYTES = 32, 12
 
 
 @dataclass(frozen=True)
-class KnownAs:
+class ParticipantIdentity:
     """Who a run's person is to the recruiter.
 
     Attributes
@@ -46,7 +46,7 @@ class KnownAs:
 
 @dataclass(frozen=True)
 class Sealed:
-    """What is stored of `KnownAs`, in two tables; both texts are Base64.
+    """What is stored of `ParticipantIdentity`, in two tables; both texts are Base64.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ def identifier_hash(study_key: str, identifier: str) -> str:
 
 
 # Decision 0740: One key per recruiter id, and no key in a backup.
-def seal(secret: bytes, run: str, known_as: KnownAs) -> Sealed:
+def seal(secret: bytes, run: str, known_as: ParticipantIdentity) -> Sealed:
     """Encrypt under a new key; `secret` is the installation's key, `run` the run's public id."""
     key, nonce = AESGCM.generate_key(KEY_BYTES * 8), os.urandom(NONCE_BYTES)
     plain = json.dumps({"identifier": known_as.identifier, "parameters": dict(known_as.parameters)})
@@ -87,7 +87,7 @@ def seal(secret: bytes, run: str, known_as: KnownAs) -> Sealed:
     return Sealed(_text(content), wrap(secret, key))
 
 
-def unseal(secret: bytes, run: str, sealed: Sealed) -> KnownAs:
+def unseal(secret: bytes, run: str, sealed: Sealed) -> ParticipantIdentity:
     """Decrypt.
 
     Raises
@@ -102,7 +102,7 @@ def unseal(secret: bytes, run: str, sealed: Sealed) -> KnownAs:
         plain = json.loads(AESGCM(key).decrypt(nonce, encrypted, run.encode()))
     except (UnreadableError, InvalidTag, ValueError, binascii.Error) as error:
         raise UnreadableError(f"run {run}") from error
-    return KnownAs(plain["identifier"], plain["parameters"])
+    return ParticipantIdentity(plain["identifier"], plain["parameters"])
 
 
 def rewrap(old_secret: bytes, secret: bytes, wrapped_key: str) -> str:

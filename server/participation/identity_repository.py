@@ -8,7 +8,7 @@ from sqlalchemy.orm import Session
 from server.core.db import SIGNING_KEY
 from server.models import IdentityKey, RecruiterIdentity, StudyRun
 from server.participation.identity_keys import (
-    KnownAs,
+    ParticipantIdentity,
     Sealed,
     UnreadableError,
     identifier_hash,
@@ -21,7 +21,11 @@ AT_ONCE = 500
 
 
 def keep(
-    session: Session, run: StudyRun, study_key: str, known_as: KnownAs, identifier: str | None = None
+    session: Session,
+    run: StudyRun,
+    study_key: str,
+    known_as: ParticipantIdentity,
+    identifier: str | None = None,
 ) -> None:
     """Store who the person of a run is, under a separate key.
 
@@ -46,7 +50,7 @@ def is_known(session: Session, study_key: str, identifier: str) -> bool:
     return session.scalar(select(RecruiterIdentity.study_run_id).where(same).limit(1)) is not None
 
 
-def known_as(session: Session, run: StudyRun) -> KnownAs | None:
+def known_as(session: Session, run: StudyRun) -> ParticipantIdentity | None:
     """Who the person of a run is; None where the address said nothing, or what it said is erased.
 
     Raises

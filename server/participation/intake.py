@@ -139,7 +139,7 @@ FALSE_ANSWERS_PER_MINUTE = 60
 ENFORCED_ORIGINS = ("participant", "pilot")
 
 
-class Sent(Protocol):
+class TicketedSubmission(Protocol):
     """Something of a run that carries a ticket."""
 
     @property
@@ -247,7 +247,11 @@ class Intake:
         return self.refuses and (origin in ENFORCED_ORIGINS or self.rehearses)
 
     def note(
-        self, connection: Connection, sent: "Sent", refusal: ApiError, what: evidence_repository.Refusable
+        self,
+        connection: Connection,
+        sent: "TicketedSubmission",
+        refusal: ApiError,
+        what: evidence_repository.RefusalEvents,
     ) -> None:
         """Note once a run that something of it was refused for this reason, and limit how often it may be."""
         # Each run has a share of its own: who sends false answers hinders nobody else.

@@ -16,7 +16,7 @@ from experiments.assignment.order import attention_by_block, motion_checks_by_bl
 from experiments.checks import CHECK_KINDS
 from experiments.declaration.experiment import Experiment
 from experiments.kinds import KINDS
-from server.core.changes import Stopped, watched
+from server.core.changes import Stopped, background_task
 from server.core.db import Database
 from server.core.values import hash_token, now
 from server.models import StudyRun
@@ -228,7 +228,7 @@ def digests_judged_later(
     database: Database, intake: Intake, look_every_s: float = LOOK_EVERY_S
 ) -> AbstractAsyncContextManager[None]:
     """Judge what waits from before the server started, and whatever answer it had to take unchecked."""
-    return watched(lambda stopped: _watch(database, intake, look_every_s, stopped))
+    return background_task(lambda stopped: _watch(database, intake, look_every_s, stopped))
 
 
 async def _watch(database: Database, intake: Intake, look_every_s: float, stopped: Stopped) -> None:

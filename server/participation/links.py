@@ -19,7 +19,7 @@ from server.participation import identity_repository as identities
 from server.participation import places, returning, run_repository
 from server.participation.current_run import checked_device, screens_devices
 from server.participation.evidence_repository import awaits_views_without_tickets, has_older_runs
-from server.participation.identity_keys import KnownAs
+from server.participation.identity_keys import ParticipantIdentity
 from server.participation.intake import ENFORCED_ORIGINS, Intake
 from server.participation.places import assign_slot
 from server.participation.recruiter import (
@@ -255,7 +255,7 @@ def _new_run(
     run_repository.add_all(session, [run])
     if start.query:
         written = recruiter.participant(start.query) or ""
-        known_as = KnownAs(written, without_signature(recruiter, start.query))
+        known_as = ParticipantIdentity(written, without_signature(recruiter, start.query))
         identities.keep(session, run, study.pseudonym_key, known_as, identifier)
     if deciding(loaded.experiment) is None:
         group = _group(loaded.experiment, link)

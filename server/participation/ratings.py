@@ -25,7 +25,7 @@ from server.participation.answer_schemas import (
 from server.participation.intake import TRIED_MS, Answer, Intake
 from server.participation.kinds import answer_of, served
 from server.participation.refusals import ConsentMissing, RunClosed, RunUnknown, TrialNotInRun
-from server.participation.tallies import Counted, Play, Tally
+from server.participation.tallies import Play, Tally, TallyEntry
 from server.participation.verdict import Ruling, is_settled, playback_of
 from server.participation.verdict import judge as judge_play
 from server.participation.versions import LoadedVersion, Versions
@@ -35,7 +35,7 @@ from server.participation.warnings import by_attention
 
 
 @dataclass(frozen=True)
-class Delivery:
+class SubmittedRating:
     """A rating under its id, what it is for, and the ratings of this trial or id that are stored.
 
     Its payload is the answer as it is stored.
@@ -77,7 +77,7 @@ def delivery_of(
     rating_id: str,
     rating: RatingIn,
     saved_at: datetime,
-) -> Delivery:
+) -> SubmittedRating:
     """Look up what a rating is for; RunUnknown or TrialNotInRun where there is no such thing."""
     run = rating_repository.run_for_rating(connection, hash_token(token))
     if run is None:
@@ -91,10 +91,10 @@ def delivery_of(
     if KINDS[loaded.experiment.trial.kind].adapts:
         trial = series.as_offered(connection, run.id, trial, rating)
     stored = rating_repository.stored_ratings(connection, run.id, rating.trial_index, rating_id)
-    return Delivery(rating_id, rating, rating.answer.stored(), saved_at, run, trial, loaded, stored)
+    return SubmittedRating(rating_id, rating, rating.answer.stored(), saved_at, run, trial, loaded, stored)
 
 
-def row_of(delivery: Delivery, ruling: Ruling) -> dict[str, Any]:
+def row_of(delivery: SubmittedRating, ruling: Ruling) -> dict[str, Any]:
     """The rating's row."""
     rating, run = delivery.rating, delivery.run
     playback = dict(rating.playback)
@@ -123,11 +123,11 @@ def row_of(delivery: Delivery, ruling: Ruling) -> dict[str, Any]:
     }
 
 
-def play_of(delivery: Delivery, ruling: Ruling) -> Play:
+def play_of(delivery: SubmittedRating, ruling: Ruling) -> Play:
     """What the run's tally counts of it."""
     rating, loaded, trial = delivery.rating, delivery.loaded, delivery.trial
     is_main = trial.kind == "main"
-    counted: Iterable[Counted] = ()
+    counted: Iterable[TallyEntry] = ()
     if is_main:
         places = {role: loaded.numbered[clip] for role, clip in trial.clips.items()}
         counted = served(loaded.experiment.trial.kind).counted(places, delivery.payload)
@@ -143,7 +143,7 @@ def play_of(delivery: Delivery, ruling: Ruling) -> Play:
     )
 
 
-def evidence_of(delivery: Delivery) -> Answer:
+def evidence_of(delivery: SubmittedRating) -> Answer:
     """What judges whether a person answered."""
     rating = delivery.rating
     return answer_to(
@@ -271,7 +271,7 @@ def save_rating(
     return _receipt_of_new(connection, delivery, ruling), True
 
 
-def _known(delivery: Delivery) -> rating_repository.StoredRating | None:
+def _known(delivery: SubmittedRating) -> rating_repository.StoredRating | None:
     """The stored rating this one repeats; RatingDiffers where it says something else."""
     rating, payload = delivery.rating, delivery.payload
     for row in delivery.stored:
@@ -293,7 +293,7 @@ def _short(answer: dict[str, Any]) -> Any:
 
 
 def _receipt_of_known(
-    connection: Connection, delivery: Delivery, known: rating_repository.StoredRating
+    connection: Connection, delivery: SubmittedRating, known: rating_repository.StoredRating
 ) -> Receipt:
     run = delivery.run
     return Receipt(
@@ -308,7 +308,7 @@ def _receipt_of_known(
     )
 
 
-def _check(delivery: Delivery) -> None:
+def _check(delivery: SubmittedRating) -> None:
     run, rating, experiment = delivery.run, delivery.rating, delivery.experiment
     if run.status != "active":
         raise RunClosed(f"This visit is over ({run.status.replace('_', ' ')}); nothing more is stored.")
@@ -323,13 +323,13 @@ def _check(delivery: Delivery) -> None:
         raise PlayOutOfRange(f"A clip is shown at most {max_plays} times, got play {rating.play}.")
 
 
-def _judged(delivery: Delivery) -> Ruling:
+def _judged(delivery: SubmittedRating) -> Ruling:
     is_check = delivery.trial.kind == "check"
     judge = judge_check if is_check else served(delivery.experiment.trial.kind).judge
     return judge(delivery.loaded, delivery.trial.clips, delivery.rating)
 
 
-def _receipt_of_new(connection: Connection, delivery: Delivery, ruling: Ruling) -> Receipt:
+def _receipt_of_new(connection: Connection, delivery: SubmittedRating, ruling: Ruling) -> Receipt:
     """Carry the answer into its series and its run, and say what follows from it."""
     run, rating = delivery.run, delivery.rating
     settles, before = delivery.settles(rating.play, ruling[0]), delivery.was_settled
@@ -352,7 +352,7 @@ def _receipt_of_new(connection: Connection, delivery: Delivery, ruling: Ruling) 
     )
 
 
-def _consequence(connection: Connection, delivery: Delivery) -> warnings.Lapse:
+def _consequence(connection: Connection, delivery: SubmittedRating) -> warnings.Lapse:
     """What an answer means for the run beside itself: a failed check may end it, a careless one be told."""
     run, experiment = delivery.run.id, delivery.experiment
     if delivery.trial.kind == "attention":

@@ -95,7 +95,7 @@ def numbers(clips: Iterable[tuple[int, str]]) -> dict[int, NumberedClip]:
     }
 
 
-class Counted(NamedTuple):
+class TallyEntry(NamedTuple):
     """One answer to one trial on one scale.
 
     Attributes
@@ -142,7 +142,7 @@ class Play(NamedTuple):
         Of a main trial; of others the heat map alone is kept.
     rt, onset : float or None
         In ms; None where not measured.
-    answers : tuple of Counted
+    answers : tuple of TallyEntry
         Empty where none was given.
     """
 
@@ -153,7 +153,7 @@ class Play(NamedTuple):
     method: str
     rt: float | None
     onset: float | None
-    answers: tuple[Counted, ...]
+    answers: tuple[TallyEntry, ...]
 
 
 COLUMNS = ("heat", "not_good", "counts", "answers", *ClipTime._fields)
@@ -221,7 +221,7 @@ class Tally:
             heat = heat[:trial] + letter + heat[trial + 1 :]
         self.heat = heat
 
-    def _take(self, answer: Counted) -> None:
+    def _take(self, answer: TallyEntry) -> None:
         self.answers.setdefault(answer.scale, array("Q")).append(answer.packed())
         if answer.cell is None:
             return

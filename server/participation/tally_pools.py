@@ -16,10 +16,10 @@ from server.participation.kinds import served
 from server.participation.tallies import (
     ONSET_BINS,
     UNIT,
-    Counted,
     NumberedClip,
     Play,
     Tally,
+    TallyEntry,
     numbers,
     packed_bytes,
     packed_codes,
@@ -58,7 +58,7 @@ class PooledTally:
 
 def pooled(session: Session, runs: ColumnElement[bool], scale: str, factors: Sequence[str]) -> PooledTally:
     """The counts of the runs that fit, answers of excluded ones left out."""
-    made, kept = PooledTally(), _Kept()
+    made, kept = PooledTally(), _StoredCounts()
     packed: dict[int, bytearray] = defaultdict(bytearray)
     versions = _Versions(session, factors)
     for run, version, excluded, counts, answers in tally_repository.counts_of(session, runs):
@@ -79,7 +79,7 @@ def pooled(session: Session, runs: ColumnElement[bool], scale: str, factors: Seq
 
 
 @dataclass
-class _Kept:
+class _StoredCounts:
     """The counts of many runs as they are stored: summed at once, which thousands of runs are quicker by."""
 
     plays: list[dict[str, int]] = field(default_factory=list)
@@ -182,7 +182,7 @@ class Recount:
         """A play from its rows, one for each clip of its trial."""
         row, is_main = shown[0], shown[0].part == "main"
         numbered = self._versions.get(session, row.version).numbered
-        answers: tuple[Counted, ...] = ()
+        answers: tuple[TallyEntry, ...] = ()
         if is_main:
             places = {one.role: numbered[one.clip] for one in shown if one.role and one.clip is not None}
             answers = tuple(served(row.kind).counted(places, row.payload))

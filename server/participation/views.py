@@ -131,7 +131,7 @@ def take_views(intake: Intake, connection: Connection, arrival: Arrival) -> list
     refused and the ticket does not hold.
     """
     issued: list[datetime | None] = []
-    before = _Before(connection, arrival.run)
+    before = _EarlierViews(connection, arrival.run)
     for view in arrival.views:
         try:
             issued.append(_issued_at(intake, arrival, view, before))
@@ -144,7 +144,7 @@ def take_views(intake: Intake, connection: Connection, arrival: Arrival) -> list
 
 
 @dataclass
-class _Before:
+class _EarlierViews:
     """The run's views before one of an arrival: those stored, and `shown`, which came with it.
 
     Attributes
@@ -156,16 +156,18 @@ class _Before:
     connection: Connection
     run: int
     shown: list[tuple[datetime, float]] = field(default_factory=list)
-    _spent: dict[datetime, evidence_repository.Spent] = field(default_factory=dict)
+    _spent: dict[datetime, evidence_repository.ViewTime] = field(default_factory=dict)
 
-    def spent(self, since: datetime) -> evidence_repository.Spent:
+    def spent(self, since: datetime) -> evidence_repository.ViewTime:
         """What those stored took: read once a time, since none is stored while an arrival is looked at."""
         if since not in self._spent:
             self._spent[since] = evidence_repository.spent_by_views(self.connection, self.run, since)
         return self._spent[since]
 
 
-def _issued_at(intake: Intake, arrival: Arrival, view: ArrivingView, before: _Before) -> datetime | None:
+def _issued_at(
+    intake: Intake, arrival: Arrival, view: ArrivingView, before: _EarlierViews
+) -> datetime | None:
     """When the ticket of a view was issued; the view is added to those `before` the next."""
     given = view.evidence
     if given is None:
@@ -180,7 +182,7 @@ def _issued_at(intake: Intake, arrival: Arrival, view: ArrivingView, before: _Be
     return issued_at
 
 
-def _in_time(received_at: datetime, issued_at: datetime, before: _Before) -> None:
+def _in_time(received_at: datetime, issued_at: datetime, before: _EarlierViews) -> None:
     """ClipsOutlastTickets where the views of a batch, or of the run, cannot have been shown by now."""
     spent, shown = before.spent(issued_at), before.shown
     first = min(filter(None, (spent.first_issued_at, *(moment for moment, _ in shown))))

@@ -15,7 +15,7 @@ from sqlalchemy.orm import Session
 
 from experiments.declaration.tables import Retention
 from server.accounts.audit import record
-from server.core.changes import Stopped, watched
+from server.core.changes import Stopped, background_task
 from server.core.db import Database
 from server.core.locks import Locks, LockTaken
 from server.core.settings import Settings
@@ -70,7 +70,7 @@ class Rule:
 
 
 @dataclass(frozen=True)
-class Carried:
+class ErasureCounts:
     """What was erased of a study: visits of which it was erased who took part, and visits as a whole."""
 
     study: str
@@ -137,7 +137,7 @@ def _periods(declared: Retention) -> list[Period]:
 # Decision 0741: The server enforces the declared retention.
 def carry_out(
     database: Database, settings: Settings, study: str, stopped: Callable[[], bool] = lambda: False
-) -> Carried:
+) -> ErasureCounts:
     """Erase what is due of a study, a few visits at a time so that raters are not held up.
 
     Parameters
@@ -158,7 +158,7 @@ def carry_out(
         done[what] += number
         # Raters who waited on SQLite come in between.
         time.sleep(min(time.monotonic() - began, MAX_REST_S))
-    return Carried(study, done["identifiers"], done["unfinished"] + done["answers"])
+    return ErasureCounts(study, done["identifiers"], done["unfinished"] + done["answers"])
 
 
 def _batch(session: Session, settings: Settings, name: str) -> tuple[What, int] | None:
@@ -213,7 +213,7 @@ def hourly_retention(
     database: Database, settings: Settings, locks: Locks, first_look_s: float = FIRST_LOOK_S
 ) -> AbstractAsyncContextManager[None]:
     """Carry out the periods of every study each hour while the server runs; one process at a time."""
-    return watched(lambda stopped: _watch(database, settings, locks, first_look_s, stopped))
+    return background_task(lambda stopped: _watch(database, settings, locks, first_look_s, stopped))
 
 
 async def _watch(

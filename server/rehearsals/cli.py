@@ -15,7 +15,7 @@ from experiments.errors import InputError, counted
 from server.app import create_app
 from server.cli_common import out, stored_services
 from server.core.settings import Settings
-from server.rehearsals.http import JsonClient, Refused, running_server
+from server.rehearsals.http import JsonClient, RefusedRequest, running_server
 from server.rehearsals.manners import MANNERS, act, manner_called, summary, write
 from server.rehearsals.person import Person, Rater, link_and_raters
 
@@ -95,7 +95,7 @@ def simulate(
         for done in as_completed(work):
             try:
                 ratings += done.result()
-            except Refused as error:
+            except RefusedRequest as error:
                 pool.shutdown(wait=False, cancel_futures=True)
                 raise InputError(f"the server refused a simulated participant: {error}") from error
             advance()

@@ -21,7 +21,7 @@ ACCEPTED = "application/json;clips=hash"
 """What the participant's page says that it reads."""
 
 
-class Refused(Exception):
+class RefusedRequest(Exception):
     """The server answered with a status of 400 or above, in its one error shape."""
 
     def __init__(self, status: int, body: Any) -> None:
@@ -60,22 +60,22 @@ class JsonClient:
         self.headers: dict[str, str] = {}
 
     def call(self, method: str, path: str, body: Any = None) -> tuple[int, Any]:
-        """Status and decoded answer; Refused for a status of 400 or above."""
+        """Status and decoded answer; RefusedRequest for a status of 400 or above."""
         self.send(method, path, body)
         answer = self._connection.getresponse()
         content = answer.read()
         decoded = json.loads(content) if content else None
         if answer.status >= 400:
-            raise Refused(answer.status, decoded)
+            raise RefusedRequest(answer.status, decoded)
         return answer.status, decoded
 
     def fetch(self, path: str) -> bytes:
-        """The bytes of a file; Refused for a status of 400 or above."""
+        """The bytes of a file; RefusedRequest for a status of 400 or above."""
         self._connection.request("GET", path)
         answer = self._connection.getresponse()
         content = answer.read()
         if answer.status >= 400:
-            raise Refused(answer.status, None)
+            raise RefusedRequest(answer.status, None)
         return content
 
     def send(self, method: str, path: str, body: Any = None) -> None:

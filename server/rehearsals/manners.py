@@ -24,7 +24,7 @@ from server.core.values import now
 from server.participation.clip_bytes import clip_digest, clip_hash
 from server.participation.evidence import VERDICTS
 from server.participation.judgement import judge_run
-from server.rehearsals.http import JsonClient, Refused, running_server
+from server.rehearsals.http import JsonClient, RefusedRequest, running_server
 from server.rehearsals.person import SEES_MOTION, Person, Rater, still_due, view_s
 
 # Manners of taking part: how people and programs act between two answers, seeded.
@@ -374,7 +374,7 @@ class Actor(Person):
                 self.ratings += 1
                 self.following = saved.get("next")
                 self._heed(saved["receipt"])
-            except Refused as error:
+            except RefusedRequest as error:
                 self.refused.append(error.code)
 
     def _heed(self, receipt: dict[str, Any]) -> None:
@@ -412,7 +412,7 @@ def act(
         actor = Actor(client, rater, manner, clips)
         try:
             actor.visit(link)
-        except Refused as error:
+        except RefusedRequest as error:
             actor.refused.append(error.code)
         finally:
             client.close()

@@ -28,7 +28,7 @@ from server.exports.formats import runs_csv
 from server.exports.tables import answers_table, runs_table
 from server.models import Study
 from server.rehearsals import repository
-from server.rehearsals.http import JsonClient, Refused, running_server
+from server.rehearsals.http import JsonClient, RefusedRequest, running_server
 from server.rehearsals.person import Person, link_and_raters
 from server.rehearsals.schemas import (
     DEFINITION,
@@ -65,7 +65,7 @@ def rehearse(folder: Path, say: Say) -> None:
     folder : Path
         Holds definition, manifest and order; gets `rehearsal.json` and the report.
     say : callable
-        Told the share that is done, and what is done next.
+        Gets the share that is done, and what is done next.
     """
     order = Order.model_validate_json((folder / ORDER).read_text(encoding="utf-8"))
     text = (folder / DEFINITION).read_text(encoding="utf-8")
@@ -123,7 +123,7 @@ def _take_part(address: str, token: str, rater: Any) -> None:
     client = JsonClient(address)
     try:
         Person(client, rater).take_part(token)
-    except Refused as error:
+    except RefusedRequest as error:
         raise InputError(f"the server refused a simulated person: {error}") from error
     finally:
         client.close()

@@ -32,7 +32,7 @@ class Revision(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Counted:
+class CachedResult:
     """Results and what they were counted from."""
 
     revision: Revision
@@ -58,10 +58,10 @@ class ResultsCache:
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
         self._lock = threading.Lock()
-        self._kept: dict[Key, Counted] = {}
+        self._kept: dict[Key, CachedResult] = {}
         self._counting: dict[Key, threading.Lock] = {}
 
-    def get(self, key: Key, revision: Revision, count: Count) -> Counted:
+    def get(self, key: Key, revision: Revision, count: Count) -> CachedResult:
         """Results of `revision`, or the latest of the same decisions where counting is slow."""
         kept = self._kept.get(key)
         if kept is None or kept.revision.decisions != revision.decisions:
@@ -74,7 +74,7 @@ class ResultsCache:
             threading.Thread(target=self._count_quietly, args=(key, revision, count), daemon=True).start()
         return kept
 
-    def _count_once(self, key: Key, revision: Revision, count: Count) -> Counted:
+    def _count_once(self, key: Key, revision: Revision, count: Count) -> CachedResult:
         """Count, or take what another thread counted meanwhile."""
         with self._of(key):
             kept = self._kept.get(key)
@@ -88,10 +88,10 @@ class ResultsCache:
             with self._lock:
                 self._kept.pop(key, None)
 
-    def _counted(self, key: Key, count: Count) -> Counted:
+    def _counted(self, key: Key, count: Count) -> CachedResult:
         begun = self._clock()
         revision, results = count()
-        made = Counted(revision, results, self._clock() - begun, self._clock())
+        made = CachedResult(revision, results, self._clock() - begun, self._clock())
         with self._lock:
             self._kept.pop(key, None)
             self._kept[key] = made

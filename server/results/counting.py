@@ -7,7 +7,7 @@ from contextlib import AbstractAsyncContextManager
 from sqlalchemy.orm import Session
 
 from server.accounts.identity import OPERATOR
-from server.core.changes import Stopped, watched
+from server.core.changes import Stopped, background_task
 from server.core.db import Database
 from server.models import Study, StudyVersion
 from server.results import repository, service
@@ -51,7 +51,7 @@ def results_counted_ahead(
     database: Database, cache: ResultsCache, first_look_s: float = FIRST_LOOK_S
 ) -> AbstractAsyncContextManager[None]:
     """Count, once, what the results pages of open studies with many answers will show."""
-    return watched(lambda stopped: _count(database, cache, first_look_s, stopped))
+    return background_task(lambda stopped: _count(database, cache, first_look_s, stopped))
 
 
 async def _count(database: Database, cache: ResultsCache, first_look_s: float, stopped: Stopped) -> None:

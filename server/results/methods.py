@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 
 from experiments.files import whole_file
 from server.models import Study
-from server.results.methods_clauses import Described, Methods, declared_numbers, sentences
+from server.results.methods_clauses import DescribedSeries, Methods, declared_numbers, sentences
 from server.results.methods_repository import Number, numbers, used_versions
 from server.studies.lookup import definition_of, version_numbered
 from server.studies.series import series_of, version_of_series
@@ -23,18 +23,18 @@ def methods_of(
     session: Session, study: Study, origin: str, series: int | None, results: dict[str, Any] | None = None
 ) -> Methods:
     """The paragraph; `results` are those of a report, which says how many each declared rule left out."""
-    return paragraph_of(counted(session, study, origin, series), results)
+    return paragraph_of(methods_figures(session, study, origin, series), results)
 
 
 @dataclass(frozen=True)
-class Counted:
+class MethodsFigures:
     """What a paragraph needs of the database, taken at one moment."""
 
     study: str
-    described: Described
+    described: DescribedSeries
 
 
-def counted(session: Session, study: Study, origin: str, series: int | None) -> Counted:
+def methods_figures(session: Session, study: Study, origin: str, series: int | None) -> MethodsFigures:
     """What the database has to say of a series: its declarations and every number."""
     version = version_of_series(session, study, series)
     experiment = definition_of(version)
@@ -42,7 +42,7 @@ def counted(session: Session, study: Study, origin: str, series: int | None) -> 
         (one, definition_of(version_numbered(session, study, one.number)))
         for one in used_versions(session, study.id, origin, version.series)
     ]
-    described = Described(
+    described = DescribedSeries(
         study=study.id,
         origin=origin,
         series=version.series,
@@ -52,7 +52,7 @@ def counted(session: Session, study: Study, origin: str, series: int | None) -> 
         elsewhere="" if used else _elsewhere(session, study, origin, version.series),
         numbers=numbers(session, study.id, origin, version.series) | declared_numbers(experiment),
     )
-    return Counted(study.name, described)
+    return MethodsFigures(study.name, described)
 
 
 PEOPLE = {
@@ -73,7 +73,7 @@ def _elsewhere(session: Session, study: Study, origin: str, series: int) -> str:
     return "; ".join(placed)
 
 
-def paragraph_of(known: Counted, results: dict[str, Any] | None) -> Methods:
+def paragraph_of(known: MethodsFigures, results: dict[str, Any] | None) -> Methods:
     """The paragraph of what was counted, and of the results of a report."""
     excluded = _excluded(results)
     described = replace(

@@ -110,7 +110,7 @@ PARTICIPANTS = "participant"
 
 
 @dataclass
-class Described:
+class DescribedSeries:
     """What the paragraph is about.
 
     Attributes
@@ -166,7 +166,7 @@ def declared_numbers(experiment: Experiment) -> dict[str, Number]:
     return {name: Number(name, value, f"declaration: {key}") for name, (key, value) in values.items()}
 
 
-def sentences(of: Described) -> tuple[str, ...]:
+def sentences(of: DescribedSeries) -> tuple[str, ...]:
     """The sentences that apply to the visits of a study."""
     return (
         *_origin(of),
@@ -178,7 +178,7 @@ def sentences(of: Described) -> tuple[str, ...]:
     )
 
 
-def _completed(of: Described) -> list[str]:
+def _completed(of: DescribedSeries) -> list[str]:
     if of.value("complete"):
         return [*_checks(of), *_display(of), *_evidence(of)]
     return [
@@ -187,13 +187,13 @@ def _completed(of: Described) -> list[str]:
     ]
 
 
-def _origin(of: Described) -> list[str]:
+def _origin(of: DescribedSeries) -> list[str]:
     if of.origin == PARTICIPANTS:
         return []
     return [f"These visits are no data of participants: their origin is '{of.origin}'."]
 
 
-def _recruitment(of: Described) -> list[str]:
+def _recruitment(of: DescribedSeries) -> list[str]:
     if of.elsewhere:
         return [f"{of.elsewhere}; data series {of.series} has no visits yet."]
     lines = ["Visits begun: {begun}; consent was given in {agreed}."]
@@ -216,7 +216,7 @@ def _recruitment(of: Described) -> list[str]:
     return lines
 
 
-def _ends(of: Described) -> str:
+def _ends(of: DescribedSeries) -> str:
     ends = [
         "{complete} {complete:was|were} completed",
         "{withdrew} {withdrew:was|were} ended at the participant's wish",
@@ -238,7 +238,7 @@ Rule = ScreeningRule | ExclusionRule
 
 
 def _in_force(
-    of: Described, rules_of: Callable[[Experiment], Sequence[Rule]]
+    of: DescribedSeries, rules_of: Callable[[Experiment], Sequence[Rule]]
 ) -> tuple[list[str], dict[tuple[int, ...], list[str]]]:
     """Names of the rules that held for every visit, and those of others by the versions that have them.
 
@@ -260,7 +260,7 @@ def _in_force(
     return always, partly
 
 
-def _screening(of: Described) -> list[str]:
+def _screening(of: DescribedSeries) -> list[str]:
     always, partly = _in_force(of, lambda experiment: experiment.screening)
     lines = [f"Rules of screening, declared before the data: {', '.join(always)}."] if always else []
     for versions, names in partly.items():
@@ -271,7 +271,7 @@ def _screening(of: Described) -> list[str]:
     return lines
 
 
-def _warnings(of: Described) -> list[str]:
+def _warnings(of: DescribedSeries) -> list[str]:
     rules = [rule for _, experiment in of.used for rule in experiment.warnings.rules]
     names = ", ".join(dict.fromkeys(rule.rule.replace("_", " ") for rule in rules))
     if not names and not of.value("warned"):
@@ -286,7 +286,7 @@ def _warnings(of: Described) -> list[str]:
     return [f"While taking part people were warned of {names}, in {{warned}} {{warned:visit|visits}}.{ended}"]
 
 
-def _exclusions(of: Described) -> list[str]:
+def _exclusions(of: DescribedSeries) -> list[str]:
     lines = _declared_exclusions(of)
     if of.rules:
         lines.append(f"They excluded: {'; '.join(f'{words}: {{{name}}}' for name, words in of.rules)}.")
@@ -300,7 +300,7 @@ def _exclusions(of: Described) -> list[str]:
     return lines
 
 
-def _declared_exclusions(of: Described) -> list[str]:
+def _declared_exclusions(of: DescribedSeries) -> list[str]:
     """Of the newest version, which the analysis follows: declared before every visit, or later."""
     always, _ = _in_force(of, lambda experiment: experiment.exclusions)
     now = {rule.model_dump_json(): rule.rule.replace("_", " ") for rule in of.experiment.exclusions}
@@ -325,7 +325,7 @@ def _declared_exclusions(of: Described) -> list[str]:
     return lines or ["No exclusion was declared before the data."]
 
 
-def _asked(of: Described, by_block: Callable[[Experiment], Sequence[int]]) -> list[tuple[int, ...]]:
+def _asked(of: DescribedSeries, by_block: Callable[[Experiment], Sequence[int]]) -> list[tuple[int, ...]]:
     """How many are asked in each block, of the versions that completed visits had, each once."""
     return sorted({tuple(by_block(experiment)) for version, experiment in of.used if version.complete})
 
@@ -342,7 +342,7 @@ def _changed(asked: Sequence[tuple[int, ...]]) -> str:
     return f"; their number per visit was changed ({', '.join(map(str, totals))})" if len(totals) > 1 else ""
 
 
-def _checks(of: Described) -> list[str]:
+def _checks(of: DescribedSeries) -> list[str]:
     lines = []
     asked = _asked(of, attention_by_block)
     if of.value("checks"):
@@ -363,7 +363,7 @@ def _checks(of: Described) -> list[str]:
     return lines
 
 
-def _motion_checks(of: Described) -> list[str]:
+def _motion_checks(of: DescribedSeries) -> list[str]:
     if not of.value("motion_checks") + of.value("motion_checks_other_way"):
         return []
     asked = _asked(of, motion_checks_by_block)
@@ -387,7 +387,7 @@ def _motion_checks(of: Described) -> list[str]:
     ]
 
 
-def _display(of: Described) -> list[str]:
+def _display(of: DescribedSeries) -> list[str]:
     lines = []
     if of.value("plays"):
         lines += [_drawn(of), _as_declared(of)]
@@ -399,7 +399,7 @@ def _display(of: Described) -> list[str]:
     return lines
 
 
-def _drawn(of: Described) -> str:
+def _drawn(of: DescribedSeries) -> str:
     if of.value("plays_by_frame") == of.value("plays"):
         recorded = of.value("plays_good") == of.value("plays")
         times = " and each frame's time recorded" if recorded else ""
@@ -415,7 +415,7 @@ def _drawn(of: Described) -> str:
     return f"Of {{plays}} {{plays:play|plays}} in completed visits the clip was {listed}."
 
 
-def _as_declared(of: Described) -> str:
+def _as_declared(of: DescribedSeries) -> str:
     parts = ["{plays_good} {plays_good:was|were} shown as declared"]
     if of.value("plays_uncertain"):
         parts.append("{plays_uncertain} could not be verified")
@@ -428,7 +428,7 @@ def _as_declared(of: Described) -> str:
     return f"Of {{plays}} {{plays:play|plays}} in completed visits {listed}."
 
 
-def _reasons(of: Described) -> list[str]:
+def _reasons(of: DescribedSeries) -> list[str]:
     start = "plays_flagged_by_"
     return [
         f"{name.removeprefix(start).removeprefix('flagged_').replace('_', ' ')}: {{{name}}}"
@@ -437,7 +437,7 @@ def _reasons(of: Described) -> list[str]:
     ]
 
 
-def _evidence(of: Described) -> list[str]:
+def _evidence(of: DescribedSeries) -> list[str]:
     judged = sum(of.value(name) for name in ("likely", "unclear", "unlikely"))
     if not judged:
         return [
@@ -455,7 +455,7 @@ def _evidence(of: Described) -> list[str]:
     return lines
 
 
-def _gathered(of: Described) -> str:
+def _gathered(of: DescribedSeries) -> str:
     """What was gathered as evidence; with numbers where it was not of every completed visit."""
     kinds: Mapping[str, str] = {
         "with_tickets": "tickets of the server and the server's time",

@@ -160,7 +160,7 @@ NOT_MET = "."
 
 
 @dataclass
-class _Seen:
+class _ClipFailures:
     """What is known of one clip."""
 
     file: str
@@ -183,10 +183,10 @@ def failing_clips(session: Session, study: Study, chosen: Origin | None) -> list
         for play in monitor_repository.failed_plays(session, with_failures)
         if _letter(runs[play.run], play.trial_index) == NOT_SEEN_IN_TRIAL
     ]
-    clips: dict[str, _Seen] = {}
+    clips: dict[str, _ClipFailures] = {}
     for play in failed:
         for _, clip in play.blamed:
-            seen = clips.setdefault(clip.sha256, _Seen(clip.file, clip.cell))
+            seen = clips.setdefault(clip.sha256, _ClipFailures(clip.file, clip.cell))
             seen.failed_for.add(runs[play.run].participant)
             seen.rules[play.rule] += 1
     _add_who_met(session, runs, clips)
@@ -195,13 +195,13 @@ def failing_clips(session: Session, study: Study, chosen: Origin | None) -> list
     return sorted(listed, key=lambda clip: (not clip.alarm, -clip.failed_for, clip.file))
 
 
-def _add_who_met(session: Session, runs: dict[int, MetRun], clips: dict[str, _Seen]) -> None:
+def _add_who_met(session: Session, runs: dict[int, MetRun], clips: dict[str, _ClipFailures]) -> None:
     for run, trial_index, sha256 in monitor_repository.trials_with_clips(session, list(runs), list(clips)):
         if _letter(runs[run], trial_index) != NOT_MET:
             clips[sha256].met_by.add(runs[run].participant)
 
 
-def _add_reasons(session: Session, runs: list[int], clips: dict[str, _Seen]) -> None:
+def _add_reasons(session: Session, runs: list[int], clips: dict[str, _ClipFailures]) -> None:
     """What the pages said of clips that they could not show."""
     for data in monitor_repository.unavailable_clips(session, runs):
         named: Iterable[object] = [data.get("clip_sha256"), *_listed(data.get("clips"))]
@@ -220,7 +220,7 @@ def _letter(run: MetRun, trial_index: int) -> str:
     return run.heat[trial_index] if trial_index < len(run.heat) else NOT_MET
 
 
-def _of(sha256: str, seen: _Seen) -> FailingClip:
+def _of(sha256: str, seen: _ClipFailures) -> FailingClip:
     people, failed = len(seen.met_by | seen.failed_for), len(seen.failed_for)
     return FailingClip(
         clip_sha256=sha256,

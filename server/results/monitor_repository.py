@@ -178,7 +178,7 @@ def unavailable_clips(session: Session, runs: Sequence[int]) -> list[dict[str, A
 
 
 def refused_browsers(session: Session, study: Study) -> int:
-    """How often a browser was refused at the door."""
+    """How often a browser was refused before a run began."""
     query = (
         select(func.count())
         .select_from(RunEvent)

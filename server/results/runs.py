@@ -10,7 +10,7 @@ from server.core.errors import Conflict
 from server.core.values import now
 from server.models import AssignedTrial, Link, Rating, Study, StudyRun, VersionClip
 from server.participation import visit_repository
-from server.participation.identity_keys import KnownAs, UnreadableError
+from server.participation.identity_keys import ParticipantIdentity, UnreadableError
 from server.participation.identity_repository import known_as
 from server.results.schemas import (
     RunIdentity,
@@ -88,7 +88,7 @@ def identity(session: Session, study: Study, public_id: str, reader: Identity) -
     run = visit_repository.find_run(session, study, public_id)
     record(session, reader, "identity read", "run", public_id, study=study.name)
     try:
-        known = known_as(session, run) or KnownAs()
+        known = known_as(session, run) or ParticipantIdentity()
     except UnreadableError as error:
         raise Conflict(f"{error}.") from error
     return RunIdentity(

@@ -94,7 +94,7 @@ def common(study: Study, version: StudyVersion, of: Pool, tally: PooledTally) ->
 
 def margins(means: summary.CellMeans, factors: list[str], between: Sequence[str] = ()) -> list[Margin]:
     """Every factor, every pair of factors, and the cells where there are more than two factors."""
-    people = summary.alike(means)
+    people = summary.raters_of_same_cells(means)
     kept = [list(chosen) for size in (1, 2) for chosen in combinations(factors, size)]
     if len(factors) > 2:
         kept.append(factors)

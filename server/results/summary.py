@@ -27,26 +27,29 @@ CellMeans = Mapping[str, Mapping[tuple[str, ...], float]]
 """Participant -> (levels in factor order) -> mean rating."""
 
 
-class Alike(NamedTuple):
+class RatersOfSameCells(NamedTuple):
     """Participants who rated the same cells: their means by cell, a row a participant."""
 
     cells: tuple[tuple[str, ...], ...]
     rows: list[tuple[float, ...]]
 
 
-def alike(cell_means: CellMeans) -> list[Alike]:
+def raters_of_same_cells(cell_means: CellMeans) -> list[RatersOfSameCells]:
     """Participants by the cells they rated. Thousands are then reckoned with column by column."""
-    groups: dict[tuple[tuple[str, ...], ...], Alike] = {}
+    groups: dict[tuple[tuple[str, ...], ...], RatersOfSameCells] = {}
     for means in cell_means.values():
         cells = tuple(means)
         if cells not in groups:
-            groups[cells] = Alike(cells, [])
+            groups[cells] = RatersOfSameCells(cells, [])
         groups[cells].rows.append(tuple(means.values()))
     return list(groups.values())
 
 
 def margin(
-    people: Sequence[Alike], factors: Sequence[str], keep: Sequence[str], between: Sequence[str] = ()
+    people: Sequence[RatersOfSameCells],
+    factors: Sequence[str],
+    keep: Sequence[str],
+    between: Sequence[str] = (),
 ) -> list[MarginMean]:
     """Marginal means of the factors in `keep`, over the participants who have every one of those levels.
 
@@ -54,7 +57,7 @@ def margin(
     group for itself where `keep` has factors of `between`, of which a participant has one level or some.
     """
     fixed = [factors.index(name) for name in keep if name in between]
-    groups: dict[tuple[str, ...], list[Alike]] = {}
+    groups: dict[tuple[str, ...], list[RatersOfSameCells]] = {}
     for those in people:
         for group, cells in _cells_by_group(those, fixed).items():
             groups.setdefault(group, []).append(_of_cells(those, cells))
@@ -62,7 +65,7 @@ def margin(
     return [mean for group in groups.values() for mean in _of_group(group, keep, places)]
 
 
-def _cells_by_group(those: Alike, fixed: Sequence[int]) -> dict[tuple[str, ...], list[int]]:
+def _cells_by_group(those: RatersOfSameCells, fixed: Sequence[int]) -> dict[tuple[str, ...], list[int]]:
     """Which of their cells lie in each group, by its levels of the factors at `fixed`."""
     groups: dict[tuple[str, ...], list[int]] = defaultdict(list)
     for number, levels in enumerate(those.cells):
@@ -70,15 +73,17 @@ def _cells_by_group(those: Alike, fixed: Sequence[int]) -> dict[tuple[str, ...],
     return groups
 
 
-def _of_cells(those: Alike, cells: Sequence[int]) -> Alike:
+def _of_cells(those: RatersOfSameCells, cells: Sequence[int]) -> RatersOfSameCells:
     """The same participants with some of their cells."""
     if len(cells) == len(those.cells):
         return those
     rows = [tuple(row[number] for number in cells) for row in those.rows]
-    return Alike(tuple(those.cells[number] for number in cells), rows)
+    return RatersOfSameCells(tuple(those.cells[number] for number in cells), rows)
 
 
-def _of_group(people: Sequence[Alike], keep: Sequence[str], places: Sequence[int]) -> list[MarginMean]:
+def _of_group(
+    people: Sequence[RatersOfSameCells], keep: Sequence[str], places: Sequence[int]
+) -> list[MarginMean]:
     collapsed = [_collapse(those, places) for those in people]
     conditions = list(dict.fromkeys(key for columns in collapsed for key in columns))
     complete = [columns for columns in collapsed if len(columns) == len(conditions)]
@@ -97,7 +102,7 @@ def _of_group(people: Sequence[Alike], keep: Sequence[str], places: Sequence[int
     ]
 
 
-def _collapse(those: Alike, places: Sequence[int]) -> dict[tuple[str, ...], Sequence[float]]:
+def _collapse(those: RatersOfSameCells, places: Sequence[int]) -> dict[tuple[str, ...], Sequence[float]]:
     """Condition -> each participant's mean over the cells of that condition."""
     members: dict[tuple[str, ...], list[int]] = defaultdict(list)
     for number, levels in enumerate(those.cells):

@@ -22,7 +22,7 @@ from server.core.storage import CHUNK_BYTES
 from server.studies import uploads
 from server.studies.schemas import AskFrameRate, LeaveOut, UploadOut, UploadProgress
 from server.studies.uploads import Quota
-from server.transcoding.preparing import Preparing
+from server.transcoding.preparing import UploadPreparation
 from server.transcoding.records import ask_rate
 
 # Uploads of own clips, and the originals of those that were converted.
@@ -122,7 +122,7 @@ def _quota(settings: Settings, identity: Identity) -> Quota:
     return Quota(settings.upload_folder, identity.account_id, settings.max_uploads_bytes)
 
 
-def _progress(settings: Settings, preparing: Preparing, upload: str, account: int) -> UploadProgress:
+def _progress(settings: Settings, preparing: UploadPreparation, upload: str, account: int) -> UploadProgress:
     folder = uploads.upload_folder(settings.upload_folder, upload, account)
     told = uploads.progress(folder)
     if told.waiting:

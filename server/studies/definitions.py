@@ -15,7 +15,7 @@ from server.studies.creation import planned_experiment
 from server.studies.lookup import find_study
 from server.studies.schemas import (
     BlockOut,
-    Checked,
+    DefinitionCheck,
     DesignOut,
     EditDefinition,
     EditedDefinition,
@@ -60,14 +60,14 @@ def _notes(experiment: Experiment) -> list[str]:
         return [str(error), *unread]
 
 
-def check(text: str) -> Checked:
+def check(text: str) -> DefinitionCheck:
     """Every problem of a definition with its line, or what it expands to."""
     try:
         experiment = planned_experiment(text)
     except DefinitionError as error:
         problems = [ProblemOut(line=p.line, path=p.path, message=p.message) for p in error.problems]
-        return Checked(problems=problems, design=None)
-    return Checked(problems=[], design=design_out(experiment))
+        return DefinitionCheck(problems=problems, design=None)
+    return DefinitionCheck(problems=[], design=design_out(experiment))
 
 
 def edit(edited: EditDefinition) -> EditedDefinition:

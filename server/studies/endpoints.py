@@ -34,10 +34,10 @@ from server.studies.schemas import (
     ArchiveStudy,
     ChangeSettings,
     ChangeStatus,
-    Checked,
     ClipOut,
     CloneStudy,
     Comparison,
+    DefinitionCheck,
     DefinitionText,
     EditDefinition,
     EditedDefinition,
@@ -68,7 +68,7 @@ def list_experiments(settings: SettingsDep, _identity: Viewer) -> list[ShippedEx
 
 
 @router.post("/definitions/check")
-def check_definition(_identity: Viewer, body: DefinitionText) -> Checked:
+def check_definition(_identity: Viewer, body: DefinitionText) -> DefinitionCheck:
     """Check a definition: every problem with its line and the nearest right name, or what it expands to."""
     return definitions.check(body.toml)
 

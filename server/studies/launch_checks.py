@@ -31,7 +31,7 @@ class NotReady(Conflict):
     code = "not_ready"
 
 
-class ToLaunch(NamedTuple):
+class LaunchState(NamedTuple):
     """What participants of a live study meet: its declaration, clips, recruiters and links."""
 
     version: StudyVersion
@@ -41,7 +41,7 @@ class ToLaunch(NamedTuple):
     has_personal_links: bool
 
 
-Check = Callable[[ToLaunch], Iterator[LaunchCheck]]
+Check = Callable[[LaunchState], Iterator[LaunchCheck]]
 
 
 def launch_checks(session: Session, name: str, identity: Identity) -> list[LaunchCheck]:
@@ -72,7 +72,7 @@ def refuse_if_live(session: Session, study: Study) -> None:
         raise NotReady(" ".join(new))
 
 
-def _blocking_sentences(launch: ToLaunch) -> list[str]:
+def _blocking_sentences(launch: LaunchState) -> list[str]:
     return [finding.text for check in _BLOCKING for finding in check(launch) if finding.blocks]
 
 
@@ -82,8 +82,8 @@ def refuse_recruiter(study: Study, recruiter: Recruiter | None, page: str) -> No
         raise NotReady(_CODE_NEEDED.format(page=page))
 
 
-def _to_launch(session: Session, study: Study, version: StudyVersion) -> ToLaunch:
-    return ToLaunch(
+def _to_launch(session: Session, study: Study, version: StudyVersion) -> LaunchState:
+    return LaunchState(
         version,
         definition_of(version),
         stored_recruiter(study.recruiter) if study.recruiter else None,
@@ -92,13 +92,13 @@ def _to_launch(session: Session, study: Study, version: StudyVersion) -> ToLaunc
     )
 
 
-def _placeholders(launch: ToLaunch) -> Iterator[LaunchCheck]:
+def _placeholders(launch: LaunchState) -> Iterator[LaunchCheck]:
     """Texts that still have marks such as [Title]."""
     for text in unfilled(launch.experiment):
         yield LaunchCheck(kind="placeholders", blocks=text.certain, text=str(text))
 
 
-def _completion_codes(launch: ToLaunch) -> Iterator[LaunchCheck]:
+def _completion_codes(launch: LaunchState) -> Iterator[LaunchCheck]:
     """Prolific knows its own code alone; a random one pays nobody."""
     recruiters = [(launch.recruiter, "Settings")] if launch.recruiter else []
     recruiters += [(recruiter, "Links") for recruiter in launch.of_links]
@@ -120,7 +120,7 @@ def _code_is_random(recruiter: Recruiter) -> bool:
     return recruiter.kind == "prolific" and not fixed
 
 
-def _levels_told_apart(launch: ToLaunch) -> Iterator[LaunchCheck]:
+def _levels_told_apart(launch: LaunchState) -> Iterator[LaunchCheck]:
     """Levels that raters can recognize by something other than the factor."""
     manifest = Manifest.model_validate(launch.version.manifest)
     for sentence in reported_leaks(manifest.clips):
@@ -129,7 +129,7 @@ def _levels_told_apart(launch: ToLaunch) -> Iterator[LaunchCheck]:
         )
 
 
-def _translations(launch: ToLaunch) -> Iterator[LaunchCheck]:
+def _translations(launch: LaunchState) -> Iterator[LaunchCheck]:
     """Texts that participants read in another language than they chose."""
     first = launch.experiment.languages[0]
     for language, paths in untranslated(launch.experiment).items():
@@ -143,7 +143,7 @@ def _translations(launch: ToLaunch) -> Iterator[LaunchCheck]:
         )
 
 
-def _recruiter(launch: ToLaunch) -> Iterator[LaunchCheck]:
+def _recruiter(launch: LaunchState) -> Iterator[LaunchCheck]:
     """Without a recruiter and without personal links nothing says who a participant is."""
     if launch.recruiter is None and not launch.of_links and not launch.has_personal_links:
         yield LaunchCheck(
@@ -161,7 +161,7 @@ def _recruiter(launch: ToLaunch) -> Iterator[LaunchCheck]:
         )
 
 
-def _flicker(launch: ToLaunch) -> Iterator[LaunchCheck]:
+def _flicker(launch: LaunchState) -> Iterator[LaunchCheck]:
     """Motion checks of flickering dots that the consent does not mention."""
     if languages := silent_on_flicker(launch.experiment):
         yield LaunchCheck(
@@ -173,7 +173,7 @@ def _flicker(launch: ToLaunch) -> Iterator[LaunchCheck]:
         )
 
 
-def _person_checks(launch: ToLaunch) -> Iterator[LaunchCheck]:
+def _person_checks(launch: LaunchState) -> Iterator[LaunchCheck]:
     """Recruited participants, and too few checks to tell people from programs."""
     if (launch.recruiter or launch.of_links) and guessed_throughout(launch.experiment) >= ENOUGH_BY_CHANCE:
         yield LaunchCheck(

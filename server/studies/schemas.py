@@ -75,7 +75,7 @@ class DesignOut(BaseModel):
     turned_away: str = Field(description="Devices that can take no part, in a sentence; empty where all can.")
 
 
-class Checked(BaseModel):
+class DefinitionCheck(BaseModel):
     """Whether a definition can be used, and what it expands to."""
 
     problems: list[ProblemOut]

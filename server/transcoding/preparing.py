@@ -19,7 +19,7 @@ END_S = 5.0
 LOCK = "transcoding"
 
 
-class Preparing:
+class UploadPreparation:
     """Has uploaded videos looked into and converted, in a process of its own.
 
     Parameters

@@ -192,7 +192,7 @@ FORKS = hasattr(os, "fork") and hasattr(signal, "SIGSTOP")
 
 
 @dataclass
-class _Started:
+class _Conversion:
     """A file that a process is at, running or stopped, and those that the process does afterwards."""
 
     account: str
@@ -226,7 +226,7 @@ class Worker:
         limit = address_limit(memory_of_machine())
         self._most = started_at_most(limit)
         self._limit_each = limit // self._most
-        self._started: dict[str, _Started] = {}
+        self._started: dict[str, _Conversion] = {}
         self._budget_s: dict[Video, float] = {}
         self._failures: dict[Video, int] = {}
 
@@ -254,7 +254,7 @@ class Worker:
         taken = (video for started in self._started.values() for video in started.videos)
         self._turns.refresh(taken, now=now)
 
-    def _start(self, account: str) -> _Started | None:
+    def _start(self, account: str) -> _Conversion | None:
         """Start the next files of an account; None where the first has gone, or there is no room for it."""
         if len(self._started) >= self._most and not self._make_room():
             return None
@@ -264,7 +264,7 @@ class Worker:
         videos = [video]
         if not self._is_awaited(account):
             videos += self._turns.take_further(account, folder, self._failures)
-        self._started[account] = _Started(account, folder, deque(videos), *self._fork(videos))
+        self._started[account] = _Conversion(account, folder, deque(videos), *self._fork(videos))
         return self._started[account]
 
     def _is_awaited(self, account: str) -> bool:
@@ -300,7 +300,7 @@ class Worker:
         finally:  # of an error, or of a signal: nothing of the parent's is run here
             os._exit(1)
 
-    def _run(self, started: _Started) -> None:
+    def _run(self, started: _Conversion) -> None:
         """Let a process have its turn, and go on for as long as no other account waits."""
         begun = now = time.monotonic()
         turn_ends = begun + TURN_S
@@ -335,7 +335,7 @@ class Worker:
         self._budget_s.pop(video, None)
         self._failures.pop(video, None)
 
-    def _take_result(self, started: _Started) -> None:
+    def _take_result(self, started: _Conversion) -> None:
         """Note that a process has ended; a file at which it ended by an error is tried once more."""
         status = self._end(started, kill=False)
         if started.videos and os.waitstatus_to_exitcode(status) not in (0, TRY_AFRESH):
@@ -350,7 +350,7 @@ class Worker:
         else:
             _refuse(*video)
 
-    def _end(self, started: _Started, *, kill: bool = True) -> int:
+    def _end(self, started: _Conversion, *, kill: bool = True) -> int:
         """Clear up after a process, which is ended first unless it ends; return its status."""
         del self._started[started.account]
         if kill:

@@ -58,7 +58,7 @@ def test_the_slice_on_postgres_asks_for_it_and_is_not_long() -> None:
         ("tests/server/test_pages.py::test_a", {"postgres"}, (), True),
         ("tests/server/test_prepared.py::test_a", {"postgres"}, (), False),
         ("tests/server/test_durability.py::test_a", set(), (), True),
-        ("tests/server/attacks/test_lane.py::test_a", set(), (), True),
+        ("tests/server/attacks/test_concurrency_limit.py::test_a", set(), (), True),
         ("tests/browser/participant/test_flow.py::test_a", {"browser"}, (), False),
         ("tests/browser/participant/test_flow.py::test_a", {"firefox"}, (), True),
         ("tests/stimuli_builder/test_a.py::test_a", set(), ("shared_data",), True),

@@ -11,7 +11,7 @@ from fastapi.testclient import TestClient
 from sqlalchemy.exc import IntegrityError
 
 from server.context import Services
-from server.core.logs import JsonLines, Needless, PlainLines, described, logging_configuration
+from server.core.logs import JsonLines, PlainLines, UvicornFilter, described, logging_configuration
 from server.core.settings import Settings
 from server.operations.metrics import Observer
 
@@ -66,7 +66,7 @@ def test_the_databases_own_first_line_is_kept() -> None:
 )
 def test_uvicorn_tells_no_failure_twice_and_nothing_of_websockets(line: str, kept: bool) -> None:
     record = logging.LogRecord("uvicorn.error", logging.WARNING, "", 1, line, (), None)
-    assert Needless().filter(record) is kept
+    assert UvicornFilter().filter(record) is kept
 
 
 @pytest.mark.parametrize("form", ["json", "text"])

@@ -899,10 +899,6 @@ export interface components {
     [key: string]: string;
    }[];
   };
-  Checked: {
-   problems: components["schemas"]["ProblemOut"][];
-   design: components["schemas"]["DesignOut"] | null;
-  };
   ChoiceField: {
    name: string;
    label: {
@@ -1114,6 +1110,10 @@ export interface components {
    */
    among: "declared";
    cells: components["schemas"]["CellPair"][];
+  };
+  DefinitionCheck: {
+   problems: components["schemas"]["ProblemOut"][];
+   design: components["schemas"]["DesignOut"] | null;
   };
   DefinitionText: {
    toml: string;
@@ -3754,7 +3754,6 @@ export type ChangeStatus = components['schemas']['ChangeStatus'];
 export type ChangeWorkspace = components['schemas']['ChangeWorkspace'];
 export type CheckAnswer = components['schemas']['CheckAnswer'];
 export type CheckWording = components['schemas']['CheckWording'];
-export type Checked = components['schemas']['Checked'];
 export type ChoiceField = components['schemas']['ChoiceField'];
 export type ClipDifference = components['schemas']['ClipDifference'];
 export type ClipInRole = components['schemas']['ClipInRole'];
@@ -3776,6 +3775,7 @@ export type Creator = components['schemas']['Creator'];
 export type Dataset = components['schemas']['Dataset'];
 export type Declaration = components['schemas']['Declaration'];
 export type DeclaredPairs = components['schemas']['DeclaredPairs'];
+export type DefinitionCheck = components['schemas']['DefinitionCheck'];
 export type DefinitionText = components['schemas']['DefinitionText'];
 export type DesignOut = components['schemas']['DesignOut'];
 export type Display = components['schemas']['Display'];
@@ -6290,7 +6290,7 @@ export interface operations {
      [name: string]: unknown;
     };
     content: {
-     "application/json": components["schemas"]["Checked"];
+     "application/json": components["schemas"]["DefinitionCheck"];
     };
    };
    422: {

@@ -13,7 +13,7 @@ from experiments.declaration.experiment import Experiment
 from experiments.declaration.trial import Answer
 from server.core.errors import Invalid
 from server.participation.answer_schemas import Part, RatingIn
-from server.participation.tallies import Counted, NumberedClip
+from server.participation.tallies import NumberedClip, TallyEntry
 from server.participation.verdict import Ruling
 from server.participation.versions import LoadedVersion
 
@@ -37,7 +37,7 @@ def asked_in(prompt: str) -> int:
 
 
 @dataclass(frozen=True)
-class Served:
+class ServedKind:
     """A kind of trial in the server.
 
     Attributes
@@ -58,7 +58,7 @@ class Served:
     validate: Callable[[Experiment, Part, RatingIn], None]
     judge: Callable[[LoadedVersion, Mapping[str, int], RatingIn], Ruling]
     simulated: Callable[[Preference, Mapping[str, Any], Mapping[str, Any], random.Random], dict[str, Any]]
-    counted: Callable[[Mapping[str, NumberedClip], Mapping[str, Any]], Iterable[Counted]]
+    counted: Callable[[Mapping[str, NumberedClip], Mapping[str, Any]], Iterable[TallyEntry]]
 
 
 class AnswerOfOtherKind(Invalid):
@@ -80,10 +80,10 @@ def answer_of(rating: RatingIn, model: type[A]) -> A:
     return rating.answer
 
 
-_SERVED: dict[str, Served] = {}
+_SERVED: dict[str, ServedKind] = {}
 
 
-def served(kind: str) -> Served:
+def served(kind: str) -> ServedKind:
     """What the server does for trials of this kind."""
     if kind not in _SERVED:
         _SERVED[kind] = import_module(f"server.participation.kinds.{kind}").SERVED

@@ -11,8 +11,8 @@ from experiments.kinds.clip_rating import ShownClipRating
 from experiments.kinds.scales import scales_of
 from server.core.errors import Invalid
 from server.participation.answer_schemas import Part, RatingIn
-from server.participation.kinds import Preference, Served, answer_of, asked_in
-from server.participation.tallies import Counted, NumberedClip
+from server.participation.kinds import Preference, ServedKind, answer_of, asked_in
+from server.participation.tallies import NumberedClip, TallyEntry
 from server.participation.verdict import Ruling, judge_several, playback_of
 from server.participation.verdict import judge as judge_play
 
@@ -130,14 +130,14 @@ def _answers(answers: dict[str, Any]) -> dict[str, Any]:
     return {"kind": "clip_rating", "answers": answers}
 
 
-def counted(clips: Mapping[str, NumberedClip], payload: Mapping[str, Any]) -> list[Counted]:
+def counted(clips: Mapping[str, NumberedClip], payload: Mapping[str, Any]) -> list[TallyEntry]:
     """Each number by its scale; it has a mean by cell. "Not applicable" is none."""
     answers, shown = payload.get("answers", {SCALE_NAME: payload}), clips["shown"]
     return [
-        Counted(name, shown.clip, None, one["response"], shown.cell)
+        TallyEntry(name, shown.clip, None, one["response"], shown.cell)
         for name, one in answers.items()
         if one["response"] is not None
     ]
 
 
-SERVED = Served(validate, judge, simulated, counted)
+SERVED = ServedKind(validate, judge, simulated, counted)

@@ -14,9 +14,9 @@ from experiments.declaration.continuous_rating import (
 from experiments.declaration.experiment import Experiment
 from server.core.errors import Invalid
 from server.participation.answer_schemas import Part, RatingIn
-from server.participation.kinds import Preference, Served, answer_of, asked_in
+from server.participation.kinds import Preference, ServedKind, answer_of, asked_in
 from server.participation.kinds.clip_rating import RatingMissing, RatingOutOfScale
-from server.participation.tallies import Counted, NumberedClip
+from server.participation.tallies import NumberedClip, TallyEntry
 from server.participation.verdict import Ruling, playback_of
 from server.participation.verdict import judge as judge_play
 
@@ -93,12 +93,12 @@ def risen(since_s: float) -> float:
     return u * math.exp(1 - u) if u > 0 else 0.0
 
 
-def counted(clips: Mapping[str, NumberedClip], payload: Mapping[str, Any]) -> list[Counted]:
+def counted(clips: Mapping[str, NumberedClip], payload: Mapping[str, Any]) -> list[TallyEntry]:
     """The trace's mean, by cell."""
     if payload["response"] is None:
         return []
     shown = clips["shown"]
-    return [Counted("", shown.clip, None, payload["response"], shown.cell)]
+    return [TallyEntry("", shown.clip, None, payload["response"], shown.cell)]
 
 
-SERVED = Served(validate, judge, simulated, counted)
+SERVED = ServedKind(validate, judge, simulated, counted)

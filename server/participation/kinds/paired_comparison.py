@@ -15,9 +15,9 @@ from experiments.declaration.paired_comparison import (
 )
 from server.core.errors import Invalid
 from server.participation.answer_schemas import Part, RatingIn
-from server.participation.kinds import Preference, Served, answer_of, asked_in
+from server.participation.kinds import Preference, ServedKind, answer_of, asked_in
 from server.participation.kinds.clip_rating import RatingMissing
-from server.participation.tallies import Counted, NumberedClip
+from server.participation.tallies import NumberedClip, TallyEntry
 from server.participation.verdict import Ruling, judge_several, playback_of
 from server.participation.verdict import judge as judge_play
 
@@ -75,11 +75,11 @@ def simulated(
     return {"kind": "paired_comparison", "winner": winner, "arrangement": arrangement}
 
 
-def counted(clips: Mapping[str, NumberedClip], payload: Mapping[str, Any]) -> list[Counted]:
+def counted(clips: Mapping[str, NumberedClip], payload: Mapping[str, Any]) -> list[TallyEntry]:
     """The number of the answer, for left and right or first and second."""
     code = check_response(payload)
     pair = [clips[role].clip for role in ("left", "first", "right", "second") if role in clips]
-    return [] if code is None else [Counted("", pair[0], pair[1], code)]
+    return [] if code is None else [TallyEntry("", pair[0], pair[1], code)]
 
 
-SERVED = Served(validate, judge, simulated, counted)
+SERVED = ServedKind(validate, judge, simulated, counted)

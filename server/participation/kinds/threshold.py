@@ -8,9 +8,9 @@ from experiments.declaration.experiment import Experiment
 from experiments.declaration.threshold import CODES, ThresholdAnswer, YesNo, threshold_of
 from server.core.errors import Invalid
 from server.participation.answer_schemas import Part, RatingIn
-from server.participation.kinds import Preference, Served, answer_of, asked_in
+from server.participation.kinds import Preference, ServedKind, answer_of, asked_in
 from server.participation.kinds.clip_rating import RatingMissing
-from server.participation.tallies import Counted, NumberedClip
+from server.participation.tallies import NumberedClip, TallyEntry
 from server.participation.verdict import Ruling, judge_several, playback_of
 from server.participation.verdict import judge as judge_play
 
@@ -66,14 +66,14 @@ def simulated(
     return {"kind": "threshold", "chosen": chosen, "known": series["known"]}
 
 
-def counted(clips: Mapping[str, NumberedClip], payload: Mapping[str, Any]) -> list[Counted]:
+def counted(clips: Mapping[str, NumberedClip], payload: Mapping[str, Any]) -> list[TallyEntry]:
     """Yes as 1 and no as 0, so that a cell's mean is its share of yes; of two clips, the answer's number."""
     if payload["chosen"] is None:
         return []
     if "shown" in clips:
         shown = clips["shown"]
-        return [Counted("", shown.clip, None, float(payload["chosen"] == "yes"), shown.cell)]
-    return [Counted("", clips["first"].clip, clips["second"].clip, CODES[payload["chosen"]])]
+        return [TallyEntry("", shown.clip, None, float(payload["chosen"] == "yes"), shown.cell)]
+    return [TallyEntry("", clips["first"].clip, clips["second"].clip, CODES[payload["chosen"]])]
 
 
-SERVED = Served(validate, judge, simulated, counted)
+SERVED = ServedKind(validate, judge, simulated, counted)

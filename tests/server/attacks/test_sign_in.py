@@ -13,7 +13,7 @@ from fastapi.testclient import TestClient
 
 from server.accounts import credentials, invitations, signing_in
 from server.accounts.credentials import (
-    Checked,
+    PasswordCheck,
     PasswordsBusy,
     PasswordWork,
     WeakPassword,
@@ -74,7 +74,13 @@ def test_of_six_who_use_one_recovery_code_or_one_time_code_one_gets_in(
         got = together(
             SIX,
             lambda _, code=code: signing_in.open_session(
-                services.database, services.settings, services.sign_ins, owner.name, Checked(stored), code, ""
+                services.database,
+                services.settings,
+                services.sign_ins,
+                owner.name,
+                PasswordCheck(stored),
+                code,
+                "",
             ),
         )
         assert sum(token is not None for token, _ in got) == 1, got

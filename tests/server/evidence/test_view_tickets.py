@@ -212,7 +212,7 @@ def test_what_was_spent_is_read_once_for_the_views_of_a_call(
     whole = [ended(watcher, view_of(watcher, trial)) for trial in trials]
     asked, ask = [], evidence_repository.spent_by_views
 
-    def noted(*question: Any) -> evidence_repository.Spent:
+    def noted(*question: Any) -> evidence_repository.ViewTime:
         asked.append(question)
         return ask(*question)
 

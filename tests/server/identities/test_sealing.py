@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from server.participation.identity_keys import (
-    KnownAs,
+    ParticipantIdentity,
     UnreadableError,
     identifier_hash,
     rewrap,
@@ -26,7 +26,7 @@ STUDY_KEY = "00" * 31 + "01"
 
 @given(ANY_TEXT, st.dictionaries(ANY_TEXT, ANY_TEXT, max_size=4))
 def test_what_was_sealed_comes_back(identifier: str, parameters: dict[str, str]) -> None:
-    known = KnownAs(identifier, parameters)
+    known = ParticipantIdentity(identifier, parameters)
     sealed = seal(SECRET, RUN, known)
     assert unseal(SECRET, RUN, sealed) == known
     assert seal(SECRET, RUN, known) != sealed
@@ -34,7 +34,10 @@ def test_what_was_sealed_comes_back(identifier: str, parameters: dict[str, str])
 
 @pytest.mark.parametrize("change", ["secret", "run", "content", "key", "another key", "no key", "no text"])
 def test_nothing_else_opens_it(change: str) -> None:
-    sealed, other = seal(SECRET, RUN, KnownAs("5a9d")), seal(SECRET, RUN, KnownAs("77b2"))
+    sealed, other = (
+        seal(SECRET, RUN, ParticipantIdentity("5a9d")),
+        seal(SECRET, RUN, ParticipantIdentity("77b2")),
+    )
     flipped = bytearray(base64.b64decode(sealed.content))
     flipped[-1] ^= 1
     given_instead = {
@@ -52,7 +55,7 @@ def test_nothing_else_opens_it(change: str) -> None:
 
 def test_the_content_is_aes_gcm_with_the_run_as_associated_data() -> None:
     """Read by the library alone, as anybody could who has the key."""
-    sealed = seal(SECRET, RUN, KnownAs("5a9d", {"a": "b"}))
+    sealed = seal(SECRET, RUN, ParticipantIdentity("5a9d", {"a": "b"}))
     content, key = base64.b64decode(sealed.content), unwrap(SECRET, sealed.wrapped_key)
     plain = json.loads(AESGCM(key).decrypt(content[:12], content[12:], RUN.encode()))
     assert plain == {"identifier": "5a9d", "parameters": {"a": "b"}}
@@ -60,9 +63,9 @@ def test_the_content_is_aes_gcm_with_the_run_as_associated_data() -> None:
 
 
 def test_another_secret_key_takes_the_keys_over() -> None:
-    sealed = seal(SECRET, RUN, KnownAs("5a9d"))
+    sealed = seal(SECRET, RUN, ParticipantIdentity("5a9d"))
     taken_over = replace(sealed, wrapped_key=rewrap(SECRET, b"new", sealed.wrapped_key))
-    assert unseal(b"new", RUN, taken_over) == KnownAs("5a9d")
+    assert unseal(b"new", RUN, taken_over) == ParticipantIdentity("5a9d")
     with pytest.raises(UnreadableError):
         rewrap(b"neither", b"new", sealed.wrapped_key)
 

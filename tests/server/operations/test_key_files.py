@@ -17,7 +17,7 @@ from server.core.storage import ClipStore
 from server.models import IdentityKey, Study, StudyRun
 from server.operations import key_escrow
 from server.operations.backup import back_up, decrypt, identity_in, make_identity, recipient_of
-from server.operations.backup_stores import FolderOfBackups, KeptBackup, back_up_to, backups_in
+from server.operations.backup_stores import FolderOfBackups, StoredBackup, back_up_to, backups_in
 from server.operations.drill import drill, drill_when_due
 from server.operations.key_escrow import NAME, key_file
 from server.operations.restore import restore
@@ -224,7 +224,7 @@ def test_one_that_is_overtaken_off_the_host_brings_no_key_back(
         decrypt(source, target, identity_in(safe[1]), keys)
     assert first.run_id not in target.getvalue().decode()
     for backup in backups_in(store):
-        result = drill(services.settings, KeptBackup(store, backup.name), identity_in(safe[1]))
+        result = drill(services.settings, StoredBackup(store, backup.name), identity_in(safe[1]))
         assert result.said == ""
 
 
@@ -361,9 +361,9 @@ def test_a_plain_and_an_encrypted_backup_in_one_folder_have_their_own_keys(
         with_clips=False,
     )
     for name in (encrypted.name, "palpebra-2026-03-02.tar"):
-        assert drill(services.settings, KeptBackup(store, name), identity_in(safe[1])).said == ""
+        assert drill(services.settings, StoredBackup(store, name), identity_in(safe[1])).said == ""
     # The plain one needs no private key for a key file that is not its own.
-    assert drill(services.settings, KeptBackup(store, "palpebra-2026-03-02.tar")).said == ""
+    assert drill(services.settings, StoredBackup(store, "palpebra-2026-03-02.tar")).said == ""
 
 
 def test_the_weekly_drill_knows_where_the_key_file_is(

@@ -10,7 +10,7 @@ from sqlalchemy import select, text
 
 from server.accounts import service, signing_in
 from server.accounts.audit_verification import Verdict, verify
-from server.accounts.credentials import Checked, secret_of
+from server.accounts.credentials import PasswordCheck, secret_of
 from server.accounts.identity import Identity
 from server.context import Services, open_services
 from server.core.errors import ApiError
@@ -49,7 +49,7 @@ def failure(services: Services, phone: Phone, code: str) -> ApiError | None:
     with services.database.read() as session:
         stored = session.scalars(select(Account).where(Account.name == phone.name)).one().password_hash
     _, failed = signing_in.open_session(
-        services.database, services.settings, services.sign_ins, phone.name, Checked(stored), code, ""
+        services.database, services.settings, services.sign_ins, phone.name, PasswordCheck(stored), code, ""
     )
     return failed
 

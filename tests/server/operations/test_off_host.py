@@ -21,7 +21,7 @@ from server.operations import watched_backups as watching
 from server.operations.backup import back_up, decrypt, encrypted, identity_in, make_identity, recipient_of
 from server.operations.backup_stores import (
     BackupStore,
-    KeptBackup,
+    StoredBackup,
     back_up_to,
     backup_store,
     backups_in,
@@ -82,11 +82,11 @@ def rated(client: TestClient, services: Services, study: StudyInDatabase) -> Ser
     return services
 
 
-def backed_up(services: Services, store: BackupStore, public: str, name: str = BACKUP) -> KeptBackup:
+def backed_up(services: Services, store: BackupStore, public: str, name: str = BACKUP) -> StoredBackup:
     kept_as, _ = back_up_to(
         services.database, services.settings, services.clips, store, name, recipient_of(public)
     )
-    return KeptBackup(store, kept_as)
+    return StoredBackup(store, kept_as)
 
 
 def test_a_bucket_gets_it_encrypted_and_it_comes_back(

@@ -38,7 +38,7 @@ from server.operations.snapshots import (
     superfluous,
     take_snapshot,
 )
-from server.participation.identity_keys import KnownAs
+from server.participation.identity_keys import ParticipantIdentity
 from server.participation.identity_repository import keep
 from server.privacy.ledger import note_erased
 from tests.helpers.admins import Admin
@@ -286,7 +286,7 @@ class TestErasures:
         visit.rate_all()
         with services.database.write() as session:
             run = session.scalars(select(StudyRun)).one()
-            keep(session, run, run.study.pseudonym_key, KnownAs("5a9d"))
+            keep(session, run, run.study.pseudonym_key, ParticipantIdentity("5a9d"))
         settings = services.settings.model_copy(update={"snapshot_minutes": 60.0})
         look(settings)
         (taken,) = snapshots_of(settings)

@@ -10,7 +10,7 @@ from sqlalchemy import inspect, text
 
 from server.context import Services
 from server.models import IdentityKey, RecruiterIdentity, StudyRun
-from server.participation.identity_keys import KnownAs, identifier_hash
+from server.participation.identity_keys import ParticipantIdentity, identifier_hash
 from server.participation.identity_repository import known_as
 from server.participation.returning import pseudonym
 from tests.helpers.admins import Admin
@@ -265,7 +265,7 @@ def test_no_table_holds_a_raw_id(services: Services, victim: Participant) -> Non
             holding |= {table for row in rows if any(SONA_CODE in str(value) for value in row)}
         assert holding == set()
         known = known_as(session, session.query(StudyRun).one())
-        assert known == KnownAs(SONA_CODE, QUERY)
+        assert known == ParticipantIdentity(SONA_CODE, QUERY)
 
 
 def test_no_page_or_export_shows_a_raw_id(

@@ -12,7 +12,7 @@ from server.accounts import provider_sign_in, signing_in, workspaces
 from server.accounts import repository as accounts
 from server.accounts import service as account_service
 from server.accounts.identity import OPERATOR, Identity
-from server.accounts.provider_protocol import NotRecognised, Recognised
+from server.accounts.provider_protocol import NotRecognised, ProviderIdentity
 from server.context import Services
 from server.core.errors import ApiError
 from server.core.settings import Provider, RoleRule, Settings
@@ -43,11 +43,11 @@ def both_workspaces(services: Services) -> None:
         workspaces.create(session, "motion", "Motion laboratory", OPERATOR)
 
 
-def recognised(subject: str, *groups: str) -> Recognised:
-    return Recognised("https://uni.example", subject, {"name": subject, "groups": list(groups)}, False)
+def recognised(subject: str, *groups: str) -> ProviderIdentity:
+    return ProviderIdentity("https://uni.example", subject, {"name": subject, "groups": list(groups)}, False)
 
 
-def sign_in(services: Services, subject: str, *groups: str) -> provider_sign_in.Finished:
+def sign_in(services: Services, subject: str, *groups: str) -> provider_sign_in.SignInOutcome:
     attempt = LoginAttempt(provider="uni", purpose="sign in", next_page="/", expires_at=now())
     return provider_sign_in.finish_sign_in(
         services.database, services.settings, "uni", attempt, recognised(subject, *groups), "a browser"

@@ -27,7 +27,7 @@ from server.accounts.resets import (
     MAX_OPEN_LINKS,
     MAX_RESET_LETTERS_A_DAY,
     RESERVED_LETTERS,
-    Asking,
+    LetterRequest,
 )
 from server.accounts.schemas import Address
 from server.accounts.service import end_everything
@@ -390,9 +390,9 @@ def _hours_pass(services: Services, hours: float) -> None:
             row.expires_at -= datetime.timedelta(hours=hours)
 
 
-def asking_from(number: int, device: str | None = None) -> Asking:
+def asking_from(number: int, device: str | None = None) -> LetterRequest:
     """Somebody at an address that shares its range with no other number's."""
-    return Asking(f"198.51.{number}.7", device)
+    return LetterRequest(f"198.51.{number}.7", device)
 
 
 def test_an_account_gets_so_many_letters_a_day(ada: Admin, services: Services, box: Letterbox) -> None:
@@ -429,7 +429,11 @@ def test_a_range_of_addresses_gets_an_account_so_many_letters(
 ) -> None:
     for last in range(2 * LETTERS_FROM_A_RANGE):
         resets.write_to_who_forgot(
-            services.database, services.settings, services.sign_ins, "ada", Asking(f"198.51.100.{last}", None)
+            services.database,
+            services.settings,
+            services.sign_ins,
+            "ada",
+            LetterRequest(f"198.51.100.{last}", None),
         )
         _hours_pass(services, 1)
     assert len(box.letters) == LETTERS_FROM_A_RANGE

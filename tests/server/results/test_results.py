@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-from server.results.summary import alike, margin
+from server.results.summary import margin, raters_of_same_cells
 from tests.helpers.admins import Admin
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase
 
@@ -70,7 +70,7 @@ def test_error_bars_are_cousineau_morey() -> None:
     # three participants, two conditions, by hand: differences 1, 2, 3; sd of a difference 1;
     # the SE of a condition is sd(differences) / 2 / sqrt(3) * sqrt(2)
     rows = {"a": {("x",): 1.0, ("y",): 2.0}, "b": {("x",): 3.0, ("y",): 5.0}, "c": {("x",): 2.0, ("y",): 5.0}}
-    first, second = margin(alike(rows), ["f"], ["f"])
+    first, second = margin(raters_of_same_cells(rows), ["f"], ["f"])
     assert (first.mean, second.mean) == (2.0, 4.0)
     assert first.se_within == pytest.approx(math.sqrt(2) / 2 / math.sqrt(3))
 
@@ -82,7 +82,10 @@ def test_a_constant_per_participant_changes_no_error_bar(offsets: list[float], d
     levels = [("x",), ("y",), ("z",)]
     plain = {str(n): dict(zip(levels, row, strict=True)) for n, row in enumerate(scores)}
     moved = {n: {k: v + offsets[int(n)] for k, v in row.items()} for n, row in plain.items()}
-    one, two = margin(alike(plain), ["f"], ["f"]), margin(alike(moved), ["f"], ["f"])
+    one, two = (
+        margin(raters_of_same_cells(plain), ["f"], ["f"]),
+        margin(raters_of_same_cells(moved), ["f"], ["f"]),
+    )
     for a, b in zip(one, two, strict=True):
         assert a.se_within == pytest.approx(b.se_within, abs=1e-9)
 
@@ -93,15 +96,18 @@ def test_groups_of_participants_have_means_and_errors_of_their_own() -> None:
         "b": {("near", "x"): 4.0, ("near", "y"): 6.0},
         "c": {("far", "x"): 1.0, ("far", "y"): 1.0},
     }
-    near, far = margin(alike(rows), ["view", "form"], ["view"], ["view"])
+    near, far = margin(raters_of_same_cells(rows), ["view", "form"], ["view"], ["view"])
     assert (near.levels, near.mean, near.participants) == ({"view": "near"}, 4.0, 2)
     assert near.se_within == pytest.approx(1.0)
     assert (far.levels, far.mean, far.participants, far.se_within) == ({"view": "far"}, 1.0, 1, None)
-    both = margin(alike(rows), ["view", "form"], ["view", "form"], ["view"])
+    both = margin(raters_of_same_cells(rows), ["view", "form"], ["view", "form"], ["view"])
     assert [(one.levels["view"], one.mean) for one in both] == [
         ("near", 3),
         ("near", 5),
         ("far", 1),
         ("far", 1),
     ]
-    assert [one.mean for one in margin(alike(rows), ["view", "form"], ["form"], ["view"])] == [7 / 3, 11 / 3]
+    assert [one.mean for one in margin(raters_of_same_cells(rows), ["view", "form"], ["form"], ["view"])] == [
+        7 / 3,
+        11 / 3,
+    ]

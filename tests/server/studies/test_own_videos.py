@@ -9,7 +9,7 @@ import pytest
 
 from server.context import Services
 from server.core.locks import FileLocks
-from server.transcoding.preparing import Preparing
+from server.transcoding.preparing import UploadPreparation
 from server.transcoding.records import BEGUN, records_of
 from tests.helpers.admins import Admin
 from tests.helpers.studies import Participant, clip_url
@@ -186,7 +186,7 @@ def test_an_upload_goes_on_where_it_was_broken_off(
     assert (other.status_code, "more than once" in other.text) == (422, True)
 
 
-def wait_for_end(preparing: Preparing) -> None:
+def wait_for_end(preparing: UploadPreparation) -> None:
     until = time.monotonic() + 60
     while preparing._thread is not None:
         assert time.monotonic() < until
@@ -201,7 +201,7 @@ def test_a_file_at_which_the_worker_ended_twice_is_refused_and_the_others_are_pr
     for name, content in videos:
         (folder / name).write_bytes(content)
     (folder / BEGUN).write_text("slow_2.mp4\nslow_2.mp4\n")
-    preparing = Preparing(folder.parent, FileLocks(folder.parent.parent / "locks"))
+    preparing = UploadPreparation(folder.parent, FileLocks(folder.parent.parent / "locks"))
     preparing.begin()
     wait_for_end(preparing)
     records = records_of(folder)
@@ -218,7 +218,7 @@ def test_an_error_on_the_way_stops_no_later_upload(
     folder = tmp_path / "uploads" / "a"
     folder.mkdir(parents=True)
     (folder / "slow_2.mp4").write_bytes(dict(videos)["slow_2.mp4"])
-    preparing = Preparing(folder.parent, FileLocks(folder.parent.parent / "locks"))
+    preparing = UploadPreparation(folder.parent, FileLocks(folder.parent.parent / "locks"))
 
     def refuses(_: Path) -> list[Path]:
         raise error
@@ -238,11 +238,11 @@ def test_what_a_server_left_is_done_by_the_next(tmp_path: Path, videos: list[tup
     folder = tmp_path / "uploads" / "a"
     folder.mkdir(parents=True)
     (folder / "slow_2.mp4").write_bytes(dict(videos)["slow_2.mp4"])
-    first = Preparing(folder.parent, FileLocks(folder.parent.parent / "locks"))
+    first = UploadPreparation(folder.parent, FileLocks(folder.parent.parent / "locks"))
     first.close()
     first.begin()
     assert records_of(folder) == {}
-    second = Preparing(folder.parent, FileLocks(folder.parent.parent / "locks"))
+    second = UploadPreparation(folder.parent, FileLocks(folder.parent.parent / "locks"))
     second.begin()
     wait_for_end(second)
     assert list(records_of(folder)) == ["slow_2.mp4"]

@@ -15,7 +15,7 @@ from server.models import Rating, RunTally, StudyRun
 from server.operations import doctor
 from server.participation import ratings
 from server.participation.answer_schemas import RatingIn
-from server.participation.tallies import Counted, Play, Tally, tally_of, unpacked
+from server.participation.tallies import Play, Tally, TallyEntry, tally_of, unpacked
 from server.participation.tally_pools import Recount
 from tests.helpers.admins import Admin
 from tests.helpers.databases import run_server_command
@@ -24,7 +24,7 @@ from tests.helpers.studies import Participant, good_playback
 small = st.integers(0, 2**18 - 1)
 values = st.integers(-100_000, 134_217_000).map(lambda units: units / 1000)
 answers = st.builds(
-    Counted,
+    TallyEntry,
     st.sampled_from(["", "naturalness"]),
     small,
     st.none() | small.filter(lambda n: n < 2**18 - 1),
@@ -51,7 +51,7 @@ def tallied(given_plays: list[Play]) -> Tally:
 
 
 @given(answers)
-def test_a_packed_answer_is_the_answer(answer: Counted) -> None:
+def test_a_packed_answer_is_the_answer(answer: TallyEntry) -> None:
     assert unpacked(answer.packed()) == (answer.clip, answer.second, answer.value)
 
 

@@ -47,7 +47,7 @@ function DefinitionEditor({ toml, onChange }: Props) {
 }
 
 /** What the server says of a definition, half a second after the last key. */
-function useCheck(toml: string): Schemas["Checked"] | undefined {
+function useCheck(toml: string): Schemas["DefinitionCheck"] | undefined {
   const [settled] = useDebouncedValue(toml, 500);
   const { data } = useQuery({
     queryKey: ["check", settled],

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from experiments.declaration.experiment import Experiment
 from server.participation.answer_schemas import Part, RatingIn
-from server.participation.kinds import Preference, Served, answer_of
-from server.participation.tallies import Counted, NumberedClip
+from server.participation.kinds import Preference, ServedKind, answer_of
+from server.participation.tallies import NumberedClip, TallyEntry
 from server.participation.verdict import Ruling
 from tests.experiments.trials.toy import SameAnswer
 
@@ -29,8 +29,8 @@ def simulated(
     return {"kind": "same_or_not", "same": rng.random() < 0.5}
 
 
-def counted(clips: Mapping[str, NumberedClip], payload: Mapping[str, Any]) -> list[Counted]:
-    return [Counted("", clips["first"].clip, clips["second"].clip, float(payload["same"]))]
+def counted(clips: Mapping[str, NumberedClip], payload: Mapping[str, Any]) -> list[TallyEntry]:
+    return [TallyEntry("", clips["first"].clip, clips["second"].clip, float(payload["same"]))]
 
 
-SERVED = Served(validate, judge, simulated, counted)
+SERVED = ServedKind(validate, judge, simulated, counted)

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from server.request_limits import ExperimentersLane
+from server.request_limits import ConcurrencyLimit
 
 PAGE = "/api/admin/studies"
 
@@ -33,9 +33,9 @@ async def _nothing(*_: Any) -> Any:
     return {}
 
 
-def _asked(lane: ExperimentersLane, *paths: str) -> list[asyncio.Task[None]]:
+def _asked(limit: ConcurrencyLimit, *paths: str) -> list[asyncio.Task[None]]:
     scopes = [{"type": "http", "method": "GET", "path": path} for path in paths]
-    return [asyncio.ensure_future(lane(scope, _nothing, _nothing)) for scope in scopes]
+    return [asyncio.ensure_future(limit(scope, _nothing, _nothing)) for scope in scopes]
 
 
 async def _settled() -> None:
@@ -52,8 +52,8 @@ def loop() -> Iterator[asyncio.Runner]:
 def test_two_are_served_and_the_third_waits_until_an_answer_begins(loop: asyncio.Runner) -> None:
     async def go() -> None:
         pages = Pages()
-        lane = ExperimentersLane(pages, at_once=2)
-        tasks = _asked(lane, PAGE, PAGE, PAGE, "/api/run", "/clips/a.mp4", "/api/admin/session")
+        limit = ConcurrencyLimit(pages, at_once=2)
+        tasks = _asked(limit, PAGE, PAGE, PAGE, "/api/run", "/clips/a.mp4", "/api/admin/session")
         await _settled()
         assert pages.begun == [PAGE, PAGE, "/api/run", "/clips/a.mp4", "/api/admin/session"]
         pages.begins.set()  # the answers begin and stream on
@@ -69,8 +69,8 @@ def test_a_request_that_breaks_or_is_given_up_leaves_its_place(loop: asyncio.Run
     async def go() -> None:
         pages = Pages()
         pages.breaks = True
-        lane = ExperimentersLane(pages, at_once=1)
-        first, second = _asked(lane, PAGE, PAGE)
+        limit = ConcurrencyLimit(pages, at_once=1)
+        first, second = _asked(limit, PAGE, PAGE)
         await _settled()
         second.cancel()  # while it waits
         pages.begins.set()
@@ -78,6 +78,6 @@ def test_a_request_that_breaks_or_is_given_up_leaves_its_place(loop: asyncio.Run
             await asyncio.gather(first, second)
         pages.breaks = False
         pages.ends.set()
-        await asyncio.wait_for(_asked(lane, PAGE)[0], 5)
+        await asyncio.wait_for(_asked(limit, PAGE)[0], 5)
 
     loop.run(go())
