@@ -5,17 +5,18 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from functools import lru_cache
 
-from fastapi import APIRouter, FastAPI
+from fastapi import APIRouter, FastAPI, Request
 from fastapi.routing import APIRoute
 from starlette.routing import BaseRoute
 
 from server import web
 from server.accounts import endpoints as accounts
 from server.accounts import provider_endpoints, reset_endpoints, workspace_endpoints
-from server.accounts.audit import RefusalLog
-from server.context import open_services
+from server.accounts.audit import note_refusal
+from server.context import open_services, services_of
 from server.core.changes import ChangeNotifier
 from server.core.error_handlers import install_error_handlers
+from server.core.errors import ApiError
 from server.core.settings import Settings
 from server.exports import endpoints as exports
 from server.operations import endpoints as operations
@@ -98,6 +99,13 @@ def every_route() -> tuple[BaseRoute, ...]:
     return tuple(whole.routes)
 
 
+async def _note_refusal(request: Request, refusal: ApiError) -> None:
+    services = services_of(request)
+    await note_refusal(
+        request, refusal, services.database, known=services.refusals, strangers=services.strangers
+    )
+
+
 def create_app(settings: Settings | None = None, *, rehearses: bool = False) -> FastAPI:
     """The server with these settings (from the environment where None); the database must be migrated.
 
@@ -138,8 +146,7 @@ def create_app(settings: Settings | None = None, *, rehearses: bool = False) -> 
     )
     app.state.services = services
     app.router.routes.extend(every_route())
-    refusals = RefusalLog(services.database, known=services.refusals, strangers=services.strangers)
-    install_error_handlers(app, refusals.note)
+    install_error_handlers(app, _note_refusal)
     app.add_middleware(ChangeNotifier, changes=services.changes)
     app.add_middleware(ConcurrencyLimit)  # inside the limits: a body that comes slowly holds no place
     app.add_middleware(RequestLimits, settings=services.settings)

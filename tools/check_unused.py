@@ -52,7 +52,7 @@ CALLED_FROM_OUTSIDE = {
     "collect": "prometheus_client",
     "_gen_likelihoods": "questplus",
     "__call__": "a protocol",
-    "Sent": "a protocol that annotations name in quotes",
+    "TicketedSubmission": "a protocol that annotations name in quotes",
     "data_url": "a template of the report",
     "create_lasting_app": "uvicorn",
     "bake_face": "an entry point of packages/face_baking",

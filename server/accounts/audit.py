@@ -309,40 +309,49 @@ def latest(session: Session, before: int | None, limit: int) -> list[AuditEntry]
 ADMIN = "/api/admin/"
 
 
-class RefusalLog:
-    """Puts refusals of the admin API into the audit log, so many a minute; the rest are counted.
+async def note_refusal(
+    request: Request,
+    refusal: ApiError,
+    database: Database,
+    known: BoundedRecords,
+    strangers: BoundedRecords,
+) -> None:
+    """Put a refusal of the admin API into the audit log, so many a minute; the rest are counted.
+
+    Where it cannot be written the refusal is answered all the same, and the log has a line.
 
     Parameters
     ----------
     known, strangers : BoundedRecords
         How many a minute: of accounts, and of nobody.
     """
-
-    def __init__(self, database: Database, known: BoundedRecords, strangers: BoundedRecords) -> None:
-        self._database, self._known, self._strangers = database, known, strangers
-
-    async def note(self, request: Request, refusal: ApiError) -> None:
-        """Write one down. Where it cannot be written it is answered all the same, and the log has a line."""
-        if request.url.path.startswith(ADMIN):
-            route = str(getattr(request.scope.get("route"), "path", "unmatched"))
-            try:
-                await run_in_threadpool(self._write, request, route, refusal)
-            except (SQLAlchemyError, OSError, ValueError) as error:
-                log.error("a refusal could not be put into the audit log: %s", described(error))
-
-    def _write(self, request: Request, route: str, refusal: ApiError) -> None:
+    if request.url.path.startswith(ADMIN):
         actor = getattr(request.state, "identity", None) or NOBODY
-        name, records = (NOBODY, self._strangers) if actor == NOBODY else (actor.name, self._known)
-        unwritten = records.written(f"{name} {request.method} {route} {refusal.code}")
-        if unwritten is None:
-            return
-        details = {"code": refusal.code, "status": refusal.status}
-        details |= {"not_written_before": unwritten} if unwritten else {}
-        # No column of PostgreSQL holds a NUL.
-        study = str(request.path_params.get("study", "")).replace("\0", "\ufffd")
-        asked = f"{request.method} {route}"
-        with self._database.write() as session:
-            if study:
-                record(session, actor, "refused", "study", study, **details, route=asked)
-            else:
-                record(session, actor, "refused", "route", asked, **details)
+        records = strangers if actor == NOBODY else known
+        try:
+            await run_in_threadpool(_write_refusal, request, refusal, actor, database, records)
+        except (SQLAlchemyError, OSError, ValueError) as error:
+            log.error("a refusal could not be put into the audit log: %s", described(error))
+
+
+def _write_refusal(
+    request: Request,
+    refusal: ApiError,
+    actor: Identity | Literal["nobody"],
+    database: Database,
+    records: BoundedRecords,
+) -> None:
+    route = f"{request.method} {getattr(request.scope.get('route'), 'path', 'unmatched')}"
+    name = NOBODY if actor == NOBODY else actor.name
+    unwritten = records.written(f"{name} {route} {refusal.code}")
+    if unwritten is None:
+        return
+    details: dict[str, Any] = {"code": refusal.code, "status": refusal.status}
+    details |= {"not_written_before": unwritten} if unwritten else {}
+    # No column of PostgreSQL holds a NUL.
+    study = str(request.path_params.get("study", "")).replace("\0", "\ufffd")
+    with database.write() as session:
+        if study:
+            record(session, actor, "refused", "study", study, **details, route=route)
+        else:
+            record(session, actor, "refused", "route", route, **details)
