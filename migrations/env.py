@@ -6,7 +6,7 @@ from alembic import context
 from sqlalchemy import Connection
 
 from server.core.db import open_database
-from server.core.migrate import derived_anew, migrating, refuse_without_views, revision_of
+from server.core.migrate import derived_anew, migration_transaction, refuse_without_views, revision_of
 from server.core.settings import Settings
 from server.models import Base, UtcDateTime
 
@@ -34,7 +34,7 @@ if given is not None:
 else:
     database = open_database(Settings())
     context.config.attributes["secret_key"] = database.secret_key
-    with migrating(database) as connection:
+    with migration_transaction(database) as connection:
         before = revision_of(connection)
         with derived_anew(connection):
             migrate(connection)

@@ -144,12 +144,12 @@ class RequestLimits:
         request = Request(scope)
         services = services_of(request)
         await run_in_threadpool(recognise_uploader, request, services.database, services.settings)
-        if _declared(scope) > self.upload_bytes:
+        if _declared_length(scope) > self.upload_bytes:
             raise too_large(self.upload_bytes)
-        return _counted(receive, self.upload_bytes)
+        return _count_body(receive, self.upload_bytes)
 
     async def _collected(self, scope: Scope, receive: Receive) -> Receive:
-        kind, declared = kind_of(scope["method"], scope["path"]), _declared(scope)
+        kind, declared = kind_of(scope["method"], scope["path"]), _declared_length(scope)
         body = _Body(self.run_bytes if kind == "run" else ANONYMOUS_BYTES, bytearray())
         try:
             async with asyncio.timeout(BODY_S):
@@ -162,7 +162,7 @@ class RequestLimits:
             self._held -= body.held
         if (problem := body_problem(bytes(body.content))) is not None:
             raise TextNotStorable(f"The request was refused: {problem}.")
-        return _replayed(bytes(body.content), receive)
+        return _replay_body(bytes(body.content), receive)
 
     async def _collect(self, scope: Scope, receive: Receive, kind: Kind, body: _Body) -> None:
         more = True
@@ -205,12 +205,12 @@ def _check_head(scope: Scope) -> None:
         raise TooManyHeaders(f"The request has too many headers: at most {MAX_HEADERS} are read.")
 
 
-def _declared(scope: Scope) -> int:
+def _declared_length(scope: Scope) -> int:
     text = dict(scope["headers"]).get(b"content-length", b"0")
     return int(text) if text.isdigit() else 0
 
 
-def _replayed(content: bytes, receive: Receive) -> Receive:
+def _replay_body(content: bytes, receive: Receive) -> Receive:
     """A `receive` that gives the collected body once, then what the connection says."""
     given = False
 
@@ -224,7 +224,7 @@ def _replayed(content: bytes, receive: Receive) -> Receive:
     return replay
 
 
-def _counted(receive: Receive, limit: int) -> Receive:
+def _count_body(receive: Receive, limit: int) -> Receive:
     """A `receive` that refuses an upload which grows too large, stalls or trickles."""
     received, began = 0, time.monotonic()
 

@@ -22,7 +22,7 @@ from server.core.errors import ERROR_RESPONSES, ApiError, NotFound
 from server.core.migrate import current_revision, newest_revision
 from server.core.repository import newest_clip
 from server.core.requests import SettingsDep
-from server.core.row_security import acting
+from server.core.row_security import request_scope
 from server.core.settings import Settings
 from server.core.storage import ClipStore
 
@@ -98,7 +98,7 @@ class RowSecurity:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
-        with acting():
+        with request_scope():
             await self.app(scope, receive, send)
 
 

@@ -70,7 +70,7 @@ def _address_of(origin: str) -> str:
 
 def identify(request: Request, database: Database, settings: Settings) -> Identity:
     """The identity of a request, which acts for it from here on; NotSignedIn where there is none."""
-    identity = _recognised(request, database, settings)
+    identity = _recognized_identity(request, database, settings)
     needed = settings.owners_second_factor and identity.role == "owner"
     if needed and not identity.second_factor:
         identity = replace(identity, role="experimenter", held_back=True)
@@ -79,7 +79,7 @@ def identify(request: Request, database: Database, settings: Settings) -> Identi
     return identity
 
 
-def _recognised(request: Request, database: Database, settings: Settings) -> Identity:
+def _recognized_identity(request: Request, database: Database, settings: Settings) -> Identity:
     authorization = request.headers.get("authorization", "")
     if authorization.startswith("Bearer "):
         return _by_token(database, authorization.removeprefix("Bearer ").strip())

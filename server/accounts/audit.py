@@ -28,7 +28,7 @@ from server.accounts.identity import OPERATOR, Identity, Operator
 from server.core.db import SIGNING_KEY, SYSLOG, Database
 from server.core.errors import ApiError
 from server.core.limits import BoundedRecords
-from server.core.logs import described
+from server.core.logs import describe_error
 from server.core.settings import syslog_address
 from server.core.values import now
 from server.models import AuditEntry
@@ -72,17 +72,17 @@ def details_digest(key: bytes, salt: str, details: dict[str, Any]) -> str:
     >>> a == details_digest(b"k", "s", {"b": [2], "a": 1}) != details_digest(b"k", "t", {"a": 1, "b": [2]})
     True
     """
-    return _keyed(key, ["details", salt, details])
+    return _keyed_hash(key, ["details", salt, details])
 
 
 # Decision 0686: The audit log is a keyed hash chain.
 def entry_hash(key: bytes, previous: str, entry: Entry, digest: str) -> str:
     """Equation (2), 64 hexadecimal digits; `previous` is the hash of the entry before, or `START`."""
     at = entry.at.astimezone(UTC).isoformat(timespec="microseconds")
-    return _keyed(key, ["entry", previous, entry.position, at, *entry[2:], digest])
+    return _keyed_hash(key, ["entry", previous, entry.position, at, *entry[2:], digest])
 
 
-def _keyed(key: bytes, parts: list[Any]) -> str:
+def _keyed_hash(key: bytes, parts: list[Any]) -> str:
     text = json.dumps(parts, sort_keys=True, ensure_ascii=True, separators=(",", ":"))
     return hmac.new(key, text.encode("ascii"), hashlib.sha256).hexdigest()
 
@@ -153,7 +153,7 @@ class _Stream(_Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Send one message, over a new connection where the last was ended; OSError where that fails too."""
         line = f"<{self.encodePriority(self.facility, 'info')}>{self.format(record)}".encode()
-        if self._connection is not None and not _ended(self._connection):
+        if self._connection is not None and not _hung_up(self._connection):
             try:
                 self._send(line)
             except OSError:
@@ -178,7 +178,7 @@ class _Stream(_Handler):
         self._connection = None
 
 
-def _ended(connection: socket.socket) -> bool:
+def _hung_up(connection: socket.socket) -> bool:
     """Whether the other side has hung up, as one that restarts does: what is sent then is lost, unsaid."""
     connection.settimeout(0)
     try:
@@ -233,20 +233,20 @@ def _join(session: Session) -> None:
         position += 1
         entry.position, entry.details_salt = position, secrets.token_hex(16)
         entry.details_digest = details_digest(key, entry.details_salt, entry.details)
-        previous = entry_hash(key, previous, linked(entry), entry.details_digest)
+        previous = entry_hash(key, previous, chain_entry(entry), entry.details_digest)
         entry.chain_hash = previous
     session.flush()
     if address := session.info.get(SYSLOG):
-        lines = [written(entry) for entry in entries]
+        lines = [export_line(entry) for entry in entries]
         event.listen(session, "after_commit", lambda _session: forward(address, lines), once=True)
 
 
-def linked(entry: AuditEntry) -> Entry:
+def chain_entry(entry: AuditEntry) -> Entry:
     """What the chain holds of a row."""
     return Entry(entry.position or 0, entry.at, entry.actor, entry.action, entry.target_kind, entry.target)
 
 
-def written(entry: AuditEntry) -> dict[str, object]:
+def export_line(entry: AuditEntry) -> dict[str, object]:
     """An entry as a line of an export, without the salt of its details."""
     return {
         "position": entry.position,
@@ -331,7 +331,7 @@ async def note_refusal(
         try:
             await run_in_threadpool(_write_refusal, request, refusal, actor, database, records)
         except (SQLAlchemyError, OSError, ValueError) as error:
-            log.error("a refusal could not be put into the audit log: %s", described(error))
+            log.error("a refusal could not be put into the audit log: %s", describe_error(error))
 
 
 def _write_refusal(

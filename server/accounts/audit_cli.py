@@ -12,7 +12,7 @@ from experiments.command_groups import command_group
 from experiments.errors import InputError
 from experiments.files import whole_file
 from server.accounts import repository
-from server.accounts.audit import written
+from server.accounts.audit import export_line
 from server.accounts.audit_verification import verify
 from server.cli_common import out, stored_services
 from server.core.db import Database
@@ -83,6 +83,6 @@ def _lines(database: Database, after: int) -> Iterator[str]:
         number = 0
         for entry in repository.chained_entries(session, after):
             number += 1
-            yield json.dumps(written(entry)) + "\n"
+            yield json.dumps(export_line(entry)) + "\n"
         position, digest = repository.last_link(session) or (0, "")
         yield json.dumps({"complete": True, "entries": number, "head": f"{position}:{digest}"}) + "\n"

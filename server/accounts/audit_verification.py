@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from sqlalchemy.orm import Session
 
 from server.accounts import audit, repository
-from server.accounts.audit import linked
+from server.accounts.audit import chain_entry
 from server.models import AuditEntry
 
 # `server audit verify`: go along the chain, and name the first entry that does not fit.
@@ -93,7 +93,7 @@ def _problem(key: bytes, last: int, previous: str, entry: AuditEntry, erased_run
     if entry.position != last + 1:
         return f"entry {last + 1} is missing; the next there is is {named}"
     digest = entry.details_digest or ""
-    if entry.chain_hash != audit.entry_hash(key, previous, linked(entry), digest):
+    if entry.chain_hash != audit.entry_hash(key, previous, chain_entry(entry), digest):
         return f"{named} does not fit the chain: it, or the key of this server, was changed"
     if entry.details_salt is not None:
         fits = digest == audit.details_digest(key, entry.details_salt, entry.details)
@@ -121,7 +121,7 @@ def reseal(session: Session, secret: bytes) -> tuple[int, str]:
         for entry in page:
             if entry.details_salt is not None:
                 entry.details_digest = audit.details_digest(key, entry.details_salt, entry.details)
-            previous = audit.entry_hash(key, previous, linked(entry), entry.details_digest or "")
+            previous = audit.entry_hash(key, previous, chain_entry(entry), entry.details_digest or "")
             entry.chain_hash, position = previous, entry.position or 0
     return position, previous
 
@@ -131,6 +131,6 @@ def under(session: Session, secret: bytes) -> Iterator[AuditEntry]:
     key, previous = audit.chain_key(secret), audit.START
     for entry in repository.chained_entries(session):
         digest, stored = entry.details_digest or "", entry.chain_hash or ""
-        if stored == audit.entry_hash(key, previous, linked(entry), digest):
+        if stored == audit.entry_hash(key, previous, chain_entry(entry), digest):
             yield entry
         previous = stored

@@ -174,24 +174,24 @@ def secret_of(key: bytes, kept: str) -> str:
 
     Under another key it is another secret, which fits no code.
     """
-    held = _unwrapped(key, kept) if kept.startswith(WRAPPED) else None
+    held = _unwrap_secret(key, kept) if kept.startswith(WRAPPED) else None
     if held is None:
         held = hmac.new(key, f"totp:{kept}".encode(), hashlib.sha256).digest()[:20]
     return base64.b32encode(held).decode("ascii")
 
 
-def rewrapped(old_key: bytes, key: bytes, kept: str) -> str:
+def rewrap_secret(old_key: bytes, key: bytes, kept: str) -> str:
     """What to keep of an account under another key of the server, so that its app's secret stays.
 
     What is wrapped already, but not under `old_key`, is given back as it is.
     """
-    if kept.startswith(WRAPPED) and _unwrapped(old_key, kept) is None:
+    if kept.startswith(WRAPPED) and _unwrap_secret(old_key, kept) is None:
         return kept
     secret = base64.b32decode(secret_of(old_key, kept))
     return WRAPPED + base64.b64encode(aes_key_wrap_with_padding(_wrapping_key(key), secret)).decode("ascii")
 
 
-def _unwrapped(key: bytes, kept: str) -> bytes | None:
+def _unwrap_secret(key: bytes, kept: str) -> bytes | None:
     try:
         return aes_key_unwrap_with_padding(_wrapping_key(key), base64.b64decode(kept.removeprefix(WRAPPED)))
     except InvalidUnwrap:

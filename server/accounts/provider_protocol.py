@@ -49,13 +49,13 @@ class LogoutRefused(ApiError):
     code = "logout_refused"
 
 
-def away(why: str) -> ProviderAway:
+def provider_away(why: str) -> ProviderAway:
     """A refusal to raise where the provider does not answer as it should."""
     log.warning("a provider of sign-in cannot be used: %s", why)
     return ProviderAway("The service to sign in with does not answer as it should; please try again later.")
 
 
-def refused(why: str) -> NotRecognised:
+def sign_in_refused(why: str) -> NotRecognised:
     """A refusal to raise where what was answered does not hold."""
     log.warning("a sign-in by a provider is refused: %s", why)
     return NotRecognised("The sign-in could not be confirmed; please begin it again.")
@@ -108,9 +108,9 @@ def metadata_of(issuer: str, told: dict[str, Any]) -> Metadata:
     except ValidationError as error:
         first = error.errors()[0]
         name = ".".join(str(part) for part in first["loc"])
-        raise away(f"its description: {name}: {first['msg']}"[:300]) from error
+        raise provider_away(f"its description: {name}: {first['msg']}"[:300]) from error
     if metadata.issuer != issuer:
-        raise away(f"it calls itself {metadata.issuer[:200]!r}")
+        raise provider_away(f"it calls itself {metadata.issuer[:200]!r}")
     return metadata
 
 
@@ -181,9 +181,9 @@ async def json_object(address: str) -> dict[str, Any]:
         answer.raise_for_status()
         told = answer.json()
     except MALFORMED as error:
-        raise away(f"{address}: {type(error).__name__} {error}"[:300]) from error
+        raise provider_away(f"{address}: {type(error).__name__} {error}"[:300]) from error
     if not isinstance(told, dict):
-        raise away(f"{address} is not a JSON object")
+        raise provider_away(f"{address} is not a JSON object")
     return told
 
 
@@ -279,7 +279,7 @@ class ProviderClient:
         metadata = await self._described()
         announced = metadata.authorization_response_iss_parameter_supported
         if issuer != self.provider.issuer and (issuer is not None or announced):
-            raise refused("the answer came from another issuer")
+            raise sign_in_refused("the answer came from another issuer")
         async with self._client(metadata) as client:
             token = await self._token(client, metadata, code, secrets.verifier)
             claims = await self._claims(metadata, token, secrets.nonce)
@@ -355,11 +355,11 @@ class ProviderClient:
         try:
             token = await client.fetch_token(metadata.token_endpoint, code=code, code_verifier=verifier)
         except AuthlibBaseError as error:
-            raise refused(f"the code was not accepted ({str(error.error)[:60]!r})") from error
+            raise sign_in_refused(f"the code was not accepted ({str(error.error)[:60]!r})") from error
         except MALFORMED as error:
-            raise away(f"token endpoint: {type(error).__name__}") from error
+            raise provider_away(f"token endpoint: {type(error).__name__}") from error
         if not isinstance(token.get("id_token"), str):
-            raise refused("there is no ID token")
+            raise sign_in_refused("there is no ID token")
         return dict(token)
 
     async def _claims(self, metadata: Metadata, token: Mapping[str, Any], nonce: str) -> Mapping[str, Any]:
@@ -378,9 +378,9 @@ class ProviderClient:
             claims = CodeIDToken(decoded.claims, decoded.header, options, params)
             claims.validate(leeway=LEEWAY_S)
         except (JoseError, ValueError, TypeError) as error:
-            raise refused(f"its ID token does not hold: {type(error).__name__} {error}") from error
+            raise sign_in_refused(f"its ID token does not hold: {type(error).__name__} {error}") from error
         if not isinstance(claims["sub"], str) or not 1 <= len(claims["sub"]) <= 255:
-            raise refused("its ID token names no subject")
+            raise sign_in_refused("its ID token names no subject")
         return dict(claims)
 
     async def _decoded(self, metadata: Metadata, text: str, registry: JWSRegistry) -> jwt.Token:
@@ -414,9 +414,9 @@ class ProviderClient:
             answer.raise_for_status()
             told = answer.json()
         except (AuthlibBaseError, *MALFORMED) as error:
-            raise away(f"userinfo: {type(error).__name__}") from error
+            raise provider_away(f"userinfo: {type(error).__name__}") from error
         if not isinstance(told, dict) or told.get("sub") != claims["sub"]:
-            raise refused("its user info is about somebody else")
+            raise sign_in_refused("its user info is about somebody else")
         return told
 
 

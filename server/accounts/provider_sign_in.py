@@ -93,11 +93,11 @@ def begin_attempt(
     state, browser = new_token(), new_token()
     with database.write() as session:
         repository.forget_old_attempts(session)
-        keep(session, provider_id, purpose, state, browser, next_page, asking, invitation_hash)
+        store_attempt(session, provider_id, purpose, state, browser, next_page, asking, invitation_hash)
     return SignInAttempt(secrets_of(settings.key, browser, state), browser)
 
 
-def keep(
+def store_attempt(
     session: Session,
     provider_id: str,
     purpose: Purpose,
@@ -131,14 +131,14 @@ def take_attempt(database: Database, provider_id: str, state: str, browser: str)
     """
     with database.read() as session:
         attempt = repository.find_attempt(session, hash_token(state), hash_token(browser), "sign in", "link")
-    if attempt is None or not _ended(database, attempt):
+    if attempt is None or not _end_attempt(database, attempt):
         raise NotRecognised("This sign-in was finished before, or begun in another browser.")
     if attempt.provider != provider_id:
         raise NotRecognised("This sign-in was begun with another service.")
     return attempt
 
 
-def _ended(database: Database, attempt: LoginAttempt) -> bool:
+def _end_attempt(database: Database, attempt: LoginAttempt) -> bool:
     """Whether it was this request that ended it, of several at once."""
     with database.write() as session:
         return repository.end_attempt(session, attempt.id)
@@ -249,7 +249,7 @@ def held_workspaces(session: Session, provider: Provider) -> dict[str, Workspace
     """
     known = {}
     for name in sorted({rule.workspace for rule in provider.roles}):
-        if (workspace := workspaces.find(session, name, lock=True)) is None:
+        if (workspace := workspaces.find_workspace(session, name, lock=True)) is None:
             log.warning("a rule of a sign-in provider names the workspace '%s', which does not exist", name)
         else:
             known[name] = workspace
@@ -429,7 +429,7 @@ def finish_sign_in(
         bring_up_to_date(session, provider_id, account, roles_by_claims(provider, whom.claims), held)
         if account.totp_confirmed_at is not None and not whom.second_factor:
             state = new_token()
-            keep(session, provider_id, "code", state, state, attempt.next_page, identity_of(account))
+            store_attempt(session, provider_id, "code", state, state, attempt.next_page, identity_of(account))
             return SignInOutcome("/sign-in?code=asked", asks_code=state)
         token = begin_session(
             settings, session, account, user_agent, second_factor=whom.second_factor, provider=provider_id

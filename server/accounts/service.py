@@ -175,7 +175,7 @@ def check_known(session: Session, name: str) -> None:
     NotFound
         With the name that comes nearest.
     """
-    _named(session, name)
+    _account_named(session, name)
 
 
 def reset_password(session: Session, name: str, fresh: str) -> tuple[int, str]:
@@ -186,7 +186,7 @@ def reset_password(session: Session, name: str, fresh: str) -> tuple[int, str]:
     tuple of int and str
         The account's number, and what became of its logins.
     """
-    account = _named(session, name)
+    account = _account_named(session, name)
     logins = renew(session, None, account, fresh)
     record(session, None, "password reset", "account", account.name)
     return account.id, logins
@@ -222,14 +222,14 @@ def renew(session: Session, actor: Identity | None, account: Account, fresh: str
 
 def reset_second_factor(session: Session, name: str) -> int:
     """From the command line: turn an account's second factor off, end its sessions; gives its number."""
-    account = _named(session, name)
+    account = _account_named(session, name)
     _without_second_factor(session, account)
     end_everything(session, account.id)
     record(session, None, "second factor reset", "account", account.name)
     return account.id
 
 
-def _named(session: Session, name: str) -> Account:
+def _account_named(session: Session, name: str) -> Account:
     account = repository.account_named(session, name, lock=True)
     if account is None:
         names = [known.name for known in repository.accounts(session)]

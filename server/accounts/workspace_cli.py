@@ -35,7 +35,7 @@ def list_workspaces() -> None:
     with stored_services() as services, services.database.read() as session:
         table = Table("workspace", "title", "studies", "second factor", "members")
         counts = workspace_repository.counts(session)
-        for one in workspace_repository.every(session):
+        for one in workspace_repository.every_workspace(session):
             people = ", ".join(
                 f"{account.name} ({role})" for account, role in workspace_repository.members(session, one)
             )
@@ -77,7 +77,7 @@ def set_member(
     """
     new_role = None if remove else one_of(ROLES, role, "the role")
     with stored_services() as services, services.database.write() as session:
-        known = workspaces.managed(session, workspace, OPERATOR)
+        known = workspaces.managed_workspace(session, workspace, OPERATOR)
         workspaces.set_member(session, known, account, new_role, OPERATOR)
     out.print(f"workspace {workspace}: {account} {'is out' if remove else f'is {role}'}")
 

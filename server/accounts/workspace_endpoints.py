@@ -27,7 +27,7 @@ workspace_router = APIRouter(prefix="/api/admin/workspaces", tags=["workspaces"]
 def list_workspaces(database: DatabaseDep, identity: Myself) -> list[WorkspaceOut]:
     """The workspaces one belongs to; all of them for who manages the server."""
     with database.read() as session:
-        return workspaces.listed(session, identity)
+        return workspaces.list_workspaces(session, identity)
 
 
 @workspace_router.post("", status_code=201)
@@ -42,7 +42,7 @@ def create_workspace(database: DatabaseDep, identity: Founder, body: NewWorkspac
 def change_workspace(database: DatabaseDep, identity: Myself, workspace: str, body: ChangeWorkspace) -> None:
     """Change the title, or whether a second factor is asked for."""
     with database.write() as session:
-        known = workspaces.managed(session, workspace, identity)
+        known = workspaces.managed_workspace(session, workspace, identity)
         workspaces.change(session, known, body.title, body.second_factor_required, identity)
 
 
@@ -50,14 +50,14 @@ def change_workspace(database: DatabaseDep, identity: Myself, workspace: str, bo
 def delete_workspace(database: DatabaseDep, identity: Owner, workspace: str) -> None:
     """Remove a workspace without studies."""
     with database.write() as session:
-        workspaces.delete(session, workspaces.managed(session, workspace, identity), identity)
+        workspaces.delete(session, workspaces.managed_workspace(session, workspace, identity), identity)
 
 
 @workspace_router.get("/{workspace}/members")
 def list_members(database: DatabaseDep, identity: Myself, workspace: str) -> list[MemberOut]:
     """Who belongs to a workspace; for its owners."""
     with database.write() as session:
-        return workspaces.members(session, workspaces.managed(session, workspace, identity))
+        return workspaces.members(session, workspaces.managed_workspace(session, workspace, identity))
 
 
 @workspace_router.put("/{workspace}/members/{account}", status_code=204)
@@ -67,7 +67,7 @@ def set_member(
     """Take an account into a workspace, or change its role there."""
     with database.write() as session:
         workspaces.set_member(
-            session, workspaces.managed(session, workspace, identity), account, body.role, identity
+            session, workspaces.managed_workspace(session, workspace, identity), account, body.role, identity
         )
 
 
@@ -76,7 +76,7 @@ def remove_member(database: DatabaseDep, identity: Myself, workspace: str, accou
     """Take an account out of a workspace; rights granted on single studies stay."""
     with database.write() as session:
         workspaces.set_member(
-            session, workspaces.managed(session, workspace, identity), account, None, identity
+            session, workspaces.managed_workspace(session, workspace, identity), account, None, identity
         )
 
 

@@ -41,7 +41,7 @@ MAKING_STUDIES: Final[tuple[Role, ...]] = ("experimenter", "owner")
 """The roles that may make studies in a workspace."""
 
 
-def effective(role: Role | None, granted: Iterable[Right]) -> frozenset[Right]:
+def effective_rights(role: Role | None, granted: Iterable[Right]) -> frozenset[Right]:
     """The rights on a study of one with this role in its workspace and these grants.
 
     >>> sorted(effective(None, ["run"]))
@@ -57,7 +57,7 @@ def effective(role: Role | None, granted: Iterable[Right]) -> frozenset[Right]:
     return rights | {"view"} if rights else rights
 
 
-def ordered(rights: Collection[Right]) -> list[Right]:
+def ordered_rights(rights: Collection[Right]) -> list[Right]:
     """Rights in the order in which they are told.
 
     >>> ordered({"own", "view"})
@@ -111,7 +111,7 @@ def rights_on(session: Session, studies: Iterable[Study], identity: Identity) ->
     )
     for study_id, word in session.execute(query):
         granted[study_id].add(RIGHTS[RIGHTS.index(word)])
-    return {one.id: effective(roles.get(one.workspace_id or 0), granted[one.id]) for one in listed}
+    return {one.id: effective_rights(roles.get(one.workspace_id or 0), granted[one.id]) for one in listed}
 
 
 def roles_of(session: Session, account_id: int) -> dict[int, Role]:
@@ -156,14 +156,14 @@ def may_upload(session: Session, identity: Identity) -> bool:
 def default_workspace(session: Session) -> Workspace:
     """The workspace of whatever is put into no other; made where it is missing."""
     insert_once(session, Workspace, [{"name": DEFAULT_WORKSPACE, "title": "Laboratory"}])
-    return session.scalars(_named(DEFAULT_WORKSPACE)).one()
+    return session.scalars(_workspace_query(DEFAULT_WORKSPACE)).one()
 
 
-def _named(name: str) -> Select[Workspace]:
+def _workspace_query(name: str) -> Select[Workspace]:
     return select(Workspace).where(Workspace.name == name)
 
 
-def find(session: Session, name: str, *, lock: bool = False) -> Workspace | None:
+def find_workspace(session: Session, name: str, *, lock: bool = False) -> Workspace | None:
     """The workspace called `name`.
 
     Parameters
@@ -171,10 +171,10 @@ def find(session: Session, name: str, *, lock: bool = False) -> Workspace | None
     lock : bool, optional
         Hold it until the transaction ends.
     """
-    return session.scalar(_named(name).with_for_update() if lock else _named(name))
+    return session.scalar(_workspace_query(name).with_for_update() if lock else _workspace_query(name))
 
 
-def every(session: Session) -> list[Workspace]:
+def every_workspace(session: Session) -> list[Workspace]:
     """All workspaces by name."""
     return list(session.scalars(select(Workspace).order_by(Workspace.name)))
 
@@ -238,7 +238,7 @@ def grants(session: Session, study: Study) -> dict[str, list[Right]]:
     listed: dict[str, list[Right]] = {}
     for name, word in session.execute(query.order_by(Account.name)):
         listed.setdefault(name, []).append(RIGHTS[RIGHTS.index(word)])
-    return {name: ordered(given) for name, given in listed.items()}
+    return {name: ordered_rights(given) for name, given in listed.items()}
 
 
 def set_grants(

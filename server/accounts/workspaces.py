@@ -14,7 +14,7 @@ from server.accounts.access import WRITER, Writer, account_of
 from server.accounts.audit import record
 from server.accounts.identity import Identity, NotAllowed, Operator, must_be_fresh
 from server.accounts.schemas import GrantOut, MemberOut, WorkspaceOut
-from server.accounts.workspace_repository import ordered
+from server.accounts.workspace_repository import ordered_rights
 from server.core.db import Database
 from server.core.errors import Conflict, Invalid, NotFound
 from server.core.requests import DatabaseDep
@@ -43,10 +43,10 @@ class Standing:
 
 def standing_of(session: Session, studies: Sequence[Study], identity: Identity) -> dict[int, Standing]:
     """Study number -> its workspace and her rights."""
-    names = {workspace.id: workspace.name for workspace in workspace_repository.every(session)}
+    names = {workspace.id: workspace.name for workspace in workspace_repository.every_workspace(session)}
     rights = workspace_repository.rights_on(session, studies, identity)
     return {
-        study.id: Standing(names.get(study.workspace_id or 0, ""), ordered(rights[study.id]))
+        study.id: Standing(names.get(study.workspace_id or 0, ""), ordered_rights(rights[study.id]))
         for study in studies
     }
 
@@ -54,16 +54,16 @@ def standing_of(session: Session, studies: Sequence[Study], identity: Identity) 
 def standing_on(session: Session, study: Study, rights: frozenset[Right]) -> Standing:
     """Where one study belongs, with the rights on it that are known."""
     workspace = workspace_repository.workspace_of(session, study)
-    return Standing(workspace.name if workspace else "", ordered(rights))
+    return Standing(workspace.name if workspace else "", ordered_rights(rights))
 
 
 def find_workspace(session: Session, name: str, *, lock: bool = False) -> Workspace:
     """The workspace called `name`, for whoever manages the server."""
-    workspace = workspace_repository.find(session, name, lock=lock)
+    workspace = workspace_repository.find_workspace(session, name, lock=lock)
     if workspace is None:
         if name == DEFAULT_WORKSPACE:
             return workspace_repository.default_workspace(session)
-        names = [one.name for one in workspace_repository.every(session)]
+        names = [one.name for one in workspace_repository.every_workspace(session)]
         raise NotFound(f"There is no workspace '{name[:60]}'{did_you_mean(name, names)}")
     return workspace
 
@@ -107,7 +107,7 @@ def own_workspaces(session: Session, account_id: int) -> list[tuple[Workspace, R
     return workspace_repository.workspaces_of(session, account_id)
 
 
-def listed(session: Session, identity: Identity) -> list[WorkspaceOut]:
+def list_workspaces(session: Session, identity: Identity) -> list[WorkspaceOut]:
     """The workspaces she belongs to; all of them where she manages the server."""
     roles = workspace_repository.roles_of(session, identity.account_id)
     with every_row(session):  # numbers alone; of workspaces that are not shown they are not used
@@ -121,7 +121,7 @@ def listed(session: Session, identity: Identity) -> list[WorkspaceOut]:
             members=counts.get(one.id, (0, 0))[0],
             studies=counts.get(one.id, (0, 0))[1],
         )
-        for one in workspace_repository.every(session)
+        for one in workspace_repository.every_workspace(session)
         if one.id in roles or identity.role == "owner"
     ]
 
@@ -145,7 +145,7 @@ def grants_on(session: Session, study: Study) -> list[GrantOut]:
     return [GrantOut(account=name, rights=rights) for name, rights in given.items()]
 
 
-def managed(session: Session, name: str, identity: Identity | Operator) -> Workspace:
+def managed_workspace(session: Session, name: str, identity: Identity | Operator) -> Workspace:
     """A workspace she may manage: her own, or any where she manages the server.
 
     One that asks for a second factor is managed by nobody without, the server's owners included; the command
@@ -157,15 +157,15 @@ def managed(session: Session, name: str, identity: Identity | Operator) -> Works
     workspace = (
         find_workspace(session, name, lock=True)
         if identity.role == "owner"
-        else _owned(session, name, identity)
+        else _owned_workspace(session, name, identity)
     )
     if workspace.second_factor_required and not identity.second_factor:
         raise NotAllowed(f"The workspace '{name}' asks for a second factor; set one up under My account.")
     return workspace
 
 
-def _owned(session: Session, name: str, identity: Identity) -> Workspace:
-    workspace = workspace_repository.find(session, name, lock=True)
+def _owned_workspace(session: Session, name: str, identity: Identity) -> Workspace:
+    workspace = workspace_repository.find_workspace(session, name, lock=True)
     role = (
         workspace_repository.roles_of(session, identity.account_id).get(workspace.id)
         if workspace is not None
@@ -180,7 +180,7 @@ def _owned(session: Session, name: str, identity: Identity) -> Workspace:
 
 def create(session: Session, name: str, title: str, identity: Identity | Operator) -> Workspace:
     """Make a workspace; the account that makes it owns it."""
-    if workspace_repository.find(session, name) is not None:
+    if workspace_repository.find_workspace(session, name) is not None:
         raise Conflict(f"There is already a workspace called '{name}'; choose another name.")
     workspace = Workspace(name=name, title=title, created_by=identity.account_id)
     session.add(workspace)
@@ -252,7 +252,13 @@ def grant(
     account = account_named(session, name)
     workspace_repository.set_grants(session, study, account, rights, identity.account_id)
     record(
-        session, identity, "rights granted", "study", study.name, account=account.name, rights=ordered(rights)
+        session,
+        identity,
+        "rights granted",
+        "study",
+        study.name,
+        account=account.name,
+        rights=ordered_rights(rights),
     )
 
 

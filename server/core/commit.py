@@ -153,7 +153,7 @@ class GroupCommit:
             _commit(writer, batch)
             for loop in {work.loop for work in batch}:
                 mine = [work for work in batch if work.loop is loop]
-                _tell(loop, mine)
+                _resolve_batch(loop, mine)
         writer.rest()
 
 
@@ -177,7 +177,7 @@ def _commit(writer: Writer, batch: list[_Work]) -> None:
             _commit(writer, [work])
 
 
-def _tell(loop: asyncio.AbstractEventLoop, batch: list[_Work]) -> None:
+def _resolve_batch(loop: asyncio.AbstractEventLoop, batch: list[_Work]) -> None:
     def answer_all() -> None:
         for work in batch:
             work.answer()
@@ -286,7 +286,7 @@ class Prepared:
         """The driver's cursor on the rows that there are."""
         dialect = connection.dialect
         if dialect.name not in self._compiled:
-            self._compiled[dialect.name] = _compiled(self._statement, dialect, self._columns)
+            self._compiled[dialect.name] = _compile_statement(self._statement, dialect, self._columns)
         compiled = self._compiled[dialect.name]
         if not connection.in_transaction():
             connection.begin()
@@ -317,7 +317,7 @@ class Query(Prepared, Generic[Row]):
         rows, processors = cursor.fetchall(), self._processors[dialect.name]
         cursor.close()
         if processors:
-            rows = [_changed(row, processors) for row in rows]
+            rows = [_processed_row(row, processors) for row in rows]
         return list(map(self._make, rows))
 
     def one_or_none(self, connection: Connection, values: Mapping[str, Any]) -> Row | None:
@@ -326,7 +326,7 @@ class Query(Prepared, Generic[Row]):
         return rows[0] if rows else None
 
 
-def _compiled(statement: Any, dialect: Dialect, columns: list[str]) -> _Compiled:
+def _compile_statement(statement: Any, dialect: Dialect, columns: list[str]) -> _Compiled:
     compiled: SQLCompiler = statement.compile(dialect=dialect, column_keys=columns or None)
     names = (compiled.positiontup or ()) if compiled.positional else tuple(compiled.binds)
     binds = {name: compiled.binds[name] for name in names}
@@ -350,7 +350,7 @@ def _result_processors(
     return tuple((index, change) for index, change in enumerate(changes) if change is not None)
 
 
-def _changed(row: Sequence[Any], processors: _ResultProcessors) -> list[Any]:
+def _processed_row(row: Sequence[Any], processors: _ResultProcessors) -> list[Any]:
     values = list(row)
     for index, change in processors:
         values[index] = change(values[index])

@@ -14,7 +14,7 @@ from starlette.exceptions import HTTPException
 from experiments.errors import InputError
 from server.core.db import is_away, is_busy
 from server.core.errors import ApiError, error_response, refusal_response, refused_value
-from server.core.logs import described
+from server.core.logs import describe_error
 
 log = logging.getLogger("palpebra")
 
@@ -114,10 +114,10 @@ async def _database(_request: Request, error: Exception) -> JSONResponse:
     if not is_away(error):
         raise error
     if is_busy(error):
-        log.error("the database is busy: %s", described(error))
+        log.error("the database is busy: %s", describe_error(error))
         message = "Another program keeps the database busy; nothing was stored, please try again."
         return error_response(503, "database_busy", message, headers={"retry-after": "2"})
-    log.error("the database is away: %s", described(error))
+    log.error("the database is away: %s", describe_error(error))
     message = "The server cannot reach its database at the moment; please try again."
     return error_response(503, "database_away", message, headers={"retry-after": "2"})
 

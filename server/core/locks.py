@@ -22,7 +22,7 @@ from server.models import Job
 
 
 @contextmanager
-def locked(path: Path, *, wait: bool = True) -> Iterator[None]:
+def file_lock(path: Path, *, wait: bool = True) -> Iterator[None]:
     """Hold the lock of a file, which is made where it is missing; it ends with the process at the latest.
 
     Raises
@@ -250,7 +250,7 @@ class FileLocks:
         """Hold a lock; LockTaken where another does."""
         with ExitStack() as held:
             try:
-                held.enter_context(locked(self._folder / f"{name}.lock", wait=False))
+                held.enter_context(file_lock(self._folder / f"{name}.lock", wait=False))
             except BlockingIOError:
                 raise LockTaken(name) from None
             except ImportError:  # a system without such locks has one process alone
@@ -263,7 +263,7 @@ class FileLocks:
         path = self._folder / public_id
         with ExitStack() as held:
             with suppress(ImportError):  # a system without such locks: the job's age alone tells
-                held.enter_context(locked(path))
+                held.enter_context(file_lock(path))
             yield
             path.unlink(missing_ok=True)
 

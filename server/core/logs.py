@@ -50,7 +50,7 @@ class JsonLines(logging.Formatter):
             **getattr(record, "fields", {}),
         }
         if record.exc_info and record.exc_info[1] is not None:
-            line["error"] = described(record.exc_info[1])
+            line["error"] = describe_error(record.exc_info[1])
             line["frames"] = frames(record.exc_info[1].__traceback__)
         return json.dumps(line, ensure_ascii=False, default=str)
 
@@ -63,7 +63,7 @@ class PlainLines(logging.Formatter):
         fields = " ".join(f"{name}={value}" for name, value in getattr(record, "fields", {}).items())
         line = f"{record.levelname.lower()}: {record.getMessage()} {fields}".rstrip()
         if record.exc_info and record.exc_info[1] is not None:
-            line += f": {described(record.exc_info[1])}"
+            line += f": {describe_error(record.exc_info[1])}"
             line += "".join(f"\n    {frame}" for frame in frames(record.exc_info[1].__traceback__))
         return line
 
@@ -76,7 +76,7 @@ class UvicornFilter(logging.Filter):
         return not str(record.msg).startswith(NEEDLESS)
 
 
-def described(error: BaseException) -> str:
+def describe_error(error: BaseException) -> str:
     """The exception's type; its words only where they come from the system or the database's first line."""
     kind = type(error).__name__
     if isinstance(error, DBAPIError) and error.orig is not None:

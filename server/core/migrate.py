@@ -34,7 +34,7 @@ def alembic_config(
 
 
 @contextmanager
-def migrating(database: Database) -> Iterator[Connection]:
+def migration_transaction(database: Database) -> Iterator[Connection]:
     """A connection whose one transaction holds all migrations: killed half-way, the database is as it was.
 
     Alembic takes SQLite for a database that commits with each change of a table; begun like this it does not.
@@ -51,7 +51,7 @@ def upgrade(database: Database) -> tuple[str | None, str | None]:
 
     Views that are not those of this program's columns are made anew, with no new revision too.
     """
-    with migrating(database) as connection:
+    with migration_transaction(database) as connection:
         before = revision_of(connection)
         if before == newest_revision() and views_are_current(connection):
             _raise_wall_at_newest(connection)
@@ -94,7 +94,7 @@ def revision_of(connection: Connection) -> str | None:
 
 def downgrade(database: Database, revision: str = "-1") -> None:
     """Undo migrations down to `revision`, which leaves no views (`refuse_without_views` says how far)."""
-    with migrating(database) as connection, derived_anew(connection):
+    with migration_transaction(database) as connection, derived_anew(connection):
         command.downgrade(alembic_config(connection, database.secret_key), revision)
 
 

@@ -47,7 +47,7 @@ _acting: ContextVar[ActingAccount | None] = ContextVar("acting", default=None)
 
 
 @contextmanager
-def acting() -> Iterator[None]:
+def request_scope() -> Iterator[None]:
     """What is within is one request: it acts for nobody until an account is recognised."""
     before = _acting.set(ActingAccount())
     try:
@@ -66,16 +66,16 @@ class NarrowedSession(Session):
     """A session whose transactions are a member's where the request is."""
 
 
-def _narrow(_session: Session, _transaction: SessionTransaction, connection: Connection) -> None:
+def _narrow_transaction(_session: Session, _transaction: SessionTransaction, connection: Connection) -> None:
     request = _acting.get()
     if request is not None and request.account_id is not None:
-        connection.exec_driver_sql(_narrowing(request.account_id))
+        connection.exec_driver_sql(_narrowing_statement(request.account_id))
 
 
-event.listen(NarrowedSession, "after_begin", _narrow)
+event.listen(NarrowedSession, "after_begin", _narrow_transaction)
 
 
-def _narrowing(account_id: int) -> str:
+def _narrowing_statement(account_id: int) -> str:
     # Two statements in one message: each transaction of a member waits for the database once more, not twice.
     return f"SET LOCAL {ACCOUNT} = '{int(account_id)}'; SET LOCAL ROLE {ROLE}"
 
@@ -95,7 +95,7 @@ def every_row(session: Session) -> Iterator[None]:
     yield
     # Not where an error leaves the block: the transaction it broke takes no statement, and is rolled back.
     session.flush()
-    session.connection().exec_driver_sql(_narrowing(request.account_id))
+    session.connection().exec_driver_sql(_narrowing_statement(request.account_id))
 
 
 def kind_of_session(narrows: bool) -> type[Session]:
@@ -197,10 +197,10 @@ def raise_wall(connection: Connection, *, stood: bool = False) -> bool:
     if _mark(connection) == mark and _is_whole(connection):
         return True
     statements.append(f"COMMENT ON FUNCTION palpebra_account() IS '{mark}'")
-    return _raised(connection, statements, stood)
+    return _carry_out_all(connection, statements, stood)
 
 
-def _raised(connection: Connection, statements: list[str], stood: bool) -> bool:
+def _carry_out_all(connection: Connection, statements: list[str], stood: bool) -> bool:
     """Whether the statements could be carried out, all or none; a wall of before is not left half-built."""
     try:
         with connection.begin_nested():
@@ -308,10 +308,10 @@ def _role_is_ours(connection: Connection) -> bool:
     if _version(connection) < OLDEST_POSTGRES:
         return False
     if not connection.scalar(text("SELECT count(*) FROM pg_roles WHERE rolname = :role"), {"role": ROLE}):
-        _tried(connection, f"CREATE ROLE {ROLE} NOLOGIN")
+        _try_statement(connection, f"CREATE ROLE {ROLE} NOLOGIN")
     if not _may_take_role(connection):
         how = " WITH SET TRUE, INHERIT FALSE" if _version(connection) >= 160_000 else ""
-        _tried(connection, f"GRANT {ROLE} TO CURRENT_USER{how}")
+        _try_statement(connection, f"GRANT {ROLE} TO CURRENT_USER{how}")
     return _may_take_role(connection)
 
 
@@ -321,7 +321,7 @@ def _may_take_role(connection: Connection) -> bool:
     return bool(connection.scalar(query, {"right": right, "role": ROLE}))
 
 
-def _tried(connection: Connection, statement: str) -> None:
+def _try_statement(connection: Connection, statement: str) -> None:
     """What this user may not do, or another did at this moment, is left."""
     try:
         with connection.begin_nested():

@@ -112,7 +112,7 @@ VisibleObject = Annotated[dict[str, Any], BeforeValidator(visible)]
 """A stored JSON object as an answer shows it."""
 
 
-def encoded(text: str) -> bytes:
+def encode_text(text: str) -> bytes:
     """`text` in UTF-8, what cannot be encoded made visible."""
     try:
         return text.encode("utf-8")

@@ -50,7 +50,7 @@ from server.exports.seals import page as seal_page
 from server.exports.seals import seal_of
 from server.models import Job, Study, StudyVersion
 from server.results import job_repository
-from server.results.jobs import begun, in_background, is_under_way, note, run_analysis, shown
+from server.results.jobs import begin_job, in_background, is_under_way, job_state, note, run_analysis
 from server.results.methods import MethodsFigures, methods_figures, paragraph_of, read_results, write_beside
 from server.studies.lookup import definition_of, find_study
 from server.studies.series import version_of_series
@@ -342,7 +342,7 @@ def start(
     with database.write() as session:
         study = find_study(session, name, identity, "run")
         version_of_series(session, study, order.series)
-        job = begun(
+        job = begin_job(
             locks,
             session,
             study,
@@ -428,7 +428,7 @@ def _capsule_out(settings: Settings, locks: Locks, job: Job) -> CapsuleOut:
     is_there = job.status == "done" and path.is_file()
     return CapsuleOut.model_validate(
         {
-            **shown(locks, job, "the server was stopped while it was made"),
+            **job_state(locks, job, "the server was stopped while it was made"),
             "origin": job.parameters.get("origin", "participant"),
             "series": job.parameters.get("series"),
             "clips": job.parameters.get("clips", True),

@@ -18,7 +18,7 @@ from experiments.files import check_targets, whole_file, whole_text
 from server.accounts.audit import record
 from server.accounts.identity import OPERATOR
 from server.cli_common import out, stored_services
-from server.core.values import encoded
+from server.core.values import encode_text
 from server.exports.capsules import CapsuleContents, CapsuleOrigin, build_capsule
 from server.exports.extract import ExportOrigin, Extract
 from server.exports.formats import CSV_FORMATS, FORMATS, Format, row_count, spreadsheet_pieces
@@ -142,7 +142,7 @@ def _write_scripts(out_file: Path, experiment: Experiment) -> str:
     """Write the scripts beside the CSV; their names in words."""
     targets = {language: out_file.with_suffix(f".{language}") for language in LANGUAGES}
     for language, target in targets.items():
-        _write(target, [encoded(script(experiment, language, out_file.name))])
+        _write(target, [encode_text(script(experiment, language, out_file.name))])
     return " or ".join(target.name for target in targets.values())
 
 

@@ -15,7 +15,7 @@ from experiments.columns import View
 from experiments.columns.view import Dialect, Stretch, Stretches, levels_at, with_levels
 from experiments.errors import InputError
 from experiments.kinds import KINDS
-from server.core.values import encoded
+from server.core.values import encode_text
 from server.exports import repository
 from server.exports.extract import Extract
 from server.exports.repository import Rows, Runs
@@ -173,7 +173,7 @@ class ExportBrokenOff(InputError):
     """An export holds another number of rows than the study had when it began."""
 
 
-def whole(rows: Iterable[Row], expected: int, extra: int = 0) -> Iterator[Row]:
+def check_whole(rows: Iterable[Row], expected: int, extra: int = 0) -> Iterator[Row]:
     """`rows` as they come; ExportBrokenOff at the end where they are not `expected` + `extra`."""
     number = -extra
     for row in rows:
@@ -187,16 +187,18 @@ def csv_pieces(rows: Iterable[Sequence[Any]]) -> Iterator[bytes]:
     """Rows as CSV in UTF-8, some hundred rows a piece."""
     remaining = iter(rows)
     while batch := list(islice(remaining, ROWS_A_PIECE)):
-        yield encoded(csv_text(batch))
+        yield encode_text(csv_text(batch))
 
 
 def rating_pieces(session: Session, study: Study, extract: Extract) -> Iterator[bytes]:
     """Header and lines of the tidy CSV, some hundred lines a piece."""
     factors, view = factor_names(session, study), view_of(session, study)
     yield from csv_pieces([view.csv_header(factors)])
-    lines = whole(rating_lines(session, study, extract, view, factors), rating_count(session, study, extract))
+    lines = check_whole(
+        rating_lines(session, study, extract, view, factors), rating_count(session, study, extract)
+    )
     while batch := list(islice(lines, ROWS_A_PIECE)):
-        yield encoded("\n".join((*batch, "")))
+        yield encode_text("\n".join((*batch, "")))
 
 
 def rating_table(session: Session, study: Study, extract: Extract) -> Iterator[Sequence[Any]]:
@@ -204,7 +206,7 @@ def rating_table(session: Session, study: Study, extract: Extract) -> Iterator[S
     factors, view = factor_names(session, study), view_of(session, study)
     yield view.csv_header(factors)
     rows = (view.csv_row(row, factors) for row in rating_rows(session, study, extract))
-    yield from whole(rows, rating_count(session, study, extract))
+    yield from check_whole(rows, rating_count(session, study, extract))
 
 
 # A zip on its way out: written member by member, taken piece by piece, in constant memory.

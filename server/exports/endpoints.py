@@ -21,7 +21,7 @@ from server.context import Services, ServicesDep
 from server.core.db import Database
 from server.core.errors import ERROR_RESPONSES, Conflict, NotFound
 from server.core.requests import DatabaseDep, SettingsDep
-from server.core.values import Number, encoded
+from server.core.values import Number, encode_text
 from server.exports import capsules as capsule_service
 from server.exports import reports as report_service
 from server.exports.extract import EVERYTHING, ExportOrigin, Extract
@@ -137,7 +137,7 @@ class Download:
         return table.count
 
 
-async def _asked(
+async def _requested_download(
     services: ServicesDep,
     identity: Exporter,
     study: str,
@@ -148,12 +148,12 @@ async def _asked(
 
 
 async def _asked_as_csv(
-    download: Annotated[Download, Depends(_asked)], excel: Excel = False, guard: Guard = True
+    download: Annotated[Download, Depends(_requested_download)], excel: Excel = False, guard: Guard = True
 ) -> Download:
     return replace(download, excel=excel, guard=guard)
 
 
-Asked = Annotated[Download, Depends(_asked)]
+Asked = Annotated[Download, Depends(_requested_download)]
 AskedAsCsv = Annotated[Download, Depends(_asked_as_csv)]
 
 
@@ -187,7 +187,7 @@ def download_script(
             f"{study}-ratings.csv",
         )
     headers = {"content-disposition": f'attachment; filename="{study}.{language}"'}
-    return Response(encoded(text), media_type="text/plain; charset=utf-8", headers=headers)
+    return Response(encode_text(text), media_type="text/plain; charset=utf-8", headers=headers)
 
 
 @router.get("/raw.ndjson", response_class=StreamingResponse)
@@ -348,10 +348,10 @@ def get_seal(database: DatabaseDep, identity: Viewer, study: str) -> SealOut:
     """Whether there is a sealed plan."""
     with database.read() as session:
         known = find_study(session, study, identity, "view")
-        return _out(seal_of(session, known), people_begun(session, known))
+        return _seal_out(seal_of(session, known), people_begun(session, known))
 
 
-def _out(seal: Seal | None, people: int) -> SealOut:
+def _seal_out(seal: Seal | None, people: int) -> SealOut:
     if seal is None:
         return SealOut(sealed_at=None, sha256=None, version=None, power=False, participants=people)
     return SealOut(
@@ -368,7 +368,7 @@ def seal_study(database: DatabaseDep, identity: Writer, study: str, body: NewSea
     """Seal design, exclusions, analysis plan and power, once, before the first participant."""
     with database.write() as session:
         # Nobody has begun: else it would not be sealed.
-        return _out(
+        return _seal_out(
             seal_plan(session, find_study(session, study, identity, "edit"), identity, body.power), people=0
         )
 
@@ -378,13 +378,13 @@ def download_seal(
     database: DatabaseDep, identity: Viewer, study: str, ending: Literal["json", "html"]
 ) -> Response:
     """The sealed file, or a page of it that prints well."""
-    seal = _sealed(database, study, identity)
+    seal = _seal_of_study(database, study, identity)
     text, kind = (seal.text(), "application/json") if ending == "json" else (page(seal), "text/html")
     headers = {"content-disposition": f'attachment; filename="{study}-seal.{ending}"'}
-    return Response(encoded(text), media_type=f"{kind}; charset=utf-8", headers=headers)
+    return Response(encode_text(text), media_type=f"{kind}; charset=utf-8", headers=headers)
 
 
-def _sealed(database: Database, study: str, identity: Identity) -> Seal:
+def _seal_of_study(database: Database, study: str, identity: Identity) -> Seal:
     with database.read() as session:
         seal = seal_of(session, find_study(session, study, identity, "view"))
     if seal is None:

@@ -15,9 +15,9 @@ from sqlalchemy.orm import Session
 from experiments.columns import Column
 from experiments.columns.runs import IDENTITY_COLUMNS
 from experiments.errors import InputError
-from server.core.values import encoded, now
+from server.core.values import encode_text, now
 from server.exports import psych_ds, repository, tables
-from server.exports.csv_lines import csv_pieces, rating_count, rating_pieces, whole
+from server.exports.csv_lines import check_whole, csv_pieces, rating_count, rating_pieces
 from server.exports.extract import Extract
 from server.exports.tables import ExportTable, answers_table, cells_of, runs_table, wide_table
 from server.models import Study
@@ -38,7 +38,7 @@ def columns_json(columns: list[Column]) -> bytes:
     return _COLUMNS.dump_json(columns, indent=1)
 
 
-def converted(table: ExportTable, ending: Ending) -> Iterator[bytes]:
+def converted_pieces(table: ExportTable, ending: Ending) -> Iterator[bytes]:
     """The pieces of the file; InputError, with the program's own line, where it cannot be made."""
     with TemporaryDirectory(prefix="export-") as temporary:
         folder = Path(temporary)
@@ -126,8 +126,8 @@ def wide_csv(session: Session, study: Study, extract: Extract) -> Iterator[bytes
 def raw_json(session: Session, study: Study, extract: Extract) -> Iterator[bytes]:
     """Everything stored, one JSON object a run and line; the last line tells that it is complete."""
     number = repository.run_count(session, study, extract)
-    for line in whole(tables.raw_lines(session, study, extract), number):
-        yield encoded(line)
+    for line in check_whole(tables.raw_lines(session, study, extract), number):
+        yield encode_text(line)
     yield (json.dumps({"complete": True, "runs": number}) + "\n").encode()
 
 
@@ -135,7 +135,7 @@ def codebook_markdown(session: Session, study: Study, extract: Extract) -> Itera
     """What every column means; the same whatever the origin."""
     del extract
     explained = tables.explained_tables(all_definitions(session, study))
-    yield encoded(tables.codebook_text(active_definition(session, study), explained))
+    yield encode_text(tables.codebook_text(active_definition(session, study), explained))
 
 
 def psych_ds_zip(session: Session, study: Study, extract: Extract) -> Iterator[bytes]:
@@ -147,7 +147,7 @@ def identities_csv(session: Session, study: Study, extract: Extract) -> Iterator
     """One row a visit whose person is known, of any origin: the recruiter's id beside the pseudonym."""
     del extract
     rows = identity_rows(session, study)
-    yield from csv_pieces(whole(rows, repository.known_person_count(session, study), extra=1))
+    yield from csv_pieces(check_whole(rows, repository.known_person_count(session, study), extra=1))
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ class Conversion:
 
     def pieces(self, session: Session, study: Study, extract: Extract) -> Iterator[bytes]:
         """The converted file."""
-        return converted(self.table(session, study, extract), self.ending)
+        return converted_pieces(self.table(session, study, extract), self.ending)
 
 
 CONVERSIONS: dict[Format, Conversion] = {

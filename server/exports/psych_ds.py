@@ -16,7 +16,7 @@ from experiments.design import rated_levels
 from experiments.kinds import KINDS
 from experiments.kinds.scales import scales_of
 from experiments.rules import DropFailedPlays, DropSlowTrials, ExcludeIncomplete
-from server.core.values import encoded, iso
+from server.core.values import encode_text, iso
 from server.exports.csv_lines import csv_pieces, zip_pieces
 from server.exports.extract import Extract
 from server.exports.repository import first_start
@@ -45,7 +45,7 @@ MOVED = "All times of the dataset are moved alike, so that its first run starts 
 
 
 # Decision 0641: Shared datasets contain no personal data.
-def deidentified(table: ExportTable, first: datetime | None) -> ExportTable:
+def deidentified_table(table: ExportTable, first: datetime | None) -> ExportTable:
     """The table without identifying columns, its times counted from `first`."""
     kept = [index for index, column in enumerate(table.columns) if not column.identifying]
     columns = [table.columns[index] for index in kept]
@@ -55,20 +55,20 @@ def deidentified(table: ExportTable, first: datetime | None) -> ExportTable:
         for index, column in enumerate(columns)
     ]
     shift = EPOCH - first.astimezone(UTC) if first else timedelta()
-    return replace(table, columns=described, rows=_moved(table.rows, kept, times, shift))
+    return replace(table, columns=described, rows=_deidentified_rows(table.rows, kept, times, shift))
 
 
-def _moved(
+def _deidentified_rows(
     rows: Iterator[Sequence[Any]], kept: list[int], times: frozenset[int], shift: timedelta
 ) -> Iterator[Sequence[Any]]:
     for row in rows:
         cells = [row[index] for index in kept]
         for index in times:
-            cells[index] = _shifted(cells[index], shift)
+            cells[index] = _shifted_moment(cells[index], shift)
         yield cells
 
 
-def _shifted(moment: Any, shift: timedelta) -> Any:
+def _shifted_moment(moment: Any, shift: timedelta) -> Any:
     return iso(datetime.fromisoformat(moment) + shift) if moment else moment
 
 
@@ -185,9 +185,10 @@ def dataset_folder(session: Session, study: Study, made: str, extract: Extract) 
     renamed = {name: beside_runs(name) for name in sorted(factors) if beside_runs(name) != name}
     first = first_start(session, study, extract)
     answers, *others = [
-        deidentified(table, first) for table in _tables(session, study, extract, bool(scales_of(definition)))
+        deidentified_table(table, first)
+        for table in _tables(session, study, extract, bool(scales_of(definition)))
     ]
-    tables = [_renamed(answers, renamed), *others]
+    tables = [_with_renamed_columns(answers, renamed), *others]
     paths = {
         table.name: f"data/study-{_keyword(study.name)}_description-{table.name}_data.csv" for table in tables
     }
@@ -197,7 +198,7 @@ def dataset_folder(session: Session, study: Study, made: str, extract: Extract) 
             definition, language, f"../{paths[tables[0].name]}", renamed
         )
     members = (
-        *((path, [encoded(text)]) for path, text in texts.items()),
+        *((path, [encode_text(text)]) for path, text in texts.items()),
         *((paths[table.name], guarded_csv(csv_pieces(table.with_header()))) for table in tables),
     )
     return Folder(iter(members), paths[tables[0].name], paths["runs"], renamed)
@@ -208,7 +209,7 @@ def _tables(session: Session, study: Study, extract: Extract, wide: bool) -> lis
     return [make(session, study, extract) for make in makers]
 
 
-def _renamed(table: ExportTable, renamed: dict[str, str]) -> ExportTable:
+def _with_renamed_columns(table: ExportTable, renamed: dict[str, str]) -> ExportTable:
     columns = [replace(column, name=renamed.get(column.name, column.name)) for column in table.columns]
     return replace(table, columns=columns)
 

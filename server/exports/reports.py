@@ -24,7 +24,7 @@ from server.exports.schemas import NewReport, ReportOut
 from server.exports.seals import seal_of
 from server.models import Job
 from server.results import job_repository
-from server.results.jobs import begun, in_background, note, run_analysis, shown
+from server.results.jobs import begin_job, in_background, job_state, note, run_analysis
 from server.results.methods import methods_of, read_results, write
 from server.studies.lookup import find_study
 from server.studies.series import version_of_series
@@ -41,7 +41,7 @@ def start(
     """Queue a report and begin it in the background; Conflict where one of this study is under way."""
     with database.write() as session:
         study = find_study(session, name, identity, "run")
-        job = begun(
+        job = begin_job(
             locks,
             session,
             study,
@@ -71,7 +71,7 @@ def report_out(settings: Settings, locks: Locks, job: Job) -> ReportOut:
     done = job.status == "done" and folder.is_dir()
     return ReportOut.model_validate(
         {
-            **shown(locks, job, "the server was stopped while it was built"),
+            **job_state(locks, job, "the server was stopped while it was built"),
             "origin": job.parameters.get("origin") or _origin_of_older(job.parameters),
             "series": job.parameters.get("series"),
             "finished_at": job.finished_at,

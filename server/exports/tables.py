@@ -24,12 +24,12 @@ from server.core.values import iso
 from server.exports import repository
 from server.exports.csv_lines import (
     ExportBrokenOff,
+    check_whole,
     factor_names,
     rating_count,
     rating_rows,
     rating_table,
     view_of,
-    whole,
 )
 from server.exports.extract import Extract
 from server.exports.repository import run_count
@@ -104,12 +104,12 @@ def _calibration(session: Session, run: StudyRun) -> dict[str, Any]:
 
 def _evidence(session: Session, run: StudyRun) -> dict[str, Any]:
     judged = judge_run(session, run)
-    values = {f"evidence_{name}": _rounded(value) for name, value in asdict(judged.signals).items()}
+    values = {f"evidence_{name}": _rounded_cell(value) for name, value in asdict(judged.signals).items()}
     points = "" if judged.verdict == "not_judged" else judged.points
     return values | {"evidence_verdict": judged.verdict, "evidence_points": points}
 
 
-def _rounded(value: float | None) -> float | str:
+def _rounded_cell(value: float | None) -> float | str:
     return "" if value is None else round(value, 4)
 
 
@@ -411,7 +411,7 @@ def answers_table(session: Session, study: Study, extract: Extract) -> ExportTab
 def runs_table(session: Session, study: Study, extract: Extract) -> ExportTable:
     """One row a visit, a column a question of the forms."""
     forms, number = form_columns(all_definitions(session, study)), run_count(session, study, extract)
-    rows = whole(run_rows(session, study, extract, forms), number)
+    rows = check_whole(run_rows(session, study, extract, forms), number)
     return ExportTable("runs", run_columns(forms), rows, number)
 
 
@@ -419,7 +419,7 @@ def wide_table(session: Session, study: Study, extract: Extract) -> ExportTable:
     """One row a visit, a column a cell with the mean rating in it; InputError for trials without a scale."""
     definitions, number = all_definitions(session, study), run_count(session, study, extract)
     newest, forms = definition_of_series(session, study, extract.series), form_columns(definitions)
-    rows = whole(wide_rows(session, study, extract, newest, forms), number)
+    rows = check_whole(wide_rows(session, study, extract, newest, forms), number)
     return ExportTable("wide", wide_columns(newest, forms), rows, number)
 
 

@@ -22,7 +22,7 @@ from sqlalchemy import Connection, Table
 from experiments.errors import InputError
 from experiments.files import check_targets, whole_private_file
 from server.core.db import Database
-from server.core.locks import locked
+from server.core.locks import file_lock
 from server.core.settings import Settings
 from server.core.storage import ClipStore
 from server.core.values import iso, now
@@ -84,7 +84,7 @@ def back_up(
     key_path = keys or key_escrow.key_file_of(path)
     check_targets([path, key_path, key_path.parent / LEDGER_NAME])
     key_escrow.check_replaceable(key_path, settings.key)
-    with _written(path) as stream:
+    with _open_target(path) as stream:
         described, kept = write_backup(database, settings, clips, stream, with_clips=with_clips)
         _write_keys(settings, key_path, kept)
     return described
@@ -92,7 +92,7 @@ def back_up(
 
 def _write_keys(settings: Settings, path: Path, kept: KeyFile) -> None:
     """Key file and ledger, by one backup of the installation at a time."""
-    with locked(settings.common_folder / "backup-keys.lock"):
+    with file_lock(settings.common_folder / "backup-keys.lock"):
         key_escrow.check_replaceable(path, settings.key)
         key_escrow.write_keys(path, kept)
         _write_ledger(settings, path.parent / LEDGER_NAME, kept.written_at)
@@ -116,7 +116,7 @@ def write_backup(
             kept = key_escrow.read_keys(connection, settings.key, described.created_at)
             _add_bytes(tar, DESCRIPTION, described.model_dump_json(indent=2).encode())
             for name in described.tables:
-                tar.add(Path(folder) / name, TABLES + name + ".ndjson.gz", filter=_plain)
+                tar.add(Path(folder) / name, TABLES + name + ".ndjson.gz", filter=_without_owner)
         _add_bytes(tar, KEY, settings.key)
         for sha256 in described.clips:
             _add_clip(tar, clips, sha256)
@@ -173,7 +173,7 @@ def _entry(name: str, size: int) -> tarfile.TarInfo:
     return entry
 
 
-def _plain(entry: tarfile.TarInfo) -> tarfile.TarInfo:
+def _without_owner(entry: tarfile.TarInfo) -> tarfile.TarInfo:
     """Nothing of the machine's users in the file."""
     entry.uid = entry.gid = 0
     entry.uname = entry.gname = ""
@@ -182,7 +182,7 @@ def _plain(entry: tarfile.TarInfo) -> tarfile.TarInfo:
 
 
 @contextmanager
-def _written(path: Path) -> Iterator[IO[bytes]]:
+def _open_target(path: Path) -> Iterator[IO[bytes]]:
     # It holds the secret key and everybody's answers: for the owner of the file alone.
     try:
         with whole_private_file(path) as stream:
@@ -235,7 +235,7 @@ def make_identity(path: Path) -> str:
 
 
 @contextmanager
-def encrypted(write: Callable[[IO[bytes]], None], recipient: x25519.Recipient) -> Iterator[IO[bytes]]:
+def encrypted_stream(write: Callable[[IO[bytes]], None], recipient: x25519.Recipient) -> Iterator[IO[bytes]]:
     """What `write` writes, encrypted, to be read while it is written; its error comes out of the reader.
 
     Parameters
@@ -244,8 +244,8 @@ def encrypted(write: Callable[[IO[bytes]], None], recipient: x25519.Recipient) -
         Given a stream, in a thread of its own.
     """
     with (
-        _produced(write) as plain,
-        _produced(lambda target: pyrage.encrypt_io(plain, target, [recipient])) as sealed,
+        _produced_stream(write) as plain,
+        _produced_stream(lambda target: pyrage.encrypt_io(plain, target, [recipient])) as sealed,
     ):
         yield sealed
 
@@ -287,7 +287,7 @@ class _Reader:
 
 
 @contextmanager
-def _produced(write: Callable[[IO[bytes]], None]) -> Iterator[IO[bytes]]:
+def _produced_stream(write: Callable[[IO[bytes]], None]) -> Iterator[IO[bytes]]:
     outlet, inlet = os.pipe()
     errors: list[BaseException] = []
 

@@ -17,7 +17,7 @@ from server.core.db import Database
 from server.core.settings import Settings
 from server.core.storage import ClipStore, s3_client
 from server.core.values import iso, now
-from server.operations.backup import ENDING, Description, decrypt, encrypted, write_backup
+from server.operations.backup import ENDING, Description, decrypt, encrypted_stream, write_backup
 from server.operations.key_escrow import NAME, content_of_keys, installation
 from server.privacy.ledger import LEDGER_NAME, ledger_for_backup
 
@@ -255,7 +255,7 @@ def back_up_to(
         made.append(described)
 
     kept_as = f"{name.removesuffix('.tar')}{ending_of(settings.key)}"
-    with encrypted(write, recipient) as stream:
+    with encrypted_stream(write, recipient) as stream:
         store.put(kept_as, stream)
     return kept_as, made[0]
 
@@ -288,9 +288,9 @@ def _put_newest(
     store: BackupStore, kept: _CompanionFile, content: bytes, recipient: x25519.Recipient
 ) -> None:
     """Put a file and remove the older ones; where a newer one is there that one stays."""
-    with encrypted(lambda stream: _write(stream, content), recipient) as stream:
+    with encrypted_stream(lambda stream: _write(stream, content), recipient) as stream:
         store.put(str(kept), stream)
-    there = _named(store, kept.name, kept.installation)
+    there = _files_called(store, kept.name, kept.installation)
     # One of the future is of a clock that was wrong: it would stay for ever.
     present = max(str(kept), str(replace(kept, moment=iso(now()))))
     newest = max(name for name in there if name <= present)
@@ -299,7 +299,7 @@ def _put_newest(
             store.remove(name)
 
 
-def _named(store: BackupStore, name: str, whose: str) -> list[str]:
+def _files_called(store: BackupStore, name: str, whose: str) -> list[str]:
     """The files of this name, by an installation, or any where it is not known; the newest last."""
     beginning = f"{name.partition('.')[0]}-{whose}"
     named = [entry.name for entry in store.entries() if entry.name.startswith(beginning)]
@@ -321,30 +321,30 @@ def brought_here(kept: StoredBackup, folder: Path, identity: x25519.Identity | N
     """
     files = [folder / kept.name.removesuffix(ENDING)]
     try:
-        _bring(kept.store, kept.name, files[0], identity)
-        for stored, name in _beside(kept):
+        _bring_file(kept.store, kept.name, files[0], identity)
+        for stored, name in _companion_files(kept):
             files.append(folder / name)
-            _bring(kept.store, stored, files[-1], identity)
+            _bring_file(kept.store, stored, files[-1], identity)
         yield files[0]
     finally:
         for file in files:
             file.unlink(missing_ok=True)
 
 
-def _beside(kept: StoredBackup) -> Iterator[tuple[str, str]]:
+def _companion_files(kept: StoredBackup) -> Iterator[tuple[str, str]]:
     """Key file and ledger of a backup: as they are stored, and as they are called beside it."""
     whose = installation_of(kept.name) or ""
     for name in (NAME, LEDGER_NAME):
         if kept.name.endswith(ENDING):
             # Where somebody renamed the backup: restore refuses keys that are not its own.
-            stored = _named(kept.store, name, whose)
+            stored = _files_called(kept.store, name, whose)
         else:
             stored = [entry.name for entry in kept.store.entries() if entry.name == name]
         if stored:
             yield stored[-1], name
 
 
-def _bring(store: BackupStore, name: str, target: Path, identity: x25519.Identity | None) -> None:
+def _bring_file(store: BackupStore, name: str, target: Path, identity: x25519.Identity | None) -> None:
     with store.open(name) as source, target.open("wb") as stream:
         target.chmod(0o600)
         if not name.endswith(ENDING):

@@ -29,7 +29,7 @@ from server.operations.backup_stores import (
     ending_of,
 )
 from server.operations.drill import identity_of
-from server.operations.watched_backups import newest_backup, superfluous
+from server.operations.watched_backups import newest_backup, superfluous_backups
 
 LOWEST_PRIORITY = 19
 
@@ -115,7 +115,7 @@ def backup(
             keys=keys or services.settings.backup_keys,
         )
     out.print(f"{path}: {_contents(described)}, {path.stat().st_size / 1e6:.1f} MB")
-    for old in superfluous(path.parent.glob("palpebra-*.tar"), keep) if keep else ():
+    for old in superfluous_backups(path.parent.glob("palpebra-*.tar"), keep) if keep else ():
         old.unlink()
         out.print(f"removed {old}")
 
@@ -142,7 +142,7 @@ def _back_up_to(to: str, recipient: str, name: str, *, with_clips: bool, keep: i
         ending = ending_of(settings.key)
     out.print(f"{store.address}/{kept_as}: {_contents(described)}, encrypted")
     ours = [Path(entry.name) for entry in store.entries() if entry.name.endswith(ending)]
-    for old in superfluous(ours, keep) if keep else ():
+    for old in superfluous_backups(ours, keep) if keep else ():
         store.remove(old.name)
         out.print(f"removed {old.name}")
 

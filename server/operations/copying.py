@@ -11,7 +11,7 @@ from experiments.errors import InputError
 from server.accounts import repository as accounts
 from server.accounts.audit import SECOND_FACTOR_SET_UP, record
 from server.accounts.audit_verification import reseal, under, verify
-from server.accounts.credentials import rewrapped
+from server.accounts.credentials import rewrap_secret
 from server.accounts.identity import OPERATOR
 from server.accounts.repository import hold_chain
 from server.core.db import Database
@@ -45,7 +45,7 @@ def copy_database(
         A database cannot be opened, the source is not of the newest revision, the target is not empty, or
         what was read back differs from what was written.
     """
-    source, target = _opened(source_url), _opened(target_url)
+    source, target = _open_by_url(source_url), _open_by_url(target_url)
     try:
         if source.url == target.url:
             raise InputError("source and target are the same database; give two addresses")
@@ -80,7 +80,7 @@ def address(url: str) -> str:
     return make_url(url).render_as_string(hide_password=True)
 
 
-def _opened(url: str) -> Database:
+def _open_by_url(url: str) -> Database:
     try:
         return Database(Settings(database_url=url).resolved_database_url, pool=2)
     except Exception as error:
@@ -161,5 +161,5 @@ def _carry_factors(session: Session, old: bytes, secret: bytes) -> int:
     # Read anew: looking through the log lets go of what was read before.
     holders = [holder for holder in accounts.with_second_factor(session) if holder.id not in of_now]
     for holder in holders:
-        holder.totp_secret = rewrapped(old, secret, holder.totp_secret or "")
+        holder.totp_secret = rewrap_secret(old, secret, holder.totp_secret or "")
     return len(holders)

@@ -73,10 +73,10 @@ def backups(services: Services) -> Iterator[Finding]:
     yield Finding(
         "backups", "ok" if fine else "warning", said, "" if fine else "see why no newer one is made"
     )
-    yield _drilled(watched)
+    yield _drill_finding(watched)
 
 
-def _drilled(watched: WatchedBackups) -> Finding:
+def _drill_finding(watched: WatchedBackups) -> Finding:
     drill = watched.drill
     if drill is None and watched.drilled_elsewhere:
         return Finding(
@@ -104,13 +104,13 @@ def snapshots(services: Services) -> Iterator[Finding]:
             yield Finding("snapshots", "warning", "asked for, but they are of SQLite alone", advice)
         return
     if settings.snapshot_minutes:
-        yield _taken(settings)
+        yield _snapshot_finding(settings)
     for path in set_aside(settings):
         advice = f"it holds everybody's answers, erased ones too: once all is well, remove {path}"
         yield Finding("database of before", "warning", path.name, advice)
 
 
-def _taken(settings: Settings) -> Finding:
+def _snapshot_finding(settings: Settings) -> Finding:
     there = snapshots_of(settings)
     if not there:
         return Finding("snapshots", "warning", "there is none", "start the server, which takes them")

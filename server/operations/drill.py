@@ -19,7 +19,7 @@ from experiments.files import whole_file
 from server.context import Services, open_services
 from server.core.changes import background_task
 from server.core.db import open_database
-from server.core.locks import LockTaken, locked, open_locks
+from server.core.locks import LockTaken, file_lock, open_locks
 from server.core.settings import Settings
 from server.core.values import now
 from server.operations.backup import ENDING, TABLES, Description, identity_in
@@ -68,7 +68,7 @@ def drill(
     DrillUnderWayError
         Another process is at it.
     """
-    with _alone(settings):
+    with _drill_lock(settings):
         return _drill(settings, backup, identity, keys)
 
 
@@ -84,10 +84,10 @@ def _drill(
     try:
         with (
             tempfile.TemporaryDirectory(prefix=COPIES, dir=settings.data_folder) as folder,
-            _here(settings, backup, Path(folder), identity) as path,
+            _local_backup(settings, backup, Path(folder), identity) as path,
         ):
             _check_room(settings, path)
-            result = _brought_back(_beside(settings, Path(folder)), path, keys)
+            result = _brought_back(_drill_settings(settings, Path(folder)), path, keys)
     except InputError as error:
         result = DrillResult(at=now(), backup=backup.name, passed=False, said=str(error))
     except Exception as error:  # whatever goes wrong is what it is there to find
@@ -102,7 +102,7 @@ def _drill(
 
 
 @contextmanager
-def _here(
+def _local_backup(
     settings: Settings, backup: Path | StoredBackup, folder: Path, identity: x25519.Identity | None
 ) -> Iterator[Path]:
     """The backup as a file of this machine, in the open."""
@@ -172,7 +172,7 @@ def _need_room(settings: Settings, needed: float) -> None:
         )
 
 
-def _beside(settings: Settings, folder: Path) -> Settings:
+def _drill_settings(settings: Settings, folder: Path) -> Settings:
     """Settings of an installation of its own in `folder`, with the server's ledger of erasures."""
     apart = Settings(
         **settings.model_dump()
@@ -213,7 +213,7 @@ def drill_when_due(settings: Settings) -> DrillResult | None:
     if backup is None or (backup.name.endswith(ENDING) and settings.backup_identity is None):
         return None
     try:
-        with _alone(settings), _alone_of_all_hosts(settings):
+        with _drill_lock(settings), _alone_of_all_hosts(settings):
             if not is_due(last_drill(settings), now()):
                 return None
             return _drill(settings, backup, identity_of(settings))
@@ -229,7 +229,7 @@ def identity_of(settings: Settings) -> x25519.Identity | None:
 def sweep(settings: Settings) -> None:
     """Remove the copy of a drill that was killed: it holds everybody's answers."""
     try:
-        with _alone(settings):
+        with _drill_lock(settings):
             pass
     except DrillUnderWayError:
         pass
@@ -249,11 +249,11 @@ def _alone_of_all_hosts(settings: Settings) -> Iterator[None]:
 
 
 @contextmanager
-def _alone(settings: Settings) -> Iterator[None]:
+def _drill_lock(settings: Settings) -> Iterator[None]:
     """Hold the lock of the drills, which ends with the process; copies of a killed one go first."""
     with ExitStack() as held:
         try:
-            held.enter_context(locked(settings.data_folder / "restore-drill.lock", wait=False))
+            held.enter_context(file_lock(settings.data_folder / "restore-drill.lock", wait=False))
         except BlockingIOError:
             raise DrillUnderWayError("another restore drill is under way; wait until it has ended") from None
         for copy in settings.data_folder.glob(f"{COPIES}*"):

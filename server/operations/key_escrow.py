@@ -177,12 +177,12 @@ def content_of_keys(keys: KeyFile) -> bytes:
 def key_file(path: Path) -> KeyFile:
     """Read a key file; InputError where it is none."""
     try:
-        return parsed(path.read_bytes(), str(path))
+        return parse_key_file(path.read_bytes(), str(path))
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror or error}") from error
 
 
-def parsed(content: bytes, name: str) -> KeyFile:
+def parse_key_file(content: bytes, name: str) -> KeyFile:
     """The key file of this content; InputError where it is none."""
     try:
         keys = KeyFile.model_validate_json(content)
@@ -201,12 +201,12 @@ def put_back(connection: Connection, secret: bytes, keys: KeyFile | None) -> tup
     by_fingerprint = keys.studies if keys else {}
     for study, fingerprint in study_keys(connection).items():
         wrapped = by_fingerprint.get(fingerprint)
-        key = _unwrapped(secret, wrapped) if wrapped else None
+        key = _unwrap_key(secret, wrapped) if wrapped else None
         set_study_key(connection, study, key or new_pseudonym_key())
     return set_run_keys(connection, keys.runs if keys else {})
 
 
-def _unwrapped(secret: bytes, wrapped: str) -> str | None:
+def _unwrap_key(secret: bytes, wrapped: str) -> str | None:
     try:
         return unwrap(secret, wrapped).hex()
     except UnreadableError:

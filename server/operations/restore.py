@@ -201,7 +201,7 @@ def _write_tables(
     known = {table.name: table for table in tables_of(connection)}
     for name in _in_order(known, described):
         expected = described.tables[name]
-        written = _written(connection, known[name], tar)
+        written = _write_table(connection, known[name], tar)
         if (written.rows, written.sha256) != (expected.rows, expected.sha256):
             raise InputError(
                 f"table {name}: expected {expected.rows} rows, the file holds {written.rows} or other "
@@ -221,7 +221,7 @@ def _put_keys_back(connection: Connection, keys: _Keys, told: Callable[[str], No
         told(f"{readable} recruiters' ids; of {lost} there is no key any more")
 
 
-def _written(connection: Connection, table: Table, tar: tarfile.TarFile) -> Content:
+def _write_table(connection: Connection, table: Table, tar: tarfile.TarFile) -> Content:
     """Put a table's rows in; what a changed byte made of them is refused as damage, whatever it is."""
     try:
         return write_rows(connection, table, _rows(tar, table.name))

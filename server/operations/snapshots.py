@@ -15,7 +15,7 @@ from experiments.errors import InputError, counted
 from server.accounts.audit import record
 from server.core.changes import background_task
 from server.core.db import Database, checked_url, open_database
-from server.core.locks import locked
+from server.core.locks import file_lock
 from server.core.migrate import upgrade
 from server.core.settings import Settings
 from server.core.values import iso, now
@@ -26,7 +26,7 @@ from server.privacy.ledger import ledger_path
 # What snapshots ask of SQLite itself: a copy, one file without a WAL, a database that nobody else uses.
 
 
-def copied(source: Path, target: Path) -> str:
+def copy_database_file(source: Path, target: Path) -> str:
     """Copy by SQLite's backup API, in one step: it sees one moment, and in WAL mode holds up no writer.
 
     Returns
@@ -119,7 +119,7 @@ def snapshots_of(settings: Settings) -> list[Snapshot]:
     return sorted(known)
 
 
-def aside(database: Path, moment: datetime) -> Path:
+def path_aside(database: Path, moment: datetime) -> Path:
     """What the database of before is called once another took its place."""
     return database.with_name(f"{database.stem}{_BEFORE}{moment:%Y-%m-%dT%H%M%SZ}{database.suffix}")
 
@@ -145,7 +145,7 @@ def take_snapshot(settings: Settings) -> Snapshot:
         raise InputError(f"{source} is not there yet; start the server once, or run: server database upgrade")
     folder = settings.data_folder / FOLDER
     try:
-        with locked(folder / LOCK, wait=False):
+        with file_lock(folder / LOCK, wait=False):
             _remove_torn(folder)
             moment = now().replace(microsecond=0)
             snapshot = Snapshot(moment, folder / moment.strftime(_NAME))
@@ -161,7 +161,7 @@ def take_snapshot(settings: Settings) -> Snapshot:
 def _copy(source: Path, temporary: Path, target: Path) -> None:
     os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600))
     try:
-        if (said := copied(source, temporary)) != "ok":
+        if (said := copy_database_file(source, temporary)) != "ok":
             raise InputError(f"{source} is not sound: {said.splitlines()[-1]}; run: server doctor")
         with temporary.open("rb") as written:
             os.fsync(written.fileno())
@@ -192,7 +192,7 @@ def changed_at(database: Path) -> datetime:
     return datetime.fromtimestamp(max(path.stat().st_mtime for path in files if path.exists()), UTC)
 
 
-def superfluous(moments: Iterable[datetime], moment: datetime) -> list[datetime]:
+def superfluous_snapshots(moments: Iterable[datetime], moment: datetime) -> list[datetime]:
     """The moments of snapshots that go, oldest first: see `ALL_OF`, `HOURLY_OF`, `DAILY_OF`.
 
     The newest stays, however old it is.
@@ -214,7 +214,7 @@ def superfluous(moments: Iterable[datetime], moment: datetime) -> list[datetime]
 def remove_superfluous(settings: Settings, moment: datetime) -> list[Snapshot]:
     """Remove the snapshots that are too many or too old; return them."""
     there = snapshots_of(settings)
-    going = set(superfluous((one.taken_at for one in there), moment))
+    going = set(superfluous_snapshots((one.taken_at for one in there), moment))
     removed = [one for one in there if one.taken_at in going]
     for one in removed:
         one.path.unlink(missing_ok=True)
@@ -293,7 +293,7 @@ def go_back(settings: Settings, snapshot: Snapshot, told: Callable[[str], None])
         Another program has the database open, or there is no room for the copy.
     """
     path = database_file(settings)
-    before = aside(path, now())
+    before = path_aside(path, now())
     coming = path.with_name(f".{path.name}.coming")
     with closed_to_others(path):
         try:
@@ -350,14 +350,14 @@ async def _watch(settings: Settings, look_every_s: float) -> None:
     while True:
         await asyncio.sleep(look_every_s)
         try:
-            await asyncio.to_thread(look, settings)
+            await asyncio.to_thread(take_due_snapshot, settings)
         except InputError as error:  # such as no room: in words, and the next look comes
             LOG.error("snapshot: %s", error)
         except Exception:  # the next look comes, whatever went wrong with this one
             LOG.exception("snapshot")
 
 
-def look(settings: Settings) -> None:
+def take_due_snapshot(settings: Settings) -> None:
     """Take a snapshot if one is due, remove what is too many, and erase in the others who was erased."""
     if is_due(settings, now()):
         try:

@@ -164,7 +164,7 @@ def day_of(path: Path) -> date | None:
         return None
 
 
-def superfluous(paths: Iterable[Path], days: int) -> list[Path]:
+def superfluous_backups(paths: Iterable[Path], days: int) -> list[Path]:
     """Backups that `--keep DAYS` removes, the oldest first.
 
     A day counts where there is a backup of it, so that a machine that was off for a month keeps what it has.

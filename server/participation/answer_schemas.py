@@ -68,7 +68,7 @@ LEFT_OUT = object()
 """Stands for a value whose key is left out where it is unknown."""
 
 
-def validated(
+def validate_measured(
     data: Any,
     validate: Callable[[Any], Model],
     measured: Mapping[Path, Any],
@@ -103,7 +103,7 @@ def validated(
             cleared = _path_cleared(repaired, detail["loc"], measured) if is_value else None
             if cleared is None:
                 raise fault
-            _clear(repaired, *cleared)
+            _clear_values(repaired, *cleared)
             unknown.add(cleared[0])
         count(repaired, unknown)
         try:
@@ -120,19 +120,19 @@ def _path_cleared(
     steps: list[str] = []
     here = data
     for step in location:
-        held = _held(here, step)
+        held = _value_at_step(here, step)
         # Of a choice between models the fault names the one chosen, which is no key of the data.
         if held is LEFT_OUT and isinstance(here, dict) and step == here.get("kind"):
             continue
         steps.append(str(step))
         here = held
-        pattern = next((path for path in measured if _fits(path, steps)), None)
+        pattern = next((path for path in measured if _path_fits(path, steps)), None)
         if pattern is not None:
             return tuple(steps), measured[pattern]
     return None
 
 
-def _held(value: Any, step: int | str) -> Any:
+def _value_at_step(value: Any, step: int | str) -> Any:
     if isinstance(value, dict):
         return value.get(step, LEFT_OUT)
     if isinstance(value, list) and isinstance(step, int) and step < len(value):
@@ -140,11 +140,11 @@ def _held(value: Any, step: int | str) -> Any:
     return LEFT_OUT
 
 
-def _fits(path: Path, steps: Sequence[str]) -> bool:
+def _path_fits(path: Path, steps: Sequence[str]) -> bool:
     return len(path) == len(steps) and all(one in (ANY, step) for one, step in zip(path, steps, strict=True))
 
 
-def _clear(data: Any, path: Path, unknown: Any) -> None:
+def _clear_values(data: Any, path: Path, unknown: Any) -> None:
     *above, last = path
     for step in above:
         data = data[int(step)] if isinstance(data, list) else data.setdefault(step, {})
@@ -304,7 +304,7 @@ class ViewsIn(BaseModel):
     @classmethod
     def _whatever_was_measured(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
         """A number that no browser can have measured is unknown, and counted; the view is stored."""
-        return validated(data, handler, _MEASURED_OF_VIEWS, _count_unknown_of_views)
+        return validate_measured(data, handler, _MEASURED_OF_VIEWS, _count_unknown_of_views)
 
 
 class ViewsSaved(BaseModel):
@@ -443,7 +443,7 @@ class RatingIn(BaseModel):
     @classmethod
     def _whatever_was_measured(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
         """A number that no browser can have measured is unknown, and counted; the answer is stored."""
-        return validated(data, handler, _MEASURED, _count_unknown)
+        return validate_measured(data, handler, _MEASURED, _count_unknown)
 
     @model_validator(mode="before")
     @classmethod

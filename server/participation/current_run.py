@@ -128,7 +128,7 @@ class _ScreeningRules(NamedTuple):
     devices: list[ScreenDevice]
 
 
-def _declared(experiment: Experiment) -> _ScreeningRules:
+def _screening_rules(experiment: Experiment) -> _ScreeningRules:
     declared = _ScreeningRules([], [])
     for rule in experiment.screening:
         match rule:
@@ -145,14 +145,14 @@ def _declared(experiment: Experiment) -> _ScreeningRules:
 
 def screens_devices(experiment: Experiment) -> bool:
     """True where a browser or screen that will not do ends the run."""
-    return bool(_declared(experiment).devices)
+    return bool(_screening_rules(experiment).devices)
 
 
 def by_form(
     session: Session, run: StudyRun, experiment: Experiment, form: str, answers: Mapping[str, Any]
 ) -> None:
     """End the run where a rule refuses one of these (checked) answers."""
-    for rule in _declared(experiment).answers:
+    for rule in _screening_rules(experiment).answers:
         if rule.form == form and rule.field in answers and rule.screens_out(answers[rule.field]):
             return _end(session, run, {"rule": rule.rule, "form": form, "field": rule.field})
     return None

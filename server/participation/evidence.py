@@ -14,7 +14,7 @@ from typing import Any, Literal
 # Answers of any kind of trial as values that can be compared.
 
 
-def comparable(payload: Mapping[str, Any]) -> int | str | None:
+def comparable_answer(payload: Mapping[str, Any]) -> int | str | None:
     """A stored answer as one value, equal for equal answers; None where nothing was answered."""
     said = {name: _without_time(value) for name, value in payload.items() if value is not None}
     if said.keys() == {"response"}:
@@ -200,12 +200,12 @@ def signals_of(
         press_spread=statistics.stdev(lengths) if len(lengths) >= MIN_FOR_SPREAD else None,
         rt_median=statistics.median(times) if times else None,
         rt_spread=statistics.stdev(map(math.log, times)) if spread else None,
-        same_answer=_same(responses) if len(responses) >= MIN_FOR_SPREAD else None,
+        same_answer=_share_of_commonest(responses) if len(responses) >= MIN_FOR_SPREAD else None,
         cycle=_cycle(responses) if len(responses) >= 2 * MIN_FOR_SPREAD else None,
         checks=_share([*(one.response == one.expected for one in checks), *(False for _ in unstored_checks)]),
         motion_checks=_share(right),
         motion_checks_asked=len(motion) or None,
-        motion_checks_guessed=guessed(
+        motion_checks_guessed=chance_of_guessing(
             sum(right), [one.choices for one in motion], [*(one.choices for one in asked), *passed_over]
         ),
         motion_checks_other_way=sum(one.other_way for one in offered) if offered else None,
@@ -229,7 +229,9 @@ def checks_tell(answers: Sequence[JudgedAnswer], passed_over: Sequence[int] = ()
     return _tell([*asked, *passed_over])
 
 
-def guessed(right: int, choices: Sequence[int], asked: Sequence[int] | None = None) -> float | None:
+def chance_of_guessing(
+    right: int, choices: Sequence[int], asked: Sequence[int] | None = None
+) -> float | None:
     """How likely somebody who guesses is right at least `right` times; None where too few were asked.
 
     The number of right guesses is Poisson-binomial: check i is guessed with 1 / choices[i]. Enough are asked
@@ -271,7 +273,7 @@ def _order(indices: Sequence[int]) -> float | None:
     return _share([before < after for before, after in itertools.pairwise(indices)])
 
 
-def _same(responses: Sequence[int | str]) -> float:
+def _share_of_commonest(responses: Sequence[int | str]) -> float:
     return Counter(responses).most_common(1)[0][1] / len(responses)
 
 

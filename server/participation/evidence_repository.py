@@ -83,7 +83,7 @@ def clip_ms_since(connection: Connection, run: int, issued_at: datetime) -> floa
     return float(connection.scalar(query) or 0.0)
 
 
-def unfetched(connection: Connection, run: int) -> int:
+def answers_without_digest(connection: Connection, run: int) -> int:
     """How many answers of a run to trials with clips have no digest of them."""
     is_without = AnswerEvidence.digest.is_(None) & (AnswerEvidence.clip_ms > 0)
     query = select(func.count()).where((AnswerEvidence.study_run_id == run) & is_without)
@@ -149,7 +149,7 @@ def answers(session: Session, run: StudyRun) -> list[StoredAnswer]:
     """The answers of a run; of a rating only what is judged, since its frame log is large."""
     rated = (Rating.trial_index, Rating.play, Rating.kind, Rating.payload, Rating.rt, Rating.verdict)
     query = select(*rated, Rating.saved_at).where(Rating.study_run_id == run.id).order_by(Rating.id)
-    trials, shown, evidence = _trials(session, run), _with_clips(session, run), _stored(session, run)
+    trials, shown, evidence = _trials(session, run), _with_clips(session, run), _stored_evidence(session, run)
     checks = _checks(session, run) if any(trial.kind == "check" for trial in trials.values()) else {}
     return [
         StoredAnswer(
@@ -195,7 +195,7 @@ def checks_passed_over(session: Session, run: StudyRun) -> list[CheckName]:
     return [cast(CheckName, levels["check"]) for levels in session.scalars(query)]
 
 
-def _stored(session: Session, run: StudyRun) -> dict[tuple[int, int], AnswerEvidence]:
+def _stored_evidence(session: Session, run: StudyRun) -> dict[tuple[int, int], AnswerEvidence]:
     rows = session.scalars(select(AnswerEvidence).where(AnswerEvidence.study_run_id == run.id))
     return {(row.trial_index, row.play): row for row in rows}
 

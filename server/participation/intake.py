@@ -290,7 +290,7 @@ class Intake:
         if given.digest is not None:
             return self._is_right(answer, given)
         allowed = max(UNFETCHED, answer.trials // UNFETCHED_SHARE)
-        if evidence_repository.unfetched(connection, answer.run) < allowed:
+        if evidence_repository.answers_without_digest(connection, answer.run) < allowed:
             return None
         if any(self.clips.hash_at_once(sha256, size) is None for sha256, size in answer.clips):
             return None

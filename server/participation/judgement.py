@@ -22,7 +22,7 @@ from server.core.values import hash_token, now
 from server.models import StudyRun
 from server.participation import evidence_repository, rating_repository
 from server.participation.clip_bytes import ClipBytes, clip_digest
-from server.participation.evidence import NOT_JUDGED, JudgedAnswer, Judgement, comparable, judge
+from server.participation.evidence import NOT_JUDGED, JudgedAnswer, Judgement, comparable_answer, judge
 from server.participation.evidence_repository import WaitingClip
 from server.participation.intake import Intake
 from server.studies.lookup import definition_of
@@ -36,7 +36,7 @@ def judge_run(session: Session, run: StudyRun) -> Judgement:
         return NOT_JUDGED
     rows = evidence_repository.answers(session, run)
     unstored = rating_repository.refused_checks(session.connection(), run.id)
-    offered = _offered(run) if unstored or any(row.trial.kind == "attention" for row in rows) else 0
+    offered = _choices_offered(run) if unstored or any(row.trial.kind == "attention" for row in rows) else 0
     answers = [_answer(row, offered) for row in rows]
     passed_over = [
         len(CHECK_KINDS[check].choices) for check in evidence_repository.checks_passed_over(session, run)
@@ -59,7 +59,7 @@ def guessed_throughout(experiment: Experiment) -> float:
     return 1 / guesses
 
 
-def _offered(run: StudyRun) -> int:
+def _choices_offered(run: StudyRun) -> int:
     """How many answers an attention check of the run's study offers."""
     experiment = definition_of(run.version)
     return KINDS[experiment.trial.kind].check_choices(experiment)
@@ -67,7 +67,7 @@ def _offered(run: StudyRun) -> int:
 
 def _answer(row: evidence_repository.StoredAnswer, offered: int) -> JudgedAnswer:
     evidence, trial = row.evidence, row.trial
-    response, choices = comparable(row.rating.payload), 0
+    response, choices = comparable_answer(row.rating.payload), 0
     if trial.kind == "attention":
         response, choices = KINDS[row.rating.kind].check_response(row.rating.payload), offered
     if trial.kind == "check":
@@ -118,10 +118,10 @@ def judge_waiting(database: Database, intake: Intake, token: str) -> None:
     token_hash = hash_token(token)
     with database.read() as session:
         waiting = evidence_repository.waiting_clips(session.connection(), token_hash)
-    judged = _judged(intake.clips, waiting, time.monotonic() + LIMIT_S, set())
+    judged = _judge_digests(intake.clips, waiting, time.monotonic() + LIMIT_S, set())
     if judged:
         with database.write_connection() as connection:
-            _stored(connection, judged)
+            _store_judged(connection, judged)
     if len(judged) < _answers(waiting):
         intake.unchecked.set()
 
@@ -143,11 +143,11 @@ def judge_later(database: Database, clips: ClipBytes, stopped: Callable[[], bool
 def _judge_run_later(database: Database, clips: ClipBytes, run_id: int, away: set[str]) -> int:
     with database.read() as session:
         waiting = evidence_repository.waiting_of_run(session.connection(), run_id)
-    judged = _judged(clips, waiting, time.monotonic() + LATER_LIMIT_S, away)
+    judged = _judge_digests(clips, waiting, time.monotonic() + LATER_LIMIT_S, away)
     if judged:
         with database.write() as session:
             run = evidence_repository.lock_run(session, run_id)
-            stored = _stored(session.connection(), judged)
+            stored = _store_judged(session.connection(), judged)
             if stored and run.evidence_verdict is not None and run.erased_at is None:
                 _judge_again(session, run, stored)
     return _answers(waiting) - len(judged)
@@ -170,7 +170,7 @@ def _key_of(clip: WaitingClip) -> AnswerKey:
     return clip.run, clip.trial_index, clip.play
 
 
-def _judged(
+def _judge_digests(
     clips: ClipBytes, waiting: Iterable[WaitingClip], limit: float, away: set[str]
 ) -> dict[AnswerKey, bool]:
     """Whether the digest of each answer is right, of those whose clips were had by `limit`.
@@ -192,7 +192,7 @@ def _judged(
     return judged
 
 
-def _stored(connection: Connection, judged: Mapping[AnswerKey, bool]) -> dict[AnswerKey, bool]:
+def _store_judged(connection: Connection, judged: Mapping[AnswerKey, bool]) -> dict[AnswerKey, bool]:
     """Store what was made of the digests; those of which another worker had said nothing meanwhile."""
     return {
         answer: right

@@ -82,7 +82,7 @@ def link_state(versions: Versions, session: Session, token: str) -> LinkState:
     resumable = (
         run is not None and run.status == "active" and returning.refusal_to_resume(experiment, run) is None
     )
-    over = run is not None and not resumable and not returning.restarts(experiment, run)
+    over = run is not None and not resumable and not returning.must_restart(experiment, run)
     status = _status(session, link, link.study, version_id, experiment)
     return LinkState(
         study=LinkedStudy(
@@ -123,17 +123,17 @@ def start_run(
     known = returning.known_run(settings, versions, session, link, recruiter_of(link), start)
     if known is not None:
         experiment = versions.get(session, known.version_id).experiment
-        if not returning.restarts(experiment, known):
-            return _resumed(settings, experiment, known, start.client_id)
+        if not returning.must_restart(experiment, known):
+            return _resume_run(settings, experiment, known, start.client_id)
         with session.begin_nested():  # should a new visit be refused, the old one stays as it is
             known.status = "withdrawn"
             known.client_id = f"{known.client_id}:{known.public_id}"
             session.flush()
-            return _begun(settings, versions, intake, session, link, study, start)
-    return _begun(settings, versions, intake, session, link, study, start)
+            return _begin_run(settings, versions, intake, session, link, study, start)
+    return _begin_run(settings, versions, intake, session, link, study, start)
 
 
-def _begun(
+def _begin_run(
     settings: Settings,
     versions: Versions,
     intake: Intake,
@@ -199,7 +199,7 @@ def _origin(link: Link, study: Study) -> Origin:
     return "participant" if study.status == "live" else "pilot"
 
 
-def _resumed(settings: Settings, experiment: Experiment, run: StudyRun, client_id: UUID) -> RunStarted:
+def _resume_run(settings: Settings, experiment: Experiment, run: StudyRun, client_id: UUID) -> RunStarted:
     refusal = returning.refusal_to_resume(experiment, run)
     if refusal is not None:
         raise refusal

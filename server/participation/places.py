@@ -14,7 +14,7 @@ from experiments.kinds import KINDS
 from server.models import StudyRun
 from server.participation import run_repository, series
 from server.participation.refusals import GroupRefused
-from server.participation.run_repository import compared
+from server.participation.run_repository import compared_answers
 from server.participation.versions import LoadedVersion
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ def _trials(session: Session, run: StudyRun, experiment: Experiment, lease: time
     kind = KINDS[experiment.trial.kind]
     if kind.assign_by is None or not kind.chooses(experiment):
         return kind.assign(experiment, run.seed, run.slot)
-    stored = compared(session, run.version_id, run.origin, lease)
+    stored = compared_answers(session, run.version_id, run.origin, lease)
     return kind.assign_by(experiment, run.seed, run.slot, stored)
 
 
@@ -106,13 +106,13 @@ def _trial_rows(run: StudyRun, loaded: LoadedVersion, trials: list[Trial]) -> li
             "kind": trial.kind,
             "block": trial.block,
             "block_label": trial.block_label,
-            "expected_response": _expected(loaded, trial),
+            "expected_response": _expected_response(loaded, trial),
         }
         for index, trial in enumerate(trials)
     ]
 
 
-def _expected(loaded: LoadedVersion, trial: Trial) -> int | None:
+def _expected_response(loaded: LoadedVersion, trial: Trial) -> int | None:
     return trial.expected_response if trial.check is None else loaded.checks[trial.check].answer
 
 
@@ -126,11 +126,11 @@ def _clip_rows(run: StudyRun, loaded: LoadedVersion, trials: list[Trial]) -> lis
             "version_clip_id": clip,
         }
         for index, trial in enumerate(trials)
-        for position, (role, clip) in enumerate(_shown(loaded, trial))
+        for position, (role, clip) in enumerate(_clips_of_trial(loaded, trial))
     ]
 
 
-def _shown(loaded: LoadedVersion, trial: Trial) -> list[tuple[str, int]]:
+def _clips_of_trial(loaded: LoadedVersion, trial: Trial) -> list[tuple[str, int]]:
     """Role and id of each clip of a trial."""
     if trial.check is not None:
         return [("shown", loaded.checks[trial.check].ident)]

@@ -54,7 +54,7 @@ _working = threading.Lock()
 def estimate(model: Model, answers: Answers) -> Estimate:
     """The estimate after these answers."""
     with _working:
-        return _after(model, answers).estimate
+        return _state_after(model, answers).estimate
 
 
 def choices(model: Model, answers: Answers, count: int) -> list[Point]:
@@ -66,7 +66,7 @@ def choices(model: Model, answers: Answers, count: int) -> list[Point]:
     chosen: list[Point] = []
     with _working:
         for _ in range(count):
-            state = _after(model, answers)
+            state = _state_after(model, answers)
             chosen.append(state.chosen)
             answers = (*answers, (state.chosen, state.yes_is_likelier))
     return chosen
@@ -105,7 +105,7 @@ def _likelihoods(model: Model) -> dict[Point, tuple[Any, Any]]:
     engine = _engine(model)
     return {
         point: tuple(
-            engine.likelihoods.sel(**_spoken(model, point), response=said)
+            engine.likelihoods.sel(**_named_stimulus(model, point), response=said)
             .transpose(*engine.prior.dims)
             .values
             for said in (YES, NO)
@@ -114,36 +114,36 @@ def _likelihoods(model: Model) -> dict[Point, tuple[Any, Any]]:
     }
 
 
-def _after(model: Model, answers: Answers) -> _State:
+def _state_after(model: Model, answers: Answers) -> _State:
     """The state after these answers, from the longest beginning of them that is kept."""
     begin = len(answers)
     while begin and (model, answers[:begin]) not in _states:
         begin -= 1
-    state = _states.get((model, answers[:begin])) or _kept(model, (), None)
+    state = _states.get((model, answers[:begin])) or _store_state(model, (), None)
     _states.move_to_end((model, answers[:begin]))
     for end in range(begin + 1, len(answers) + 1):
-        state = _kept(model, answers[:end], state)
+        state = _store_state(model, answers[:end], state)
     return state
 
 
-def _kept(model: Model, answers: Answers, before: _State | None) -> _State:
+def _store_state(model: Model, answers: Answers, before: _State | None) -> _State:
     with warnings.catch_warnings():
         # Where a parameter has become impossible, the library takes the logarithm of 0 and leaves it out.
         warnings.simplefilter("ignore")
-        state = _stepped(model, answers, before)
+        state = _next_state(model, answers, before)
     _states[model, answers] = state
     while len(_states) > min(MAX_STATES, max(1, MAX_PARAMETERS // state.posterior.size)):
         _states.popitem(last=False)
     return state
 
 
-def _stepped(model: Model, answers: Answers, before: _State | None) -> _State:
+def _next_state(model: Model, answers: Answers, before: _State | None) -> _State:
     engine = _engine(model)
     if before is None:
         engine.posterior = engine.prior
     else:
         (stimulus, positive), engine.posterior = answers[-1], before.posterior
-        engine.update(stim=_spoken(model, stimulus), outcome={"response": YES if positive else NO})
+        engine.update(stim=_named_stimulus(model, stimulus), outcome={"response": YES if positive else NO})
         engine.stim_history.clear()
         engine.resp_history.clear()
     spoken = engine.next_stim
@@ -166,7 +166,7 @@ def _estimate(model: Model, engine: "QuestPlus") -> Estimate:
     return Estimate(sign * means[threshold], math.sqrt(variance), means[spread], max(0.0, entropy))
 
 
-def _spoken(model: Model, stimulus: Point) -> dict[str, float]:
+def _named_stimulus(model: Model, stimulus: Point) -> dict[str, float]:
     spoken = {"intensity": -stimulus.value if model.falling else stimulus.value}
     return spoken if stimulus.second is None else {**spoken, "second": stimulus.second}
 

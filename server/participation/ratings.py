@@ -23,7 +23,7 @@ from server.participation.answer_schemas import (
     Verdict,
 )
 from server.participation.intake import TRIED_MS, Answer, Intake
-from server.participation.kinds import answer_of, served
+from server.participation.kinds import answer_of, served_kind
 from server.participation.refusals import ConsentMissing, RunClosed, RunUnknown, TrialNotInRun
 from server.participation.tallies import Play, Tally, TallyEntry
 from server.participation.verdict import Ruling, is_settled, playback_of
@@ -130,7 +130,7 @@ def play_of(delivery: SubmittedRating, ruling: Ruling) -> Play:
     counted: Iterable[TallyEntry] = ()
     if is_main:
         places = {role: loaded.numbered[clip] for role, clip in trial.clips.items()}
-        counted = served(loaded.experiment.trial.kind).counted(places, delivery.payload)
+        counted = served_kind(loaded.experiment.trial.kind).counted(places, delivery.payload)
     playback = rating.playback
     return Play(
         rating.trial_index,
@@ -257,21 +257,21 @@ def save_rating(
 ) -> tuple[Receipt, bool]:
     """Store a rating with its evidence, or find it stored; return the receipt and whether it is new."""
     delivery = delivery_of(versions, connection, token, rating_id, rating, saved_at)
-    known = _known(delivery)
+    known = _known_rating(delivery)
     if known is not None:
         return _receipt_of_known(connection, delivery, known), False
     _check(delivery)
     tally = delivery.trial.tally or Tally()
     if delivery.run.evidence == "asked":
         tally.clip_time = intake.take(connection, evidence_of(delivery), tally.clip_time)
-    ruling = _judged(delivery)
+    ruling = _ruling_of(delivery)
     rating_repository.add_rating(connection, row_of(delivery, ruling))
     tally.add(play_of(delivery, ruling))
     rating_repository.keep_tally(connection, delivery.run.id, tally, is_new=delivery.trial.tally is None)
     return _receipt_of_new(connection, delivery, ruling), True
 
 
-def _known(delivery: SubmittedRating) -> rating_repository.StoredRating | None:
+def _known_rating(delivery: SubmittedRating) -> rating_repository.StoredRating | None:
     """The stored rating this one repeats; RatingDiffers where it says something else."""
     rating, payload = delivery.rating, delivery.payload
     for row in delivery.stored:
@@ -281,14 +281,15 @@ def _known(delivery: SubmittedRating) -> rating_repository.StoredRating | None:
         if same_play and row.payload == payload:
             return row
         raise RatingDiffers(
-            f"Trial {row.trial_index}, play {row.play} is stored with the answer {_short(row.payload)}; "
-            f"got {_short(payload)} for trial {rating.trial_index}, play {rating.play}. The first is kept.",
+            f"Trial {row.trial_index}, play {row.play} is stored with the answer {_first_value(row.payload)}"
+            f"; got {_first_value(payload)} for trial {rating.trial_index}, play {rating.play}. "
+            "The first is kept.",
             stored={"trial_index": row.trial_index, "play": row.play, "answer": row.payload},
         )
     return None
 
 
-def _short(answer: dict[str, Any]) -> Any:
+def _first_value(answer: dict[str, Any]) -> Any:
     return next(iter(answer.values()))
 
 
@@ -317,15 +318,15 @@ def _check(delivery: SubmittedRating) -> None:
     if delivery.trial.kind == "check":
         validate_check(delivery.loaded, delivery.trial.clips, rating)
     else:
-        served(experiment.trial.kind).validate(experiment, delivery.trial.kind, rating)
+        served_kind(experiment.trial.kind).validate(experiment, delivery.trial.kind, rating)
     max_plays = experiment.playback.max_repeats + 1
     if rating.play > max_plays:
         raise PlayOutOfRange(f"A clip is shown at most {max_plays} times, got play {rating.play}.")
 
 
-def _judged(delivery: SubmittedRating) -> Ruling:
+def _ruling_of(delivery: SubmittedRating) -> Ruling:
     is_check = delivery.trial.kind == "check"
-    judge = judge_check if is_check else served(delivery.experiment.trial.kind).judge
+    judge = judge_check if is_check else served_kind(delivery.experiment.trial.kind).judge
     return judge(delivery.loaded, delivery.trial.clips, delivery.rating)
 
 

@@ -64,7 +64,7 @@ def keep(
     if which is not None:
         known = any((one.get("trial_index"), one.get("play")) == which for one in before)
         part = _check_answer(versions, intake, connection, run, record, received_at, known=known)
-    kept = _kept(record, which, whole=len(before) < MAX_WHOLE)
+    kept = _kept_record(record, which, whole=len(before) < MAX_WHOLE)
     rating_repository.add_event(
         connection, run.id, str(record.id), rating_repository.REFUSED, kept, received_at
     )
@@ -123,26 +123,26 @@ def _evidence(body: dict[str, Any]) -> RatingEvidence | None:
         return None
 
 
-def _kept(record: RefusedRecord, which: tuple[int, int] | None, *, whole: bool) -> dict[str, Any]:
+def _kept_record(record: RefusedRecord, which: tuple[int, int] | None, *, whole: bool) -> dict[str, Any]:
     """What is stored: the reason and the record, without what would not fit."""
-    body = _storable({key: value for key, value in record.body.items() if key != "evidence"})
+    body = _storable_value({key: value for key, value in record.body.items() if key != "evidence"})
     if _size(body) > KEPT_BYTES and isinstance(body.get("playback"), dict):
         body["playback"] = {key: value for key, value in body["playback"].items() if key != "drawn"}
     if _size(body) > KEPT_BYTES or not whole:
         body = {"left_out_bytes": _size(body)}
     told = {"path": record.path, "status": record.status, "code": record.code, "reason": record.message}
     where = {} if which is None else {"trial_index": which[0], "play": which[1]}
-    return {**_storable(told), **where, "record": body}
+    return {**_storable_value(told), **where, "record": body}
 
 
-def _storable(value: Any, levels: int = MAX_DEPTH) -> Any:
+def _storable_value(value: Any, levels: int = MAX_DEPTH) -> Any:
     """The same without what no database holds: numbers beyond all bounds, NUL, half characters, depth."""
     if isinstance(value, dict | list) and not levels:
         return None
     if isinstance(value, dict):
-        return {_storable(str(key)): _storable(one, levels - 1) for key, one in value.items()}
+        return {_storable_value(str(key)): _storable_value(one, levels - 1) for key, one in value.items()}
     if isinstance(value, list):
-        return [_storable(one, levels - 1) for one in value]
+        return [_storable_value(one, levels - 1) for one in value]
     if isinstance(value, str):
         return value.replace("\0", "").encode("utf-8", "replace").decode("utf-8")
     return None if isinstance(value, float) and not isfinite(value) else value

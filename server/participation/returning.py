@@ -58,7 +58,7 @@ def resume_code(key: bytes, public_id: str) -> str:
     """The code of the run with this public id, as the page shows it."""
     digest = hmac.digest(key, f"{CODE_PURPOSE}:{public_id}".encode(), hashlib.sha256)
     secret = int.from_bytes(digest[:8], "big") >> (64 - _SECRET_SIGNS * _BITS)
-    signs = _written(int(public_id[:_HEX_DIGITS], 16), _GROUP) + _written(secret, _SECRET_SIGNS)
+    signs = _code_text(int(public_id[:_HEX_DIGITS], 16), _GROUP) + _code_text(secret, _SECRET_SIGNS)
     return "-".join(signs[start : start + _GROUP] for start in range(0, CODE_SIGNS, _GROUP))
 
 
@@ -73,12 +73,12 @@ def run_prefix(typed: str) -> str | None:
     return f"{number:0{_HEX_DIGITS}x}"
 
 
-def fits(key: bytes, public_id: str, typed: str) -> bool:
+def code_fits(key: bytes, public_id: str, typed: str) -> bool:
     """Whether the typed code is that of this run."""
     return hmac.compare_digest(_signs(resume_code(key, public_id)).encode(), _signs(typed).encode())
 
 
-def _written(number: int, signs: int) -> str:
+def _code_text(number: int, signs: int) -> str:
     return "".join(_SIGNS[number >> _BITS * start & 31] for start in reversed(range(signs)))
 
 
@@ -184,7 +184,7 @@ def count_code(resume_codes: RateLimit, link_token: str, typed: str) -> None:
 def _run_of_code(settings: Settings, session: Session, link: Link, typed: str) -> StudyRun:
     prefix = run_prefix(typed)
     runs = run_repository.runs_beginning(session, link, prefix) if prefix else ()
-    run = next((run for run in runs if fits(settings.key, run.public_id, typed)), None)
+    run = next((run for run in runs if code_fits(settings.key, run.public_id, typed)), None)
     if run is None:
         raise ResumeCodeWrong(
             "This is the resume code of no visit by this link; please compare it once more."
@@ -205,7 +205,7 @@ def _refuse_by_id_alone(experiment: Experiment, run: StudyRun, start: RunStart) 
         )
 
 
-def restarts(experiment: Experiment, run: StudyRun) -> bool:
+def must_restart(experiment: Experiment, run: StudyRun) -> bool:
     """True where coming back begins anew. Before consent there is nothing to begin anew."""
     return experiment.session.resume == "restart" and run.status == "active" and run.consented_at is not None
 
@@ -214,7 +214,7 @@ def refusal_to_resume(experiment: Experiment, run: StudyRun) -> RunLeft | RunToo
     """Why this run may not be taken up again; None where it may, or where it is over and only looked at."""
     if run.status != "active" or run.origin == "preview":
         return None
-    if now() > _oldest(experiment, run):
+    if now() > _too_old_at(experiment, run):
         hours = f"{experiment.session.maximum_age_hours:g}"
         return RunTooOld(f"This visit began more than {hours} hours ago and cannot be taken up again.")
     if experiment.session.resume == "block" and run.consented_at is not None:
@@ -226,7 +226,7 @@ def resumable_until(experiment: Experiment, run: StudyRun) -> datetime | None:
     """Until when a reloaded page may go on by itself, without a connection; None where it must ask first."""
     kept = experiment.session.resume == "resume" and run.status == "active" and run.origin != "preview"
     kept = kept and run.slot != NO_SLOT  # only the server knows which clips follow from an answer
-    return _oldest(experiment, run) if kept else None
+    return _too_old_at(experiment, run) if kept else None
 
 
 def shown_code(key: bytes, experiment: Experiment, link_kind: str, run_id: str) -> str | None:
@@ -235,5 +235,5 @@ def shown_code(key: bytes, experiment: Experiment, link_kind: str, run_id: str) 
     return resume_code(key, run_id) if by_code else None
 
 
-def _oldest(experiment: Experiment, run: StudyRun) -> datetime:
+def _too_old_at(experiment: Experiment, run: StudyRun) -> datetime:
     return run.started_at + timedelta(hours=experiment.session.maximum_age_hours)

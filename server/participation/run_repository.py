@@ -79,13 +79,13 @@ _ANSWERED_FORMS = select(_forms.c.form).where(_forms.c.study_run_id == bindparam
 _LINK_KIND = select(Link.kind).where(Link.id == bindparam("link"))
 
 
-def _unnested(table: Table) -> Any:
+def _unnested_rows(table: Table) -> Any:
     """All rows as one statement of columns (PostgreSQL): row by row they would take four times as long."""
     columns = (func.unnest(bindparam(column.name, type_=ARRAY(column.type))) for column in table.columns)
     return insert(table).from_select(list(table.columns.keys()), select(*columns))
 
 
-_ADD = {table: (insert(table), _unnested(table)) for table in (_trials, _clips)}
+_ADD = {table: (insert(table), _unnested_rows(table)) for table in (_trials, _clips)}
 
 
 def link_by_token(session: Session, token: str) -> Link | None:
@@ -272,7 +272,7 @@ def add_all(session: Session, rows: Iterable[object]) -> None:
 
 def places_taken(session: Session, column: Any, ident: int, origin: str, lease: timedelta) -> int:
     """Runs of this origin that are complete, or active and seen within the lease; `column` equals `ident`."""
-    query = select(func.count()).select_from(StudyRun).where(column == ident, *_holding(now() - lease))
+    query = select(func.count()).select_from(StudyRun).where(column == ident, *_slot_holders(now() - lease))
     return session.scalar(query.where(StudyRun.origin == origin)) or 0
 
 
@@ -281,7 +281,7 @@ def places_by_group(session: Session, version_id: int, origin: str, lease: timed
     query = select(StudyRun.group_name, func.count()).where(
         StudyRun.version_id.in_(versions_of_series(version_id)),
         StudyRun.origin == origin,
-        *_holding(now() - lease),
+        *_slot_holders(now() - lease),
     )
     return Counter(dict(session.execute(query.group_by(StudyRun.group_name)).all()))
 
@@ -310,7 +310,7 @@ def free_slot(session: Session, version_id: int, origin: str, lease: timedelta) 
     return session.connection().scalar(_FREE_SLOT, values) or 0
 
 
-def _holding(seen_after: Any) -> tuple[Any, ...]:
+def _slot_holders(seen_after: Any) -> tuple[Any, ...]:
     alive = (StudyRun.status == "active") & (StudyRun.last_seen_at > seen_after)
     return (
         StudyRun.excluded.is_(False),
@@ -318,18 +318,18 @@ def _holding(seen_after: Any) -> tuple[Any, ...]:
     )
 
 
-def _held(version: Any, origin: Any, seen_after: Any) -> Select[int]:
+def _slots_held(version: Any, origin: Any, seen_after: Any) -> Select[int]:
     """The slots that runs hold; those that have none yet stay aside."""
     return select(StudyRun.slot).where(
         StudyRun.version_id == version,
         StudyRun.origin == origin,
         StudyRun.slot != NO_SLOT,
-        *_holding(seen_after),
+        *_slot_holders(seen_after),
     )
 
 
 def _free_slot_statement() -> Any:
-    taken = _held(bindparam("version"), bindparam("origin"), bindparam("seen_after")).cte("taken")
+    taken = _slots_held(bindparam("version"), bindparam("origin"), bindparam("seen_after")).cte("taken")
     candidates = union_all(select(literal(0).label("slot")), select(taken.c.slot + 1)).subquery()
     return select(func.min(candidates.c.slot)).where(candidates.c.slot.not_in(select(taken.c.slot)))
 
@@ -342,7 +342,9 @@ def free_slot_of(
     session: Session, version_id: int, origin: str, lease: timedelta, groups: int, turns: Sequence[int]
 ) -> int:
     """As `free_slot`, among the slots that are one of `turns` modulo `groups`."""
-    taken = _held(version_id, origin, now() - lease).where((StudyRun.slot % groups).in_(turns)).cte("taken")
+    taken = (
+        _slots_held(version_id, origin, now() - lease).where((StudyRun.slot % groups).in_(turns)).cte("taken")
+    )
     firsts = [select(literal(turn).label("slot")) for turn in turns]
     candidates = union_all(*firsts, select(taken.c.slot + groups)).subquery()
     free = select(func.min(candidates.c.slot)).where(candidates.c.slot.not_in(select(taken.c.slot)))
@@ -354,7 +356,7 @@ def free_slot_of(
 Winner = Literal["left", "right", "tie"]
 
 
-def compared(session: Session, version_id: int, origin: str, lease: timedelta) -> list[Compared]:
+def compared_answers(session: Session, version_id: int, origin: str, lease: timedelta) -> list[Compared]:
     """What was answered, and what was dealt to people seen within the lease who have not answered it yet.
 
     Of runs of this origin that are not excluded; failed plays are no answers. Ordered, so that equal stored

@@ -50,7 +50,7 @@ from server.participation.run_schemas import (
 )
 from server.participation.trial_list import shown_checks, trial_list
 from server.participation.versions import LoadedVersion, Versions
-from server.participation.warnings import EVENT, RULE, failed_checks, in_language, waiting
+from server.participation.warnings import EVENT, RULE, failed_checks, in_language, waiting_warning
 
 # Check a form's answers against its declaration.
 
@@ -207,7 +207,7 @@ def state_of(
         ),
         server_time=moment,
         tickets=_tickets(intake, run, loaded, moment),
-        warning=waiting(session.connection(), run.id, experiment) if run.status == "active" else None,
+        warning=waiting_warning(session.connection(), run.id, experiment) if run.status == "active" else None,
     )
 
 
@@ -220,7 +220,7 @@ def _tickets(intake: Intake, run: StudyRun, loaded: LoadedVersion, moment: datet
     return Tickets(batch=batch.text, by_trial=tickets(intake.key, batch, plays))
 
 
-def saved(run: StudyRun) -> Saved:
+def saved_response(run: StudyRun) -> Saved:
     """The answer to a write."""
     return Saved(saved_at=now(), stage=run.stage, status=run.status)
 
@@ -236,7 +236,7 @@ def save_consent(versions: Versions, session: Session, token: str, agreed: bool)
         calibrates = experiment.display.calibrate != "off"
         run.consented_at = now()
         run.stage = "forms_before" if before else "calibration" if calibrates else "instructions"
-    return saved(run)
+    return saved_response(run)
 
 
 def save_calibration(session: Session, token: str, result: CalibrationResult) -> Saved:
@@ -245,14 +245,14 @@ def save_calibration(session: Session, token: str, result: CalibrationResult) ->
     current_run.check_calibrations(run_repository.calibrations(session, run))
     session.add(Calibration(study_run_id=run.id, **result.model_dump()))
     run.px_per_mm, run.viewing_distance_mm = result.px_per_mm, result.viewing_distance_mm
-    return saved(run)
+    return saved_response(run)
 
 
 def save_device(session: Session, token: str, device: dict[str, Any]) -> Saved:
     """Add what the page found out about browser and screen to what is known."""
     run = open_run(session, token)
     run.device = current_run.checked_device({**run.device, **device})
-    return saved(run)
+    return saved_response(run)
 
 
 def screen_out_device(versions: Versions, session: Session, token: str, body: ScreenOut) -> Saved:
@@ -261,7 +261,7 @@ def screen_out_device(versions: Versions, session: Session, token: str, body: Sc
     if not current_run.screens_devices(versions.get(session, run.version_id).experiment):
         raise ScreeningUndeclared("This study declares no screening by device; the run goes on.")
     current_run.by_device(session, run, body.reason, body.data)
-    return saved(run)
+    return saved_response(run)
 
 
 def save_stage(session: Session, token: str, stage: Stage) -> Saved:
@@ -274,7 +274,7 @@ def save_stage(session: Session, token: str, stage: Stage) -> Saved:
         need_consent(run)
     if run.status in ("active", "complete"):
         run.stage, run.last_seen_at = stage, now()
-    return saved(run)
+    return saved_response(run)
 
 
 def save_language(versions: Versions, session: Session, token: str, language: str) -> Saved:
@@ -284,7 +284,7 @@ def save_language(versions: Versions, session: Session, token: str, language: st
     if language not in languages:
         raise LanguageUnknown(f"The study has no texts in '{language}'{did_you_mean(language, languages)}.")
     run.language = language
-    return saved(run)
+    return saved_response(run)
 
 
 def need_consent(run: StudyRun) -> None:
@@ -331,7 +331,7 @@ def withdraw(session: Session, token: str) -> Saved:
     if run.status == "active":
         run.status, run.last_seen_at = "withdrawn", now()
         run.evidence_verdict = judge_run(session, run).verdict
-    return saved(run)
+    return saved_response(run)
 
 
 # A form's answers stored; one of them may end the run, or decide its group.
@@ -356,7 +356,7 @@ def save_form(
         run_repository.lock_study_of_run(session, token)
     run = open_run(session, token)
     need_consent(run)
-    checked = _checked(loaded, name, answers)
+    checked = _checked_answers(loaded, name, answers)
     if asked is not None and decides and run.slot != NO_SLOT:
         _refuse_another_group(loaded, run, asked.field, checked)
     _store(session, run, name, checked)
@@ -364,12 +364,14 @@ def save_form(
     if asked is not None and decides and run.status == "active" and run.slot == NO_SLOT:
         _assign_slot_of(session, run, loaded, group_of_answer(loaded.experiment, checked[asked.field]))
     if not decides or run.status != "active":
-        return saved(run)
+        return saved_response(run)
     session.flush()
-    return saved(run).model_copy(update={"run": state_of(settings, versions, intake, session, run, moment)})
+    return saved_response(run).model_copy(
+        update={"run": state_of(settings, versions, intake, session, run, moment)}
+    )
 
 
-def _checked(loaded: LoadedVersion, name: str, answers: Mapping[str, Any]) -> dict[str, Any]:
+def _checked_answers(loaded: LoadedVersion, name: str, answers: Mapping[str, Any]) -> dict[str, Any]:
     forms = {form.name: form for form in loaded.experiment.forms}
     if name not in forms:
         raise FormUnknown(f"The study declares no form '{name}'{did_you_mean(name, forms)}.")

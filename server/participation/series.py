@@ -92,12 +92,12 @@ def follow(database: Database, versions: Versions, token: str) -> Outlook | None
             row for row in series_repository.trials(connection, run.id) if row.trial_index not in refused
         ]
         answers = series_repository.answers(connection, run.id)
-    outlook = reckoned(loaded, trials, answers)
+    outlook = outlook_after(loaded, trials, answers)
     with database.write_connection() as connection:
         return _keep(connection, token, outlook)
 
 
-def reckoned(loaded: LoadedVersion, trials: Sequence[Any], answers: Sequence[Any]) -> Outlook:
+def outlook_after(loaded: LoadedVersion, trials: Sequence[Any], answers: Sequence[Any]) -> Outlook:
     """The outlook on the series that these trials make, after these answers. Pure."""
     experiment = loaded.experiment
     assumed, declared, levels = model(experiment), threshold_of(experiment), points(experiment)
@@ -114,7 +114,7 @@ def reckoned(loaded: LoadedVersion, trials: Sequence[Any], answers: Sequence[Any
                 estimates[row.trial_index, row.play] = quest.estimate(assumed, said[:number])
         mine = [row for row in trials if row.series == one.name]
         waiting = [row for row in mine if row.plays == 0 and not row.closed]
-        if waiting and ended(declared.stop, assumed, said):
+        if waiting and is_certain_enough(declared.stop, assumed, said):
             closing += [row.trial_index for row in waiting]
             continue
         next_ones = waiting[: declared.ahead + 1]
@@ -125,7 +125,7 @@ def reckoned(loaded: LoadedVersion, trials: Sequence[Any], answers: Sequence[Any
     return Outlook(known, tuple(offers), estimates, tuple(closing))
 
 
-def ended(stop: Stop, assumed: Model, said: Answers) -> bool:
+def is_certain_enough(stop: Stop, assumed: Model, said: Answers) -> bool:
     """Whether the estimate is as certain as the rule asks; the number of trials ends a series by itself."""
     if (stop.sd is None and stop.entropy is None) or len(said) < stop.at_least:
         return False

@@ -127,7 +127,7 @@ class TallyEntry(NamedTuple):
         return min(_ZERO - 1, max(-_ZERO, round(UNIT * self.value)))
 
 
-def unpacked(code: int) -> tuple[int, int | None, float]:
+def unpack_answer(code: int) -> tuple[int, int | None, float]:
     """Clip, second clip and value of a packed answer."""
     clip, second = divmod(code >> _VALUE_BITS, 1 << _CLIP_BITS)
     return clip, second - 1 if second else None, (code % (1 << _VALUE_BITS) - _ZERO) / UNIT

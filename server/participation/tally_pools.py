@@ -12,7 +12,7 @@ from sqlalchemy.orm import Session
 
 from server.core.db import Database
 from server.participation import tally_repository
-from server.participation.kinds import served
+from server.participation.kinds import served_kind
 from server.participation.tallies import (
     ONSET_BINS,
     UNIT,
@@ -23,7 +23,7 @@ from server.participation.tallies import (
     numbers,
     packed_bytes,
     packed_codes,
-    unpacked,
+    unpack_answer,
 )
 from server.participation.tally_repository import CellClip, ShownClip
 from server.participation.versions import Versions
@@ -56,7 +56,9 @@ class PooledTally:
     plays: Counter[tuple[str, str, str]] = field(default_factory=Counter)
 
 
-def pooled(session: Session, runs: ColumnElement[bool], scale: str, factors: Sequence[str]) -> PooledTally:
+def pooled_tally(
+    session: Session, runs: ColumnElement[bool], scale: str, factors: Sequence[str]
+) -> PooledTally:
     """The counts of the runs that fit, answers of excluded ones left out."""
     made, kept = PooledTally(), _StoredCounts()
     packed: dict[int, bytearray] = defaultdict(bytearray)
@@ -92,16 +94,16 @@ class _StoredCounts:
             self.onsets.append(counted["onsets"])
 
     def add_to(self, made: PooledTally) -> None:
-        for key, number in _summed(self.plays).items():
+        for key, number in _summed_counts(self.plays).items():
             verdict, method, rule = key.split(" ")
             made.plays[verdict, method, rule] = number
-        for start, number in _summed(self.times).items():
+        for start, number in _summed_counts(self.times).items():
             made.times[int(start)] = number
         if self.onsets:
             made.onsets = [sum(numbers) for numbers in zip(*self.onsets, strict=True)]
 
 
-def _summed(counts: Iterable[dict[str, int]]) -> dict[str, int]:
+def _summed_counts(counts: Iterable[dict[str, int]]) -> dict[str, int]:
     """Key -> the sum of its counts."""
     made: dict[str, int] = defaultdict(int)
     for one in counts:
@@ -118,7 +120,7 @@ def means_by_cell(sums: Sequence[int], levels: Sequence[tuple[str, ...]]) -> dic
 
 def _add_answers(made: PooledTally, packed: bytearray, clips: Sequence[CellClip]) -> None:
     for code, times in Counter(packed_codes(packed)).items():
-        first, second, value = unpacked(code)
+        first, second, value = unpack_answer(code)
         made.answers[clips[first].id, None if second is None else clips[second].id, value] += times
 
 
@@ -185,7 +187,7 @@ class Recount:
         answers: tuple[TallyEntry, ...] = ()
         if is_main:
             places = {one.role: numbered[one.clip] for one in shown if one.role and one.clip is not None}
-            answers = tuple(served(row.kind).counted(places, row.payload))
+            answers = tuple(served_kind(row.kind).counted(places, row.payload))
         return Play(
             row.trial_index,
             is_main,

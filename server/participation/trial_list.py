@@ -94,7 +94,7 @@ class _FirstClips(dict[int | None, dict[str, Any]]):
     def __missing__(self, ident: int) -> dict[str, Any]:
         clip = self.loaded.clips[ident]
         told = {name: getattr(clip, name) for name in _SIZE if name != "inter_ocular_px"}
-        self[ident] = _told(clip) | told | {"inter_ocular_px": self.loaded.inter_ocular_px}
+        self[ident] = _clip_info(clip) | told | {"inter_ocular_px": self.loaded.inter_ocular_px}
         return self[ident]
 
 
@@ -107,11 +107,11 @@ class _Clips(dict[tuple[str, int], TrialClip]):
 
     def __missing__(self, shown: tuple[str, int]) -> TrialClip:
         role, ident = shown
-        self[shown] = TrialClip.model_validate({"role": role, **_told(self.loaded.clips[ident])})
+        self[shown] = TrialClip.model_validate({"role": role, **_clip_info(self.loaded.clips[ident])})
         return self[shown]
 
 
-def _told(clip: PlacedClip) -> dict[str, Any]:
+def _clip_info(clip: PlacedClip) -> dict[str, Any]:
     return {"clip_sha256": clip.sha256, "frames": clip.frames, "fps": clip.fps}
 
 
@@ -225,12 +225,12 @@ def shown_checks(experiment: Experiment, language: str) -> ShownChecks | None:
         else None
     )
     return ShownChecks(
-        by_kind={kind: _shown(experiment, kind, language) for kind in declared.kinds},
+        by_kind={kind: _shown_check(experiment, kind, language) for kind in declared.kinds},
         other_way=ShownOtherWay.model_validate(said) if said else None,
     )
 
 
-def _shown(experiment: Experiment, kind: CheckName, language: str) -> ShownCheck:
+def _shown_check(experiment: Experiment, kind: CheckName, language: str) -> ShownCheck:
     wording = experiment.evidence.motion_checks.wording
     words = next((words for words in wording if words.check == kind), None) or CHECK_KINDS[kind]
     return ShownCheck(

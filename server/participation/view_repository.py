@@ -112,7 +112,7 @@ def run_of_views(connection: Connection, token_hash: str) -> RunOfViews | None:
     return _RUN.one_or_none(connection, {"token_hash": token_hash})
 
 
-def stored(connection: Connection, run: int, trial: int) -> list[StoredView] | None:
+def stored_views(connection: Connection, run: int, trial: int) -> list[StoredView] | None:
     """The views stored of a trial; None where the run has no such trial."""
     rows = _OF_TRIAL.all(connection, {"run": run, "trial": trial})
     if not rows:
@@ -158,7 +158,7 @@ def numbers(session: Session, run: StudyRun) -> dict[int, int]:
     return dict(rows.all())
 
 
-def unanswered(session: Session, run: StudyRun) -> Sequence[View]:
+def unanswered_views(session: Session, run: StudyRun) -> Sequence[View]:
     """Views of plays that have no answer, in the order of their trials and numbers."""
     answered = select(Rating.id).where(
         Rating.study_run_id == View.study_run_id,

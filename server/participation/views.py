@@ -44,7 +44,7 @@ PER_MS = 100
 Entry = tuple[int, float]
 
 
-def packed(log: Iterable[Entry]) -> str:
+def pack_log(log: Iterable[Entry]) -> str:
     """A log as text."""
     out, frame_before, time_before = bytearray(), 0, 0
     for frame, ms in log:
@@ -55,8 +55,8 @@ def packed(log: Iterable[Entry]) -> str:
     return base64.b64encode(out).decode("ascii")
 
 
-def unpacked(text: str) -> list[Entry]:
-    """The log that `packed` made a text of."""
+def unpack_log(text: str) -> list[Entry]:
+    """The log that `pack_log` made a text of."""
     numbers, entries, frame, time = _numbers(base64.b64decode(text)), [], 0, 0
     for step in numbers:
         frame, time = frame + step, time + next(numbers)
@@ -223,7 +223,7 @@ def save_views(
         )
     if run.consented_at is None:
         raise ConsentMissing("Nothing is stored before the participant has agreed; send the consent first.")
-    known = {view.view_id: view for view in _known(connection, run, sent)}
+    known = {view.view_id: view for view in _known_views(connection, run, sent)}
     numbers = {(view.trial_index, view.number): view.view_id for view in known.values()}
     _refuse_others(sent, known, numbers)
     news = [view for view in sent.views if _says_more(view, known.get(str(view.id)))]
@@ -235,7 +235,7 @@ def save_views(
         ident = str(view.id)
         row = known.get(ident) or StoredView(ident, view.trial_index, view.number, completed=False)
         if ident not in known:
-            view_repository.begin(connection, _begun(run, view, moment, issued_at))
+            view_repository.begin(connection, _new_view_row(run, view, moment, issued_at))
             begun += 1
         if _ends(view) and not row.completed:
             _complete(connection, run, view, length)
@@ -245,10 +245,10 @@ def save_views(
     return ViewsSaved(begun=begun, completed=completed, saved_at=moment)
 
 
-def _known(connection: Connection, run: RunOfViews, sent: ViewsIn) -> Iterable[StoredView]:
+def _known_views(connection: Connection, run: RunOfViews, sent: ViewsIn) -> Iterable[StoredView]:
     """The stored views of the trials that these are of; TrialNotInRun where the run has no such trial."""
     for trial in sorted({view.trial_index for view in sent.views}):
-        stored = view_repository.stored(connection, run.id, trial)
+        stored = view_repository.stored_views(connection, run.id, trial)
         if stored is None:
             raise TrialNotInRun(
                 f"Trial {trial} is not in this run, which has trials 0 to {run.trials_total - 1}."
@@ -349,7 +349,9 @@ def _tickets(
     return take_views(intake, connection, arrival)
 
 
-def _begun(run: RunOfViews, view: ViewIn, moment: datetime, issued_at: datetime | None) -> dict[str, Any]:
+def _new_view_row(
+    run: RunOfViews, view: ViewIn, moment: datetime, issued_at: datetime | None
+) -> dict[str, Any]:
     return {
         "view_id": str(view.id),
         "study_run_id": run.id,
@@ -376,12 +378,14 @@ def _complete(connection: Connection, run: RunOfViews, view: ViewIn, length: flo
     }
     view_repository.complete(connection, run.id, str(view.id), ended)
     for role, clip in {clip.role: clip for clip in view.clips}.items():
-        view_repository.add_clip(connection, run.id, str(view.id), role, clip.clip_sha256, packed(clip.drawn))
+        view_repository.add_clip(
+            connection, run.id, str(view.id), role, clip.clip_sha256, pack_log(clip.drawn)
+        )
 
 
 def unanswered_views(session: Session, run: StudyRun) -> dict[int, list[ViewState]]:
     """The views of each trial that were begun for a play without an answer yet, in their order."""
-    waiting = view_repository.unanswered(session, run)
+    waiting = view_repository.unanswered_views(session, run)
     clips = view_repository.clips_of(session, waiting)
     by_trial: dict[int, list[ViewState]] = {}
     for view in waiting:
@@ -401,7 +405,7 @@ def _state(view: View, clips: list[ViewClip]) -> ViewState:
             "showings": view.showings,
             "clips": [
                 SeenClip.model_validate(
-                    {"role": clip.role, "clip_sha256": clip.clip_sha256, "drawn": unpacked(clip.frame_log)}
+                    {"role": clip.role, "clip_sha256": clip.clip_sha256, "drawn": unpack_log(clip.frame_log)}
                 )
                 for clip in clips
             ],

@@ -14,7 +14,7 @@ from experiments.rules.warnings import GivenAnswer
 from server.core.values import new_public_id, now
 from server.participation import rating_repository
 from server.participation.answer_schemas import WarningShown
-from server.participation.evidence import comparable
+from server.participation.evidence import comparable_answer
 
 # Attention checks: how many of a run have failed, and whether so many end it.
 
@@ -75,12 +75,12 @@ def after_answer(
     if not rules:
         return NO_LAPSE
     rows = rating_repository.latest_answers(connection, run, max(rule.answers for rule in rules))
-    if _broken(rules, rows) is None:
+    if _broken_rule(rules, rows) is None:
         return NO_LAPSE
     events = rating_repository.events_of(connection, run, (WARNED, SHOWN))
     warned = sum(event.type == WARNED for event in events)
     shown = [event.received_at for event in events if event.type == SHOWN]
-    rule = _broken(rules, [row for row in rows if not shown or row.saved_at > max(shown)])
+    rule = _broken_rule(rules, [row for row in rows if not shown or row.saved_at > max(shown)])
     if rule is None or len(shown) < warned:
         return NO_LAPSE
     if warned < experiment.warnings.maximum:
@@ -93,7 +93,7 @@ def after_answer(
     return Lapse(None, ends=True)
 
 
-def waiting(connection: Connection, run: int, experiment: Experiment) -> WarningShown | None:
+def waiting_warning(connection: Connection, run: int, experiment: Experiment) -> WarningShown | None:
     """The last warning of a run that no page has shown yet: the one that got it may be gone."""
     if not experiment.warnings.rules:
         return None
@@ -119,12 +119,12 @@ def _as_told(
 ) -> WarningShown | None:
     rules = (rule for rule in experiment.warnings.rules if rule.rule == data["rule"])
     rule = next(rules, None)
-    return _shown(connection, run, experiment, rule, data["number"]) if rule else None
+    return _shown_warning(connection, run, experiment, rule, data["number"]) if rule else None
 
 
-def _broken(rules: Sequence[WarningRule], rows: Sequence[Any]) -> WarningRule | None:
+def _broken_rule(rules: Sequence[WarningRule], rows: Sequence[Any]) -> WarningRule | None:
     """The first rule that the latest of these answers (the latest first) break."""
-    values = [(comparable(row.payload), row.rt) for row in rows]
+    values = [(comparable_answer(row.payload), row.rt) for row in rows]
     given = [GivenAnswer(str(value), rt) for value, rt in values if value is not None][::-1]
     for rule in rules:
         if len(given) >= rule.answers and rule.lapses(given[-rule.answers :]):
@@ -143,10 +143,10 @@ def _warn(
 ) -> Lapse:
     data = {"rule": rule.rule, "number": number}
     rating_repository.add_event(connection, run, _event_id(rating_id), WARNED, data, saved_at)
-    return Lapse(_shown(connection, run, experiment, rule, number), ends=False)
+    return Lapse(_shown_warning(connection, run, experiment, rule, number), ends=False)
 
 
-def _shown(
+def _shown_warning(
     connection: Connection, run: int, experiment: Experiment, rule: WarningRule, number: int
 ) -> WarningShown:
     text = in_language(rule.text, rating_repository.language(connection, run), experiment.languages)

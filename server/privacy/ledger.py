@@ -126,15 +126,15 @@ def add_to_ledger(settings: Settings, further: bytes) -> None:
 
 def erasures_in_ledger(settings: Settings) -> list[str]:
     """The runs that were erased; a line that a crash cut off is passed over."""
-    return _named(settings, "run")
+    return _runs_under_key(settings, "run")
 
 
 def identifier_erasures_in_ledger(settings: Settings) -> list[str]:
     """The runs of which it was erased who took part."""
-    return _named(settings, "identifiers_of")
+    return _runs_under_key(settings, "identifiers_of")
 
 
-def _named(settings: Settings, key: str) -> list[str]:
+def _runs_under_key(settings: Settings, key: str) -> list[str]:
     path = ledger_path(settings)
     if not path.is_file():
         return []

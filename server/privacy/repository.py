@@ -111,7 +111,7 @@ def study_versions(session: Session, study: Study) -> Sequence[StudyVersion]:
     return session.scalars(query.order_by(StudyVersion.number)).all()
 
 
-def _kept(version: StudyVersion) -> tuple[ColumnElement[bool], ...]:
+def _visits_of_version(version: StudyVersion) -> tuple[ColumnElement[bool], ...]:
     return (
         StudyRun.version_id == version.id,
         StudyRun.origin.in_(OF_PERSONS),
@@ -121,7 +121,7 @@ def _kept(version: StudyVersion) -> tuple[ColumnElement[bool], ...]:
 
 def kept_visits(version: StudyVersion, *, unfinished: bool) -> Select[StudyRun]:
     """The visits of a version that are not erased, or those of them that were not completed."""
-    query = select(StudyRun).where(*_kept(version))
+    query = select(StudyRun).where(*_visits_of_version(version))
     return query.where(StudyRun.status != "complete") if unfinished else query
 
 
@@ -130,7 +130,7 @@ def identified_visits(version: StudyVersion) -> Select[StudyRun]:
     has_id = StudyRun.id.in_(select(IdentityKey.study_run_id))
     labelled = (Link.kind == "personal") & Link.label.not_in(("", ERASED))
     known = has_id | (StudyRun.completion_code != "") | labelled
-    return select(StudyRun).join(Link, Link.id == StudyRun.link_id).where(*_kept(version), known)
+    return select(StudyRun).join(Link, Link.id == StudyRun.link_id).where(*_visits_of_version(version), known)
 
 
 def numbers_due(session: Session, chosen: Select[StudyRun], seen_before: datetime) -> set[int]:

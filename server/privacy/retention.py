@@ -81,24 +81,24 @@ class ErasureCounts:
 def preview(session: Session, study: Study, moment: datetime) -> RetentionPreview:
     """What is due, and when something is next."""
     rules = list(_rules(session, study))
-    whole = _due(session, (rule for rule in rules if rule.what != "identifiers"), moment)
-    known = _due(session, (rule for rule in rules if rule.what == "identifiers"), moment)
+    whole = _due_visits(session, (rule for rule in rules if rule.what != "identifiers"), moment)
+    known = _due_visits(session, (rule for rule in rules if rule.what == "identifiers"), moment)
     return RetentionPreview(
         study=study.name,
         periods=_periods(_active(session, study)),
         identifiers=len(known - whole),
         visits=len(whole),
-        next_at=_next(session, rules, moment),
+        next_at=_next_due(session, rules, moment),
     )
 
 
-def _due(session: Session, rules: Iterable[Rule], moment: datetime) -> set[int]:
+def _due_visits(session: Session, rules: Iterable[Rule], moment: datetime) -> set[int]:
     """The visits that are due by any of the rules."""
     due = (repository.numbers_due(session, rule.visits, rule.limit(moment)) for rule in rules)
     return set[int]().union(*due)
 
 
-def _next(session: Session, rules: list[Rule], moment: datetime) -> datetime | None:
+def _next_due(session: Session, rules: list[Rule], moment: datetime) -> datetime | None:
     coming = (
         (repository.first_seen_after(session, rule.visits, rule.limit(moment)), rule.days) for rule in rules
     )
@@ -222,13 +222,13 @@ async def _watch(
     await asyncio.sleep(first_look_s)
     while True:
         try:
-            await asyncio.to_thread(alone, database, settings, locks, stopped)
+            await asyncio.to_thread(carry_out_alone, database, settings, locks, stopped)
         except Exception:  # the next look comes, whatever went wrong with this one
             LOG.exception("retention")
         await asyncio.sleep(LOOK_EVERY_S)
 
 
-def alone(database: Database, settings: Settings, locks: Locks, stopped: Stopped) -> None:
+def carry_out_alone(database: Database, settings: Settings, locks: Locks, stopped: Stopped) -> None:
     """Carry out what is due unless another process is at it."""
     with suppress(LockTaken), locks.held("retention"):
         every_study(database, settings, stopped)

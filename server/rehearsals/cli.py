@@ -69,7 +69,7 @@ def simulate(
     if manner:
         if url:
             raise InputError("--as starts a server of its own, whose time it can tell; leave --url out")
-        _as(
+        _simulate_manner(
             settings,
             study,
             manner,
@@ -90,7 +90,7 @@ def simulate(
         ThreadPoolExecutor(at_once) as pool,
         _bar(participants) as advance,
     ):
-        work = [pool.submit(_one, address, token, raters(number, seed)) for number in people]
+        work = [pool.submit(_take_part, address, token, raters(number, seed)) for number in people]
         ratings = 0
         for done in as_completed(work):
             try:
@@ -104,7 +104,7 @@ def simulate(
     )
 
 
-def _as(
+def _simulate_manner(
     settings: Settings, study: str, name: str, people: range, at_once: int, json_file: Path | None
 ) -> None:
     """Simulated people in a manner, with the verdict on each."""
@@ -118,7 +118,7 @@ def _as(
     out.print(f"study {study}, {len(runs)} as {name}: {summary(runs)}")
 
 
-def _one(address: str, token: str, rater: Rater) -> int:
+def _take_part(address: str, token: str, rater: Rater) -> int:
     client = JsonClient(address)
     try:
         person = Person(client, rater)

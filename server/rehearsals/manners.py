@@ -136,15 +136,22 @@ def _screen_reader(_rng: random.Random, _person: Habits) -> Interaction:
     return {"presses": 2, "trusted": 2, "press_ms": None, "moves": 0}
 
 
-def _nothing(_rng: random.Random, _person: Habits) -> None:
+def _no_interaction(_rng: random.Random, _person: Habits) -> None:
     return None
 
 
 MANNERS: dict[str, Manner] = {
     "http": Manner(
-        tickets=False, fetches=False, waits=False, rt_ms=_plausible_rt, interaction=_nothing, answers="any"
+        tickets=False,
+        fetches=False,
+        waits=False,
+        rt_ms=_plausible_rt,
+        interaction=_no_interaction,
+        answers="any",
     ),
-    "http-slow": Manner(tickets=True, fetches=True, waits=True, rt_ms=_plausible_rt, interaction=_nothing),
+    "http-slow": Manner(
+        tickets=True, fetches=True, waits=True, rt_ms=_plausible_rt, interaction=_no_interaction
+    ),
     "script": Manner(
         tickets=True, fetches=True, waits=True, rt_ms=_polling_rt, interaction=_synthetic_click, answers="any"
     ),

@@ -20,7 +20,7 @@ from server.accounts.identity import OPERATOR
 from server.core.db import Database
 from server.core.settings import Settings
 from server.core.values import derived_token
-from server.participation.kinds import served
+from server.participation.kinds import served_kind
 from server.participation.versions import Versions
 from server.rehearsals.http import RunApi
 from server.studies.links import PURPOSE, create_link
@@ -321,7 +321,7 @@ class Person:
     def _answer(self, trial: dict[str, Any], declared: dict[str, Any]) -> dict[str, Any]:
         if trial["kind"] == "check":
             return {"kind": "check", "check": self.rater.check_answer(trial, self.rater.rng)}
-        return served(declared["kind"]).simulated(self.rater, trial, declared, self.rater.rng)
+        return served_kind(declared["kind"]).simulated(self.rater, trial, declared, self.rater.rng)
 
     def _playback(self, trial: dict[str, Any]) -> dict[str, Any]:
         rng, frames = self.rater.rng, _frames(trial)

@@ -93,7 +93,7 @@ def rehearse(folder: Path, say: Say) -> None:
         say(0.55, "reading the data")
         with services.database.read() as session:
             study = find_study(session, experiment.name, OPERATOR, "view")
-            result = _shown(session, study, experiment, order)
+            result = _rehearsal_result(session, study, experiment, order)
             _export(session, study, folder)
     say(0.6, "making the report")
     report = folder / REPORT
@@ -129,7 +129,9 @@ def _take_part(address: str, token: str, rater: Any) -> None:
         client.close()
 
 
-def _shown(session: Session, study: Study, experiment: Experiment, order: Order) -> RehearsalResult:
+def _rehearsal_result(
+    session: Session, study: Study, experiment: Experiment, order: Order
+) -> RehearsalResult:
     runs = repository.runs(session, study)
     people = [
         RehearsedPerson(

@@ -21,7 +21,7 @@ from server.accounts.audit import record
 from server.accounts.identity import OPERATOR, Identity
 from server.core.db import Database
 from server.core.errors import NotFound
-from server.core.locks import LONGEST_S, Locks, locked
+from server.core.locks import LONGEST_S, Locks, file_lock
 from server.core.settings import Settings
 from server.core.values import now
 from server.models import Job
@@ -38,7 +38,7 @@ from server.rehearsals.schemas import (
     Step,
 )
 from server.results import job_repository
-from server.results.jobs import begun, in_background, is_under_way, note, shown
+from server.results.jobs import begin_job, in_background, is_under_way, job_state, note
 from server.studies.lookup import active_version, find_study
 
 _KEPT_VARIABLES = ("PATH", "LANG", "LC_ALL", "HOME", "TMPDIR", "VIRTUAL_ENV", "PYTHONPATH")
@@ -59,7 +59,7 @@ def start(
         version = active_version(session, study)
         parameters = {**order.model_dump(), "version": version.number}
         in_the_way = "A rehearsal of this study goes on already; wait for it."
-        job = begun(locks, session, study, "rehearsal", parameters, identity, in_the_way)
+        job = begin_job(locks, session, study, "rehearsal", parameters, identity, in_the_way)
         record(session, identity, "rehearsal asked for", "study", name, **order.model_dump())
         session.flush()
         rehearsal = _out(locks, job)
@@ -106,7 +106,7 @@ def _folder(settings: Settings, public_id: str) -> Path:
 def _out(locks: Locks, job: Job) -> RehearsalOut:
     return RehearsalOut.model_validate(
         {
-            **shown(locks, job, "the server was stopped while it went on"),
+            **job_state(locks, job, "the server was stopped while it went on"),
             "version": job.parameters.get("version", 0),
             "participants": job.parameters.get("participants", 0),
         }
@@ -143,7 +143,7 @@ def _turn(settings: Settings, folder: Path) -> Iterator[bool]:
     while not _is_cancelled(folder):
         with ExitStack() as held:
             try:
-                held.enter_context(locked(settings.data_folder / "rehearsals" / _LOCK, wait=False))
+                held.enter_context(file_lock(settings.data_folder / "rehearsals" / _LOCK, wait=False))
             except BlockingIOError:
                 time.sleep(_LOOK_EVERY_S)
                 continue

@@ -28,7 +28,7 @@ def pool_and_revision(
     return pool, version, repository.revision(session, study, pool)
 
 
-def counted(
+def counted_results(
     session: Session, study: Study, origin: str, series: int | None, scale: str | None
 ) -> tuple[Revision, AnyResults]:
     """The results with the revision they are of."""
@@ -74,7 +74,7 @@ def count_ahead(database: Database, cache: ResultsCache, stopped: Stopped) -> No
 def _keep(database: Database, cache: ResultsCache, name: str, origin: str) -> None:
     def count() -> tuple[Revision, AnyResults]:
         with database.read() as session:
-            return counted(session, find_study(session, name, OPERATOR, "view"), origin, None, None)
+            return counted_results(session, find_study(session, name, OPERATOR, "view"), origin, None, None)
 
     with database.read() as session:
         study = find_study(session, name, OPERATOR, "view")

@@ -75,7 +75,7 @@ def get_results(
 
     def count() -> tuple[Revision, AnyResults]:
         with services.database.read() as session:
-            return counting.counted(
+            return counting.counted_results(
                 session, find_study(session, study, identity, "view"), origin, series, scale
             )
 
@@ -136,7 +136,7 @@ def changes(before: MonitorSnapshot | None, after: MonitorSnapshot) -> str:
     return after.model_copy(update={"runs": changed}).model_dump_json()
 
 
-async def _waited(changes: Changes, stopping: Stopping, seen: int | None) -> bool:
+async def _wait_for_change(changes: Changes, stopping: Stopping, seen: int | None) -> bool:
     """Wait for the next look at the study; False, at once, where the server is to end.
 
     Parameters
@@ -172,7 +172,7 @@ async def stream_monitor(
         nonlocal seen
         yield first
         until = time.monotonic() + 60 * services.settings.monitor_stream_minutes
-        while await _waited(services.changes, services.stopping, seen) and time.monotonic() < until:
+        while await _wait_for_change(services.changes, services.stopping, seen) and time.monotonic() < until:
             if await request.is_disconnected():
                 return
             seen = services.changes.number

@@ -66,7 +66,7 @@ WRITE_AGAIN_S = (1, 2, 4, 8, 15, 30, 60)
 """How long to wait before the end of a job is written again, where the database did not take it."""
 
 
-def begun(
+def begin_job(
     locks: Locks,
     session: Session,
     study: Study,
@@ -122,7 +122,7 @@ def _fail(database: Database, public_id: str, message: str) -> None:
     return note(database, public_id, status="failed", message=message, finished_at=now())
 
 
-def shown(locks: Locks, job: Job, stopped: str) -> dict[str, Any]:
+def job_state(locks: Locks, job: Job, stopped: str) -> dict[str, Any]:
     """What the page shows of a job of any kind; `stopped` is said where the server was stopped meanwhile."""
     stale = is_abandoned(locks, job)
     return {

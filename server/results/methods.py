@@ -49,7 +49,7 @@ def methods_figures(session: Session, study: Study, origin: str, series: int | N
         experiment=experiment,
         used=used,
         rules=(),
-        elsewhere="" if used else _elsewhere(session, study, origin, version.series),
+        elsewhere="" if used else _runs_elsewhere(session, study, origin, version.series),
         numbers=numbers(session, study.id, origin, version.series) | declared_numbers(experiment),
     )
     return MethodsFigures(study.name, described)
@@ -62,7 +62,7 @@ PEOPLE = {
 }
 
 
-def _elsewhere(session: Session, study: Study, origin: str, series: int) -> str:
+def _runs_elsewhere(session: Session, study: Study, origin: str, series: int) -> str:
     """Where the visits of an origin are that a series has none of; empty where there are none at all."""
     placed = []
     for other in series_of(session, study):
@@ -75,7 +75,7 @@ def _elsewhere(session: Session, study: Study, origin: str, series: int) -> str:
 
 def paragraph_of(known: MethodsFigures, results: dict[str, Any] | None) -> Methods:
     """The paragraph of what was counted, and of the results of a report."""
-    excluded = _excluded(results)
+    excluded = _exclusion_counts(results)
     described = replace(
         known.described,
         rules=[(name, words) for name, (words, _) in excluded.items()],
@@ -108,7 +108,7 @@ def write_beside(folder: Path, methods: Methods) -> None:
         (folder / f"methods.{name}").write_text(content, encoding="utf-8")
 
 
-def _excluded(results: dict[str, Any] | None) -> dict[str, tuple[str, Number]]:
+def _exclusion_counts(results: dict[str, Any] | None) -> dict[str, tuple[str, Number]]:
     """Number of runs (or trials) by declared rule, as the report of the analysis counts them."""
     left_out = (results or {}).get("exclusions") or {}
     counts: dict[str, int] = {}

@@ -125,11 +125,11 @@ def numbers(session: Session, study: int, origin: str, series: int) -> dict[str,
     values = _at_once(session, RUNS, OF_RUNS, of) | _at_once(session, PLAYS, OF_CHECKS, of, EXTRA)
     plays = _plays(session, study, origin, series)
     values |= _play_numbers(plays)
-    known = {name: Number(name, values[name], _filled(query, of)) for name, query in QUERIES.items()}
+    known = {name: Number(name, values[name], _filled_query(query, of)) for name, query in QUERIES.items()}
     for rule, number in _flagged_by(plays):
         name = f"plays_flagged_by_{rule}"
         query = f"{PLAYS} AND {MAIN} AND t.verdict = 'flagged' AND t.verdict_rule = '{rule}'"
-        known[name] = Number(name, number, _filled(query, of))
+        known[name] = Number(name, number, _filled_query(query, of))
     return known
 
 
@@ -149,7 +149,7 @@ def begun_with(study: int, origin: str, series: int, versions: Iterable[int], vi
     listed = ", ".join(map(str, versions))
     name = f"begun_with_{listed.replace(', ', '_')}"
     query = f"{RUNS} AND v.number IN ({listed})"
-    return Number(name, visits, _filled(query, {"study": study, "origin": origin, "series": series}))
+    return Number(name, visits, _filled_query(query, {"study": study, "origin": origin, "series": series}))
 
 
 def _at_once(
@@ -215,7 +215,7 @@ def _flagged_by(plays: Plays) -> list[tuple[str, int]]:
     return rules.most_common()
 
 
-def _filled(query: str, values: Mapping[str, int | str]) -> str:
+def _filled_query(query: str, values: Mapping[str, int | str]) -> str:
     for name, value in values.items():
         query = query.replace(f":{name}", str(value) if isinstance(value, int) else f"'{value}'")
     return query

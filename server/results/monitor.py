@@ -55,17 +55,17 @@ def snapshot(
         dropped=by_status["active"] - active,
         screened_out=by_status["screened_out"],
         withdrawn=by_status["withdrawn"],
-        others=others(every, origin),
+        others=runs_of_other_origins(every, origin),
         refused_browsers=monitor_repository.refused_browsers(session, study),
         groups=group_counts(session, study, experiment, origin, moment - lease),
         funnel=funnel(counted),
         expected_finish=expected_finish(by_status["complete"], *recent, study.quota, moment),
         total=sum(kind.runs for kind in counted),
-        runs=[monitored(run, moment, lease) for run in runs],
+        runs=[monitored_run(run, moment, lease) for run in runs],
     )
 
 
-def others(every: Sequence[RunCount], origin: str) -> dict[str, int]:
+def runs_of_other_origins(every: Sequence[RunCount], origin: str) -> dict[str, int]:
     """Runs of other origins than this, previews left out."""
     counts = Counter[str]()
     for kind in every:
@@ -88,7 +88,7 @@ def group_counts(
     ]
 
 
-def monitored(run: Any, moment: datetime, lease: timedelta) -> MonitoredRun:
+def monitored_run(run: Any, moment: datetime, lease: timedelta) -> MonitoredRun:
     """One line of the monitor's table."""
     letters = run.heat.ljust(run.trials_total, ".")[: run.trials_total]
     silent = moment - run.last_seen_at
@@ -191,7 +191,7 @@ def failing_clips(session: Session, study: Study, chosen: Origin | None) -> list
             seen.rules[play.rule] += 1
     _add_who_met(session, runs, clips)
     _add_reasons(session, with_failures, clips)
-    listed = [_of(sha256, seen) for sha256, seen in clips.items()]
+    listed = [_failing_clip(sha256, seen) for sha256, seen in clips.items()]
     return sorted(listed, key=lambda clip: (not clip.alarm, -clip.failed_for, clip.file))
 
 
@@ -204,13 +204,13 @@ def _add_who_met(session: Session, runs: dict[int, MetRun], clips: dict[str, _Cl
 def _add_reasons(session: Session, runs: list[int], clips: dict[str, _ClipFailures]) -> None:
     """What the pages said of clips that they could not show."""
     for data in monitor_repository.unavailable_clips(session, runs):
-        named: Iterable[object] = [data.get("clip_sha256"), *_listed(data.get("clips"))]
+        named: Iterable[object] = [data.get("clip_sha256"), *_as_list(data.get("clips"))]
         for sha256 in {str(one) for one in named if one}:
             if sha256 in clips and data.get("reason"):
                 clips[sha256].reasons[str(data["reason"])[:200]] += 1
 
 
-def _listed(value: object) -> list[object]:
+def _as_list(value: object) -> list[object]:
     if isinstance(value, dict):
         return list(value.values())
     return value if isinstance(value, list) else []
@@ -220,7 +220,7 @@ def _letter(run: MetRun, trial_index: int) -> str:
     return run.heat[trial_index] if trial_index < len(run.heat) else NOT_MET
 
 
-def _of(sha256: str, seen: _ClipFailures) -> FailingClip:
+def _failing_clip(sha256: str, seen: _ClipFailures) -> FailingClip:
     people, failed = len(seen.met_by | seen.failed_for), len(seen.failed_for)
     return FailingClip(
         clip_sha256=sha256,

@@ -9,7 +9,7 @@ from experiments.kinds import KINDS
 from server.core.errors import NotFound
 from server.core.storage import clip_address
 from server.models import Clip, Rating, Study, StudyRun, VersionClip, View, ViewClip
-from server.participation.views import unpacked
+from server.participation.views import unpack_log
 from server.participation.visit_repository import find_run
 from server.results import replay_repository
 from server.results.schemas import (
@@ -170,7 +170,7 @@ def replayed_trial(session: Session, study: Study, public_id: str, trial_index: 
             session,
             run,
             number,
-            _with(ratings, number),
+            _rating_of_play(ratings, number),
             [one for one in stored if one[0].play == number],
             hashes,
         )
@@ -187,7 +187,7 @@ def replayed_trial(session: Session, study: Study, public_id: str, trial_index: 
     )
 
 
-def _with(ratings: Iterable[Rating], play: int) -> Rating | None:
+def _rating_of_play(ratings: Iterable[Rating], play: int) -> Rating | None:
     return next((rating for rating in ratings if rating.play == play), None)
 
 
@@ -228,7 +228,7 @@ def _view(view: View, clips: Iterable[ViewClip]) -> ReplayedView:
             "screen": view.screen,
             "showings": view.showings,
             "clips": [
-                {"role": clip.role, "clip_sha256": clip.clip_sha256, "drawn": unpacked(clip.frame_log)}
+                {"role": clip.role, "clip_sha256": clip.clip_sha256, "drawn": unpack_log(clip.frame_log)}
                 for clip in clips
             ],
             "disturbances": view.disturbances,

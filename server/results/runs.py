@@ -39,8 +39,8 @@ def page(
     last = None if before is None else visit_repository.find_run(session, study, before).id
     runs = visit_repository.page_of_runs(session, study, show, search, last, limit + 1, simulated=simulated)
     shown = runs[:limit]
-    counts = visit_repository.answered(session, [run.id for run in shown])
-    refused = visit_repository.refused(session, [run.id for run in shown])
+    counts = visit_repository.answered_trials(session, [run.id for run in shown])
+    refused = visit_repository.refused_records(session, [run.id for run in shown])
     are_all = last is None and len(runs) <= limit
     return RunPage(
         runs=[summary(run, *counts.get(run.id, (0, 0)), refused.get(run.id, 0)) for run in shown],
@@ -107,7 +107,9 @@ def timeline(session: Session, study: Study, public_id: str) -> Timeline:
     answered = len({rating.trial_index for rating, _, _ in plays})
     not_good = sum(rating.verdict in ("flagged", "failed") for rating, _, _ in plays)
     return Timeline(
-        summary=summary(run, answered, not_good, visit_repository.refused(session, [run.id]).get(run.id, 0)),
+        summary=summary(
+            run, answered, not_good, visit_repository.refused_records(session, [run.id]).get(run.id, 0)
+        ),
         device=run.device,
         consented_at=run.consented_at,
         trials=[_trial(*play) for play in plays],

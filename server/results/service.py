@@ -14,7 +14,7 @@ from experiments.kinds.scales import scale_called, scales_of
 from server.core.values import now
 from server.models import Study, StudyVersion
 from server.participation.tallies import RT_MS
-from server.participation.tally_pools import PooledTally, pooled
+from server.participation.tally_pools import PooledTally, pooled_tally
 from server.results import summary
 from server.results.repository import Pool, clips_of
 from server.results.schemas import (
@@ -50,13 +50,13 @@ def results(session: Session, study: Study, version: StudyVersion, of: Pool) -> 
     scale = scale_called(definition, of.scale)
     bins = bins_of(scale)
     factors = list(definition.factor_names)
-    tally = pooled(session, of.runs(), of.scale, factors)
+    tally = pooled_tally(session, of.runs(), of.scale, factors)
     clips = _clips(session, version, tally, bins, scale.maximum)
     return Results(
         **common(study, version, of, tally),
         ratings=sum(clip.ratings for clip in clips),
-        scales=[_shown(one) for one in scales_of(definition)],
-        scale=_shown(scale),
+        scales=[_scale_out(one) for one in scales_of(definition)],
+        scale=_scale_out(scale),
         bins=bins,
         # Of a dealt factor a participant has some levels only, as of one between participants.
         margins=margins(
@@ -114,7 +114,7 @@ def bins_of(scale: RatedScale) -> list[float]:
     return [scale.minimum + index * width for index in range(count)]
 
 
-def _shown(scale: RatedScale) -> ResultScale:
+def _scale_out(scale: RatedScale) -> ResultScale:
     return ResultScale(
         name=scale.name,
         type=scale.type,
@@ -156,14 +156,14 @@ def _cells(clips: list[ClipResult]) -> list[CellResult]:
         CellResult(
             cell=cell,
             ratings=sum(clip.ratings for clip in members),
-            mean=_weighted(members),
+            mean=_weighted_mean(members),
             counts=[sum(column) for column in zip(*(clip.counts for clip in members), strict=True)],
         )
         for cell, members in grouped.items()
     ]
 
 
-def _weighted(clips: list[ClipResult]) -> float | None:
+def _weighted_mean(clips: list[ClipResult]) -> float | None:
     total = sum(clip.ratings for clip in clips)
     return sum(clip.ratings * clip.mean for clip in clips if clip.mean is not None) / total if total else None
 

@@ -206,11 +206,11 @@ def student_t(df: int) -> float:
     low, high = 0.0, 20.0
     for _ in range(60):
         middle = (low + high) / 2.0
-        low, high = (middle, high) if _within(middle, df) < COVERAGE else (low, middle)
+        low, high = (middle, high) if _probability_within(middle, df) < COVERAGE else (low, middle)
     return high
 
 
-def _within(t: float, df: int) -> float:
+def _probability_within(t: float, df: int) -> float:
     theta = math.atan(t / math.sqrt(df))
     sine, cosine = math.sin(theta), math.cos(theta)
     odd = df % 2

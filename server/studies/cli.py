@@ -213,7 +213,7 @@ def list_links(study: Annotated[str, typer.Argument(help="Name of the study.")])
             out.print(f"{link.kind},{link.label},{link_url(public_url, key, link.public_id)}")
 
 
-def _labelled(links: list[Link], label: str) -> Link:
+def _labelled_link(links: list[Link], label: str) -> Link:
     """The link with this label; InputError where there is none, or more than one."""
     named = [link for link in links if link.label == label]
     if len(named) != 1:
@@ -238,7 +238,7 @@ def show_secret(
     """
     with stored_services() as services, services.database.write() as session:
         known = find_study(session, study, OPERATOR, "own")
-        of_link = None if link is None else _labelled(links_of(session, known), link)
+        of_link = None if link is None else _labelled_link(links_of(session, known), link)
         told = signing(session, services.settings.key, known, name, None, of_link)
     out.print(f"secret: {told.secret}", soft_wrap=True, highlight=False)
     out.print(f"address: LINK?{told.query}", soft_wrap=True, highlight=False)

@@ -269,12 +269,12 @@ def _add_clips(session: Session, version: StudyVersion, manifest: Manifest) -> N
     stored = {video.sha256: video for video in (*manifest.files, *manifest.sources)}
     known = repository.known_clips(session, stored)
     repository.insert_clips(
-        session, (_stored(video) for video in stored.values() if video.sha256 not in known)
+        session, (_stored_source(video) for video in stored.values() if video.sha256 not in known)
     )
     repository.insert_version_clips(session, version, map(_placed_clips, manifest.files))
 
 
-def _stored(video: DesignClip | CheckClip | SourceVideo) -> dict[str, Any]:
+def _stored_source(video: DesignClip | CheckClip | SourceVideo) -> dict[str, Any]:
     return {
         "sha256": video.sha256,
         "bytes": video.bytes,
@@ -302,7 +302,7 @@ def _placed_clips(clip: DesignClip | CheckClip) -> dict[str, Any]:
 # New studies and new versions: definition and clips are checked and stored before the database changes.
 
 
-def shipped(settings: Settings) -> list[ShippedExperiment]:
+def shipped_experiments(settings: Settings) -> list[ShippedExperiment]:
     """The experiments and demonstrations that come with the program, their clips built or not."""
     experiments = []
     for name in (*SHIPPED, *DEMOS):
@@ -372,11 +372,11 @@ def _materials(
                 "The upload has a manifest; give the definition (TOML) its clips were built from too."
             )
         return order.toml, planned_experiment(order.toml), read_manifest(folder), folder
-    return _own(order, folder)
+    return _own_study(order, folder)
 
 
-def _own(order: NewStudy, folder: Path) -> tuple[str, Experiment, Manifest, Path]:
-    placed = _placed(order.levels, folder)
+def _own_study(order: NewStudy, folder: Path) -> tuple[str, Experiment, Manifest, Path]:
+    placed = _placed_levels(order.levels, folder)
     check_factorial(placed)
     if order.toml is None and order.own_clips is None:
         raise Invalid("Give the study a title and a question, or a definition.")
@@ -387,7 +387,7 @@ def _own(order: NewStudy, folder: Path) -> tuple[str, Experiment, Manifest, Path
     return text or "", experiment, own_clips.manifest_of(experiment, placed, folder), folder
 
 
-def _placed(levels: LevelsTable | LevelsPattern | None, folder: Path) -> Placed:
+def _placed_levels(levels: LevelsTable | LevelsPattern | None, folder: Path) -> Placed:
     files = [path.name for path in videos_of(folder)]
     if levels is None:
         raise Invalid("Say which levels each clip has: by a CSV table or a file-name pattern.")
@@ -425,6 +425,6 @@ def _added_clips(
     if (folder / MANIFEST_NAME).is_file():
         manifest = read_manifest(folder)
     else:
-        manifest = own_clips.manifest_of(experiment, _placed(order.levels, folder), folder)
+        manifest = own_clips.manifest_of(experiment, _placed_levels(order.levels, folder), folder)
     _store(clips, manifest, folder)
     return manifest

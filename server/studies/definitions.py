@@ -24,7 +24,7 @@ from server.studies.schemas import (
     LevelOut,
     ProblemOut,
 )
-from server.studies.series import judged
+from server.studies.series import effects_of_edit
 from server.studies.toml_edit import with_data
 
 
@@ -83,4 +83,4 @@ def edit(edited: EditDefinition) -> EditedDefinition:
 
 def judge_edit(session: Session, name: str, text: str, identity: Identity) -> JudgedEdit:
     """What saving this definition would do to stored answers; DefinitionError where it cannot be used."""
-    return judged(session, find_study(session, name, identity, "view"), planned_experiment(text))
+    return effects_of_edit(session, find_study(session, name, identity, "view"), planned_experiment(text))

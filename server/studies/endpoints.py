@@ -64,7 +64,7 @@ router = APIRouter(prefix="/api/admin", tags=["studies"], responses=ERROR_RESPON
 @router.get("/experiments")
 def list_experiments(settings: SettingsDep, _identity: Viewer) -> list[ShippedExperiment]:
     """The experiments that come with the program."""
-    return creation.shipped(settings)
+    return creation.shipped_experiments(settings)
 
 
 @router.post("/definitions/check")

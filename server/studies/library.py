@@ -90,7 +90,7 @@ class Strips(BaseModel):
 @strip_router.get("")
 def get_strips(settings: SettingsDep, _identity: Viewer) -> Strips:
     """What strips there are; none where they have not been made on this server."""
-    strips = _declared(settings.strips_folder)
+    strips = _declared_strips(settings.strips_folder)
     return strips or Strips(width_px=1, height_px=1, closures=[], characters=[])
 
 
@@ -98,7 +98,7 @@ def get_strips(settings: SettingsDep, _identity: Viewer) -> Strips:
 def get_strip(settings: SettingsDep, _identity: Viewer, name: str) -> Response:
     """The strip of one character."""
     folder = settings.strips_folder
-    strips = _declared(folder)
+    strips = _declared_strips(folder)
     if strips is None or name not in strips.characters:
         raise NotFound(
             f"There is no picture strip of '{name}'; run `stimuli strips --out DATA_FOLDER/stimuli/strips`."
@@ -107,7 +107,7 @@ def get_strip(settings: SettingsDep, _identity: Viewer, name: str) -> Response:
     return Response(content, media_type="image/webp", headers={"cache-control": "private, no-cache"})
 
 
-def _declared(folder: Path) -> Strips | None:
+def _declared_strips(folder: Path) -> Strips | None:
     """The declaration; None where there is none, it is not readable or a picture is missing."""
     try:
         declared = Strips.model_validate_json((folder / STRIPS_FILE).read_bytes())

@@ -7,7 +7,7 @@ from experiments.errors import did_you_mean
 from experiments.schema.stored import load_stored
 from server.accounts import workspace_repository as workspaces
 from server.accounts.identity import Identity, NotAllowed, Operator, SecondFactorNeeded
-from server.accounts.workspace_repository import ordered
+from server.accounts.workspace_repository import ordered_rights
 from server.core.errors import Conflict, NotFound
 from server.models import RIGHTS, Right, Study, StudyVersion
 from server.studies import repository
@@ -55,7 +55,7 @@ def _check(
     session: Session, study: Study, identity: Identity, right: Right, rights: frozenset[Right]
 ) -> None:
     if right not in rights:
-        held = " and ".join(ordered(rights))
+        held = " and ".join(ordered_rights(rights))
         raise NotAllowed(f"This needs the right '{right}' on the study '{study.name}'; you have {held}.")
     workspace = workspaces.workspace_of(session, study)
     if workspace is not None and workspace.second_factor_required and not identity.second_factor:

@@ -191,17 +191,19 @@ def find_link(session: Session, study: Study, public_id: str) -> Link | None:
 
 def links_of(session: Session, study: Study) -> list[Link]:
     """The links of a study that have not been withdrawn, in the order they were made."""
-    return list(session.scalars(_shown(study)))
+    return list(session.scalars(_visible_links(study)))
 
 
 def number_of_links(session: Session, study: Study) -> int:
     """How many links `links_of` would give."""
-    return session.scalar(select(func.count()).select_from(_shown(study).order_by(None).subquery())) or 0
+    return (
+        session.scalar(select(func.count()).select_from(_visible_links(study).order_by(None).subquery())) or 0
+    )
 
 
 def links_after(session: Session, study: Study, link: Link | None, limit: int) -> list[Link]:
     """At most `limit` links in the order they were made, those behind `link`."""
-    query = _shown(study).limit(limit)
+    query = _visible_links(study).limit(limit)
     return list(session.scalars(query if link is None else query.where(Link.id > link.id)))
 
 
@@ -215,7 +217,9 @@ def runs_by_link(session: Session, links: Sequence[Link]) -> dict[int, tuple[int
 
 def first_general_link(session: Session, study: Study, group: str) -> Link | None:
     """The oldest general link for a group (empty: for none) that belongs to no recruiter."""
-    query = _shown(study).where(Link.kind == "general", Link.recruiter.is_(None), Link.group_name == group)
+    query = _visible_links(study).where(
+        Link.kind == "general", Link.recruiter.is_(None), Link.group_name == group
+    )
     return session.scalar(query.limit(1))
 
 
@@ -230,11 +234,11 @@ def recruiters_of_links(session: Session, study: Study) -> list[dict[str, Any]]:
 
 def has_personal_links(session: Session, study: Study) -> bool:
     """Whether somebody was given a link that is theirs alone."""
-    personal = _shown(study).where(Link.kind == "personal").limit(1)
+    personal = _visible_links(study).where(Link.kind == "personal").limit(1)
     return session.scalar(personal) is not None
 
 
-def _shown(study: Study) -> Select[Link]:
+def _visible_links(study: Study) -> Select[Link]:
     query = select(Link).where(
         Link.study_id == study.id, Link.revoked_at.is_(None), Link.synthetic.is_(False)
     )

@@ -92,7 +92,7 @@ def _measures_the_same(
     return known == clips and not changes_what_is_measured(difference(definition_of(version), experiment))
 
 
-def judged(session: Session, study: Study, experiment: Experiment) -> JudgedEdit:
+def effects_of_edit(session: Session, study: Study, experiment: Experiment) -> JudgedEdit:
     """What saving this definition as a further version would do to the answers that are stored."""
     present = active_version(session, study)
     series = series_for(study, experiment, Manifest.model_validate(present.manifest))
@@ -185,25 +185,29 @@ def _side(version: StudyVersion) -> ComparedVersion:
 
 
 def _key(change: Change) -> KeyDifference:
-    pieces = word_difference(_said(change.before), _said(change.after))
+    pieces = word_difference(_value_text(change.before), _value_text(change.after))
     return KeyDifference(
         path=change.path, effect=change.effect, pieces=[Piece(kind=kind, text=text) for kind, text in pieces]
     )
 
 
-def _said(value: Any) -> str:
+def _value_text(value: Any) -> str:
     """A value as it is read: texts as they are, nothing for what is not there."""
     if value is None:
         return ""
-    return value if isinstance(value, str) else json.dumps(_given(value), ensure_ascii=False, indent=1)
+    return (
+        value
+        if isinstance(value, str)
+        else json.dumps(_without_left_out(value), ensure_ascii=False, indent=1)
+    )
 
 
-def _given(value: Any) -> Any:
+def _without_left_out(value: Any) -> Any:
     """A value without the keys of its tables that were left out."""
     if isinstance(value, dict):
-        given = {key: _given(item) for key, item in value.items()}
+        given = {key: _without_left_out(item) for key, item in value.items()}
         return {key: item for key, item in given.items() if item not in (None, {}, [])}
-    return [_given(item) for item in value] if isinstance(value, list) else value
+    return [_without_left_out(item) for item in value] if isinstance(value, list) else value
 
 
 def _clips(old: Clips, new: Clips) -> Iterator[ClipDifference]:

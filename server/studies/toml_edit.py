@@ -49,7 +49,7 @@ def with_data(text: str, data: Mapping[str, Any]) -> str:
         document = tomlkit.parse(text)
         _merge(document, edited)
         merged = tomlkit.dumps(document)
-        if _same(tomllib.loads(merged), edited):
+        if _is_same(tomllib.loads(merged), edited):
             return merged
     except (TOMLKitError, tomllib.TOMLDecodeError):
         pass
@@ -90,18 +90,18 @@ def _without_none(value: Any) -> Any:
     return value
 
 
-def _same(one: Any, other: Any) -> bool:
+def _is_same(one: Any, other: Any) -> bool:
     """Equal, where true is not 1, and 60 is 60.0, as in JSON. Order of keys counts for nothing."""
     if isinstance(one, Mapping) and isinstance(other, Mapping):
-        return one.keys() == other.keys() and all(_same(one[key], other[key]) for key in one)
+        return one.keys() == other.keys() and all(_is_same(one[key], other[key]) for key in one)
     if isinstance(one, list) and isinstance(other, list):
-        return len(one) == len(other) and all(map(_same, one, other))
+        return len(one) == len(other) and all(map(_is_same, one, other))
     if isinstance(one, int | float) and isinstance(other, int | float):
         return isinstance(one, bool) is isinstance(other, bool) and one == other
     return type(one) is type(other) and bool(one == other)
 
 
-def _plain(item: Any) -> Any:
+def _plain_value(item: Any) -> Any:
     return item.unwrap() if hasattr(item, "unwrap") else item
 
 
@@ -111,7 +111,7 @@ def _merge(table: Any, edited: Mapping[str, Any]) -> None:
     for key, value in edited.items():
         if key not in table:
             _add(table, key, value)
-        elif not _same(_plain(table[key]), value):
+        elif not _is_same(_plain_value(table[key]), value):
             _change(table, key, value)
 
 
@@ -172,7 +172,7 @@ def _known_again(old: Sequence[Any], edited: Sequence[Any]) -> list[int | None]:
                 known[index] = number
                 free.remove(number)
 
-    match(lambda number, index: _same(old[number], edited[index]))
+    match(lambda number, index: _is_same(old[number], edited[index]))
     match(lambda number, index: _are_of_one_name(old[number], edited[index]))
     if len(old) == len(edited):
         match(lambda number, index: number == index)
@@ -193,7 +193,7 @@ def _merged_tables(old: AoT, edited: Sequence[Mapping[str, Any]]) -> tuple[AoT, 
     """The elements in their new order, and the comments that now stand above the first."""
     tables = list(old.body)
     above = [[], *[_take_tail(table) for table in tables]]
-    known = _known_again([_plain(table) for table in tables], edited)
+    known = _known_again([_plain_value(table) for table in tables], edited)
     fresh = tomlkit.aot()
     leads: list[list[Any]] = []
     for number, value in zip(known, edited, strict=True):
@@ -248,12 +248,12 @@ def _give_tail(item: Any, tail: Sequence[Any]) -> None:
 
 def _merge_array(array: Array, edited: list[Any]) -> None:
     """Change an array in its place, so that its lines and their comments stay."""
-    known = _known_again(_plain(array), edited)
+    known = _known_again(_plain_value(array), edited)
     kept = [number for number in known if number is not None]
     if kept != sorted(kept) or not kept:
         array.clear()
         for value in edited:
-            array.append(toml_items.inline(value))
+            array.append(toml_items.inline_item(value))
         toml_items.spread(array)
         return
     for number in reversed(range(len(array))):
@@ -261,6 +261,6 @@ def _merge_array(array: Array, edited: list[Any]) -> None:
             del array[number]
     for index, (origin, value) in enumerate(zip(known, edited, strict=True)):
         if origin is None:
-            array.insert(index, toml_items.inline(value))
-        elif not _same(_plain(array[index]), value):
-            array[index] = toml_items.inline(value)
+            array.insert(index, toml_items.inline_item(value))
+        elif not _is_same(_plain_value(array[index]), value):
+            array[index] = toml_items.inline_item(value)

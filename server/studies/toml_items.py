@@ -25,15 +25,15 @@ def is_inline(table: Any) -> bool:
 def item(value: Any, in_line: bool = False, top: bool = False) -> Item:
     """A new value as it is best read: a table of its own, or within a line where it is short."""
     if in_line:
-        return inline(value)
+        return inline_item(value)
     if isinstance(value, Mapping):
-        return table(value) if top or not _is_short(value) else inline(value)
+        return table(value) if top or not _is_short(value) else inline_item(value)
     if are_tables(value) and not _are_rows(value):
         tables = tomlkit.aot()
         for element in value:
             tables.append(table(element))
         return close(tables)
-    return inline(value)
+    return inline_item(value)
 
 
 def table(value: Mapping[str, Any]) -> Table:
@@ -72,17 +72,17 @@ def _are_rows(value: Sequence[Mapping[str, Any]]) -> bool:
     return all(len(element) <= 3 and _is_short(element) for element in value)
 
 
-def inline(value: Any) -> Item:
+def inline_item(value: Any) -> Item:
     """A value that stands behind its key; a list of tables takes a line an element."""
     if isinstance(value, Mapping):
         table = tomlkit.inline_table()
         for key, inner in value.items():
-            table.append(key, inline(inner))
+            table.append(key, inline_item(inner))
         return table
     if isinstance(value, list):
         array = tomlkit.array()
         for inner in value:
-            array.append(inline(inner))
+            array.append(inline_item(inner))
         spread(array)
         return array
     if isinstance(value, str):

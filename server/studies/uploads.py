@@ -279,9 +279,9 @@ def leave_out(folder: Path, name: str) -> None:
     Invalid
         It is still being looked into, or belongs to a built set, which is taken as a whole.
     """
-    file, aside = _named(videos_of(folder), name), folder / ASIDE
+    file, aside = _file_called(videos_of(folder), name), folder / ASIDE
     if file is None:
-        if _named(files_aside(folder), name) is None:
+        if _file_called(files_aside(folder), name) is None:
             raise NotFound(f"This upload has no file '{name[:100]}'.")
         return
     if (folder / MANIFEST_NAME).exists():
@@ -309,9 +309,9 @@ def put_back(folder: Path, name: str) -> None:
     Invalid
         Another file of its name, or one that would be the same clip, has come since.
     """
-    file, there = _named(files_aside(folder), name), videos_of(folder)
+    file, there = _file_called(files_aside(folder), name), videos_of(folder)
     if file is None:
-        if _named(there, name) is None:
+        if _file_called(there, name) is None:
             raise NotFound(f"This upload has no file '{name[:100]}'.")
         return
     target = folder / file.name
@@ -324,7 +324,7 @@ def put_back(folder: Path, name: str) -> None:
         write_record(folder, record)
 
 
-def _named(files: list[Path], name: str) -> Path | None:
+def _file_called(files: list[Path], name: str) -> Path | None:
     # Looked up among the names that there are: nothing that is sent becomes a path.
     asked = one_form(name)
     return next((path for path in files if path.name == asked), None)
@@ -474,7 +474,7 @@ def describe(identifier: str, folder: Path) -> UploadOut:
     has_manifest = any(path.name == MANIFEST_NAME for path in paths)
     check_names(clip_name(path.name) for path in clips)
     first_of: dict[str, str] = {}
-    files = [_described(path, records.get(path.name), first_of, built=has_manifest) for path in clips]
+    files = [_described_file(path, records.get(path.name), first_of, built=has_manifest) for path in clips]
     return UploadOut(
         id=identifier,
         files=files,
@@ -487,7 +487,9 @@ def describe(identifier: str, folder: Path) -> UploadOut:
     )
 
 
-def _described(path: Path, record: Prepared | None, first_of: dict[str, str], *, built: bool) -> UploadedFile:
+def _described_file(
+    path: Path, record: Prepared | None, first_of: dict[str, str], *, built: bool
+) -> UploadedFile:
     shared = {"name": path.name, "bytes": path.stat().st_size}
     if record is None:
         return UploadedFile.model_validate(shared | {"state": "ready" if built else "waiting"})

@@ -17,7 +17,7 @@ from server.context import Services
 from server.core.settings import Settings
 from server.core.values import now
 from server.models import Clip, Link, Study, StudyRun, StudyVersion
-from server.participation.tally_pools import pooled
+from server.participation.tally_pools import pooled_tally
 from server.results.repository import Pool
 from tests.helpers.databases import BACKENDS, run_server_command
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase
@@ -335,7 +335,7 @@ def test_a_draft_is_rehearsed_and_no_count_of_people_knows(
             Pool(study_id=1, origin=origin, series=1, scale=SCALE_NAME)
             for origin in ("participant", "pilot", "simulated")
         )
-        counts = [pooled(session, pool.runs(), SCALE_NAME, ()).answers.total() for pool in pools]
+        counts = [pooled_tally(session, pool.runs(), SCALE_NAME, ()).answers.total() for pool in pools]
     assert counts[:2] == [0, 0]
     assert counts[2] >= 15
 

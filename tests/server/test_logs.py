@@ -11,7 +11,7 @@ from fastapi.testclient import TestClient
 from sqlalchemy.exc import IntegrityError
 
 from server.context import Services
-from server.core.logs import JsonLines, PlainLines, UvicornFilter, described, logging_configuration
+from server.core.logs import JsonLines, PlainLines, UvicornFilter, describe_error, logging_configuration
 from server.core.settings import Settings
 from server.operations.metrics import Observer
 
@@ -50,7 +50,7 @@ def test_what_a_person_sent_is_not_logged(formatter: logging.Formatter, error: E
 
 def test_the_databases_own_first_line_is_kept() -> None:
     assert (
-        described(IntegrityError("x", {}, Exception("duplicate key\nDETAIL")))
+        describe_error(IntegrityError("x", {}, Exception("duplicate key\nDETAIL")))
         == "IntegrityError: duplicate key"
     )
 

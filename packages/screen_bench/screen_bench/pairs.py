@@ -16,7 +16,7 @@ from screen_bench.display import HEIGHT_PX, WIDTH_PX, Display
 from screen_bench.measure import AFTER_CLIP_S, SETTLE_S, poller
 from server.cli_common import migrated_services
 from server.models import View, ViewClip
-from server.participation.views import unpacked
+from server.participation.views import unpack_log
 from tests.browser.server_process import ServerProcess
 
 CLIP_HEIGHT_PX = 120
@@ -170,7 +170,7 @@ def _records(server: ServerProcess, plays: int) -> list[tuple[object, ...]]:
         views = session.query(View).where(View.study_run_id == run).all()
         return [
             tuple(
-                repr(unpacked(clip.frame_log))
+                repr(unpack_log(clip.frame_log))
                 for clip in session.query(ViewClip).where(ViewClip.view == view.id).order_by(ViewClip.role)
             )
             for view in views

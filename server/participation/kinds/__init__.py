@@ -83,7 +83,7 @@ def answer_of(rating: RatingIn, model: type[A]) -> A:
 _SERVED: dict[str, ServedKind] = {}
 
 
-def served(kind: str) -> ServedKind:
+def served_kind(kind: str) -> ServedKind:
     """What the server does for trials of this kind."""
     if kind not in _SERVED:
         _SERVED[kind] = import_module(f"server.participation.kinds.{kind}").SERVED

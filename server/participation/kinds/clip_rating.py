@@ -57,7 +57,7 @@ def validate(experiment: Experiment, part: Part, rating: RatingIn) -> None:
     answer = answer_of(rating, RatingAnswer)
     if answer.reference_gap_ms is not None and clip_rating_of(experiment).reference is None:
         raise NoReference("Expected no reference_gap_ms, since this study shows no reference; got one.")
-    asked = {scale.name: scale for scale in _asked(experiment, part)}
+    asked = {scale.name: scale for scale in _rated_scales(experiment, part)}
     for name in answer.answers:
         if name not in asked:
             raise NoSuchScale(f"Expected answers on the scales {', '.join(asked)}; got one on {name}.")
@@ -71,7 +71,7 @@ def validate(experiment: Experiment, part: Part, rating: RatingIn) -> None:
         _check(asked[name], given)
 
 
-def _asked(experiment: Experiment, part: Part) -> tuple[RatedScale, ...]:
+def _rated_scales(experiment: Experiment, part: Part) -> tuple[RatedScale, ...]:
     if part == "attention":
         return (clip_rating_of(experiment).check_scale.rated("response"),)
     return scales_of(experiment)
@@ -114,11 +114,11 @@ def simulated(
     liking = preference(trial["clips"][0]["clip_sha256"])
     if told.reference:
         liking = UNIMPAIRED - abs(liking - preference(trial["clips"][1]["clip_sha256"]))
-    given = _answers({scale.name: _answered(scale.rated(""), liking, rng) for scale in told.scales})
+    given = _answers({scale.name: _simulated_value(scale.rated(""), liking, rng) for scale in told.scales})
     return given | ({"reference_gap_ms": told.reference.gap_ms} if told.reference else {})
 
 
-def _answered(scale: RatedScale, liking: float, rng: random.Random) -> dict[str, Any]:
+def _simulated_value(scale: RatedScale, liking: float, rng: random.Random) -> dict[str, Any]:
     middle, unit = (scale.minimum + scale.maximum) / 2, (scale.maximum - scale.minimum) / 6
     value = scale.nearest(middle + (-1 if scale.reverse else 1) * unit * (liking + rng.gauss(0, TRIAL_SD)))
     if scale.not_applicable and rng.random() < NOT_APPLICABLE_SHARE:

@@ -9,7 +9,7 @@ from importlib import import_module
 from sqlalchemy.orm import Session
 
 from server.models import Study, StudyVersion
-from server.participation.tally_pools import pooled
+from server.participation.tally_pools import pooled_tally
 from server.results.repository import Pool
 from server.results.schemas import AnyResults, OtherResults
 from server.results.service import common
@@ -34,7 +34,7 @@ def summary_of(kind: str) -> Summarise:
 def _summarise_unknown(session: Session, study: Study, version: StudyVersion, of: Pool) -> OtherResults:
     """Of a kind without a file here: how much there is, how it was shown, and that this is all."""
     kind = definition_of(version).trial.kind
-    tally = pooled(session, of.runs(), "", ())
+    tally = pooled_tally(session, of.runs(), "", ())
     return OtherResults(
         **common(study, version, of, tally),
         ratings=tally.answers.total(),

@@ -7,7 +7,7 @@ from sqlalchemy.orm import Session
 from experiments import design
 from experiments.declaration.continuous_rating import continuous_rating_of
 from server.models import Study, StudyVersion
-from server.participation.tally_pools import pooled
+from server.participation.tally_pools import pooled_tally
 from server.results.repository import Pool, blinks_of_cells, traces_of
 from server.results.schemas import TraceCell, TraceResults
 from server.results.service import common
@@ -18,7 +18,7 @@ from server.studies.lookup import definition_of
 def summarise(session: Session, study: Study, version: StudyVersion, of: Pool) -> TraceResults:
     """The traces of one pool, which is of the data series of `version`."""
     definition = definition_of(version)
-    declared, tally = continuous_rating_of(definition), pooled(session, of.runs(), "", ())
+    declared, tally = continuous_rating_of(definition), pooled_tally(session, of.runs(), "", ())
     order = ["/".join(level for _, level in cell) for cell in design.cells(definition)]
     return TraceResults(
         **common(study, version, of, tally),

@@ -11,7 +11,7 @@ from experiments import design
 from experiments.declaration.experiment import Experiment
 from experiments.declaration.paired_comparison import CODES
 from server.models import Study, StudyVersion
-from server.participation.tally_pools import PooledTally, pooled
+from server.participation.tally_pools import PooledTally, pooled_tally
 from server.results.repository import Pool, cells_of
 from server.results.schemas import LevelChoices, PairChoices, PairResults
 from server.results.service import common
@@ -38,7 +38,7 @@ class Choices:
 def summarise(session: Session, study: Study, version: StudyVersion, of: Pool) -> PairResults:
     """Choices of one pool, which is of the data series of `version`."""
     definition = definition_of(version)
-    tally = pooled(session, of.runs(), "", ())
+    tally = pooled_tally(session, of.runs(), "", ())
     outcomes = outcomes_of(tally, cells_of(session, of))
     sides = Counter[int]()
     for (_, _, code), times in outcomes.items():

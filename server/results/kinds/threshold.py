@@ -12,7 +12,7 @@ from experiments.declaration.experiment import Experiment
 from experiments.declaration.threshold import Series, TwoInterval, threshold_of
 from experiments.kinds.threshold_grid import Point, model, seconds, series_of
 from server.models import Study, StudyVersion
-from server.participation.tally_pools import pooled
+from server.participation.tally_pools import pooled_tally
 from server.results.repository import (
     LatestEstimate,
     PersonCount,
@@ -38,7 +38,7 @@ def summarise(session: Session, study: Study, version: StudyVersion, of: Pool) -
     series may show the same clips. So answers come from there, and all else from the tallies.
     """
     definition = definition_of(version)
-    declared, tally = threshold_of(definition), pooled(session, of.runs(), "", ())
+    declared, tally = threshold_of(definition), pooled_tally(session, of.runs(), "", ())
     counts, estimates = stimulus_counts(session, of), latest_estimates(session, of)
     second = declared.stimulus.second
     tilts = mean_tilts(definition, person_counts(session, of)) if second else {}

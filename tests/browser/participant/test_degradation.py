@@ -9,7 +9,7 @@ from playwright.sync_api import Page
 
 from server.cli_common import migrated_services
 from server.models import ViewClip
-from server.participation.views import unpacked
+from server.participation.views import unpack_log
 from tests.browser.served import Served, go_back, serve
 from tests.browser.studies import PLAIN
 from tests.browser.visit import axe_violations
@@ -74,7 +74,7 @@ def test_a_reference_and_the_rated_clip_are_one_view(studies: Served, page: Page
     ids = [view["id"] for view in studies.views(2)]
     with migrated_services(studies.server.settings) as services, services.database.read() as session:
         stored = session.query(ViewClip).where(ViewClip.view.in_(ids)).all()
-        logs = [{clip.role: unpacked(clip.frame_log) for clip in stored if clip.view == one} for one in ids]
+        logs = [{clip.role: unpack_log(clip.frame_log) for clip in stored if clip.view == one} for one in ids]
     for row, log in zip(rows, logs, strict=True):
         gap_ms = log["shown"][0][1] - log["reference"][-1][1]
         assert gap_ms >= GAP_MS, "the gap is not shorter than declared"

@@ -10,7 +10,7 @@ from playwright.sync_api import Page, Route
 from experiments.load import parse_experiment
 from server.cli_common import migrated_services
 from server.models import ViewClip
-from server.participation.views import unpacked
+from server.participation.views import unpack_log
 from tests.browser.server_process import ServerProcess
 from tests.browser.studies import PLAIN, without
 from tests.browser.visit import Visit
@@ -143,7 +143,7 @@ def test_two_long_clips_side_by_side_are_drawn_by_one_clock(
     assert left == right
     with migrated_services(server.settings) as services, services.database.read() as session:
         clips = session.query(ViewClip).order_by(ViewClip.role).all()
-        logs = {clip.role: [index for index, _ in unpacked(clip.frame_log)] for clip in clips}
+        logs = {clip.role: [index for index, _ in unpack_log(clip.frame_log)] for clip in clips}
     assert logs == {"left": left, "right": left}
     assert len(set(left)) >= FRAMES / 4
     assert row["payload"]

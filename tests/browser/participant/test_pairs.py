@@ -10,7 +10,7 @@ from playwright.sync_api import Page
 
 from server.cli_common import migrated_services
 from server.models import View, ViewClip
-from server.participation.views import unpacked
+from server.participation.views import unpack_log
 from tests.browser.analysed import analysed
 from tests.browser.served import Served, go_back, reload_in_next_clip, serve, show_to_answers, start_clip
 from tests.browser.studies import PLAIN
@@ -75,7 +75,7 @@ def test_pairs_by_keyboard(studies: Served, page: Page, tmp_path: Path) -> None:
         for view in views:
             assert view.completed
             clips = session.query(ViewClip).filter_by(view=view.id).order_by(ViewClip.role)
-            logs[view.trial_index] = [(clip.role, unpacked(clip.frame_log)) for clip in clips]
+            logs[view.trial_index] = [(clip.role, unpack_log(clip.frame_log)) for clip in clips]
     assert [row["winner"] for row in rows] == ["right", "tie"]
     digests = studies.server.rows("SELECT digest_right FROM answer_evidence WHERE clip_ms > 0")
     assert [row["digest_right"] for row in digests][:2] == [1, 1]
@@ -96,7 +96,8 @@ def logs_of(studies: Served) -> list[dict[str, list[tuple[int, float]]]]:
     with migrated_services(studies.server.settings) as services, services.database.read() as session:
         clips = session.query(ViewClip).where(ViewClip.view.in_(ids)).order_by(ViewClip.view).all()
         return [
-            {clip.role: unpacked(clip.frame_log) for clip in clips if clip.view == one} for one in sorted(ids)
+            {clip.role: unpack_log(clip.frame_log) for clip in clips if clip.view == one}
+            for one in sorted(ids)
         ]
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from server.participation.evidence import JudgedAnswer, guessed, judge, signals_of
+from server.participation.evidence import JudgedAnswer, chance_of_guessing, judge, signals_of
 from tests.server.evidence.test_verdicts import gamma_person
 
 CHECKS, CHOICES, RUNS = 10, 4, 1000
@@ -27,27 +27,27 @@ def with_checks(answers: list[JudgedAnswer], rng: random.Random, right: float) -
 
 def test_guesses_are_counted_as_the_binomial_distribution_has_them() -> None:
     expected = sum(comb(10, k) * 0.25**k * 0.75 ** (10 - k) for k in range(6, 11))
-    assert guessed(6, [4] * 10) == pytest.approx(expected)
-    assert guessed(0, [4] * 10) == pytest.approx(1)
-    assert guessed(10, [9] * 4 + [4] * 6) == pytest.approx(9**-4 * 4**-6)
+    assert chance_of_guessing(6, [4] * 10) == pytest.approx(expected)
+    assert chance_of_guessing(0, [4] * 10) == pytest.approx(1)
+    assert chance_of_guessing(10, [9] * 4 + [4] * 6) == pytest.approx(9**-4 * 4**-6)
 
 
 def test_too_few_checks_say_nothing() -> None:
     """Where one lapse would make somebody who sees them look like a guess."""
     enough = {9: 6, 4: 8, 2: 20}
-    assert guessed(0, []) is None
+    assert chance_of_guessing(0, []) is None
     for choices, number in enough.items():
-        assert guessed(number, [choices] * number) is not None
-    assert guessed(4, [9] * 4) is None
-    assert guessed(5, [4] * 5) is None
-    assert guessed(10, [2] * 10) is None
+        assert chance_of_guessing(number, [choices] * number) is not None
+    assert chance_of_guessing(4, [9] * 4) is None
+    assert chance_of_guessing(5, [4] * 5) is None
+    assert chance_of_guessing(10, [2] * 10) is None
 
 
 @pytest.mark.parametrize("choices", [4, 9])
 def test_guessing_passes_ten_checks_less_than_once_in_a_hundred_runs(choices: int) -> None:
     """By the distribution itself: the chance to reach the least number of right answers that passes."""
-    passes = next(n for n in range(CHECKS + 1) if (guessed(n, [choices] * CHECKS) or 0) < 0.01)
-    chance = guessed(passes, [choices] * CHECKS)
+    passes = next(n for n in range(CHECKS + 1) if (chance_of_guessing(n, [choices] * CHECKS) or 0) < 0.01)
+    chance = chance_of_guessing(passes, [choices] * CHECKS)
     assert chance is not None
     assert chance < 0.01
 

@@ -18,7 +18,14 @@ from server.context import Services, open_services
 from server.core.settings import Settings
 from server.core.values import now
 from server.operations import watched_backups as watching
-from server.operations.backup import back_up, decrypt, encrypted, identity_in, make_identity, recipient_of
+from server.operations.backup import (
+    back_up,
+    decrypt,
+    encrypted_stream,
+    identity_in,
+    make_identity,
+    recipient_of,
+)
 from server.operations.backup_stores import (
     BackupStore,
     StoredBackup,
@@ -236,7 +243,7 @@ def test_a_backup_that_breaks_off_leaves_nothing_and_says_why(
 
     with (
         pytest.raises(InputError, match="the disk of the database went away"),
-        encrypted(write, recipient_of(keys[0])) as stream,
+        encrypted_stream(write, recipient_of(keys[0])) as stream,
     ):
         store.put("palpebra-2026-03-01.tar.age", stream)
     assert store.entries() == []

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from server.core.settings import Settings
-from server.operations.watched_backups import day_of, superfluous
+from server.operations.watched_backups import day_of, superfluous_backups
 from tests.helpers.databases import run_server_command
 
 DAYS = st.dates(date(2026, 1, 1), date(2026, 3, 1))
@@ -45,19 +45,19 @@ def test_two_backups_a_minute_apart_leave_the_one_of_twenty_days_ago(
 def test_beyond_the_days_everything_goes_and_each_day_keeps_its_last() -> None:
     days = [date(2026, 1, 1) + timedelta(days=number) for number in range(4)]
     paths = [Path(f"palpebra-{day}T{hour}0000.tar") for day in days for hour in ("03", "15")]
-    gone = superfluous(paths, 3)
+    gone = superfluous_backups(paths, 3)
     assert names(*gone) == names(paths[0], paths[1], paths[2], paths[4])
 
 
 @given(st.lists(NAMES, max_size=40, unique=True), st.integers(1, 20))
 def test_the_promise_holds_for_any_set_of_backups(found: list[str], keep: int) -> None:
     paths = [Path(name) for name in found]
-    left = set(paths) - set(superfluous(paths, keep))
+    left = set(paths) - set(superfluous_backups(paths, keep))
     days = sorted({day_of(path) for path in paths} - {None}, reverse=True)  # type: ignore[type-var]
     assert {day_of(path) for path in left} == set(days[:keep])
-    assert superfluous(left, keep) == []
+    assert superfluous_backups(left, keep) == []
 
 
 @pytest.mark.parametrize("name", ["monday.tar", "palpebra-2026-13-01.tar", "palpebra-2026-01-01-x.tar"])
 def test_a_file_that_somebody_named_stays(name: str) -> None:
-    assert superfluous([Path(name), Path("palpebra-2026-02-01.tar")], 1) == []
+    assert superfluous_backups([Path(name), Path("palpebra-2026-02-01.tar")], 1) == []

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from sqlalchemy import func, select
 
 from server.context import Services, open_services
-from server.core.locks import locked
+from server.core.locks import file_lock
 from server.core.settings import Settings
 from server.core.values import now
 from server.models import AuditEntry, IdentityKey, Rating, StudyRun
@@ -31,11 +31,11 @@ from server.operations.snapshots import (
     SnapshotUnderWayError,
     database_file,
     is_due,
-    look,
     set_aside,
     snapshots_of,
     snapshots_taken,
-    superfluous,
+    superfluous_snapshots,
+    take_due_snapshot,
     take_snapshot,
 )
 from server.participation.identity_keys import ParticipantIdentity
@@ -116,7 +116,7 @@ class TestTaking:
 
     def test_two_at_once_are_one(self, services: Services) -> None:
         with (
-            locked(services.settings.data_folder / "snapshots" / LOCK),
+            file_lock(services.settings.data_folder / "snapshots" / LOCK),
             pytest.raises(SnapshotUnderWayError),
         ):
             take_snapshot(services.settings)
@@ -185,7 +185,7 @@ class TestThinning:
     @pytest.mark.parametrize("every_min", [5, 15, 60])
     def test_a_week_of_them(self, every_min: int) -> None:
         moments = [NOON - timedelta(minutes=every_min * number) for number in range(14 * 1440 // every_min)]
-        gone = set(superfluous(moments, NOON))
+        gone = set(superfluous_snapshots(moments, NOON))
         left = [moment for moment in moments if moment not in gone]
         assert sum(moment >= NOON - ALL_OF for moment in left) == 60 // every_min + 1
         hours = {f"{moment:%dT%H}" for moment in left if NOON - HOURLY_OF <= moment < NOON - ALL_OF}
@@ -197,9 +197,9 @@ class TestThinning:
     @given(minutes=st.lists(st.integers(0, 20_000), min_size=1, max_size=60))
     def test_what_stays_stays_when_it_is_thinned_again(self, minutes: list[int]) -> None:
         moments = {NOON - timedelta(minutes=number) for number in minutes}
-        left = moments - set(superfluous(moments, NOON))
+        left = moments - set(superfluous_snapshots(moments, NOON))
         assert max(moments) in left
-        assert superfluous(left, NOON) == []
+        assert superfluous_snapshots(left, NOON) == []
 
 
 @ON_SQLITE
@@ -288,12 +288,12 @@ class TestErasures:
             run = session.scalars(select(StudyRun)).one()
             keep(session, run, run.study.pseudonym_key, ParticipantIdentity("5a9d"))
         settings = services.settings.model_copy(update={"snapshot_minutes": 60.0})
-        look(settings)
+        take_due_snapshot(settings)
         (taken,) = snapshots_of(settings)
         path = f"/studies/short/runs/{visit.run_id}/erase"
         assert experimenter.send("POST", path, {"confirm": visit.run_id}).status_code == 200
         assert ratings_in(taken.path) > 0
-        look(settings)
+        take_due_snapshot(settings)
         assert snapshots_of(settings) == [taken]
         assert ratings_in(taken.path) == 0
         copy = open_services(settings.model_copy(update={"database_url": f"sqlite:///{taken.path}"}))

@@ -9,7 +9,7 @@ from fastapi.testclient import TestClient
 
 from server.context import Services
 from server.models import Study, StudyRun
-from server.participation.run_repository import compared
+from server.participation.run_repository import compared_answers
 from tests.helpers.studies import Participant, StudyInDatabase, add_study
 from tests.server.trials.test_comparisons import PAIRS, compare, mains
 
@@ -31,7 +31,7 @@ def counted(services: Services) -> Counter[str | None]:
 
     with services.database.read() as session:
         version = session.query(Study).one().versions[0].id
-        rows = compared(session, version, "participant", timedelta(minutes=LEASE_MINUTES))
+        rows = compared_answers(session, version, "participant", timedelta(minutes=LEASE_MINUTES))
     assert rows == sorted(rows, key=lambda row: (row.left, row.right, row.winner or ""))
     counts: Counter[str | None] = Counter()
     for row in rows:

@@ -17,7 +17,7 @@ from server.core.errors import Conflict
 from server.models import Account, Job
 from server.rehearsals import service
 from server.rehearsals.schemas import NewRehearsal
-from server.results.jobs import begun
+from server.results.jobs import begin_job
 from server.studies.lookup import find_study
 from tests.helpers.admins import Admin
 from tests.helpers.studies import SHORT, StudyInDatabase, add_study
@@ -215,7 +215,7 @@ def test_of_two_who_ask_at_once_one_is_refused(
         try:
             with services.database.write() as session:
                 asked = find_study(session, "short", OPERATOR, "run")
-                begun(services.locks, session, asked, "rehearsal", {}, somebody, "it goes on already")
+                begin_job(services.locks, session, asked, "rehearsal", {}, somebody, "it goes on already")
             outcomes.append("begun")
         except Conflict as error:
             outcomes.append(str(error))
@@ -223,7 +223,7 @@ def test_of_two_who_ask_at_once_one_is_refused(
     second = threading.Thread(target=ask)
     with services.database.write() as session:
         first = find_study(session, "short", OPERATOR, "run")
-        begun(services.locks, session, first, "rehearsal", {}, somebody, "it goes on already")
+        begin_job(services.locks, session, first, "rehearsal", {}, somebody, "it goes on already")
         session.flush()
         second.start()
         second.join(0.5)

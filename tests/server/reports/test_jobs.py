@@ -39,7 +39,7 @@ def job(services: Services, study: StudyInDatabase) -> str:
     """The public id of a report that waits."""
     with services.database.write() as session:
         known = find_study(session, "short", OPERATOR, "run")
-        return jobs.begun(services.locks, session, known, "report", {}, OPERATOR, "").public_id
+        return jobs.begin_job(services.locks, session, known, "report", {}, OPERATOR, "").public_id
 
 
 def ended(services: Services, public_id: str) -> tuple[str, str]:

@@ -15,7 +15,7 @@ from server.models import Rating, RunTally, StudyRun
 from server.operations import doctor
 from server.participation import ratings
 from server.participation.answer_schemas import RatingIn
-from server.participation.tallies import Play, Tally, TallyEntry, tally_of, unpacked
+from server.participation.tallies import Play, Tally, TallyEntry, tally_of, unpack_answer
 from server.participation.tally_pools import Recount
 from tests.helpers.admins import Admin
 from tests.helpers.databases import run_server_command
@@ -52,7 +52,7 @@ def tallied(given_plays: list[Play]) -> Tally:
 
 @given(answers)
 def test_a_packed_answer_is_the_answer(answer: TallyEntry) -> None:
-    assert unpacked(answer.packed()) == (answer.clip, answer.second, answer.value)
+    assert unpack_answer(answer.packed()) == (answer.clip, answer.second, answer.value)
 
 
 @given(st.lists(plays, max_size=12), st.randoms())
@@ -87,7 +87,7 @@ def test_every_kind_of_play_is_counted_as_it_is_stored(participant: Participant,
         tally = tally_of(row.heat, row.not_good, row.counts, row.answers)
         stored = session.scalars(select(Rating)).all()
     assert tally.not_good == sum(one.verdict in ("flagged", "failed") for one in stored) >= 2
-    assert sorted(unpacked(code)[2] for code in tally.answers["rating"]) == [2, 4, 4, 4, 4, 4, 6, 7]
+    assert sorted(unpack_answer(code)[2] for code in tally.answers["rating"]) == [2, 4, 4, 4, 4, 4, 6, 7]
     assert sum(tally.cells["rating"][::2]) == 8
     assert sum(tally.cells["rating"][1::2]) == 35_000
     assert sum(tally.plays.values()) == 9

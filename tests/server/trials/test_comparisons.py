@@ -12,7 +12,7 @@ from server.context import Services
 from server.exports.extract import Extract
 from server.exports.formats import FORMATS
 from server.models import RunTally, Study
-from server.participation.tallies import tally_of, unpacked
+from server.participation.tallies import tally_of, unpack_answer
 from server.participation.tally_pools import Recount
 from server.rehearsals.person import Person, Rater
 from tests.helpers.admins import Admin
@@ -196,7 +196,7 @@ def test_a_comparison_is_counted_by_its_two_clips(judge: Participant, services: 
     tally = tally_of(row.heat, row.not_good, row.counts, row.answers)
     version = next(iter(services.versions._loaded.values()))
     hashes = [version.clips[clip].sha256 for clip in version.numbered]
-    counted = [unpacked(code) for code in tally.answers[""]]
+    counted = [unpack_answer(code) for code in tally.answers[""]]
     assert [(hashes[left], hashes[right], value) for left, right, value in counted] == [
         (trial["clips"][0]["clip_sha256"], trial["clips"][1]["clip_sha256"], value)
         for trial, value in zip(trials, (1, 2, 3), strict=False)

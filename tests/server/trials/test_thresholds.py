@@ -279,7 +279,7 @@ def test_a_trial_that_failed_while_its_series_ended_is_still_asked_for(
     study = add_study(services, tmp_path / "clips", text_with(SHORT, rule))
     one = Participant(client, study.link_token).agree()
     late, failed = of_series(one.state(), 0)[5], list[Any]()
-    reckoned = series.reckoned
+    reckoned = series.outlook_after
 
     def meanwhile(*stored: Any) -> series.Outlook:
         outlook = reckoned(*stored)
@@ -289,7 +289,7 @@ def test_a_trial_that_failed_while_its_series_ended_is_still_asked_for(
             failed[0] = answer(one, late, "yes", playback=wrong).json()["receipt"]
         return outlook
 
-    monkeypatch.setattr(series, "reckoned", meanwhile)
+    monkeypatch.setattr(series, "outlook_after", meanwhile)
     for place in range(4):
         saved = answer(one, of_series(one.state(), 0)[place], "yes").json()
     assert failed[0]["again"]

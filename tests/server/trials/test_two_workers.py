@@ -147,7 +147,7 @@ def _check_series(services: Services) -> None:
                 assert len(numbers) >= 7
             # Reckoned anew from nothing, everything is as the two workers wrote it in turn.
             bare = [SimpleNamespace(**{**row._mapping, "threshold": None}) for row in answers]
-            outlook = series.reckoned(loaded, trials, bare)
+            outlook = series.outlook_after(loaded, trials, bare)
             for row in answers:
                 estimate = outlook.estimates[row.trial_index, row.play]
                 assert row.threshold == pytest.approx(estimate.threshold)

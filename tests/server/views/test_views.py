@@ -10,7 +10,7 @@ from sqlalchemy import text
 
 from server.context import Services
 from server.models import View, ViewClip
-from server.participation.views import packed, unpacked
+from server.participation.views import pack_log, unpack_log
 from tests.helpers.studies import Participant, StudyInDatabase
 
 BEGUN = "2026-11-21T10:00:00+00:00"
@@ -34,12 +34,12 @@ def send(participant: Participant, *views: dict[str, Any]) -> Any:
 
 @given(st.lists(entries, max_size=200))
 def test_a_frame_log_comes_back(log: list[tuple[int, float]]) -> None:
-    assert unpacked(packed(log)) == log
+    assert unpack_log(pack_log(log)) == log
 
 
 def test_a_packed_log_is_a_fraction_of_its_json() -> None:
     log = [(index, round(10.03 + index * 1000 / 60, 2)) for index in range(120)]
-    assert len(packed(log)) < 0.45 * len(json.dumps(log))
+    assert len(pack_log(log)) < 0.45 * len(json.dumps(log))
 
 
 def test_a_view_begun_is_stored_though_it_never_ends(participant: Participant, services: Services) -> None:
@@ -63,7 +63,7 @@ def test_a_view_is_begun_and_completed_once(participant: Participant, services: 
     assert [(one["begun"], one["completed"]) for one in answers] == [(1, 0), (0, 0), (0, 1), (0, 0)]
     with services.database.read() as session:
         assert session.query(View).one().completed
-        assert unpacked(session.query(ViewClip).one().frame_log) == [(0, 0), (1, 33.37), (2, 66.7)]
+        assert unpack_log(session.query(ViewClip).one().frame_log) == [(0, 0), (1, 33.37), (2, 66.7)]
 
 
 def test_views_of_other_trials_and_taken_numbers_are_refused(

@@ -128,7 +128,7 @@ def test_ones_own_studies_and_those_granted_are_seen_and_nothing_else(
 def seen(connection: Connection, account: int, query: str = "SELECT name FROM studies") -> list[object]:
     """What a member's transaction gets."""
     with connection.begin_nested() as inner:
-        connection.exec_driver_sql(row_security._narrowing(account))
+        connection.exec_driver_sql(row_security._narrowing_statement(account))
         found = list(connection.scalars(text(query)))
         inner.rollback()
     return found
