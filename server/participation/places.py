@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from datetime import timedelta
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from sqlalchemy.orm import Session
 
@@ -11,15 +11,11 @@ from experiments.assignment.order import with_checks
 from experiments.assignment.trial import Trial
 from experiments.declaration.experiment import Experiment
 from experiments.kinds import KINDS
-from server.models import StudyRun
+from server.models import Link, StudyRun
 from server.participation import run_repository, series
 from server.participation.refusals import GroupRefused
 from server.participation.run_repository import compared_answers
 from server.participation.versions import LoadedVersion
-
-if TYPE_CHECKING:
-    from server.models import Link
-
 
 # Into which groups a run may come: by turn, by its link, or by an answer; and which have places left.
 
@@ -27,7 +23,7 @@ PARAMETER = "group"
 COUNTED_ORIGINS = ("participant", "pilot")
 
 
-def check_parameter(experiment: Experiment, link: "Link", query: Mapping[str, str]) -> None:
+def check_parameter(experiment: Experiment, link: Link, query: Mapping[str, str]) -> None:
     """GroupRefused where the address asks for a group that its link is not for."""
     asked = query.get(PARAMETER)
     if asked is None or len(names(experiment)) < 2 or asked == link.group_name:
@@ -38,7 +34,7 @@ def check_parameter(experiment: Experiment, link: "Link", query: Mapping[str, st
     )
 
 
-def leads_nowhere(experiment: Experiment, link: "Link") -> bool:
+def leads_nowhere(experiment: Experiment, link: Link) -> bool:
     """True where links decide the group and this one, meant for people, is for none that there is."""
     by_link = experiment.groups.by == "link" and link.kind != "preview" and not link.synthetic
     return by_link and link.group_name not in names(experiment)

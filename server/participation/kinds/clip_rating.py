@@ -2,7 +2,7 @@
 
 import random
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from experiments.declaration.clip_rating import SCALE_NAME, RatingAnswer, ScaleAnswer, clip_rating_of
 from experiments.declaration.experiment import Experiment
@@ -15,10 +15,7 @@ from server.participation.kinds import Preference, ServedKind, answer_of, asked_
 from server.participation.tallies import NumberedClip, TallyEntry
 from server.participation.verdict import Ruling, judge_several, playback_of
 from server.participation.verdict import judge as judge_play
-
-if TYPE_CHECKING:
-    from server.participation.versions import LoadedVersion
-
+from server.participation.versions import LoadedVersion
 
 TRIAL_SD = 1.0
 """Spread of single answers of simulated people, in points of a seven-point scale."""
@@ -88,7 +85,7 @@ def _check(scale: RatedScale, given: ScaleAnswer) -> None:
         )
 
 
-def judge(loaded: "LoadedVersion", clips: Mapping[str, int], rating: RatingIn) -> Ruling:
+def judge(loaded: LoadedVersion, clips: Mapping[str, int], rating: RatingIn) -> Ruling:
     """The verdict on one play over all its views, or on a reference and the clip after it."""
     rules, rated = loaded.experiment.playback, rating.answer.given
     if not clips:

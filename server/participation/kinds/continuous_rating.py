@@ -3,7 +3,7 @@
 import math
 import random
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from experiments.declaration.continuous_rating import (
     ContinuousAnswer,
@@ -19,10 +19,7 @@ from server.participation.kinds.clip_rating import RatingMissing, RatingOutOfSca
 from server.participation.tallies import NumberedClip, TallyEntry
 from server.participation.verdict import Ruling, playback_of
 from server.participation.verdict import judge as judge_play
-
-if TYPE_CHECKING:
-    from server.participation.versions import LoadedVersion
-
+from server.participation.versions import LoadedVersion
 
 LAG_S, RISE_S, HEIGHT_SHARE = 0.8, 0.6, 0.12
 """A simulated person begins to answer a blink after LAG_S; the answer is highest RISE_S later, by
@@ -53,7 +50,7 @@ def validate(experiment: Experiment, part: Part, rating: RatingIn) -> None:
             )
 
 
-def judge(loaded: "LoadedVersion", clips: Mapping[str, int], rating: RatingIn) -> Ruling:
+def judge(loaded: LoadedVersion, clips: Mapping[str, int], rating: RatingIn) -> Ruling:
     """The verdict on the play; it fails too where the trace has not a value for each sampled frame."""
     rules, answer = loaded.experiment.playback, answer_of(rating, ContinuousAnswer)
     playback = playback_of(rating.playback)

@@ -3,7 +3,7 @@
 import math
 import random
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from experiments.declaration.experiment import Experiment
 from experiments.declaration.paired_comparison import (
@@ -20,10 +20,7 @@ from server.participation.kinds.clip_rating import RatingMissing
 from server.participation.tallies import NumberedClip, TallyEntry
 from server.participation.verdict import Ruling, judge_several, playback_of
 from server.participation.verdict import judge as judge_play
-
-if TYPE_CHECKING:
-    from server.participation.versions import LoadedVersion
-
+from server.participation.versions import LoadedVersion
 
 TIE_SHARE = 0.5
 """Davidson's nu of simulated people: ties against the geometric mean of the two odds."""
@@ -49,7 +46,7 @@ def validate(experiment: Experiment, part: Part, rating: RatingIn) -> None:
         )
 
 
-def judge(loaded: "LoadedVersion", clips: Mapping[str, int], rating: RatingIn) -> Ruling:
+def judge(loaded: LoadedVersion, clips: Mapping[str, int], rating: RatingIn) -> Ruling:
     """The verdict on a showing of all clips of the trial: each must be there, and every frame of each."""
     rules, rated = loaded.experiment.playback, rating.answer.given
     if not clips:

@@ -2,7 +2,7 @@
 
 import random
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from experiments.declaration.experiment import Experiment
 from experiments.declaration.threshold import CODES, ThresholdAnswer, YesNo, threshold_of
@@ -13,9 +13,7 @@ from server.participation.kinds.clip_rating import RatingMissing
 from server.participation.tallies import NumberedClip, TallyEntry
 from server.participation.verdict import Ruling, judge_several, playback_of
 from server.participation.verdict import judge as judge_play
-
-if TYPE_CHECKING:
-    from server.participation.versions import LoadedVersion
+from server.participation.versions import LoadedVersion
 
 
 class NoSuchAnswer(Invalid):
@@ -34,7 +32,7 @@ def validate(experiment: Experiment, part: Part, rating: RatingIn) -> None:
         raise RatingMissing("Expected an answer, got none; only a clip that failed may go without.")
 
 
-def judge(loaded: "LoadedVersion", clips: Mapping[str, int], rating: RatingIn) -> Ruling:
+def judge(loaded: LoadedVersion, clips: Mapping[str, int], rating: RatingIn) -> Ruling:
     """The verdict on the one clip, or on both: each must be that assigned, with every frame of each."""
     rules, rated = loaded.experiment.playback, rating.answer.given
     playback = playback_of(rating.playback)

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping, Sequence
 from statistics import fmean
-from typing import TYPE_CHECKING
 
 from sqlalchemy.orm import Session
 
@@ -12,6 +11,7 @@ from experiments.declaration.experiment import Experiment
 from experiments.declaration.threshold import Series, TwoInterval, threshold_of
 from experiments.kinds.threshold_grid import Point, model, seconds, series_of
 from server.models import Study, StudyVersion
+from server.participation.quest import Tilt, tilt
 from server.participation.tally_pools import pooled_tally
 from server.results.repository import (
     LatestEstimate,
@@ -26,9 +26,6 @@ from server.results.schemas import MeanTilt, SeriesResult, StimulusAnswers, Thre
 from server.results.service import common
 from server.results.summary import half_width
 from server.studies.lookup import definition_of
-
-if TYPE_CHECKING:
-    from server.participation.quest import Tilt
 
 
 def summarise(session: Session, study: Study, version: StudyVersion, of: Pool) -> ThresholdResults:
@@ -97,9 +94,6 @@ def series_result(
 
 def mean_tilts(definition: Experiment, counts: Sequence[PersonCount]) -> dict[str, MeanTilt]:
     """The mean tilt of each series that has answers."""
-    # brings the numerics of QUEST+ with it, which studies along one factor need not have loaded here
-    from server.participation import quest
-
     assumed, seconds_of = model(definition), second_by_cell(definition)
     people: dict[tuple[str, int], dict[Point, tuple[int, int]]] = {}
     for row in counts:
@@ -107,13 +101,13 @@ def mean_tilts(definition: Experiment, counts: Sequence[PersonCount]) -> dict[st
         point = Point(row.value, seconds_of[row.cell])
         n, positive = mine.get(point, (0, 0))
         mine[point] = (n + row.n, positive + row.positive)
-    by_series: dict[str, list[quest.Tilt]] = {}
+    by_series: dict[str, list[Tilt]] = {}
     for (series, _), mine in people.items():
-        by_series.setdefault(series, []).append(quest.tilt(assumed, mine))
+        by_series.setdefault(series, []).append(tilt(assumed, mine))
     return {series: _mean_tilt(tilts) for series, tilts in by_series.items()}
 
 
-def _mean_tilt(tilts: "Sequence[Tilt]") -> MeanTilt:
+def _mean_tilt(tilts: Sequence[Tilt]) -> MeanTilt:
     means = [one.mean for one in tilts]
     mean, half = fmean(means), half_width(means) if len(means) > 1 else None
     return MeanTilt(
