@@ -126,7 +126,7 @@ def reseal(session: Session, secret: bytes) -> tuple[int, str]:
     return position, previous
 
 
-def under(session: Session, secret: bytes) -> Iterator[AuditEntry]:
+def entries_under_key(session: Session, secret: bytes) -> Iterator[AuditEntry]:
     """The entries whose hash fits this key, whatever became of others, in the chain's order."""
     key, previous = audit.chain_key(secret), audit.START
     for entry in repository.chained_entries(session):

@@ -33,7 +33,7 @@ def send_mail(settings: Settings, to: str, subject: str, text: str) -> bool:
     """
     try:
         letter = _letter(settings.mail_from, to, subject, text)
-        with _connected(settings) as server:
+        with _mail_connection(settings) as server:
             server.send_message(letter, to_addrs=[to])
     except (OSError, smtplib.SMTPException, ValueError, MessageError) as error:
         code = getattr(error, "smtp_code", "")
@@ -53,7 +53,7 @@ def _letter(sender: str, to: str, subject: str, text: str) -> EmailMessage:
 
 
 @contextmanager
-def _connected(settings: Settings) -> Iterator[smtplib.SMTP]:
+def _mail_connection(settings: Settings) -> Iterator[smtplib.SMTP]:
     context, where = ssl.create_default_context(), (settings.smtp_host, settings.smtp_port)
     if settings.smtp_security == "tls":
         server: smtplib.SMTP = smtplib.SMTP_SSL(*where, timeout=TIMEOUT_S, context=context)

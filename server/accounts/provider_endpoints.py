@@ -50,7 +50,7 @@ def _set_login_cookie(response: Response, settings: Settings, token: str) -> Non
     )
 
 
-async def _enter(sign_ins: SignInThrottle, request: Request, what: str) -> None:
+async def _count_attempt(sign_ins: SignInThrottle, request: Request, what: str) -> None:
     address = address_of(request)
     key = sign_ins.key(what, address, None)
     await run_in_threadpool(sign_ins.enter, key, address, None)
@@ -71,7 +71,7 @@ async def begin_sign_in(
     """Begin to sign in with a provider: where the browser goes, and a cookie by which it is known again."""
     check_origin(request, services.settings)
     provider_sign_in.provider_of(services.settings, provider)
-    await _enter(services.sign_ins, request, f"provider {provider}")
+    await _count_attempt(services.sign_ins, request, f"provider {provider}")
     begun = await run_in_threadpool(
         provider_sign_in.begin_attempt, services.database, services.settings, provider, "sign in", body.next
     )
@@ -86,7 +86,7 @@ async def begin_invited(
     """Begin to make an invited account that signs in with a provider: where the browser goes."""
     check_origin(request, services.settings)
     provider_sign_in.provider_of(services.settings, provider)
-    await _enter(services.sign_ins, request, f"provider {provider}")
+    await _count_attempt(services.sign_ins, request, f"provider {provider}")
     begun = await run_in_threadpool(
         provider_sign_in.begin_invited, services.database, services.settings, provider, token
     )
@@ -172,7 +172,7 @@ async def finish_with_code(
 ) -> BeginSignIn:
     """Enter the second factor after a provider signed one in; gives the page to go on with."""
     check_origin(request, services.settings)
-    await _enter(services.sign_ins, request, "code after a provider")
+    await _count_attempt(services.sign_ins, request, "code after a provider")
     finished = await run_in_threadpool(
         provider_sign_in.finish_with_code,
         services.database,

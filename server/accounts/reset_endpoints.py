@@ -28,7 +28,7 @@ from server.core.settings import Settings
 router = APIRouter(prefix="/api/admin", tags=["account"], responses=ERROR_RESPONSES)
 
 
-async def _enter(sign_ins: SignInThrottle, request: Request, what: str) -> None:
+async def _count_attempt(sign_ins: SignInThrottle, request: Request, what: str) -> None:
     address = address_of(request)
     key = sign_ins.key(what, address, None)
     await run_in_threadpool(sign_ins.enter, key, address, None)
@@ -50,7 +50,7 @@ async def forgot_password(
     """Ask for a link by mail for a new password; the answer is the same whether there is such an account."""
     check_origin(request, services.settings)
     _must_send(services.settings)
-    await _enter(services.sign_ins, request, "forgotten password")
+    await _count_attempt(services.sign_ins, request, "forgotten password")
     after.add_task(
         resets.write_to_who_forgot,
         services.database,
@@ -67,7 +67,7 @@ async def set_password(
 ) -> None:
     """Choose a new password by a link; every session and every API token of the account ends."""
     check_origin(request, services.settings)
-    await _enter(services.sign_ins, request, "new password")
+    await _count_attempt(services.sign_ins, request, "new password")
     name = await run_in_threadpool(resets.name_of, services.database, body.token)
     fresh = await services.passwords.run(lambda: hash_password(body.password, name))
     letter = await run_in_threadpool(resets.set_password, services.database, body.token, fresh)
@@ -110,6 +110,6 @@ async def confirm_address(
 ) -> None:
     """Confirm an address of mail by the link that went there; the address before it is told."""
     check_origin(request, services.settings)
-    await _enter(services.sign_ins, request, "confirm an address")
+    await _count_attempt(services.sign_ins, request, "confirm an address")
     letter = await run_in_threadpool(resets.confirm_address, services.database, body.token)
     after.add_task(resets.post, services.settings, letter)

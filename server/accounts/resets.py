@@ -79,7 +79,7 @@ def write_to_who_forgot(
         for account in repository.accounts_to_write_to(session, name):
             if account.email is None or not _may_have_one(settings, sign_ins, session, account, asking):
                 continue
-            token = _keep(session, account, "new password", account.email)
+            token = _store_link(session, account, "new password", account.email)
             record(session, NOBODY, "password reset asked for", "account", account.name)
             letters.append(_reset_letter(settings.public_url, account, token))
     for letter in letters:
@@ -100,7 +100,7 @@ def _may_have_one(
     )
 
 
-def _keep(session: Session, account: Account, purpose: LetterPurpose, address: str) -> str:
+def _store_link(session: Session, account: Account, purpose: LetterPurpose, address: str) -> str:
     token = new_token()
     session.add(
         MailedLink(
@@ -130,7 +130,7 @@ def set_password(database: Database, token: str, fresh: str) -> Letter | None:
         That it happened, to the account's address.
     """
     with database.write() as session:
-        account = _used(session, token, "new password")
+        account = _use_link(session, token, "new password")
         logins = renew(session, identity_of(account), account, fresh)
         record(session, identity_of(account), "password reset by mail", "account", account.name)
         return _done_letter(account, logins)
@@ -147,7 +147,7 @@ def ask_to_confirm(database: Database, settings: Settings, me: Identity, address
             raise NotSignedIn("Your session has ended; please sign in again.")
         if repository.open_links(session, account.id, "address") >= MAX_OPEN_LINKS:
             raise Conflict(f"Several letters are under way already; try again in {LINK_MINUTES} minutes.")
-        token = _keep(session, account, "address", address)
+        token = _store_link(session, account, "address", address)
         return _confirm_letter(settings.public_url, account, address, token)
 
 
@@ -161,7 +161,7 @@ def confirm_address(database: Database, token: str) -> Letter | None:
     """
     with database.write() as session:
         address = _link(session, token, "address").address
-        account = _used(session, token, "address")
+        account = _use_link(session, token, "address")
         repository.forget_links(session, account.id, "new password")
         before, account.email = account.email, address
         record(session, identity_of(account), "address of mail confirmed", "account", account.name)
@@ -185,7 +185,7 @@ def _link(session: Session, token: str, purpose: LetterPurpose) -> MailedLink:
     return link
 
 
-def _used(session: Session, token: str, purpose: LetterPurpose) -> Account:
+def _use_link(session: Session, token: str, purpose: LetterPurpose) -> Account:
     link = _link(session, token, purpose)
     account = link.account
     if not repository.use_link(session, link.id):

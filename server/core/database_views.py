@@ -68,7 +68,7 @@ class DroppedViews:
 def views_are_current(connection: Connection) -> bool:
     """Whether the database's views are those that this program would make."""
     dialect = _dialect(connection)
-    expected_marks = {view.name: _mark(view.create(dialect), dialect) for view in views()}
+    expected_marks = {view.name: _statement_mark(view.create(dialect), dialect) for view in views()}
     return _stored_marks(connection) == expected_marks
 
 
@@ -79,7 +79,7 @@ def drop_views(connection: Connection) -> DroppedViews:
     if names and connection.dialect.name == "postgresql":
         dropped = DroppedViews(names, _grants(connection, names), _options(connection, names))
     for name in sorted(names):
-        connection.exec_driver_sql(f"DROP VIEW {_quoted(connection, name)}")
+        connection.exec_driver_sql(f"DROP VIEW {_quoted_name(connection, name)}")
     return dropped
 
 
@@ -91,7 +91,9 @@ def make_views(connection: Connection, dropped: DroppedViews) -> None:
         # Escaped: no colon in a view begins a parameter.
         connection.execute(text(statement.replace(":", r"\:")))
         if dialect == "postgresql":
-            connection.exec_driver_sql(f"COMMENT ON VIEW {view.name} IS '{_mark(statement, dialect)}'")
+            connection.exec_driver_sql(
+                f"COMMENT ON VIEW {view.name} IS '{_statement_mark(statement, dialect)}'"
+            )
     again = dropped.names & {view.name for view in views()}
     if again and dialect == "postgresql":
         _give_back(connection, again, dropped)
@@ -117,7 +119,7 @@ def _dialect(connection: Connection) -> Dialect:
     return "sqlite" if connection.dialect.name == "sqlite" else "postgresql"
 
 
-def _mark(statement: str, dialect: Dialect) -> str:
+def _statement_mark(statement: str, dialect: Dialect) -> str:
     """What tells of which statement a view was made.
 
     SQLite keeps the statement, blanks at its end aside; PostgreSQL writes its own words, and keeps a hash.
@@ -143,7 +145,7 @@ def _stored_marks(connection: Connection) -> dict[str, str]:
     }
 
 
-def _quoted(connection: Connection, name: str) -> str:
+def _quoted_name(connection: Connection, name: str) -> str:
     return connection.dialect.identifier_preparer.quote(name)
 
 

@@ -33,7 +33,7 @@ def install_error_handlers(
     async def refused(request: Request, error: Exception) -> JSONResponse:
         if isinstance(error, ApiError) and error.audited:
             await note_refusal(request, error)
-        return await _refused(request, error)
+        return await _answer_refusal(request, error)
 
     app.add_exception_handler(ApiError, refused)
     app.add_exception_handler(InputError, _bad_input)
@@ -43,10 +43,10 @@ def install_error_handlers(
     app.add_exception_handler(DataError, _out_of_range)
     app.add_exception_handler(DBAPIError, _database)
     app.add_exception_handler(PoolTimeout, _database)
-    app.add_exception_handler(Exception, _unexpected)
+    app.add_exception_handler(Exception, _answer_unexpected)
 
 
-async def _refused(_request: Request, error: Exception) -> JSONResponse:
+async def _answer_refusal(_request: Request, error: Exception) -> JSONResponse:
     if not isinstance(error, ApiError):
         raise error
     return refusal_response(error)
@@ -122,6 +122,6 @@ async def _database(_request: Request, error: Exception) -> JSONResponse:
     return error_response(503, "database_away", message, headers={"retry-after": "2"})
 
 
-async def _unexpected(_request: Request, error: Exception) -> JSONResponse:
+async def _answer_unexpected(_request: Request, error: Exception) -> JSONResponse:
     log.error("request failed", exc_info=error)
     return error_response(500, "internal", "The server failed; please try again.")

@@ -92,23 +92,23 @@ def is_storable(text: str) -> bool:
     return _UNSTORABLE.search(text) is None
 
 
-def visible(value: Any) -> Any:
+def storable_value(value: Any) -> Any:
     """`value` (as JSON gives it) with every NUL and lone surrogate, in names too, replaced by U+FFFD."""
     try:
-        return _visible(value)
+        return _storable(value)
     except RecursionError:
         return TOO_DEEP
 
 
-def _visible(value: Any) -> Any:
+def _storable(value: Any) -> Any:
     if isinstance(value, str):
         return _UNSTORABLE.sub(REPLACEMENT, value)
     if isinstance(value, dict):
-        return {_visible(name): _visible(content) for name, content in value.items()}
-    return [_visible(content) for content in value] if isinstance(value, list) else value
+        return {_storable(name): _storable(content) for name, content in value.items()}
+    return [_storable(content) for content in value] if isinstance(value, list) else value
 
 
-VisibleObject = Annotated[dict[str, Any], BeforeValidator(visible)]
+VisibleObject = Annotated[dict[str, Any], BeforeValidator(storable_value)]
 """A stored JSON object as an answer shows it."""
 
 

@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session
 from experiments.errors import InputError
 from server.accounts import repository as accounts
 from server.accounts.audit import SECOND_FACTOR_SET_UP, record
-from server.accounts.audit_verification import reseal, under, verify
+from server.accounts.audit_verification import entries_under_key, reseal, verify
 from server.accounts.credentials import rewrap_secret
 from server.accounts.identity import OPERATOR
 from server.accounts.repository import hold_chain
@@ -141,7 +141,7 @@ def carry_over(session: Session, old: bytes, secret: bytes) -> RekeyedSecrets:
     hold_chain(session)
     before = verify(session, secret, before=old)
     done, left = rewrap_all(session, old)
-    if not done and not any(under(session, old)):
+    if not done and not any(entries_under_key(session, old)):
         raise InputError(
             "nothing on this server is under that key: it was never the key here, or all was carried over "
             "before"
@@ -157,7 +157,11 @@ def carry_over(session: Session, old: bytes, secret: bytes) -> RekeyedSecrets:
 
 def _carry_factors(session: Session, old: bytes, secret: bytes) -> int:
     """Of a log that fits; who set one up since the key was changed did so under the key of now."""
-    of_now = {entry.account_id for entry in under(session, secret) if entry.action == SECOND_FACTOR_SET_UP}
+    of_now = {
+        entry.account_id
+        for entry in entries_under_key(session, secret)
+        if entry.action == SECOND_FACTOR_SET_UP
+    }
     # Read anew: looking through the log lets go of what was read before.
     holders = [holder for holder in accounts.with_second_factor(session) if holder.id not in of_now]
     for holder in holders:

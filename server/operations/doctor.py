@@ -29,7 +29,7 @@ from server.operations import repository
 from server.operations.metrics import seen_proxy
 from server.operations.snapshots import changed_at, database_file, set_aside, snapshots_of
 from server.operations.watched_backups import OLD_AFTER_S, WatchedBackups, watched_backups
-from server.participation.identity_repository import readable
+from server.participation.identity_repository import readable_identities
 from server.participation.recruiter import refused_addresses
 from server.participation.tally_pools import Recount
 from server.privacy.ledger import LEDGER_NAME, ledger_content, ledger_path, merge_ledgers
@@ -322,7 +322,7 @@ def counts(services: Services) -> Iterator[Finding]:
 def identities(services: Services) -> Iterator[Finding]:
     """Recruiters' ids can be read with the installation's key."""
     with services.database.read() as session:
-        counted = Counter(readable(session))
+        counted = Counter(readable_identities(session))
     if counted[False]:
         said = f"{counted[False]} of {counted.total()} recruiters' ids cannot be read"
         advice = "the secret key was changed; run: server database rewrap OLD_KEY_FILE"

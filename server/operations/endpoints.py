@@ -75,7 +75,7 @@ class MetricsNotForYou(ApiError):
 @router.get("/metrics")
 def metrics(request: Request, database: DatabaseDep, settings: SettingsDep) -> Response:
     """Counts and times in Prometheus' text format."""
-    if not _allowed(request, settings.metrics_token):
+    if not _may_read_metrics(request, settings.metrics_token):
         raise MetricsNotForYou(
             "Metrics need `Authorization: Bearer` with PALPEBRA_METRICS_TOKEN; "
             "without that setting they are given to this machine alone."
@@ -89,7 +89,7 @@ def get_backups(settings: SettingsDep, _identity: Owner) -> BackupsOut:
     return backups_out(settings)
 
 
-def _allowed(request: Request, token: str) -> bool:
+def _may_read_metrics(request: Request, token: str) -> bool:
     if token:
         given = request.headers.get("authorization", "").removeprefix("Bearer ")
         return hmac.compare_digest(given.encode(), token.encode())

@@ -284,7 +284,7 @@ async def post_refused(
     told = record.model_copy(update=refusal)
 
     def keep(connection: Connection) -> None:
-        refused_records.keep(services.versions, services.intake, connection, token, told, received_at)
+        refused_records.keep_refused(services.versions, services.intake, connection, token, told, received_at)
 
     await services.group_commit.run(token, keep)
     return Received(received=1)

@@ -226,7 +226,7 @@ def _guessed_together(checks: Sequence[JudgedAnswer], wrong: Sequence[int]) -> f
 def checks_tell(answers: Sequence[JudgedAnswer], passed_over: Sequence[int] = ()) -> bool:
     """Whether the motion checks asked, void ones and those passed over too, can tell guesses from people."""
     asked = [one.choices for one in answers if one.part == "check" and one.choices and not one.other_way]
-    return _tell([*asked, *passed_over])
+    return _can_tell([*asked, *passed_over])
 
 
 def chance_of_guessing(
@@ -239,12 +239,12 @@ def chance_of_guessing(
     `GUESSED_BY_CHANCE`) with at least `POWER`; whether they are is told by the choices of all that were
     `asked`, so that nobody gets around the checks by having one of them fail.
     """
-    if not choices or not _tell(choices if asked is None else asked):
+    if not choices or not _can_tell(choices if asked is None else asked):
         return None
     return _at_least([1 / number for number in choices])[right]
 
 
-def _tell(choices: Sequence[int]) -> bool:
+def _can_tell(choices: Sequence[int]) -> bool:
     guesses = _at_least([1 / number for number in choices])
     needed = next((number for number, chance in enumerate(guesses) if chance < GUESSED_BY_CHANCE), None)
     return needed is not None and _at_least([SEEN] * len(choices))[needed] >= POWER
@@ -406,16 +406,16 @@ def verdict_on(signals: Signals, *, answers: int, refused: bool, tells: bool) ->
         return ("unlikely" if refused else "unclear" if answers else "not_judged"), points
     if points <= UNLIKELY:
         return "unlikely", points
-    doubted = signals.motion_checks_other_way or (_escapes(signals) and tells)
-    return ("likely" if points >= LIKELY and _passes(signals) and not doubted else "unclear"), points
+    doubted = signals.motion_checks_other_way or (_escapes_checks(signals) and tells)
+    return ("likely" if points >= LIKELY and _passes_checks(signals) and not doubted else "unclear"), points
 
 
-def _passes(signals: Signals) -> bool:
+def _passes_checks(signals: Signals) -> bool:
     """Whether the run's attention and motion checks together are right more often than guesses."""
     return signals.checks_guessed is not None and signals.checks_guessed < ENOUGH_BY_CHANCE
 
 
-def _escapes(signals: Signals) -> bool:
+def _escapes_checks(signals: Signals) -> bool:
     """Whether the run got around its motion checks: all of them tell nothing, or more than may."""
     void, told = signals.motion_checks_void or 0, signals.motion_checks_asked or 0
     return void > max(1, VOID_SHARE * (void + told)) or (void > 0 and told == 0)

@@ -20,7 +20,7 @@ from server.participation.identity_keys import (
 AT_ONCE = 500
 
 
-def keep(
+def store_identity(
     session: Session,
     run: StudyRun,
     study_key: str,
@@ -106,7 +106,7 @@ def forget(session: Session, run: StudyRun) -> None:
         session.execute(delete(table).where(table.study_run_id == run.id))
 
 
-def readable(session: Session) -> Iterator[bool]:
+def readable_identities(session: Session) -> Iterator[bool]:
     """Of every id that is kept, whether it can be read."""
     secret = session.info[SIGNING_KEY]()
     query = (

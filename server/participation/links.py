@@ -256,7 +256,7 @@ def _new_run(
     if start.query:
         written = recruiter.participant(start.query) or ""
         known_as = ParticipantIdentity(written, without_signature(recruiter, start.query))
-        identities.keep(session, run, study.pseudonym_key, known_as, identifier)
+        identities.store_identity(session, run, study.pseudonym_key, known_as, identifier)
     if deciding(loaded.experiment) is None:
         group = _group(loaded.experiment, link)
         assign_slot(

@@ -334,7 +334,9 @@ def _receipt_of_new(connection: Connection, delivery: SubmittedRating, ruling: R
     """Carry the answer into its series and its run, and say what follows from it."""
     run, rating = delivery.run, delivery.rating
     settles, before = delivery.settles(rating.play, ruling[0]), delivery.was_settled
-    if delivery.adapts and series.take(connection, run.id, delivery.loaded, delivery.trial, rating, ruling):
+    if delivery.adapts and series.take_answer(
+        connection, run.id, delivery.loaded, delivery.trial, rating, ruling
+    ):
         before = True
     answered = int(settles and not before)
     elapsed = max(run.elapsed_ms, rating.time_elapsed or 0.0)

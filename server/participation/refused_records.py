@@ -40,7 +40,7 @@ class TooManyRefused(Conflict):
     code = "too_many_refused"
 
 
-def keep(
+def keep_refused(
     versions: Versions,
     intake: Intake,
     connection: Connection,

@@ -15,7 +15,7 @@ from experiments.kinds import KINDS
 from experiments.rules import ExcludeAttention
 from server.core.repository import insert_once
 from server.core.settings import Settings
-from server.core.values import new_public_id, now, visible
+from server.core.values import new_public_id, now, storable_value
 from server.models import NO_SLOT, Calibration, FormAnswer, RunEvent, Study, StudyRun
 from server.participation import current_run, places, run_repository
 from server.participation.answer_schemas import Tickets
@@ -98,7 +98,7 @@ def complete_run(versions: Versions, session: Session, token: str) -> Completion
     if run.status != "complete":
         raise RunClosed(f"This visit is over ({run.status}) and has no completion code.")
     code = completion_code(session, run, loaded)
-    parameters = visible(run_repository.parameters(session, run))
+    parameters = storable_value(run_repository.parameters(session, run))
     address = recruiter_of(run.link).redirect(code, run.public_id, parameters)
     return Completion(status="complete", completion_code=code, redirect_url=address)
 
@@ -131,7 +131,7 @@ def completion_code(session: Session, run: StudyRun, loaded: LoadedVersion) -> s
 
 def _screened_out(session: Session, run: StudyRun, experiment: Experiment) -> Completion:
     recruiter = recruiter_of(run.link)
-    parameters = visible(run_repository.parameters(session, run))
+    parameters = storable_value(run_repository.parameters(session, run))
     declared, careless = experiment.warnings, run_repository.ended_by(session, run, EVENT) == RULE
     if careless and declared.code == "failed_check" and recruiter.code_failed_check:
         code: str | None = recruiter.code_failed_check

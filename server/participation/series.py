@@ -75,7 +75,7 @@ class Outlook:
 
 
 # Decision 0506: An adaptive series has no state of its own.
-def follow(database: Database, versions: Versions, token: str) -> Outlook | None:
+def follow_series(database: Database, versions: Versions, token: str) -> Outlook | None:
     """Bring the series of a run up to its stored answers; None where other answers came meanwhile.
 
     Reckoning happens between two transactions, so that no other write waits for it. Doing it again changes
@@ -94,7 +94,7 @@ def follow(database: Database, versions: Versions, token: str) -> Outlook | None
         answers = series_repository.answers(connection, run.id)
     outlook = outlook_after(loaded, trials, answers)
     with database.write_connection() as connection:
-        return _keep(connection, token, outlook)
+        return _store_outlook(connection, token, outlook)
 
 
 def outlook_after(loaded: LoadedVersion, trials: Sequence[Any], answers: Sequence[Any]) -> Outlook:
@@ -140,7 +140,7 @@ def _clip(loaded: LoadedVersion, levels: dict[str, str], stimulus: dict[str, str
     return loaded.places[spec.cell, spec.exemplar]
 
 
-def _keep(connection: Connection, token: str, outlook: Outlook) -> Outlook | None:
+def _store_outlook(connection: Connection, token: str, outlook: Outlook) -> Outlook | None:
     run = series_repository.run_of(connection, token, lock=True)
     now: dict[str, int] = dict.fromkeys(outlook.known, 0)
     for row in series_repository.answers(connection, run.id):
@@ -166,10 +166,10 @@ def _keep(connection: Connection, token: str, outlook: Outlook) -> Outlook | Non
         ),
     )
     for one in new:
-        series_repository.show(connection, run.id, one.trial_index, one.role, one.clip)
+        series_repository.show_clip(connection, run.id, one.trial_index, one.role, one.clip)
     closing = [index for index in outlook.closing if index in open_now]
     if closing:
-        series_repository.close(connection, run.id, closing)
+        series_repository.close_trials(connection, run.id, closing)
     remaining = run.trials_total - run.trials_answered - len(closing)
     # A trial that was played meanwhile stays open: its page must not be told that it needs no answer.
     closed = (*(row.trial_index for row in stored if row.closed), *closing)
@@ -224,11 +224,11 @@ def as_offered(connection: Connection, run: int, trial: StoredTrial, rating: Rat
     if offered is None or offered.series is None:
         return trial
     known = answer_of(rating, ThresholdAnswer).known
-    clip = series_repository.offered(connection, run, rating.trial_index, known)
+    clip = series_repository.offered_clip(connection, run, rating.trial_index, known)
     return trial if clip is None else trial._replace(clips={**trial.clips, offered.role: clip})
 
 
-def take(
+def take_answer(
     connection: Connection,
     run: int,
     loaded: LoadedVersion,
@@ -260,7 +260,7 @@ def take(
         "ahead": before - known,
     }
     series_repository.add_answer(connection, values)
-    series_repository.show(connection, run, rating.trial_index, offered.role, clip)
+    series_repository.show_clip(connection, run, rating.trial_index, offered.role, clip)
     return bool(offered.closed)
 
 

@@ -42,7 +42,7 @@ def trials(connection: Connection, run: int) -> Sequence[Any]:
     return connection.execute(query.order_by(_trials.c.trial_index)).all()
 
 
-def offered(connection: Connection, run: int, trial_index: int, known: int) -> int | None:
+def offered_clip(connection: Connection, run: int, trial_index: int, known: int) -> int | None:
     """The clip that was chosen for a trial from so many answers; None where none was."""
     query = select(_offers.c.version_clip_id).where(
         _offers.c.study_run_id == run, _offers.c.trial_index == trial_index, _offers.c.known == known
@@ -99,7 +99,7 @@ def add_offers(connection: Connection, rows: Iterable[dict[str, Any]]) -> None:
         connection.execute(insert(_offers), values)
 
 
-def show(connection: Connection, run: int, trial_index: int, role: str, clip: int) -> None:
+def show_clip(connection: Connection, run: int, trial_index: int, role: str, clip: int) -> None:
     """Let a trial show this clip in this role."""
     where = (_clips.c.study_run_id == run, _clips.c.trial_index == trial_index, _clips.c.role == role)
     connection.execute(update(_clips).where(*where).values(version_clip_id=clip))
@@ -117,7 +117,7 @@ def note_estimate(
     connection.execute(update(_answers).where(*where).values(**values))
 
 
-def close(connection: Connection, run: int, trial_indices: Sequence[int]) -> None:
+def close_trials(connection: Connection, run: int, trial_indices: Sequence[int]) -> None:
     """Mark trials as needing no answer, and count them as settled."""
     where = (_trials.c.study_run_id == run, _trials.c.trial_index.in_(trial_indices))
     connection.execute(update(_trials).where(*where).values(closed=True))

@@ -153,7 +153,7 @@ def follow(database: Database, versions: Versions, token: str) -> Outlook | None
     The answer itself is stored by then, and its receipt must not be lost to a choice that could not be made.
     """
     try:
-        return series.follow(database, versions, token)
+        return series.follow_series(database, versions, token)
     except Exception:
         log.exception("the series of a run could not be followed; its page goes on with what it has")
         return None

@@ -90,33 +90,33 @@ def judge(
         return "failed", "clip_not_played"
     if playback.clip_sha256 != clip_sha256:
         return "failed", "wrong_clip"
-    failed = _failed(rules, playback)
+    failed = _failing_rule(rules, playback)
     if failed or not rated:
         return "failed", failed or "not_rated"
-    flagged = _flagged(rules, playback, frames)
+    flagged = _flagging_rule(rules, playback, frames)
     if flagged:
         return "flagged", flagged
-    uncertain = _uncertain(rules, playback, fps)
+    uncertain = _uncertainty(rules, playback, fps)
     return ("uncertain", uncertain) if uncertain else GOOD
 
 
-def _failed(rules: PlaybackRules, playback: Playback) -> str:
+def _failing_rule(rules: PlaybackRules, playback: Playback) -> str:
     if (playback.frames_missing or 0) > rules.failed_missing_frames:
         return "failed_missing_frames"
     if (playback.longest_gap_ms or 0) > rules.failed_longest_gap_ms:
         return "failed_longest_gap_ms"
-    return _disturbed(rules, playback, "repeat")
+    return _disturbance_with(rules, playback, "repeat")
 
 
-def _disturbed(rules: PlaybackRules, playback: Playback, consequence: Consequence) -> str:
+def _disturbance_with(rules: PlaybackRules, playback: Playback, consequence: Consequence) -> str:
     """The first disturbance of the play that has this consequence; empty where none has."""
     counts = {"focus_lost": int(bool(playback.focus_lost)), **playback.disturbances}
     named = (name for name, count in counts.items() if count and rules.consequence(name) == consequence)
     return next(named, "")
 
 
-def _flagged(rules: PlaybackRules, playback: Playback, frames: int) -> str:
-    if disturbed := _disturbed(rules, playback, "flag"):
+def _flagging_rule(rules: PlaybackRules, playback: Playback, frames: int) -> str:
+    if disturbed := _disturbance_with(rules, playback, "flag"):
         return disturbed
     if (playback.frames_missing or 0) > rules.flagged_missing_frames:
         return "flagged_missing_frames"
@@ -134,7 +134,7 @@ def _flagged(rules: PlaybackRules, playback: Playback, frames: int) -> str:
     return "" if frames - playback.frames_seen == playback.frames_missing else "frame_log_disagrees"
 
 
-def _uncertain(rules: PlaybackRules, playback: Playback, fps: float) -> str:
+def _uncertainty(rules: PlaybackRules, playback: Playback, fps: float) -> str:
     if playback.method == "video":
         return "video_fallback"
     unevenness_ms = _unevenness_ms(playback)

@@ -51,16 +51,18 @@ _SHOWN: dict[Show, tuple[ColumnElement[bool], ...]] = {
 }
 
 
-def _chosen(session: Session, study: Study, show: Show, search: str, *, simulated: bool) -> Select[StudyRun]:
+def _shown_runs(
+    session: Session, study: Study, show: Show, search: str, *, simulated: bool
+) -> Select[StudyRun]:
     """The runs of a study but previews that are to be shown; those of simulated people where asked for."""
     left_out = ("preview",) if simulated or show == "simulated" else ("preview", "simulated")
     query = select(StudyRun).where(
         StudyRun.study_id == study.id, StudyRun.origin.not_in(left_out), *_SHOWN[show]
     )
-    return query.where(_fits(session, search)) if search else query
+    return query.where(_search_condition(session, search)) if search else query
 
 
-def _fits(session: Session, search: str) -> ColumnElement[bool]:
+def _search_condition(session: Session, search: str) -> ColumnElement[bool]:
     """Which runs have a text in their participant or their public id, large or small letters.
 
     Every run is looked at, so it is done as the database does fastest: SQLite's LIKE folds what is ASCII
@@ -74,7 +76,7 @@ def _fits(session: Session, search: str) -> ColumnElement[bool]:
 
 def number_of_runs(session: Session, study: Study, show: Show, search: str, *, simulated: bool) -> int:
     """How many runs are to be shown."""
-    query = _chosen(session, study, show, search, simulated=simulated)
+    query = _shown_runs(session, study, show, search, simulated=simulated)
     return session.scalar(query.with_only_columns(func.count())) or 0
 
 
@@ -89,7 +91,7 @@ def page_of_runs(
     simulated: bool,
 ) -> list[StudyRun]:
     """At most `limit` runs, the latest first, those begun before the run with the number `before`."""
-    query = _chosen(session, study, show, search, simulated=simulated)
+    query = _shown_runs(session, study, show, search, simulated=simulated)
     query = query.order_by(StudyRun.id.desc()).limit(limit)
     query = query.options(
         joinedload(StudyRun.link), joinedload(StudyRun.version).load_only(StudyVersion.number)

@@ -141,7 +141,7 @@ def retention(
 
 def _previews(database: Database, study: str | None) -> list[RetentionPreview]:
     with database.read() as session:
-        names = retention_service.names(session) if study is None else [study]
+        names = retention_service.studies_with_period(session) if study is None else [study]
         known = [find_study(session, name, OPERATOR, "view") for name in names]
         return [retention_service.preview(session, one, now()) for one in known]
 

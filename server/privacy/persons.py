@@ -10,7 +10,7 @@ from server.accounts.audit import record
 from server.accounts.identity import Identity, Operator
 from server.accounts.repository import entries_on_run
 from server.core.errors import Conflict, NotFound
-from server.core.values import iso, now, visible
+from server.core.values import iso, now, storable_value
 from server.models import Study, StudyRun
 from server.participation.identity_keys import UnreadableError
 from server.participation.identity_repository import known_as
@@ -67,12 +67,12 @@ def _visit(session: Session, run: StudyRun) -> dict[str, Any]:
     except UnreadableError as error:
         raise Conflict(f"{error}.") from error
     entries = [
-        {"at": iso(entry.at), "action": entry.action, "details": visible(entry.details)}
+        {"at": iso(entry.at), "action": entry.action, "details": storable_value(entry.details)}
         for entry in entries_on_run(session, run.public_id)
     ]
     return {
         "run": run.public_id,
-        "recruiter": visible(asdict(known)) if known else None,
+        "recruiter": storable_value(asdict(known)) if known else None,
         "stored": repository.stored_rows(session, run),
         "audit": entries,
     }

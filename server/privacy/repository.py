@@ -7,7 +7,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, Select, Table, func, select
 from sqlalchemy.orm import Session
 
-from server.core.values import visible
+from server.core.values import storable_value
 from server.models import (
     Base,
     IdentityKey,
@@ -83,7 +83,7 @@ def _rows(session: Session, table: Any, condition: Any) -> Iterator[dict[str, An
         kept = {name: value for name, value in row.items() if name not in KEYS}
         if kept.keys() - {RUN}:
             yield {
-                name: time_text(value) if hasattr(value, "isoformat") else visible(value)
+                name: time_text(value) if hasattr(value, "isoformat") else storable_value(value)
                 for name, value in kept.items()
             }
 

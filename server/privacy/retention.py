@@ -190,12 +190,12 @@ def _erase(session: Session, settings: Settings, study: Study, rule: Rule, runs:
         note_erased(settings, ids)
 
 
-def names(session: Session) -> list[str]:
+def studies_with_period(session: Session) -> list[str]:
     """The studies of which any version declares a period."""
-    return [study.name for study in repository.every_study(session) if _declares(session, study)]
+    return [study.name for study in repository.every_study(session) if _declares_period(session, study)]
 
 
-def _declares(session: Session, study: Study) -> bool:
+def _declares_period(session: Session, study: Study) -> bool:
     """Whether a study declares a period; one that cannot be read is told and passed over."""
     try:
         return next(_rules(session, study), None) is not None
@@ -243,7 +243,7 @@ def every_study(database: Database, settings: Settings, stopped: Stopped) -> Non
         Asked between two transactions; once true no further one begins.
     """
     with database.read() as session:
-        studies = names(session)
+        studies = studies_with_period(session)
     for study in studies:
         try:
             done = carry_out(database, settings, study, stopped)

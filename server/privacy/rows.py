@@ -13,7 +13,7 @@ from sqlalchemy import JSON, Connection, DateTime, Integer, MetaData, Table, fun
 
 from experiments.errors import InputError
 from server.core.db import Database
-from server.core.values import visible
+from server.core.values import storable_value
 
 # Rows in a form of neither SQLite nor PostgreSQL: for copies, backups and their comparison.
 #
@@ -97,7 +97,9 @@ def read_rows(connection: Connection, table: Table) -> Iterator[Row]:
     query = select(table).order_by(*table.primary_key.columns).execution_options(yield_per=BATCH)
     times = {column.name for column in table.columns if isinstance(column.type, DateTime)}
     for row in connection.execute(query).mappings():
-        yield {name: time_text(value) if name in times else visible(value) for name, value in row.items()}
+        yield {
+            name: time_text(value) if name in times else storable_value(value) for name, value in row.items()
+        }
 
 
 def write_rows(connection: Connection, table: Table, rows: Iterable[Row]) -> Content:

@@ -68,10 +68,10 @@ def count_ahead(database: Database, cache: ResultsCache, stopped: Stopped) -> No
         origins = repository.large_origins(session, MANY_ANSWERS)
     for name, origin in origins:
         if not stopped():
-            _keep(database, cache, name, origin)
+            _count_ahead(database, cache, name, origin)
 
 
-def _keep(database: Database, cache: ResultsCache, name: str, origin: str) -> None:
+def _count_ahead(database: Database, cache: ResultsCache, name: str, origin: str) -> None:
     def count() -> tuple[Revision, AnyResults]:
         with database.read() as session:
             return counted_results(session, find_study(session, name, OPERATOR, "view"), origin, None, None)

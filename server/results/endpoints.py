@@ -129,7 +129,7 @@ def list_failing_clips(
         return failing_clips(session, find_study(session, study, identity, "view"), origin)
 
 
-def changes(before: MonitorSnapshot | None, after: MonitorSnapshot) -> str:
+def snapshot_changes(before: MonitorSnapshot | None, after: MonitorSnapshot) -> str:
     """`after` as JSON, with only those runs that differ from `before`."""
     known = {run.run: run for run in before.runs} if before else {}
     changed = [run for run in after.runs if known.get(run.run) != run]
@@ -189,7 +189,7 @@ async def stream_monitor(
             if not has_room:
                 return
             async for current in changing():
-                yield f"event: monitor\ndata: {changes(before, current)}\n\n"
+                yield f"event: monitor\ndata: {snapshot_changes(before, current)}\n\n"
                 before = current
 
     return StreamingResponse(events(), media_type="text/event-stream", headers={"x-accel-buffering": "no"})

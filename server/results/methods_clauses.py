@@ -51,7 +51,7 @@ class Methods:
         """The paragraph as LaTeX, each sentence followed by comments that name the sources."""
         lines = [f"% Methods of {self.study}: origin {self.origin}, data series {self.series}"]
         for sentence in self.sentences:
-            lines.append(_escaped(self._filled(sentence, {}, "{value}")))
+            lines.append(_latex_text(self._filled(sentence, {}, "{value}")))
             for name in dict.fromkeys(_HOLE.findall(sentence)):
                 number = self.numbers[name]
                 lines.append(f"% {name} = {number.value}: {number.source}")
@@ -97,7 +97,7 @@ class Methods:
         return _HOLE.sub(number, _AGREEING.sub(agreeing, sentence))
 
 
-def _escaped(text: str) -> str:
+def _latex_text(text: str) -> str:
     return "".join(LATEX_SIGNS.get(sign, sign) for sign in text)
 
 
@@ -174,11 +174,11 @@ def sentences(of: DescribedSeries) -> tuple[str, ...]:
         *_screening(of),
         *_warnings(of),
         *_exclusions(of),
-        *_completed(of),
+        *_completed_clauses(of),
     )
 
 
-def _completed(of: DescribedSeries) -> list[str]:
+def _completed_clauses(of: DescribedSeries) -> list[str]:
     if of.value("complete"):
         return [*_checks(of), *_display(of), *_evidence(of)]
     return [
@@ -210,13 +210,13 @@ def _recruitment(of: DescribedSeries) -> list[str]:
             "pseudonyms of this study instead."
         )
     if of.value("begun"):
-        lines.append(_ends(of))
+        lines.append(_ways_visits_ended(of))
     if of.value("erased"):
         lines.append("Erased afterwards, answers and consent with them: {erased}.")
     return lines
 
 
-def _ends(of: DescribedSeries) -> str:
+def _ways_visits_ended(of: DescribedSeries) -> str:
     ends = [
         "{complete} {complete:was|were} completed",
         "{withdrew} {withdrew:was|were} ended at the participant's wish",
@@ -227,10 +227,10 @@ def _ends(of: DescribedSeries) -> str:
         ends.insert(1, "{declined} {declined:was|were} ended because consent was declined")
     if of.value("restarted"):
         ends.insert(-1, "{restarted} {restarted:was|were} replaced by a new visit of the same participant")
-    return f"Of all visits {_listed(ends)}."
+    return f"Of all visits {_joined_parts(ends)}."
 
 
-def _listed(parts: Sequence[str]) -> str:
+def _joined_parts(parts: Sequence[str]) -> str:
     return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])}, and {parts[-1]}"
 
 
@@ -325,18 +325,20 @@ def _declared_exclusions(of: DescribedSeries) -> list[str]:
     return lines or ["No exclusion was declared before the data."]
 
 
-def _asked(of: DescribedSeries, by_block: Callable[[Experiment], Sequence[int]]) -> list[tuple[int, ...]]:
+def _numbers_asked(
+    of: DescribedSeries, by_block: Callable[[Experiment], Sequence[int]]
+) -> list[tuple[int, ...]]:
     """How many are asked in each block, of the versions that completed visits had, each once."""
     return sorted({tuple(by_block(experiment)) for version, experiment in of.used if version.complete})
 
 
-def _each(asked: Sequence[tuple[int, ...]]) -> int | None:
+def _number_in_each(asked: Sequence[tuple[int, ...]]) -> int | None:
     """The number in each block, where every block of every visit had the same."""
     numbers = {number for blocks in asked for number in blocks}
     return numbers.pop() if len(numbers) == 1 else None
 
 
-def _changed(asked: Sequence[tuple[int, ...]]) -> str:
+def _number_changed(asked: Sequence[tuple[int, ...]]) -> str:
     """That the number was changed, where it was."""
     totals = sorted({sum(blocks) for blocks in asked})
     return f"; their number per visit was changed ({', '.join(map(str, totals))})" if len(totals) > 1 else ""
@@ -344,10 +346,10 @@ def _changed(asked: Sequence[tuple[int, ...]]) -> str:
 
 def _checks(of: DescribedSeries) -> list[str]:
     lines = []
-    asked = _asked(of, attention_by_block)
+    asked = _numbers_asked(of, attention_by_block)
     if of.value("checks"):
-        each = _each(asked)
-        how = "instructed answers" + _changed(asked)
+        each = _number_in_each(asked)
+        how = "instructed answers" + _number_changed(asked)
         if each:
             number = of.number("attention_per_block", each, "declaration: attention.per_block")
             how = f"{number} instructed {{attention_per_block:answer|answers}} per block"
@@ -366,7 +368,7 @@ def _checks(of: DescribedSeries) -> list[str]:
 def _motion_checks(of: DescribedSeries) -> list[str]:
     if not of.value("motion_checks") + of.value("motion_checks_other_way"):
         return []
-    asked = _asked(of, motion_checks_by_block)
+    asked = _numbers_asked(of, motion_checks_by_block)
     every = [
         kind
         for version, experiment in of.used
@@ -374,14 +376,14 @@ def _motion_checks(of: DescribedSeries) -> list[str]:
         for kind in experiment.evidence.motion_checks.kinds
     ]
     kinds = ", ".join(dict.fromkeys(kind.replace("_", " ") for kind in every))
-    each = _each(asked)
+    each = _number_in_each(asked)
     shown = "Between the trials short clips showed"
     if each:
         source = "declaration: evidence.motion_checks.per_block"
         number = of.number("motion_checks_per_block", each, source)
         shown = f"In each block {number} short {{motion_checks_per_block:clip|clips}} showed"
     return [
-        f"{shown} what was asked by motion alone ({kinds}){_changed(asked)}; of {{motion_checks}} "
+        f"{shown} what was asked by motion alone ({kinds}){_number_changed(asked)}; of {{motion_checks}} "
         "{motion_checks:answer|answers} to them in completed visits {motion_checks_right} "
         "{motion_checks_right:was|were} right."
     ]
@@ -390,7 +392,7 @@ def _motion_checks(of: DescribedSeries) -> list[str]:
 def _display(of: DescribedSeries) -> list[str]:
     lines = []
     if of.value("plays"):
-        lines += [_drawn(of), _as_declared(of)]
+        lines += [_drawing_clause(of), _as_declared(of)]
     if of.experiment.display.calibrate != "off":
         lines.append(
             "The size on the screen was calibrated in {calibrated} of {complete} completed "
@@ -399,7 +401,7 @@ def _display(of: DescribedSeries) -> list[str]:
     return lines
 
 
-def _drawn(of: DescribedSeries) -> str:
+def _drawing_clause(of: DescribedSeries) -> str:
     if of.value("plays_by_frame") == of.value("plays"):
         recorded = of.value("plays_good") == of.value("plays")
         times = " and each frame's time recorded" if recorded else ""
@@ -411,7 +413,7 @@ def _drawn(of: DescribedSeries) -> str:
         ways.append("shown by the browser's video element in {plays_by_video}")
     if of.value("plays_not_drawn"):
         ways.append("not shown at all in {plays_not_drawn}")
-    listed = " and ".join(ways) if len(ways) < 3 else _listed(ways)
+    listed = " and ".join(ways) if len(ways) < 3 else _joined_parts(ways)
     return f"Of {{plays}} {{plays:play|plays}} in completed visits the clip was {listed}."
 
 
@@ -424,7 +426,7 @@ def _as_declared(of: DescribedSeries) -> str:
         parts.append(f"{{plays_flagged}} {{plays_flagged:was|were}} flagged ({reasons})")
     if of.value("plays_failed"):
         parts.append("{plays_failed} failed")
-    listed = " and ".join(parts) if len(parts) < 3 else _listed(parts)
+    listed = " and ".join(parts) if len(parts) < 3 else _joined_parts(parts)
     return f"Of {{plays}} {{plays:play|plays}} in completed visits {listed}."
 
 
@@ -445,7 +447,7 @@ def _evidence(of: DescribedSeries) -> list[str]:
             "{not_judged:visit brings|visits bring} no evidence)."
         ]
     lines = [
-        f"Automated answers: {_gathered(of)}; by this evidence {{likely}} completed "
+        f"Automated answers: {_evidence_gathered(of)}; by this evidence {{likely}} completed "
         "{likely:visit was|visits were} likely a person's, {unclear} unclear, {unlikely} unlikely, and "
         "{not_judged} could not be judged.",
         "This is evidence, not proof: it does not detect a person who lets a program choose the answers.",
@@ -455,7 +457,7 @@ def _evidence(of: DescribedSeries) -> list[str]:
     return lines
 
 
-def _gathered(of: DescribedSeries) -> str:
+def _evidence_gathered(of: DescribedSeries) -> str:
     """What was gathered as evidence; with numbers where it was not of every completed visit."""
     kinds: Mapping[str, str] = {
         "with_tickets": "tickets of the server and the server's time",
@@ -468,4 +470,4 @@ def _gathered(of: DescribedSeries) -> str:
         if visits or name == "with_tickets":
             everywhere = visits == of.value("complete")
             parts.append(words if everywhere else f"{words} (in {{{name}}} {{{name}:visit|visits}})")
-    return f"{' and '.join(parts) if len(parts) < 3 else _listed(parts)} were gathered"
+    return f"{' and '.join(parts) if len(parts) < 3 else _joined_parts(parts)} were gathered"

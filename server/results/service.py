@@ -53,7 +53,7 @@ def results(session: Session, study: Study, version: StudyVersion, of: Pool) -> 
     tally = pooled_tally(session, of.runs(), of.scale, factors)
     clips = _clips(session, version, tally, bins, scale.maximum)
     return Results(
-        **common(study, version, of, tally),
+        **common_results(study, version, of, tally),
         ratings=sum(clip.ratings for clip in clips),
         scales=[_scale_out(one) for one in scales_of(definition)],
         scale=_scale_out(scale),
@@ -79,7 +79,7 @@ class Common(TypedDict):
     playback: Playback
 
 
-def common(study: Study, version: StudyVersion, of: Pool, tally: PooledTally) -> Common:
+def common_results(study: Study, version: StudyVersion, of: Pool, tally: PooledTally) -> Common:
     """What the tallies say of a pool, whatever its kind of trial."""
     return {
         "study": study.name,

@@ -177,9 +177,9 @@ def cell_trace(traces: Sequence[Trace]) -> CellTrace:
         traces=len(alike),
         left_out=len(traces) - len(alike),
         times_s=[round(step * first.step_s, 4) for step in every],
-        mean=_rounded(mean),
-        low=None if half is None else _rounded(m - h for m, h in zip(mean, half, strict=True)),
-        high=None if half is None else _rounded(m + h for m, h in zip(mean, half, strict=True)),
+        mean=_rounded_values(mean),
+        low=None if half is None else _rounded_values(m - h for m, h in zip(mean, half, strict=True)),
+        high=None if half is None else _rounded_values(m + h for m, h in zip(mean, half, strict=True)),
         level=fmean(mean),
     )
 
@@ -189,7 +189,7 @@ def half_width(values: Sequence[float]) -> float:
     return student_t(len(values) - 1) * stdev(values) / math.sqrt(len(values))
 
 
-def _rounded(values: Iterable[float]) -> list[float]:
+def _rounded_values(values: Iterable[float]) -> list[float]:
     return [round(value, 4) for value in values]
 
 

@@ -38,7 +38,7 @@ from server.studies.links import (
     make_links,
     numbered_labels,
     prepared_links,
-    signing,
+    signing_of,
 )
 from server.studies.lookup import active_version, find_study, must_not_be_archived
 from server.studies.repository import links_of
@@ -239,7 +239,7 @@ def show_secret(
     with stored_services() as services, services.database.write() as session:
         known = find_study(session, study, OPERATOR, "own")
         of_link = None if link is None else _labelled_link(links_of(session, known), link)
-        told = signing(session, services.settings.key, known, name, None, of_link)
+        told = signing_of(session, services.settings.key, known, name, None, of_link)
     out.print(f"secret: {told.secret}", soft_wrap=True, highlight=False)
     out.print(f"address: LINK?{told.query}", soft_wrap=True, highlight=False)
     out.print(f"in Python:\n{told.python}", soft_wrap=True, highlight=False, markup=False)

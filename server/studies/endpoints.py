@@ -26,7 +26,7 @@ from server.studies.links import (
     numbered_labels,
     page_of_links,
     prepared_links,
-    signing,
+    signing_of,
     withdraw,
 )
 from server.studies.lookup import find_study
@@ -273,7 +273,7 @@ def get_signing(
     with database.write() as session:
         known = find_study(session, study, identity, "own")
         of_link = None if link is None else link_in_use(session, known, link)
-        return signing(session, settings.key, known, secret_name, identity, of_link)
+        return signing_of(session, settings.key, known, secret_name, identity, of_link)
 
 
 @link_router.get("/personal.csv", response_class=Response)

@@ -182,7 +182,7 @@ PYTHON = (
 SHELL = "printf %s '{identifier}' | openssl dgst -sha256 -mac HMAC -macopt hexkey:{secret}"
 
 
-def signing(
+def signing_of(
     session: Session,
     key: bytes,
     study: Study,

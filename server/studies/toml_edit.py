@@ -254,7 +254,7 @@ def _merge_array(array: Array, edited: list[Any]) -> None:
         array.clear()
         for value in edited:
             array.append(toml_items.inline_item(value))
-        toml_items.spread(array)
+        toml_items.spread_elements(array)
         return
     for number in reversed(range(len(array))):
         if number not in kept:

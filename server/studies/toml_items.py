@@ -83,7 +83,7 @@ def inline_item(value: Any) -> Item:
         array = tomlkit.array()
         for inner in value:
             array.append(inline_item(inner))
-        spread(array)
+        spread_elements(array)
         return array
     if isinstance(value, str):
         return _text(value)
@@ -101,7 +101,7 @@ def _text(value: str) -> Item:
     return tomlkit.value(below)
 
 
-def spread(array: Array) -> None:
+def spread_elements(array: Array) -> None:
     """Give each element a line, where it is a table or the array is long."""
     array.multiline(any(isinstance(item, Mapping) for item in array) or len(array.as_string()) > MAX_INLINE)
 

@@ -78,13 +78,15 @@ def simulated(
     for sample in range(samples_of(clip["frames"], step)):
         time_s = sample * step / clip["fps"]
         drift += rng.gauss(-0.02 * drift, DRIFT_SHARE)
-        answered = sum(risen(time_s - onset - LAG_S) for onset in preference.blinks(clip["clip_sha256"]))
+        answered = sum(
+            risen_share(time_s - onset - LAG_S) for onset in preference.blinks(clip["clip_sha256"])
+        )
         share = min(1.0, max(0.0, level + drift + HEIGHT_SHARE * answered))
         values.append(round(low + (high - low) * share, 2))
     return {"kind": "continuous_rating", "values": values, "step_frames": step, "moves": 3}
 
 
-def risen(since_s: float) -> float:
+def risen_share(since_s: float) -> float:
     """How far an answer has risen, 0 to 1, so long after it began: u exp(1 - u), u in RISE_S."""
     u = since_s / RISE_S
     return u * math.exp(1 - u) if u > 0 else 0.0

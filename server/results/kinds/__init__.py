@@ -12,7 +12,7 @@ from server.models import Study, StudyVersion
 from server.participation.tally_pools import pooled_tally
 from server.results.repository import Pool
 from server.results.schemas import AnyResults, OtherResults
-from server.results.service import common
+from server.results.service import common_results
 from server.studies.lookup import definition_of
 
 Summarise = Callable[[Session, Study, StudyVersion, Pool], AnyResults]
@@ -36,7 +36,7 @@ def _summarise_unknown(session: Session, study: Study, version: StudyVersion, of
     kind = definition_of(version).trial.kind
     tally = pooled_tally(session, of.runs(), "", ())
     return OtherResults(
-        **common(study, version, of, tally),
+        **common_results(study, version, of, tally),
         ratings=tally.answers.total(),
         note=f"Answers of {kind.replace('_', ' ')} trials have no summary here; the Data page exports them.",
     )

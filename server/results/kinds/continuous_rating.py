@@ -10,7 +10,7 @@ from server.models import Study, StudyVersion
 from server.participation.tally_pools import pooled_tally
 from server.results.repository import Pool, blinks_of_cells, traces_of
 from server.results.schemas import TraceCell, TraceResults
-from server.results.service import common
+from server.results.service import common_results
 from server.results.summary import Trace, cell_trace
 from server.studies.lookup import definition_of
 
@@ -21,7 +21,7 @@ def summarise(session: Session, study: Study, version: StudyVersion, of: Pool) -
     declared, tally = continuous_rating_of(definition), pooled_tally(session, of.runs(), "", ())
     order = ["/".join(level for _, level in cell) for cell in design.cells(definition)]
     return TraceResults(
-        **common(study, version, of, tally),
+        **common_results(study, version, of, tally),
         ratings=tally.answers.total(),
         minimum=declared.minimum,
         maximum=declared.maximum,

@@ -14,7 +14,7 @@ from server.models import Study, StudyVersion
 from server.participation.tally_pools import PooledTally, pooled_tally
 from server.results.repository import Pool, cells_of
 from server.results.schemas import LevelChoices, PairChoices, PairResults
-from server.results.service import common
+from server.results.service import common_results
 from server.studies.lookup import definition_of
 
 Outcomes = Counter[tuple[str, str, int]]
@@ -44,7 +44,7 @@ def summarise(session: Session, study: Study, version: StudyVersion, of: Pool) -
     for (_, _, code), times in outcomes.items():
         sides[code] += times
     return PairResults(
-        **common(study, version, of, tally),
+        **common_results(study, version, of, tally),
         ratings=outcomes.total(),
         pairs=pair_choices(definition, outcomes),
         levels=level_choices(definition, outcomes),
@@ -66,7 +66,7 @@ def outcomes_of(tally: PooledTally, cells: Mapping[int, str]) -> Outcomes:
 def pair_choices(definition: Experiment, outcomes: Outcomes) -> list[PairChoices]:
     """Every pair of cells that was compared, in declared order."""
     order = ["/".join(level for _, level in cell) for cell in design.cells(definition)]
-    between = _between(outcomes)
+    between = _choices_between(outcomes)
     rows = []
     for first, second in combinations(order, 2):
         made = between.get((first, second))
@@ -76,7 +76,7 @@ def pair_choices(definition: Experiment, outcomes: Outcomes) -> list[PairChoices
     return rows
 
 
-def _between(outcomes: Mapping[tuple[str, str, int], int]) -> dict[tuple[str, str], Choices]:
+def _choices_between(outcomes: Mapping[tuple[str, str, int], int]) -> dict[tuple[str, str], Choices]:
     """Choices between two names, under both orders of the two."""
     counts: dict[tuple[str, str], list[int]] = defaultdict(lambda: [0, 0, 0])
     for (left, right, code), times in outcomes.items():
@@ -97,7 +97,7 @@ def level_choices(definition: Experiment, outcomes: Outcomes) -> list[LevelChoic
             if one != other:
                 by_level[one, other, code] += times
         for level in factor.levels:
-            met = [made for (one, _), made in _between(by_level).items() if one == level.name]
+            met = [made for (one, _), made in _choices_between(by_level).items() if one == level.name]
             n = sum(made.n for made in met)
             won = sum(made.first + made.ties / 2 for made in met)
             share = won / n if n else None

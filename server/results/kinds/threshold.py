@@ -23,7 +23,7 @@ from server.results.repository import (
     stimulus_counts,
 )
 from server.results.schemas import MeanTilt, SeriesResult, StimulusAnswers, ThresholdResults
-from server.results.service import common
+from server.results.service import common_results
 from server.results.summary import half_width
 from server.studies.lookup import definition_of
 
@@ -40,7 +40,7 @@ def summarise(session: Session, study: Study, version: StudyVersion, of: Pool) -
     second = declared.stimulus.second
     tilts = mean_tilts(definition, person_counts(session, of)) if second else {}
     return ThresholdResults(
-        **common(study, version, of, tally),
+        **common_results(study, version, of, tally),
         ratings=tally.answers.total(),
         factor=declared.stimulus.factor,
         second_factor=second.factor if second else None,

@@ -16,7 +16,7 @@ from sqlalchemy import text
 
 from server.context import Services
 from server.core.settings import Settings
-from server.core.values import body_problem, is_storable, visible
+from server.core.values import body_problem, is_storable, storable_value
 from server.exports import repository, tables
 from server.rehearsals.http import JsonClient
 from server.rehearsals.person import Person, Rater
@@ -76,7 +76,7 @@ def test_what_the_door_lets_in_can_be_stored_and_what_goes_out_can_be_sent(value
 
     body = json.dumps(value)
     assert (body_problem(body.encode()) is None) == all(map(is_storable, texts(json.loads(body))))
-    json.dumps(visible(value), ensure_ascii=False).encode("utf-8")
+    json.dumps(storable_value(value), ensure_ascii=False).encode("utf-8")
 
 
 @pytest.fixture

@@ -17,7 +17,7 @@ from server.operations.doctor import identities
 from server.operations.drill import drill
 from server.operations.key_escrow import NAME
 from server.operations.restore import restore
-from server.participation.identity_repository import known_as, readable
+from server.participation.identity_repository import known_as, readable_identities
 from server.privacy.ledger import LEDGER_NAME, ledger_path, merge_ledgers
 from tests.helpers.admins import Admin
 from tests.helpers.databases import BACKENDS, run_server_command
@@ -75,7 +75,7 @@ def test_an_erased_person_is_gone_from_older_backups_too(
     assert ids(again) == {other: CODES[1]}
     assert "1 recruiters' ids; of 1 there is no key any more" in lines
     with again.database.read() as session:
-        assert list(readable(session)) == [True]
+        assert list(readable_identities(session)) == [True]
     again.database.close()
 
 

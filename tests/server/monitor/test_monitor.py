@@ -28,7 +28,7 @@ def test_only_changed_runs_are_sent_again(viewer: Admin, client, study: StudyInD
     before = MonitorSnapshot.model_validate(viewer.get("/studies/short/monitor").json())
     people[1].rate(people[1].state()["trials"][0])
     after = MonitorSnapshot.model_validate(viewer.get("/studies/short/monitor").json())
-    sent = MonitorSnapshot.model_validate_json(endpoints.changes(before, after))
+    sent = MonitorSnapshot.model_validate_json(endpoints.snapshot_changes(before, after))
     assert people[1].run_id in {run.run for run in sent.runs}
     assert len(after.runs) == 2
 

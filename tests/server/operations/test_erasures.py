@@ -14,7 +14,7 @@ from server.models import AuditEntry, StudyRun
 from server.operations.backup import back_up
 from server.operations.restore import restore
 from server.participation.identity_keys import ParticipantIdentity
-from server.participation.identity_repository import keep
+from server.participation.identity_repository import store_identity
 from server.privacy.ledger import begin_ledger, erasures_in_ledger, ledger_path, note_erased
 from tests.helpers.admins import Admin
 from tests.helpers.databases import BACKENDS, run_server_command
@@ -35,7 +35,7 @@ def test_every_visit_of_the_same_person_is_erased(
     with services.database.write() as session:
         for visit, identifier in zip(visits, ("5a9d", "5a9d", "77b2"), strict=True):
             run = session.scalars(select(StudyRun).where(StudyRun.public_id == visit.run_id)).one()
-            keep(session, run, run.study.pseudonym_key, ParticipantIdentity(identifier))
+            store_identity(session, run, run.study.pseudonym_key, ParticipantIdentity(identifier))
     first, second, other = (visit.run_id for visit in visits)
     answer = experimenter.send("POST", f"{RUNS}/{first}/erase", {"confirm": first})
     assert answer.status_code == 200

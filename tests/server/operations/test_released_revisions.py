@@ -8,7 +8,7 @@ from server.context import open_services
 from server.core.migrate import current_revision, downgrade, newest_revision, upgrade
 from server.core.settings import Settings
 from server.operations.restore import restore
-from server.participation.identity_repository import readable
+from server.participation.identity_repository import readable_identities
 from server.participation.tally_pools import Recount
 from server.privacy.rows import Content, content_of, snapshot, tables_of
 from tests.helpers.databases import BACKENDS
@@ -54,6 +54,6 @@ def test_a_released_revision_is_migrated_with_its_rows(
         }
     assert current_revision(services.database) == newest_revision()
     with services.database.read() as session:
-        assert all(readable(session))
+        assert all(readable_identities(session))
         assert list(Recount(services.versions).differing(session)) == []
     services.database.close()

@@ -39,7 +39,7 @@ from server.operations.snapshots import (
     take_snapshot,
 )
 from server.participation.identity_keys import ParticipantIdentity
-from server.participation.identity_repository import keep
+from server.participation.identity_repository import store_identity
 from server.privacy.ledger import note_erased
 from tests.helpers.admins import Admin
 from tests.helpers.databases import run_server_command
@@ -286,7 +286,7 @@ class TestErasures:
         visit.rate_all()
         with services.database.write() as session:
             run = session.scalars(select(StudyRun)).one()
-            keep(session, run, run.study.pseudonym_key, ParticipantIdentity("5a9d"))
+            store_identity(session, run, run.study.pseudonym_key, ParticipantIdentity("5a9d"))
         settings = services.settings.model_copy(update={"snapshot_minutes": 60.0})
         take_due_snapshot(settings)
         (taken,) = snapshots_of(settings)

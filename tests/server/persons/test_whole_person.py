@@ -12,7 +12,7 @@ from experiments.load import parse_experiment
 from server.context import Services
 from server.models import Base, RunEvent, StudyRun, View, ViewClip
 from server.participation.identity_keys import ParticipantIdentity
-from server.participation.identity_repository import keep
+from server.participation.identity_repository import store_identity
 from server.privacy.ledger import erasures_in_ledger, ledger_path, note_erased
 from server.privacy.persons import visits_of
 from server.privacy.retention import every_study
@@ -148,7 +148,9 @@ def test_a_person_is_the_same_by_id_and_by_run(
         # Two visits by the personal link, each under another id: the second and the third visit.
         runs["third"].link_id = runs["second"].link_id
         for name, code in {"first": "a", "second": "a", "third": "b", "preview": "a", "other": "c"}.items():
-            keep(session, runs[name], runs[name].study.pseudonym_key, ParticipantIdentity(code), code)
+            store_identity(
+                session, runs[name], runs[name].study.pseudonym_key, ParticipantIdentity(code), code
+            )
     hers = {people[name].run_id for name in ("first", "second", "third")}
     with services.database.read() as session:
         known = run_of(session, people["first"].run_id).study

@@ -120,7 +120,7 @@ def test_the_same_answers_give_the_same_stimuli_to_everybody_and_in_another_work
         rows = [row for row in rows_of(study.services) if row["run"] == one.run_id]
         shown.append([(row["value"], row["threshold"]) for row in rows])
         quest._states.clear()
-        again = series.follow(study.services.database, Versions(), one.token)
+        again = series.follow_series(study.services.database, Versions(), one.token)
         assert again is not None
         by_trial = {trial["trial_index"]: trial for trial in one.state()["trials"]}
         with study.services.database.read() as session:
