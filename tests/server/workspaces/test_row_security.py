@@ -85,7 +85,7 @@ def test_the_checks_that_are_taken_out_are_those_that_refuse(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(row_security, "act_for", lambda _account: None)
-    monkeypatch.setattr("server.accounts.identity.act_for", lambda _account: None)
+    monkeypatch.setattr("server.accounts.access.act_for", lambda _account: None)
     answer = outsiders[outsider].get(f"/studies/{foreign.study.name}")
     assert answer.status_code == 200, "the test above would pass for another reason"
 
