@@ -7,15 +7,13 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from experiments.columns import View, names_of
-from experiments.columns.base import EVIDENCE, EXCLUSION, LEVELS, ORIGIN, RUN, STUDY
+from experiments.columns.base import LEVELS, RUN, STUDY
 from experiments.errors import InputError
 
 # Which columns the analysis reads of the rows of a kind of trial.
 
 _NOT_ASKED = ("run", "language")
-_OF_A_RUN = tuple(
-    column for column in (*STUDY, *RUN, *EXCLUSION, *ORIGIN, *EVIDENCE) if column.name not in _NOT_ASKED
-)
+_OF_A_RUN = tuple(column for column in (*STUDY, *RUN) if column.name not in _NOT_ASKED)
 RUN_TEXTS = names_of(_OF_A_RUN, "text", "integer")
 RUN_FLAGS = names_of(_OF_A_RUN, "boolean")
 """Columns that are the same for all rows of a run."""

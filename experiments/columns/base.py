@@ -9,9 +9,28 @@ from collections.abc import Mapping
 
 from experiments.columns.column import Column
 
+ORIGINS = ("participant", "pilot", "simulated")
+"""Origins of runs that are exported; a preview's answers are not."""
+VERDICTS = ("likely", "unclear", "unlikely", "not_judged")
+
 STUDY: tuple[Column, ...] = (
     Column("study", "text", "Name of the study, unique on this server.", source="s.name"),
     Column("experiment", "text", "Name of the declared experiment.", source="v"),
+    Column(
+        "study_version",
+        "integer",
+        "Version of the study the run was made with.",
+        minimum=1,
+        source="v.number",
+    ),
+    Column(
+        "data_series",
+        "integer",
+        "Data series of that version: versions that measure the same share one, and their answers may be "
+        "pooled.",
+        minimum=1,
+        source="v.series",
+    ),
     Column(
         "definition_sha256",
         "text",
@@ -21,19 +40,6 @@ STUDY: tuple[Column, ...] = (
 )
 
 RUN: tuple[Column, ...] = (
-    Column(
-        "phase",
-        "text",
-        "Whether the run was made while the study was a pilot or live.",
-        values=("pilot", "live"),
-        source="r",
-    ),
-    Column(
-        "synthetic",
-        "boolean",
-        "True where no person gave this rating: simulated or synthesised data.",
-        source="r.origin = 'simulated'",
-    ),
     Column("run", "text", "Public identifier of the participant's visit (study run).", source="r.public_id"),
     Column(
         "participant",
@@ -42,11 +48,41 @@ RUN: tuple[Column, ...] = (
         source="r",
     ),
     Column(
+        "phase",
+        "text",
+        "Whether the run was made while the study was a pilot or live.",
+        values=("pilot", "live"),
+        source="r",
+    ),
+    Column(
+        "run_origin",
+        "text",
+        "Where the answers come from, fixed at the run's start: the live study, its pilot, or no person.",
+        values=ORIGINS,
+        source="r.origin",
+    ),
+    Column(
+        "synthetic",
+        "boolean",
+        "True where no person gave this rating: simulated or synthesised data.",
+        source="r.origin = 'simulated'",
+    ),
+    Column(
         "run_status",
         "text",
         "State of the visit.",
         values=("active", "complete", "screened_out", "withdrawn"),
         source="r.status",
+    ),
+    Column("excluded", "boolean", "True where an experimenter excluded the run by hand.", source="r"),
+    Column("exclusion_reason", "text", "Why an experimenter excluded the run.", source="r", identifying=True),
+    Column(
+        "evidence_verdict",
+        "text",
+        "Whether the run's answers are likely a person's; not_judged until the run is over, and where the "
+        "page brought no evidence.",
+        values=VERDICTS,
+        source="coalesce(r.evidence_verdict, 'not_judged')",
     ),
     Column("language", "text", "Language the participant read.", source="r"),
 )
@@ -135,54 +171,9 @@ TIMES: tuple[Column, ...] = (
     ),
 )
 
-EXCLUSION: tuple[Column, ...] = (
-    Column("excluded", "boolean", "True where an experimenter excluded the run by hand.", source="r"),
-    Column("exclusion_reason", "text", "Why an experimenter excluded the run.", source="r", identifying=True),
-)
 
 SAVED: tuple[Column, ...] = (
     Column("saved_at", "time", "When the server stored the row (UTC, ISO 8601).", source="t"),
-)
-
-ORIGINS = ("participant", "pilot", "simulated")
-"""Origins of runs that are exported; a preview's answers are not."""
-
-ORIGIN: tuple[Column, ...] = (
-    Column(
-        "run_origin",
-        "text",
-        "Where the answers come from, fixed at the run's start: the live study, its pilot, or no person.",
-        values=ORIGINS,
-        source="r.origin",
-    ),
-    Column(
-        "study_version",
-        "integer",
-        "Version of the study the run was made with.",
-        minimum=1,
-        source="v.number",
-    ),
-    Column(
-        "data_series",
-        "integer",
-        "Data series of that version: versions that measure the same share one, and their answers may be "
-        "pooled.",
-        minimum=1,
-        source="v.series",
-    ),
-)
-
-VERDICTS = ("likely", "unclear", "unlikely", "not_judged")
-
-EVIDENCE: tuple[Column, ...] = (
-    Column(
-        "evidence_verdict",
-        "text",
-        "Whether the run's answers are likely a person's; not_judged until the run is over, and where the "
-        "page brought no evidence.",
-        values=VERDICTS,
-        source="coalesce(r.evidence_verdict, 'not_judged')",
-    ),
 )
 
 CHECK: tuple[Column, ...] = (

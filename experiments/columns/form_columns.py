@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from experiments.columns.column import Column, unlike
+from experiments.columns.old_order import in_old_order
 from experiments.columns.runs import FORMS, RUN_COLUMNS
 from experiments.declaration.experiment import Experiment
 from experiments.declaration.forms import Form, FormField, is_empty
@@ -45,10 +46,10 @@ def form_columns(definitions: Iterable[Experiment]) -> list[FormColumn]:
     return list(_named(known.values()))
 
 
-def run_columns(forms: Iterable[FormColumn]) -> list[Column]:
+def run_columns(forms: Iterable[FormColumn], old_order: bool = False) -> list[Column]:
     """The columns of the runs CSV of a study with these questions, which stand in the place of `FORMS`."""
     columns: list[Column] = []
-    for column in RUN_COLUMNS:
+    for column in in_old_order("runs", RUN_COLUMNS) if old_order else RUN_COLUMNS:
         columns.extend([one.column for one in forms] if column is FORMS else [column])
     return columns
 

@@ -3,6 +3,7 @@
 Aliases of the tables as in the base columns, and w views.
 """
 
+from experiments.columns import base
 from experiments.columns.column import JOINED, Column
 
 PLAYBACK: tuple[Column, ...] = (
@@ -180,3 +181,28 @@ PRESENTATION: tuple[Column, ...] = (
     ),
 )
 """What `make scope` knows of the way from the drawing to the screen (docs/explanation/participant.md)."""
+
+
+def answer_columns(shown: tuple[Column, ...], answer: tuple[Column, ...]) -> tuple[Column, ...]:
+    """The columns of a view of answers in logical order, said here once for every kind of trial.
+
+    Parameters
+    ----------
+    shown, answer : tuple of Column
+        What the kind's trial showed, and what was answered.
+    """
+    return (
+        *base.STUDY,
+        *base.RUN,
+        *base.TRIAL,
+        *shown,
+        *answer,
+        *base.CHECK,
+        *base.TIMES,
+        *PLAYBACK,
+        *CLOCK,
+        *PRESENTATION,
+        *SCREEN,
+        *VIEWS,
+        *base.SAVED,
+    )

@@ -3,13 +3,14 @@
 import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import groupby
 from typing import Any, Literal
 
 from experiments.columns.base import CLIP_TABLE, LEVELS, RUN_ALIASES, RUN_JOINS
 from experiments.columns.column import JOINED, Column, ColumnType, names_of
+from experiments.columns.old_order import in_old_order
 
 Dialect = Literal["sqlite", "postgresql"]
 MADE_FROM = "made from the columns in experiments, anew at each upgrade"
@@ -61,6 +62,10 @@ class View:
             f"{spelled(column, dialect)} AS {column.name}" for column in self.columns
         )
         return f"CREATE VIEW {self.name} AS\n-- {MADE_FROM}\nSELECT {selected}\n{self.rows_in(dialect)}"
+
+    def in_old_order(self) -> "View":
+        """The same view with its columns as they stood until 0.2."""
+        return replace(self, columns=in_old_order(self.name, self.columns))
 
     def rows_in(self, dialect: Dialect) -> str:
         """The SQL after SELECT, in the words of one database; it ends in the conditions."""

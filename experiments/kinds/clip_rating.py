@@ -9,9 +9,10 @@ from experiments.assignment.groups import seat_of
 from experiments.assignment.order import single_clips
 from experiments.assignment.shares import lines, share
 from experiments.assignment.trial import Shown, Trial
-from experiments.columns import base, playback
+from experiments.columns import base
 from experiments.columns.base import rows_of
 from experiments.columns.column import Column
+from experiments.columns.playback import answer_columns
 from experiments.columns.view import Dialect, View
 from experiments.declaration.base import Declaration, Translated
 from experiments.declaration.clip_rating import (
@@ -149,26 +150,17 @@ def _fault_of_rest(reference: RatingReference, experiment: Experiment) -> str | 
 
 ANSWER: tuple[Column, ...] = (
     Column(
+        "scale",
+        "text",
+        "Name of the scale: rating where the study has one; empty in checks.",
+        source="CASE WHEN a.kind IN ('attention', 'check') THEN NULL ELSE e.key END",
+    ),
+    Column(
         "response",
         "number",
         "The rating as it was chosen on the scale, reverse-keyed or not; empty where not_applicable was.",
         source="e.value",
         member="response",
-    ),
-    Column(
-        "expected_response",
-        "integer",
-        "The answer asked for in an attention check, or right in a motion check.",
-        source="a",
-    ),
-)
-
-SCALE: tuple[Column, ...] = (
-    Column(
-        "scale",
-        "text",
-        "Name of the scale: rating where the study has one; empty in checks.",
-        source="CASE WHEN a.kind IN ('attention', 'check') THEN NULL ELSE e.key END",
     ),
     Column(
         "not_applicable",
@@ -177,6 +169,12 @@ SCALE: tuple[Column, ...] = (
         source="e.value",
         member="not_applicable",
         otherwise="false",
+    ),
+    Column(
+        "expected_response",
+        "integer",
+        "The answer asked for in an attention check, or right in a motion check.",
+        source="a",
     ),
     Column(
         "scale_rt",
@@ -223,26 +221,7 @@ def _rows(dialect: Dialect) -> str:
 RATINGS = View(
     name="ratings",
     title="Ratings: one row a play, or one a scale and play",
-    columns=(
-        *base.STUDY,
-        *base.RUN,
-        *base.TRIAL,
-        *base.CLIP,
-        *ANSWER,
-        *base.TIMES,
-        *playback.PLAYBACK,
-        *playback.SCREEN,
-        *base.EXCLUSION,
-        *base.SAVED,
-        *base.ORIGIN,
-        *playback.CLOCK,
-        *SCALE,
-        *playback.VIEWS,
-        *base.EVIDENCE,
-        *base.CHECK,
-        *playback.PRESENTATION,
-        *REFERENCE,
-    ),
+    columns=answer_columns((*base.CLIP, *REFERENCE), ANSWER),
     rows=_rows,
 )
 

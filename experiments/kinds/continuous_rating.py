@@ -6,9 +6,10 @@ from typing import Literal
 from experiments.assignment.order import single_clips
 from experiments.assignment.shares import lines as planned
 from experiments.assignment.trial import Trial
-from experiments.columns import base, playback
+from experiments.columns import base
 from experiments.columns.base import rows_of
 from experiments.columns.column import Column
+from experiments.columns.playback import answer_columns
 from experiments.columns.view import View
 from experiments.declaration.base import Declaration, Translated
 from experiments.declaration.clip_rating import Points
@@ -80,24 +81,7 @@ ANSWER: tuple[Column, ...] = (
 TRACES = View(
     name="traces",
     title="Traces: one row a play of a clip",
-    columns=(
-        *base.STUDY,
-        *base.RUN,
-        *base.TRIAL,
-        *base.CLIP,
-        *ANSWER,
-        *base.TIMES,
-        *playback.PLAYBACK,
-        *playback.SCREEN,
-        *base.EXCLUSION,
-        *base.SAVED,
-        *base.ORIGIN,
-        *playback.CLOCK,
-        *playback.VIEWS,
-        *base.CHECK,
-        *playback.PRESENTATION,
-        *base.EVIDENCE,
-    ),
+    columns=answer_columns(base.CLIP, ANSWER),
     rows=rows_of("continuous_rating", {"shown": "c"}, "LEFT JOIN clips k ON k.sha256 = c.clip_sha256\n"),
 )
 

@@ -10,9 +10,9 @@ from experiments.assignment.groups import groups, name_of, of_group, seat_of
 from experiments.assignment.order import ordered_blocks, with_attention
 from experiments.assignment.shares import expected_slots, said_of_groups
 from experiments.assignment.trial import Compared, Shown, Trial
-from experiments.columns import base, playback
 from experiments.columns.base import rows_of
 from experiments.columns.column import Column
+from experiments.columns.playback import answer_columns
 from experiments.columns.view import View
 from experiments.declaration.base import Declaration, Translated
 from experiments.declaration.experiment import Experiment
@@ -93,29 +93,16 @@ ANSWER: tuple[Column, ...] = (
     ),
 )
 
+SHOWN: tuple[Column, ...] = (
+    *_side("left", "lc", "fc"),
+    *_side("right", "rc", "sc"),
+    Column("reference", "text", "Cell of the reference clip shown before.", source="xc.cell"),
+)
+
 COMPARISONS = View(
     name="comparisons",
     title="Comparisons: one row a showing of a pair",
-    columns=(
-        *base.STUDY,
-        *base.RUN,
-        *base.TRIAL,
-        *_side("left", "lc", "fc"),
-        *_side("right", "rc", "sc"),
-        Column("reference", "text", "Cell of the reference clip shown before.", source="xc.cell"),
-        *ANSWER,
-        *base.TIMES,
-        *playback.PLAYBACK,
-        *playback.SCREEN,
-        *base.EXCLUSION,
-        *base.SAVED,
-        *base.ORIGIN,
-        *playback.CLOCK,
-        *playback.VIEWS,
-        *base.EVIDENCE,
-        *base.CHECK,
-        *playback.PRESENTATION,
-    ),
+    columns=answer_columns(SHOWN, ANSWER),
     rows=rows_of("paired_comparison", _ROLES),
 )
 

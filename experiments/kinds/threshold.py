@@ -7,9 +7,10 @@ from typing import Literal
 from experiments.assignment.groups import groups, name_of, seat_of
 from experiments.assignment.order import ordered_blocks, with_attention
 from experiments.assignment.trial import Shown, Trial
-from experiments.columns import base, playback
+from experiments.columns import base
 from experiments.columns.base import rows_of
 from experiments.columns.column import Column
+from experiments.columns.playback import answer_columns
 from experiments.columns.view import View
 from experiments.declaration.base import Declaration, Translated
 from experiments.declaration.experiment import Experiment
@@ -138,26 +139,7 @@ LEFT JOIN version_clips c ON c.id = w.version_clip_id
 THRESHOLDS = View(
     name="thresholds",
     title="Thresholds: one row a play of a trial",
-    columns=(
-        *base.STUDY,
-        *base.RUN,
-        *base.TRIAL,
-        *SERIES,
-        *base.CLIP,
-        *ANSWER,
-        *ESTIMATE,
-        *base.TIMES,
-        *playback.PLAYBACK,
-        *playback.SCREEN,
-        *base.EXCLUSION,
-        *base.SAVED,
-        *base.ORIGIN,
-        *playback.CLOCK,
-        *playback.VIEWS,
-        *base.EVIDENCE,
-        *base.CHECK,
-        *playback.PRESENTATION,
-    ),
+    columns=answer_columns((*SERIES, *base.CLIP), (*ANSWER, *ESTIMATE)),
     rows=rows_of("threshold", {}, _TABLES),
 )
 

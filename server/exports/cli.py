@@ -77,6 +77,12 @@ def export(
             "numbers). --no-guard writes every text exactly as it was given: for programs alone.",
         ),
     ] = True,
+    old_order: Annotated[
+        bool,
+        typer.Option(
+            "--old-order", help="Columns as they stood until 0.2; else logically ordered, response by scale."
+        ),
+    ] = False,
     scripts: Annotated[
         bool, typer.Option(help="Beside the long CSV, write scripts that analyse it with R and Python.")
     ] = True,
@@ -107,7 +113,7 @@ def export(
         check_targets([out_file])
     with stored_services() as services, services.database.snapshot() as session:
         known = find_study(session, study, OPERATOR, "view")
-        extract = Extract(origin, series)
+        extract = Extract(origin, series, old_order)
         definition_of_series(session, known, extract.series)
         if form != "codebook":
             action = "identities downloaded" if form == "identities" else "data downloaded"

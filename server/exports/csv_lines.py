@@ -136,9 +136,10 @@ def csv_texts(rows: Iterable[Iterable[Any]]) -> list[str]:
 # The tidy CSV: the rows of the view of the study's kind of trial, run after run, in constant memory.
 
 
-def view_of(session: Session, study: Study) -> View:
+def view_of(session: Session, study: Study, extract: Extract) -> View:
     """The view that holds the answers of the study's kind of trial, as its version in use declares it."""
-    return KINDS[active_definition(session, study).trial.kind].view
+    view = KINDS[active_definition(session, study).trial.kind].view
+    return view.in_old_order() if extract.old_order else view
 
 
 def factor_names(session: Session, study: Study) -> tuple[str, ...]:
@@ -152,7 +153,7 @@ def rating_count(session: Session, study: Study, extract: Extract) -> int:
     trials = [one.trial for one in all_definitions(session, study)]
     if any(len(trial.rated_scales()) > 1 for trial in trials):
         # A rating is a row a scale.
-        return repository.rows_in_view(session, study, extract, view_of(session, study))
+        return repository.rows_in_view(session, study, extract, view_of(session, study, extract))
     kind = active_definition(session, study).trial.kind
     of_one_kind = all(trial.kind == kind for trial in trials)
     return repository.play_count(session, study, extract, None if of_one_kind else kind)
@@ -160,7 +161,7 @@ def rating_count(session: Session, study: Study, extract: Extract) -> int:
 
 def rating_rows(session: Session, study: Study, extract: Extract) -> Iterator[Sequence[Any]]:
     """Rows of the study's view; see `repository.view_rows`."""
-    return repository.view_rows(session, study, extract, view_of(session, study))
+    return repository.view_rows(session, study, extract, view_of(session, study, extract))
 
 
 # Tables as pieces of CSV bytes, so that a download of any length takes constant memory.
@@ -192,7 +193,7 @@ def csv_pieces(rows: Iterable[Sequence[Any]]) -> Iterator[bytes]:
 
 def rating_pieces(session: Session, study: Study, extract: Extract) -> Iterator[bytes]:
     """Header and lines of the tidy CSV, some hundred lines a piece."""
-    factors, view = factor_names(session, study), view_of(session, study)
+    factors, view = factor_names(session, study), view_of(session, study, extract)
     yield from csv_pieces([view.csv_header(factors)])
     lines = check_whole(
         rating_lines(session, study, extract, view, factors), rating_count(session, study, extract)
@@ -203,7 +204,7 @@ def rating_pieces(session: Session, study: Study, extract: Extract) -> Iterator[
 
 def rating_table(session: Session, study: Study, extract: Extract) -> Iterator[Sequence[Any]]:
     """Header and rows of the tidy CSV."""
-    factors, view = factor_names(session, study), view_of(session, study)
+    factors, view = factor_names(session, study), view_of(session, study, extract)
     yield view.csv_header(factors)
     rows = (view.csv_row(row, factors) for row in rating_rows(session, study, extract))
     yield from check_whole(rows, rating_count(session, study, extract))

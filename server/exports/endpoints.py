@@ -71,6 +71,9 @@ Guard = Annotated[
 Series = Annotated[
     Number | None, Query(description="Data of one data series; without it of all, told apart by a column.")
 ]
+OldOrder = Annotated[
+    bool, Query(description="Columns as they stood until 0.2; else in logical order, response beside scale.")
+]
 
 
 @dataclass(frozen=True)
@@ -143,8 +146,9 @@ async def _requested_download(
     study: str,
     origin: ExportOrigin = "participant",
     series: Series = None,
+    old_order: OldOrder = False,
 ) -> Download:
-    return Download(services, identity, study, Extract(origin, series))
+    return Download(services, identity, study, Extract(origin, series, old_order))
 
 
 async def _asked_as_csv(

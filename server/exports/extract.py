@@ -15,10 +15,14 @@ EXPORTED = get_args(ExportOrigin)[:-1]
 
 @dataclass(frozen=True)
 class Extract:
-    """The part of a study's data that goes out; without a series of each, told apart by a column."""
+    """The part of a study's data that goes out; without a series of each, told apart by a column.
+
+    `old_order`: columns stand as they stood until 0.2.
+    """
 
     origin: ExportOrigin = "participant"
     series: int | None = None
+    old_order: bool = False
 
     def condition(self, study: Study) -> ColumnElement[bool]:
         """The condition that a run of the study is in it."""

@@ -133,8 +133,7 @@ def raw_json(session: Session, study: Study, extract: Extract) -> Iterator[bytes
 
 def codebook_markdown(session: Session, study: Study, extract: Extract) -> Iterator[bytes]:
     """What every column means; the same whatever the origin."""
-    del extract
-    explained = tables.explained_tables(all_definitions(session, study))
+    explained = tables.explained_tables(all_definitions(session, study), extract.old_order)
     yield encode_text(tables.codebook_text(active_definition(session, study), explained))
 
 

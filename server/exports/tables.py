@@ -47,7 +47,7 @@ def run_rows(
     session: Session, study: Study, extract: Extract, forms: Sequence[FormColumn]
 ) -> Iterator[list[Any]]:
     """Rows of the runs CSV in the order the runs began: the columns of `run_columns(forms)`."""
-    names = [column.name for column in run_columns(forms)]
+    names = [column.name for column in run_columns(forms, extract.old_order)]
     name = study.name
     for run in repository.each_run(session, study, extract):
         values = _values(session, run, forms) | {"study": name}
@@ -187,10 +187,12 @@ def _mean_of(scale: RatedScale, cell: str) -> str:
     return f"Mean answer on the scale {scale.name}{of}: main trials, the last play with an answer of each."
 
 
-def wide_columns(experiment: Experiment, forms: Sequence[FormColumn]) -> list[Column]:
+def wide_columns(
+    experiment: Experiment, forms: Sequence[FormColumn], old_order: bool = False
+) -> list[Column]:
     """The run, its groups, its answers to forms, how many answers are averaged, and a column a cell."""
     of_forms = {one.column.name for one in forms}
-    kept = [one for one in run_columns(forms) if one.name in OF_THE_RUN or one.name in of_forms]
+    kept = [one for one in run_columns(forms, old_order) if one.name in OF_THE_RUN or one.name in of_forms]
     between = [
         Column(
             beside_runs(factor.name),
@@ -214,10 +216,11 @@ def wide_rows(
     forms: Sequence[FormColumn],
 ) -> Iterator[list[Any]]:
     """Rows in the order the runs began; a cell is empty where the run has no answer in it."""
-    cells, names = cells_of(experiment), [column.name for column in run_columns(forms)]
+    cells = cells_of(experiment)
+    names = [column.name for column in run_columns(forms, extract.old_order)]
     kept = [
         names.index(column.name)
-        for column in wide_columns(experiment, forms)
+        for column in wide_columns(experiment, forms, extract.old_order)
         if column.name in names and column.name != "answers"
     ]
     between = [factor.name for factor in experiment.factors if factor.between]
@@ -254,7 +257,7 @@ _NOTHING = _RunMeans("", {}, 0, {})
 
 def _by_run(session: Session, study: Study, extract: Extract, experiment: Experiment) -> Iterator[_RunMeans]:
     """The runs with rows of main trials, in the order they began."""
-    factors, view = factor_names(session, study), view_of(session, study)
+    factors, view = factor_names(session, study), view_of(session, study, extract)
     header = view.csv_header(factors)
     within = [header.index(factor.name) for factor in experiment.factors if not factor.between]
     between = {factor.name: header.index(factor.name) for factor in experiment.factors if factor.between}
@@ -297,11 +300,12 @@ def factor_columns(definitions: Iterable[Experiment]) -> list[Column]:
     return list(columns.values())
 
 
-def rating_columns(definitions: Iterable[Experiment]) -> list[Column]:
+def rating_columns(definitions: Iterable[Experiment], old_order: bool = False) -> list[Column]:
     """Every column of the tidy CSV of a study with these versions, in order; the last one's kind counts."""
     versions = list(definitions)
     columns: list[Column] = []
-    for column in KINDS[versions[-1].trial.kind].view.columns:
+    view = KINDS[versions[-1].trial.kind].view
+    for column in (view.in_old_order() if old_order else view).columns:
         columns.extend(factor_columns(versions) if column.name == "levels" else [column])
     return columns
 
@@ -321,15 +325,17 @@ def codebook_text(definition: Experiment, tables: Iterable[tuple[str, Iterable[C
     return "\n".join(lines)
 
 
-def explained_tables(definitions: list[Experiment]) -> list[tuple[str, list[Column]]]:
+def explained_tables(
+    definitions: list[Experiment], old_order: bool = False
+) -> list[tuple[str, list[Column]]]:
     """The tables of a study with these versions by title: answers, runs, and wide where it has one."""
     active, forms = definitions[-1], form_columns(definitions)
     tables = [
-        (KINDS[active.trial.kind].view.title, rating_columns(definitions)),
-        ("Runs: one row a visit", run_columns(forms)),
+        (KINDS[active.trial.kind].view.title, rating_columns(definitions, old_order)),
+        ("Runs: one row a visit", run_columns(forms, old_order)),
     ]
     if scales_of(active):
-        cells = [column for column in wide_columns(active, forms) if column not in tables[1][1]]
+        cells = [column for column in wide_columns(active, forms, old_order) if column not in tables[1][1]]
         title = "Wide: one row a visit; beside columns of the runs, a column a cell of the design"
         tables.append((title, cells))
     return tables
@@ -402,9 +408,9 @@ class ExportTable:
 
 def answers_table(session: Session, study: Study, extract: Extract) -> ExportTable:
     """One row a play (or a scale and play), a column a factor."""
-    columns = rating_columns(all_definitions(session, study))
+    columns = rating_columns(all_definitions(session, study), extract.old_order)
     rows = islice(rating_table(session, study, extract), 1, None)
-    name = view_of(session, study).name
+    name = view_of(session, study, extract).name
     return ExportTable(name, columns, rows, rating_count(session, study, extract))
 
 
@@ -412,7 +418,7 @@ def runs_table(session: Session, study: Study, extract: Extract) -> ExportTable:
     """One row a visit, a column a question of the forms."""
     forms, number = form_columns(all_definitions(session, study)), run_count(session, study, extract)
     rows = check_whole(run_rows(session, study, extract, forms), number)
-    return ExportTable("runs", run_columns(forms), rows, number)
+    return ExportTable("runs", run_columns(forms, extract.old_order), rows, number)
 
 
 def wide_table(session: Session, study: Study, extract: Extract) -> ExportTable:
@@ -420,7 +426,7 @@ def wide_table(session: Session, study: Study, extract: Extract) -> ExportTable:
     definitions, number = all_definitions(session, study), run_count(session, study, extract)
     newest, forms = definition_of_series(session, study, extract.series), form_columns(definitions)
     rows = check_whole(wide_rows(session, study, extract, newest, forms), number)
-    return ExportTable("wide", wide_columns(newest, forms), rows, number)
+    return ExportTable("wide", wide_columns(newest, forms, extract.old_order), rows, number)
 
 
 TABLES: dict[TableName, Callable[[Session, Study, Extract], ExportTable]] = {

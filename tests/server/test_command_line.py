@@ -59,6 +59,11 @@ def test_a_study_from_files_to_data(settings: Settings, services: Services, sour
     # A play that failed is offered again and is a row of its own.
     assert len({(row["run"], row["trial_index"]) for row in rows if row["verdict"] != "failed"}) == 2 * 12
     assert list(rows[0]) == RATINGS.csv_header(["character", "speed"])
+    call = ("export", "short", "--origin", "simulated", "--old-order", "--out", str(out))
+    assert run_server_command(settings, *call).returncode == 0
+    as_before = list(csv.DictReader(io.StringIO(out.read_text(encoding="utf-8"))))
+    assert list(as_before[0]) == RATINGS.in_old_order().csv_header(["character", "speed"])
+    assert as_before == rows
     assert {row["synthetic"] for row in rows} == {"1"}
     assert {row["run_status"] for row in rows} == {"complete"}
     with services.database.read() as session:

@@ -7931,6 +7931,7 @@ export interface operations {
     guard?: boolean;
     origin?: "participant" | "pilot" | "simulated" | "all";
     series?: number | null;
+    old_order?: boolean;
    };
    path: {
     study: string;
@@ -7967,6 +7968,7 @@ export interface operations {
     guard?: boolean;
     origin?: "participant" | "pilot" | "simulated" | "all";
     series?: number | null;
+    old_order?: boolean;
    };
    path: {
     study: string;
@@ -8003,6 +8005,7 @@ export interface operations {
     guard?: boolean;
     origin?: "participant" | "pilot" | "simulated" | "all";
     series?: number | null;
+    old_order?: boolean;
    };
    path: {
     study: string;
@@ -8068,6 +8071,7 @@ export interface operations {
    query?: {
     origin?: "participant" | "pilot" | "simulated" | "all";
     series?: number | null;
+    old_order?: boolean;
    };
    path: {
     study: string;
@@ -8102,6 +8106,7 @@ export interface operations {
    query?: {
     origin?: "participant" | "pilot" | "simulated" | "all";
     series?: number | null;
+    old_order?: boolean;
    };
    path: {
     study: string;
@@ -8196,6 +8201,7 @@ export interface operations {
    query?: {
     origin?: "participant" | "pilot" | "simulated" | "all";
     series?: number | null;
+    old_order?: boolean;
    };
    path: {
     table: "ratings" | "wide";

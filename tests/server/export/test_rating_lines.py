@@ -65,9 +65,12 @@ def took_part(client: TestClient, study: StudyInDatabase, seeds: tuple[int, ...]
         assert Person(Api(client), Rater(seed, 1, levels)).take_part(link)
 
 
+EXTRACTS = (EVERYTHING, Extract("all", 1), Extract("all", old_order=True))
+
+
 def test_the_text_is_that_of_the_views_rows(services: Services, filled: Study) -> None:
     with services.database.read() as session:
-        for extract in (EVERYTHING, Extract("all", 1), *map(Extract, ("participant", "pilot", "simulated"))):
+        for extract in (*EXTRACTS, *map(Extract, ("participant", "pilot", "simulated"))):
             expected = b"".join(csv_pieces(rating_table(session, filled, extract)))
             assert b"".join(ratings_csv(session, filled, extract)) == expected
             assert expected.count(b"\n") > 4

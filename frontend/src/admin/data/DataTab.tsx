@@ -254,6 +254,7 @@ export function DataTab() {
   const [series, setSeries] = useState<number | null>(null);
   const detail = useQuery(studyQuery(study)).data;
   const [excel, setExcel] = useState(false);
+  const [oldOrder, setOldOrder] = useState(false);
   const hasWide = detail !== undefined && adminKind(detail.definition.trial.kind).hasWideTable === true;
   const mine = useMay(study, "own") ? [...FILES, IDENTITIES] : FILES;
   const files = mine.filter(([file]) => hasWide || !file.startsWith("wide."));
@@ -264,9 +265,11 @@ export function DataTab() {
     if (origin !== "participant" && holdsData) options.set("origin", origin);
     if (series !== null && holdsData) options.set("series", String(series));
     if (excel && file.endsWith(".csv")) options.set("excel", "true");
+    if (oldOrder && holdsData && file !== "raw.ndjson") options.set("old_order", "true");
     return options.size > 0 ? `?${options.toString()}` : "";
   };
   const option = `${origin === "participant" ? "" : ` --origin ${origin}`}${series === null ? "" : ` --series ${series}`}`;
+  const order = oldOrder ? " --old-order" : "";
   const ofCapsule = origin === "all" ? option.replace(" --origin all", "") : option;
   return (
     <Stack>
@@ -284,6 +287,12 @@ export function DataTab() {
         onChange={(event) => setExcel(event.currentTarget.checked)}
         label="For Excel"
         description="CSV files begin with a mark that shows Excel how letters are encoded. In every CSV file, an apostrophe before = + - @ keeps a text from running as a formula; analysis run removes it again."
+      />
+      <Switch
+        checked={oldOrder}
+        onChange={(event) => setOldOrder(event.currentTarget.checked)}
+        label="Columns in the order of before"
+        description="For programs that read columns by their place. Else what belongs together stands together: the response beside its scale, all of the visit before all of the trial."
       />
       <SealCard study={study} />
       <CapsuleCard study={study} origin={origin === "all" ? "participant" : origin} series={series} />
@@ -320,7 +329,7 @@ export function DataTab() {
         block
         tabIndex={0}
         aria-label="Commands"
-      >{`server export ${study}${option} --out ${study}.csv\nserver export ${study}${option} --format psych-ds --out ${study}.zip\nserver capsule ${study}${ofCapsule} --out ${study}-capsule.zip\nanalysis run ${study}.toml --csv ${study}.csv${option}`}</Code>
+      >{`server export ${study}${option} --out ${study}.csv${order}\nserver export ${study}${option}${order} --format psych-ds --out ${study}.zip\nserver capsule ${study}${ofCapsule} --out ${study}-capsule.zip\nanalysis run ${study}.toml --csv ${study}.csv${option}`}</Code>
     </Stack>
   );
 }

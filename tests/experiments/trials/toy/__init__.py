@@ -11,8 +11,9 @@ from pydantic import Field
 
 from experiments import design
 from experiments.assignment.trial import Shown, Trial
-from experiments.columns import Column, View, base, playback
+from experiments.columns import Column, View
 from experiments.columns.base import rows_of
+from experiments.columns.playback import answer_columns
 from experiments.declaration.base import Declaration, Translated
 from experiments.declaration.trial import Answer, TrialDeclaration
 from experiments.kinds.kind import Kind
@@ -63,17 +64,11 @@ TOY = Kind(
     view=View(
         name="sameness",
         title="Sameness: one row a pair",
-        columns=(
-            *base.STUDY,
-            *base.RUN,
-            *base.TRIAL,
-            Column("same", "boolean", "True where the two looked alike.", source="t.payload", member="same"),
-            Column("first_cell", "text", "Cell of the clip shown first.", source="one.cell"),
-            *base.TIMES,
-            *playback.PLAYBACK,
-            *base.EXCLUSION,
-            *base.SAVED,
-            *base.ORIGIN,
+        columns=answer_columns(
+            shown=(Column("first_cell", "text", "Cell of the clip shown first.", source="one.cell"),),
+            answer=(
+                Column("same", "boolean", "True where they looked alike.", source="t.payload", member="same"),
+            ),
         ),
         rows=rows_of("same_or_not", {"first": "one", "second": "two"}),
     ),
