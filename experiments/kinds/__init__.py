@@ -1,23 +1,29 @@
 """The kinds of trial, and the registry that finds them by name.
 
-A new kind is its [trial] in `experiments.declaration`, its file here, and its line in `KINDS` and `TRIALS`.
+A new kind is a file of its name in `experiments.declaration`, for its [trial], and one here, with its `Kind`:
+both are found by the name.
 """
 
+from importlib import import_module
 from typing import Annotated
 
 from experiments.columns.view import View
-from experiments.declaration.any_trial import CheckAnswer
+from experiments.declaration.any_trial import TRIALS, CheckAnswer
 from experiments.declaration.base import Declaration
 from experiments.declaration.trial import Answer, ByKind
-from experiments.kinds.clip_rating import CLIP_RATING
-from experiments.kinds.continuous_rating import CONTINUOUS_RATING
 from experiments.kinds.kind import Kind
-from experiments.kinds.paired_comparison import PAIRED_COMPARISON
-from experiments.kinds.threshold import THRESHOLD
 
-KINDS: dict[str, Kind] = {
-    kind.name: kind for kind in (CLIP_RATING, PAIRED_COMPARISON, THRESHOLD, CONTINUOUS_RATING)
-}
+
+def _kind_in(name: str) -> Kind:
+    """The kind of a file of this folder."""
+    module = import_module(f"experiments.kinds.{name}")
+    for value in vars(module).values():
+        if isinstance(value, Kind) and value.name == name:
+            return value
+    raise TypeError(f"{module.__name__}: expected a Kind called '{name}', found none")
+
+
+KINDS: dict[str, Kind] = {name: _kind_in(name) for name in TRIALS}
 """Every kind by the name that a TOML gives it; the first is meant where none is given."""
 
 

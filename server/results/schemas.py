@@ -208,11 +208,21 @@ class TraceResults(StudyResults):
     cells: list[TraceCell]
 
 
+class AnsweredCell(BaseModel):
+    """The answers to trials that showed a cell, or one cell and then another."""
+
+    cell: str
+    second: str | None = Field(description="Cell of the other clip, where a trial shows two.")
+    n: int
+    mean: float = Field(description="Mean of the numbers that the answers count as.")
+
+
 class OtherResults(StudyResults):
-    """Of a kind of trial without a summary."""
+    """Of a kind of trial without a summary of its own."""
 
     kind: Literal["other"] = "other"
     note: str
+    cells: list[AnsweredCell]
 
 
 AnyResults = Results | PairResults | ThresholdResults | TraceResults | OtherResults

@@ -687,6 +687,12 @@ export interface components {
   Answer: {
    kind: string;
   };
+  AnsweredCell: {
+   cell: string;
+   second: string | null;
+   n: number;
+   mean: number;
+  };
   ArchiveStudy: {
    revision: number;
    archived: boolean;
@@ -1430,7 +1436,7 @@ export interface components {
    *     }
    */
    practice: components["schemas"]["Practice"];
-   trial: components["schemas"]["ClipRating"] | components["schemas"]["PairedComparison"] | components["schemas"]["Threshold"] | components["schemas"]["ContinuousRating"];
+   trial: components["schemas"]["ClipRating"] | components["schemas"]["ContinuousRating"] | components["schemas"]["PairedComparison"] | components["schemas"]["Threshold"];
    /**
    * @default {
    *       "inter_ocular_mm": 60,
@@ -2117,6 +2123,7 @@ export interface components {
    */
    kind: "other";
    note: string;
+   cells: components["schemas"]["AnsweredCell"][];
   };
   OtherWay: {
    label: {
@@ -2353,7 +2360,7 @@ export interface components {
    trial_index: number;
    /** @default 1 */
    play?: number;
-   answer: components["schemas"]["RatingAnswer"] | components["schemas"]["ComparisonAnswer"] | components["schemas"]["ThresholdAnswer"] | components["schemas"]["ContinuousAnswer"] | components["schemas"]["CheckAnswer"];
+   answer: components["schemas"]["RatingAnswer"] | components["schemas"]["ContinuousAnswer"] | components["schemas"]["ComparisonAnswer"] | components["schemas"]["ThresholdAnswer"] | components["schemas"]["CheckAnswer"];
    rt?: number | null;
    rt_from_first_frame?: number | null;
    time_elapsed?: number | null;
@@ -2588,7 +2595,7 @@ export interface components {
    origin: string;
    language: string;
    erased: boolean;
-   trial: components["schemas"]["ShownClipRating"] | components["schemas"]["ShownPairedComparison"] | components["schemas"]["ShownThreshold"] | components["schemas"]["ShownContinuousRating"];
+   trial: components["schemas"]["ShownClipRating"] | components["schemas"]["ShownContinuousRating"] | components["schemas"]["ShownPairedComparison"] | components["schemas"]["ShownThreshold"];
    display: components["schemas"]["Display"];
    trials: components["schemas"]["ReplayableTrial"][];
   };
@@ -2764,7 +2771,7 @@ export interface components {
    languages: string[];
    texts: components["schemas"]["Texts"];
    forms: components["schemas"]["Form"][];
-   trial: components["schemas"]["ShownClipRating"] | components["schemas"]["ShownPairedComparison"] | components["schemas"]["ShownThreshold"] | components["schemas"]["ShownContinuousRating"];
+   trial: components["schemas"]["ShownClipRating"] | components["schemas"]["ShownContinuousRating"] | components["schemas"]["ShownPairedComparison"] | components["schemas"]["ShownThreshold"];
    display: components["schemas"]["Display"];
    playback: components["schemas"]["PlaybackRules"];
    break_seconds_min: number;
@@ -3726,6 +3733,7 @@ export type Active = components['schemas']['Active'];
 export type AllPairs = components['schemas']['AllPairs'];
 export type AnalysisPlan = components['schemas']['AnalysisPlan'];
 export type Answer = components['schemas']['Answer'];
+export type AnsweredCell = components['schemas']['AnsweredCell'];
 export type ArchiveStudy = components['schemas']['ArchiveStudy'];
 export type AskFrameRate = components['schemas']['AskFrameRate'];
 export type Assignment = components['schemas']['Assignment'];

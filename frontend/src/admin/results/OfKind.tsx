@@ -1,12 +1,23 @@
 /** The results as the study's kind of trial shows them, charts and all: loaded once there are answers. */
 import { Alert, SimpleGrid, Stack, Text } from "@mantine/core";
 import type { ComponentType } from "react";
-import { counted, when, labelOfOrigin } from "../ui/format";
+import type { Schemas } from "../api";
+import { type Column, DataTable } from "../ui/DataTable";
+import { counted, fixed, when, labelOfOrigin } from "../ui/format";
 import { HowShown } from "./HowShown";
 import type { ShownResults } from "./plots";
 
 /** By the name of the kind: what a file of its folder in ../kinds shows. */
 const pages = import.meta.glob<ComponentType<ShownResults>>("../kinds/*/Results.tsx", { import: "KindResults", eager: true });
+
+type AnsweredCell = Schemas["AnsweredCell"];
+
+const CELL: Column<AnsweredCell> = { title: "Cell", cell: ({ cell }) => cell };
+const SECOND: Column<AnsweredCell> = { title: "Second clip", cell: ({ second }) => second };
+const NUMBERS: Column<AnsweredCell>[] = [
+  { title: "Answers", number: true, cell: ({ n }) => n.toLocaleString() },
+  { title: "Mean", number: true, cell: ({ mean }) => fixed(mean) },
+];
 
 export function OfKind({ study, data, factors }: ShownResults) {
   const KindResults = pages[`../kinds/${data.kind}/Results.tsx`];
@@ -22,6 +33,13 @@ export function OfKind({ study, data, factors }: ShownResults) {
       {data.kind === "other" && (
         <>
           <Text>{data.note}</Text>
+          <DataTable
+            label="Answers by cell"
+            rows={data.cells}
+            rowKey={({ cell, second }) => `${cell} ${second ?? ""}`}
+            columns={data.cells.some(({ second }) => second !== null) ? [CELL, SECOND, ...NUMBERS] : [CELL, ...NUMBERS]}
+            empty="No answers."
+          />
           <SimpleGrid cols={{ base: 1, md: 2 }}>
             <HowShown data={data} />
           </SimpleGrid>
