@@ -1,5 +1,9 @@
-"""A type of scale, a type of field and a language as one would add them: new files, and edits of others."""
+"""A kind of trial, a type of scale or field, a language: added as one would, by new files and edits.
 
+The files of the kind are in `word_choice`, at their places in the tree.
+"""
+
+from pathlib import Path
 from typing import NamedTuple
 
 
@@ -9,6 +13,14 @@ class Edit(NamedTuple):
     before: str
     after: str
 
+
+_KIND_FOLDER = Path(__file__).parent / "word_choice"
+KIND: dict[str, str | Edit] = {
+    path.relative_to(_KIND_FOLDER).as_posix(): path.read_text(encoding="utf-8")
+    for path in sorted(_KIND_FOLDER.rglob("word_choice*")) + sorted(_KIND_FOLDER.rglob("*.ts"))
+    if path.is_file()
+}
+"""A forced choice of two words after a clip."""
 
 MAGNITUDE = '''\
 class Magnitude(Scale):

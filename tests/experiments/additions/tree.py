@@ -42,6 +42,7 @@ def add(folder: Path, addition: dict[str, str | Edit]) -> None:
             text = path.read_text(encoding="utf-8")
             assert text.count(content.before) == 1, name
             content = text.replace(*content)
+        path.parent.mkdir(exist_ok=True)
         path.write_text(content, encoding="utf-8")
 
 
