@@ -58,5 +58,5 @@ OLD_ORDER = {table: tuple(names.split()) for table, names in _OF_TABLE.items()}
 
 def in_old_order(table: str, columns: Iterable[Column]) -> tuple[Column, ...]:
     """The columns of a table as they stood until 0.2; those of a younger table as they are."""
-    place = {name: index for index, name in enumerate(OLD_ORDER.get(table, ()))}
-    return tuple(sorted(columns, key=lambda column: place.get(column.name, len(place))))
+    position_before = {name: index for index, name in enumerate(OLD_ORDER.get(table, ()))}
+    return tuple(sorted(columns, key=lambda column: position_before.get(column.name, len(position_before))))

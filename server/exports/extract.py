@@ -17,7 +17,12 @@ EXPORTED = get_args(ExportOrigin)[:-1]
 class Extract:
     """The part of a study's data that goes out; without a series of each, told apart by a column.
 
-    `old_order`: columns stand as they stood until 0.2.
+    Attributes
+    ----------
+    origin : ExportOrigin
+    series : int or None
+    old_order : bool
+        Whether columns stand as they stood until 0.2.
     """
 
     origin: ExportOrigin = "participant"

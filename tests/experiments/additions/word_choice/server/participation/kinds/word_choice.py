@@ -2,20 +2,18 @@
 
 import random
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from experiments.declaration.word_choice import WordAnswer
 
 from experiments.declaration.experiment import Experiment
-from server.participation.answer_schemas import RatingIn
-from server.participation.kinds import Part, Preference, Served, answer_of, asked_in
+from server.participation.answer_schemas import Part, RatingIn
+from server.participation.kinds import Preference, ServedKind, answer_of, asked_in
 from server.participation.kinds.clip_rating import RatingMissing
-from server.participation.tallies import Counted, NumberedClip
+from server.participation.tallies import NumberedClip, TallyEntry
 from server.participation.verdict import Ruling, playback_of
 from server.participation.verdict import judge as judge_play
-
-if TYPE_CHECKING:
-    from server.studies.versions import LoadedVersion
+from server.participation.versions import LoadedVersion
 
 
 def validate(_experiment: Experiment, part: Part, rating: RatingIn) -> None:
@@ -24,7 +22,7 @@ def validate(_experiment: Experiment, part: Part, rating: RatingIn) -> None:
         raise RatingMissing("Expected a word, got none; only a clip that failed may go without.")
 
 
-def judge(loaded: "LoadedVersion", clips: Mapping[str, int], rating: RatingIn) -> Ruling:
+def judge(loaded: LoadedVersion, clips: Mapping[str, int], rating: RatingIn) -> Ruling:
     """The verdict on the play."""
     rules, playback, rated = loaded.experiment.playback, playback_of(rating.playback), rating.answer.given
     if not clips:
@@ -43,12 +41,12 @@ def simulated(
     return {"kind": "word_choice", "chosen": "second" if liked else "first"}
 
 
-def counted(clips: Mapping[str, NumberedClip], payload: Mapping[str, Any]) -> list[Counted]:
+def counted(clips: Mapping[str, NumberedClip], payload: Mapping[str, Any]) -> list[TallyEntry]:
     """1 for the second word, by cell."""
     if payload["chosen"] is None:
         return []
     shown = clips["shown"]
-    return [Counted("", shown.clip, None, float(payload["chosen"] == "second"), shown.cell)]
+    return [TallyEntry("", shown.clip, None, float(payload["chosen"] == "second"), shown.cell)]
 
 
-SERVED = Served(validate, judge, simulated, counted)
+SERVED = ServedKind(validate, judge, simulated, counted)
