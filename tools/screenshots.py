@@ -293,7 +293,7 @@ def go_live(page: Page, address: str) -> None:
 
 
 def builder_pictures(folder: Path) -> None:
-    """The way of docs/builder.md: twelve clips are drawn, brought by a browser and made a study."""
+    """As docs/how-to/build-a-study.md: twelve clips are drawn, brought by a browser and made a study."""
     process = ServerProcess(folder / "data").start()
     try:
         with browser_page(1440, 900) as page:
