@@ -122,7 +122,7 @@ _PICTURE = re.compile(r"data:image/[a-z+]+;base64,[A-Za-z0-9+/=]+")
 
 
 @dataclass(frozen=True)
-class Compared:
+class FileComparison:
     """One file: `same` byte for byte, or what differs: a `figure`, `rounding` of numbers, or a `table`."""
 
     name: str
@@ -130,7 +130,7 @@ class Compared:
     said: str = ""
 
 
-def compare_reports(names: tuple[str, ...], before: Path, after: Path, made: date) -> list[Compared]:
+def compare_reports(names: tuple[str, ...], before: Path, after: Path, made: date) -> list[FileComparison]:
     """Every file of either report; `names` are those that the capsule of the day `made` promises.
 
     A file of the capsule's report that it does not promise, and that no server writes, is one that nobody can
@@ -140,7 +140,8 @@ def compare_reports(names: tuple[str, ...], before: Path, after: Path, made: dat
     held = {path.relative_to(before).as_posix() for path in before.rglob("*") if path.is_file()}
     more = sorted(held - {*names, *again, *WRITTEN_BY_SERVER})
     foreign = [
-        Compared(name, "table", "in the capsule's report, and not made by the analysis") for name in more
+        FileComparison(name, "table", "in the capsule's report, and not made by the analysis")
+        for name in more
     ]
     return [
         _of_name(name, names, again, (before, after), made) for name in sorted({*names, *again})
@@ -149,28 +150,28 @@ def compare_reports(names: tuple[str, ...], before: Path, after: Path, made: dat
 
 def _of_name(
     name: str, names: tuple[str, ...], again: set[str], folders: tuple[Path, Path], made: date
-) -> Compared:
+) -> FileComparison:
     if name not in again:
-        return Compared(name, "table", "in the capsule, and not made now")
+        return FileComparison(name, "table", "in the capsule, and not made now")
     if name not in names:
-        return Compared(name, "table", "made now, and not in the capsule")
+        return FileComparison(name, "table", "made now, and not in the capsule")
     before, after = folders
     return _compare(name, (before / name).read_bytes(), (after / name).read_bytes(), made)
 
 
-def _compare(name: str, before: bytes, after: bytes, made: date) -> Compared:
+def _compare(name: str, before: bytes, after: bytes, made: date) -> FileComparison:
     if before == after:
-        return Compared(name, "same")
+        return FileComparison(name, "same")
     if name.endswith((".svg", ".png")):
-        return Compared(name, "figure", f"{len(before):,} bytes became {len(after):,}")
+        return FileComparison(name, "figure", f"{len(before):,} bytes became {len(after):,}")
     was, now = before.decode("utf-8", "replace"), after.decode("utf-8", "replace")
     if name.endswith(".json"):
         return _numbers(name, was, now, made)
     if name.endswith(".html") and _PICTURE.sub("", was) == _PICTURE.sub("", now):
-        return Compared(name, "figure", "its pictures differ, its tables do not")
+        return FileComparison(name, "figure", "its pictures differ, its tables do not")
     if name.endswith(".md"):
-        return Compared(name, "table", _explained(_sections_that_differ(was, now), made))
-    return Compared(name, "table", _first_line(_PICTURE.sub("", was), _PICTURE.sub("", now)))
+        return FileComparison(name, "table", _explained(_sections_that_differ(was, now), made))
+    return FileComparison(name, "table", _first_line(_PICTURE.sub("", was), _PICTURE.sub("", now)))
 
 
 def _sections_that_differ(was: str, now: str) -> Iterator[tuple[str, str]]:
@@ -199,14 +200,14 @@ def _short(text: str) -> str:
     return repr(text if len(text) <= 70 else f"{text[:67]}...")
 
 
-def _numbers(name: str, was: str, now: str, made: date) -> Compared:
+def _numbers(name: str, was: str, now: str, made: date) -> FileComparison:
     try:
         spots = list(_differences(json.loads(was), json.loads(now), ""))
     except ValueError:
-        return Compared(name, "table", "no JSON")
+        return FileComparison(name, "table", "no JSON")
     if not spots:
-        return Compared(name, "rounding", f"numbers are equal to {RELATIVE:g}")
-    return Compared(name, "table", _explained(spots, made))
+        return FileComparison(name, "rounding", f"numbers are equal to {RELATIVE:g}")
+    return FileComparison(name, "table", _explained(spots, made))
 
 
 def _explained(spots: Iterable[tuple[str, str]], made: date) -> str:

@@ -9,7 +9,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from experiments.columns import Column
 from experiments.columns.column import plain_name, unlike
-from experiments.errors import InputError, expectation, shown, wrong_value
+from experiments.errors import InputError, as_toml, expectation, wrong_value
 from table_files.open import reader_of
 
 # A CSV with the declaration of its columns beside, as a table of numbers, times and named levels.
@@ -38,7 +38,7 @@ def _reason(detail: Mapping[str, Any]) -> str:
     parts = [f"column {part + 1}" if isinstance(part, int) else str(part) for part in detail["loc"][:2]]
     said = expectation(detail) is not None or detail["type"] == "missing"
     # what it says of the way out after the semicolon is TOML's
-    problem = wrong_value(detail).partition("; ")[0] if said else f"got {shown(detail['input'])}"
+    problem = wrong_value(detail).partition("; ")[0] if said else f"got {as_toml(detail['input'])}"
     return ": ".join([*parts, problem])
 
 

@@ -22,7 +22,7 @@ from analysis.within.cell_means import cell_table
 from bench.harness import cpu_times_s
 from blink_engine import BlinkEngine, perform
 from experiments import design
-from experiments.kinds.pair_choice import Stored, batch
+from experiments.kinds.pair_choice import StoredComparisons, batch
 from experiments.kinds.paired_comparison import assign
 from experiments.kinds.threshold_grid import Model, model
 from experiments.load import load_experiment
@@ -106,7 +106,7 @@ def say_ratio(name: str, ms: float, beside: str, baseline_ms: float) -> None:
 def test_pairs_chosen_when_a_run_starts(benchmark) -> None:
     rng = random.Random(1)
     edges = list(combinations(range(ITEMS), 2))
-    stored = {edge: Stored() for edge in edges}
+    stored = {edge: StoredComparisons() for edge in edges}
     for _ in range(ANSWERS):
         one = stored[rng.choice(edges)]
         one.answered += 1

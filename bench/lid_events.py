@@ -44,7 +44,7 @@ from scipy.signal import find_peaks
 
 from bench.harness import run_part
 from stimuli_builder.blinks.events.candidates import depth_of
-from stimuli_builder.blinks.events.generated import CLOSED_EYE_S, Generated, Motion, generate
+from stimuli_builder.blinks.events.generated import CLOSED_EYE_S, GeneratedSeries, Motion, generate
 from stimuli_builder.blinks.events.recognise import recognise
 from stimuli_builder.blinks.events.rules import LidEvent
 from stimuli_builder.blinks.labelling import label_blinks
@@ -262,7 +262,7 @@ def circumstance(motion: Motion, motions: Sequence[Motion]) -> str:
     return "beside a blink" if any(gap < BESIDE_S for gap in gaps) else "alone"
 
 
-def is_faint(motion: Motion, series: Generated) -> bool:
+def is_faint(motion: Motion, series: GeneratedSeries) -> bool:
     """Whether the dip of a blink, in the first eye, hardly rises above what goes on."""
     depth = depth_of(series.distances[0], series.fps)
     first, last = (int(time * series.fps) for time in (motion.onset_s, motion.end_s))
@@ -275,7 +275,7 @@ def say_circumstances(title: str, counts: Counter[str]) -> None:
     sys.stdout.write(f"{title}: {parts or 'none'}\n")
 
 
-def judge(series: Sequence[Generated]) -> None:
+def judge(series: Sequence[GeneratedSeries]) -> None:
     """Print the errors of some series."""
     totals, false = np.zeros(3), Counter[str]()
     missed: dict[str, Counter[str]] = {}

@@ -26,8 +26,8 @@ from stimuli_builder.tracking.accuracy import compare_with_truth
 from stimuli_builder.tracking.fit import Fitter, linear_parts, work_out
 from stimuli_builder.tracking.labels import Labels, save_labels
 from stimuli_builder.tracking.learn import learn
-from stimuli_builder.tracking.mesh import reduced
-from stimuli_builder.tracking.model import CoupledModel, TrainingOptions, warped
+from stimuli_builder.tracking.mesh import reduce_picture
+from stimuli_builder.tracking.model import CoupledModel, TrainingOptions, warp_picture
 from stimuli_builder.tracking.shapes import Points, default_markers, widths
 from stimuli_builder.tracking.track import track_video
 from stimuli_builder.tracking.tracker import Tracker
@@ -47,7 +47,7 @@ def best_of(repeats: int, rounds: int, job) -> float:
 
 def step_times(model: CoupledModel, picture: np.ndarray) -> tuple[float, float]:
     """Microseconds of one iteration: ours, and the direct form in numpy."""
-    small = reduced(picture, model.reduction)
+    small = reduce_picture(picture, model.reduction)
     fitter = Fitter(model, stop_px=0.0)
     c, pose = model.examples[0], model.poses[0]
     ours = best_of(40, 7, lambda: fitter.fit(small, c, pose, max_iterations=10)) / 10
@@ -58,7 +58,7 @@ def step_times(model: CoupledModel, picture: np.ndarray) -> tuple[float, float]:
 
     def direct() -> None:
         descent = np.tensordot(weights, parts, axes=1)
-        error = model.weights * (weights @ model.appearance - warped(model.mesh, small, vertices))
+        error = model.weights * (weights @ model.appearance - warp_picture(model.mesh, small, vertices))
         np.linalg.solve((descent * model.weights) @ descent.T + np.eye(len(descent)) * 1e-6, descent @ error)
 
     return 1e6 * ours, 1e6 * best_of(5, 5, direct)

@@ -206,7 +206,7 @@ def perform(
     if not 0.0 < duration_s < 1e7:
         raise ValueError(f"expected a duration above 0 s and below 10,000,000 s, got {duration_s}")
     chosen = parameters or default_parameters()
-    blinks = planned(duration_s, BlinkPlan(chosen, state, seed), events, changes)
+    blinks = plan_blinks(duration_s, BlinkPlan(chosen, state, seed), events, changes)
     if ends_open:
         blinks = [blink for blink in blinks if blink.end_s <= duration_s - 1.0 / fps]
     count = max(1, round(duration_s * fps))
@@ -224,7 +224,7 @@ def perform(
     )
 
 
-def planned(
+def plan_blinks(
     duration_s: float, plan: BlinkPlan, events: Iterable[Event], changes: Iterable[StateChange]
 ) -> list[Blink]:
     """Return every blink that begins within the duration, with events and state changes in their order."""

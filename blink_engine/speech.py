@@ -36,7 +36,7 @@ class Speech:
     end_s: float
 
 
-def joined(stretches: Iterable[Speech], gap_s: float = PAUSE_MIN_S) -> list[Speech]:
+def join_speech(stretches: Iterable[Speech], gap_s: float = PAUSE_MIN_S) -> list[Speech]:
     """Return the stretches in order, those that overlap or are parted by less than `gap_s` as one."""
     whole: list[Speech] = []
     for one in sorted(stretches, key=lambda stretch: (stretch.start_s, stretch.end_s)):
@@ -65,6 +65,6 @@ def speech_events(stretches: Sequence[Speech]) -> list[Event]:
 def speech_states(stretches: Sequence[Speech], between: StateName = "listening") -> list[StateChange]:
     """Return when the person speaks, and is in the state `between` in longer gaps."""
     changes = [StateChange(between, 0.0)]
-    for one in joined(stretches, TURN_GAP_S):
+    for one in join_speech(stretches, TURN_GAP_S):
         changes += [StateChange("speaking", one.start_s), StateChange(between, one.end_s)]
     return changes

@@ -13,7 +13,7 @@ STOPPED = 130
 """Exit code after Ctrl-C, which Typer may have turned into it."""
 
 
-class WrongCall(Protocol):
+class UsageError(Protocol):
     """What Typer raises for a command or an option that is not there, or a value that is none."""
 
     exit_code: int
@@ -44,14 +44,14 @@ def run_command_line(app: Callable[..., object]) -> None:
             sys.exit(1)
         if not hasattr(error, "format_message"):
             _say_disk(error)
-        sys.stderr.write(_wrong_call(cast(WrongCall, error)))
+        sys.stderr.write(_wrong_call(cast(UsageError, error)))
         sys.exit(2)
     if code == STOPPED:
         sys.stderr.write("stopped\n")
     sys.exit(code if isinstance(code, int) else 0)
 
 
-def _wrong_call(error: WrongCall) -> str:
+def _wrong_call(error: UsageError) -> str:
     message = _refused_option(error) or error.format_message()
     if not message or "\n" in message:  # a command without its subcommand: the help itself
         return message and message + "\n"
@@ -59,7 +59,7 @@ def _wrong_call(error: WrongCall) -> str:
     return f"error: {message.rstrip('.')}{f'; see {path} --help' if path else ''}\n"
 
 
-def _refused_option(error: WrongCall) -> str:
+def _refused_option(error: UsageError) -> str:
     """A value refused for its type or limit, in the words of refused declarations; else empty."""
     errors = getattr(error.__cause__, "errors", None)  # pydantic's, where Typer loaded it: it is slow to load
     param = getattr(error, "param", None)

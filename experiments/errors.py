@@ -71,11 +71,11 @@ def wrong_value(detail: Mapping[str, Any]) -> str:
     if expected is None:
         message = str(detail["msg"]).removeprefix("Value error, ")
         said = isinstance(given, dict | list | tuple) or ", got " in message
-        return message if said else f"{message}, got {shown(given)}"
+        return message if said else f"{message}, got {as_toml(given)}"
     if kind == "literal_error" and isinstance(given, str):
         allowed = [word.strip("' ") for word in str(context["expected"]).replace(" or ", ", ").split(",")]
-        return f"expected {expected}, got {shown(given)}" + _nearest(given, allowed)
-    return f"expected {expected}, got {shown(given)}{_way_out(kind, detail)}"
+        return f"expected {expected}, got {as_toml(given)}" + _nearest(given, allowed)
+    return f"expected {expected}, got {as_toml(given)}{_way_out(kind, detail)}"
 
 
 def expectation(detail: Mapping[str, Any]) -> str | None:
@@ -115,7 +115,7 @@ def _is_tables(given: Any) -> bool:
     return isinstance(given, list | tuple) and bool(given) and all(isinstance(one, dict) for one in given)
 
 
-def shown(given: Any) -> str:
+def as_toml(given: Any) -> str:
     """A value as it stands in TOML, long ones cut off and tables by their keys."""
     if isinstance(given, str):
         return repr(given) if len(given) <= MAX_SHOWN else f"{given[:MAX_SHOWN]!r}..."

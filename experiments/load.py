@@ -14,7 +14,7 @@ from experiments.consistency import check_consistency
 from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError, and_others, did_you_mean, is_follower, nearest, wrong_value
 from experiments.schema.effects import Key, is_tag
-from experiments.schema.stored import upgraded
+from experiments.schema.stored import upgrade_data
 
 # Tell dotted keys that take seconds to read in TOML text, in one pass and before any reader gets it.
 
@@ -218,7 +218,7 @@ def parse_experiment(text: str, source: str = "definition", *, has_data: bool = 
     data = toml_data(text, source)
     number = data.pop("format", 1)
     try:
-        data = upgraded(data, number)
+        data = upgrade_data(data, number)
     except InputError as error:
         path, _, message = str(error).partition(": ")
         raise DefinitionError(source, [Problem(line_of(text, (path,)), path, message)]) from error

@@ -53,15 +53,15 @@ def _texts(declared: BaseModel, prefix: str = "") -> Iterator[Text]:
     for key, field in type(declared).model_fields.items():
         value = getattr(declared, key)
         if key in declared.model_fields_set and value != field.get_default(call_default_factory=True):
-            yield from _within(value, f"{prefix}{key}", is_translated(field.annotation))
+            yield from _texts_within(value, f"{prefix}{key}", is_translated(field.annotation))
 
 
-def _within(value: Any, path: str, is_text: bool) -> Iterator[Text]:
+def _texts_within(value: Any, path: str, is_text: bool) -> Iterator[Text]:
     if isinstance(value, BaseModel):
         yield from _texts(value, f"{path}.")
     elif isinstance(value, tuple):
         for number, item in enumerate(value, start=1):
-            yield from _within(item, f"{path}.{number}", is_text)
+            yield from _texts_within(item, f"{path}.{number}", is_text)
     elif is_text and isinstance(value, dict):
         yield path, value
 
@@ -160,7 +160,7 @@ _ASIDES = re.compile(
 MAX_MARKS_NAMED = 5
 
 
-class Unfilled(NamedTuple):
+class UnfilledText(NamedTuple):
     """One text in one language with marks that nobody has filled in.
 
     Attributes
@@ -191,7 +191,7 @@ class Unfilled(NamedTuple):
         )
 
 
-def unfilled(declared: Experiment) -> list[Unfilled]:
+def unfilled_texts(declared: Experiment) -> list[UnfilledText]:
     """The texts with placeholders, in the languages that participants are offered; certain ones first."""
     texts = []
     for path, language, text in participant_texts(declared):
@@ -201,9 +201,9 @@ def unfilled(declared: Experiment) -> list[Unfilled]:
         if path.startswith("attention.text"):
             plain = plain.replace("{response}", " ")  # the page fills it in
         if certain := tuple(dict.fromkeys(_certain(plain))):
-            texts.append(Unfilled(path, language, certain, certain=True))
+            texts.append(UnfilledText(path, language, certain, certain=True))
         elif doubtful := tuple(dict.fromkeys(_DOUBTFUL.findall(_RULE.sub(" ", plain)))):
-            texts.append(Unfilled(path, language, doubtful, certain=False))
+            texts.append(UnfilledText(path, language, doubtful, certain=False))
     return sorted(texts, key=lambda text: not text.certain)
 
 

@@ -176,7 +176,7 @@ class VideoInfo:
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[tuple[Any, Any]]:
+def open_video(path: Path) -> Iterator[tuple[Any, Any]]:
     """Open a video: its container and first video stream, or one clear line."""
     if not path.is_file():
         raise InputError(f"{path}: expected a video file, found none; check the path")
@@ -226,7 +226,7 @@ def decode(path: Path, read: Callable[[Any], Picture] = grey) -> Iterator[tuple[
 
     A decoder fills spoilt parts of a frame from others and only marks it.
     """
-    with opened(path) as (container, stream):
+    with open_video(path) as (container, stream):
         try:
             for number, frame in enumerate(container.decode(stream)):
                 if frame.is_corrupt:
@@ -249,7 +249,7 @@ def read_frames(info: VideoInfo, numbers: Sequence[int]) -> dict[int, Picture]:
             f"{info.path}: frame {outside[0]} is asked for, the video has frames 0 to {info.frame_count - 1}"
         )
     pictures: dict[int, Picture] = {}
-    with opened(info.path) as (container, stream):
+    with open_video(info.path) as (container, stream):
         for number in sorted(set(numbers)):
             pictures[number] = _seek(info, container, stream, number)
     return pictures
@@ -345,7 +345,7 @@ def scan_video(path: Path) -> VideoInfo:
     InputError
         The file is missing, unreadable, truncated or holds no frame.
     """
-    with opened(path) as (container, stream):
+    with open_video(path) as (container, stream):
         clock = read_clock(path, container, stream)
     size_px = _displayed_size(path)
     return VideoInfo(path, size_px, clock.fps, clock.times_s, clock.stamps, clock.variable)
@@ -361,7 +361,7 @@ def scan_before_damage(path: Path) -> VideoInfo:
     """
     damaged = _ends_early(path)
     stamps: list[int] = []
-    with opened(path) as (container, stream):
+    with open_video(path) as (container, stream):
         rate = stream.average_rate or 25
         tick = stream.time_base
         try:
@@ -387,7 +387,7 @@ def scan_before_damage(path: Path) -> VideoInfo:
 
 def _ends_early(path: Path) -> bool:
     """Whether the packets break off or are too few for what is declared; decoding may end there silently."""
-    with opened(path) as (container, stream):
+    with open_video(path) as (container, stream):
         try:
             read_clock(path, container, stream)
         except DamagedFileError:
@@ -397,7 +397,7 @@ def _ends_early(path: Path) -> bool:
 
 def declared_frames(info: VideoInfo) -> int:
     """How many frames a file declares, or its declared duration holds; 0 where it tells neither."""
-    with opened(info.path) as (container, stream):
+    with open_video(info.path) as (container, stream):
         return int(stream.frames or round(_declared_s(container, stream) * info.fps))
 
 

@@ -114,12 +114,12 @@ def test_the_server_prints_names_as_they_are(text: str, capsys: pytest.CaptureFi
 def test_the_spinner_of_analysis_shows_steps_as_they_are(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
     import io
 
-    from analysis.commands.output import saying
+    from analysis.commands.output import progress_spinner
 
     stream = io.StringIO()
     stream.isatty = lambda: True  # type: ignore[method-assign]
     monkeypatch.setattr("sys.stderr", stream)
     monkeypatch.setenv("TERM", "xterm")
-    with saying(text) as say:
+    with progress_spinner(text) as say:
         say(text)
     assert text in stream.getvalue()

@@ -19,7 +19,7 @@ from video_conversion.video_file import (
     VideoFile,
     check_amount,
     frame_map,
-    opened,
+    open_container,
 )
 
 # What has to be done to a video so that every browser shows it frame by frame: in words and figures.
@@ -222,7 +222,10 @@ def encode(source: Path, conversion: Conversion, target: Path) -> float | None:
 
 def copy_pictures(source: Path, target: Path) -> None:
     """Write the encoded pictures of `source` as they are, and nothing else of the file."""
-    with opened(source) as original, av.open(str(target), "w", format="mp4", options=_container()) as clip:
+    with (
+        open_container(source) as original,
+        av.open(str(target), "w", format="mp4", options=_container()) as clip,
+    ):
         stream = original.streams.video[0]
         copied = clip.add_stream_from_template(stream)
         for packet in original.demux(stream):
@@ -237,7 +240,7 @@ def _container() -> dict[str, str]:
 
 def _pictures(source: Path, conversion: Conversion) -> Iterator[Any]:
     """Each frame of the clip as it goes into the encoder, numbered from 0."""
-    with opened(source) as container:
+    with open_container(source) as container:
         stream = container.streams.video[0]
         graph: Graph | None = None
         shown, at = conversion.frame_map, 0
@@ -291,7 +294,7 @@ def _write(source: Path, conversion: Conversion, target: Path) -> None:
 def _lowest_psnr_db(source: Path, conversion: Conversion, target: Path) -> float | None:
     """Of the clip's frames, each decoded again and compared with what went into the encoder."""
     compare, lowest = _Comparison(conversion), float("inf")
-    with opened(target) as container:
+    with open_container(target) as container:
         decoded = container.decode(video=0)
         for picture, again in zip(_pictures(source, conversion), decoded, strict=True):
             lowest = min(lowest, compare.psnr_db(again, picture))

@@ -53,7 +53,7 @@ def constant_rate(times_s: Sequence[float], candidates: Sequence[Fraction | None
     span = times_s[-1] - times_s[0]
     if span <= 0:
         return None
-    mean = snapped((len(times_s) - 1) / span)
+    mean = standard_rate((len(times_s) - 1) / span)
     fitting = (rate for rate in (*candidates, mean) if rate and _fits(times_s, rate))
     return next(fitting, None)
 
@@ -64,7 +64,7 @@ def _fits(times_s: Sequence[float], rate: Fraction) -> bool:
     return max(off) <= TOLERANCE * step
 
 
-def snapped(rate: float) -> Fraction:
+def standard_rate(rate: float) -> Fraction:
     """The standard rate nearest to `rate` where it is within 1 %, else the rate to three decimals."""
     nearest = min(STANDARD_RATES, key=lambda standard: abs(float(standard) - rate))
     return nearest if abs(float(nearest) - rate) <= SNAP * rate else Fraction(round(rate * 1000), 1000)
@@ -73,7 +73,7 @@ def snapped(rate: float) -> Fraction:
 def typical_rate(times_s: Sequence[float]) -> Fraction:
     """Frames per second of a variable rate: the inverse of the median time between frames."""
     steps = [later - earlier for earlier, later in pairwise(times_s) if later > earlier]
-    return snapped(1 / median(steps)) if steps else LONE_FRAME_RATE
+    return standard_rate(1 / median(steps)) if steps else LONE_FRAME_RATE
 
 
 def frame_map(times_s: Sequence[float], end_s: float, rate: Fraction) -> tuple[int, ...]:
@@ -185,7 +185,7 @@ class VideoFile:
 
 
 @contextmanager
-def opened(path: Path, *, with_edits: bool = True) -> Iterator[Any]:
+def open_container(path: Path, *, with_edits: bool = True) -> Iterator[Any]:
     """The file as a container, without its edit list if `with_edits` is false; NotAClip where it is none."""
     options = OPEN_OPTIONS if with_edits else OPEN_OPTIONS | {"ignore_editlist": "1"}
     try:
@@ -208,7 +208,7 @@ def examine(path: Path) -> VideoFile:
     """
     stored = _stored_packets(path, with_edits=False)
     is_edited = stored != _stored_packets(path, with_edits=True)
-    with opened(path) as container:
+    with open_container(path) as container:
         stream = container.streams.video[0]
         frames = _Frames()
         for frame in _decoded(container, stream):
@@ -221,7 +221,7 @@ def _stored_packets(path: Path, *, with_edits: bool) -> list[int | None]:
 
     NotAClip where the container holds more than a clip may: packets are counted, and none is decoded.
     """
-    with opened(path, with_edits=with_edits) as container:
+    with open_container(path, with_edits=with_edits) as container:
         if not container.streams.video:
             held = ", ".join(sorted({stream.type for stream in container.streams})) or "nothing"
             raise NotAClip(f"it holds {held} and no picture; expected a video")

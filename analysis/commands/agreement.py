@@ -11,8 +11,8 @@ from analysis.commands.output import (
     JsonOption,
     LevelsOption,
     names_in,
+    progress_spinner,
     save_json,
-    saying,
     scale_bounds,
     show_tables,
     show_text,
@@ -65,7 +65,7 @@ def reliability(
 
     check_targets([scores])
     data = numbers.read_items(file, names_in(items), names_in(reverse), scale_bounds(scale), case)
-    with saying("factor analysis"):
+    with progress_spinner("factor analysis"):
         result = numbers.reliability(data)
     save_json(json, asdict(result), data.synthetic)
     if scores is not None:
@@ -97,7 +97,7 @@ def agreement(
     from analysis.report.rating_tables import agreement_text, intraclass_table
 
     votes = read_votes(file, item, participant, rating)
-    with saying("resampling items"):
+    with progress_spinner("resampling items"):
         result = agreement.agreement(votes, level.value)
     save_json(json, asdict(result), votes.synthetic)
     show_text(agreement_text(result, file.stem, votes.synthetic))
@@ -156,7 +156,7 @@ def opinion(
     from analysis.opinion import fit_opinion, read_votes
     from analysis.report.rating_tables import opinion_text, raters_table, scores_table
 
-    with saying("reading votes"):
+    with progress_spinner("reading votes"):
         votes = read_votes(file, item, participant, rating, levels or ())
     result = fit_opinion(votes, repeats.value)
     save_json(json, asdict(result), votes.synthetic)

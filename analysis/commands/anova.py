@@ -12,9 +12,9 @@ from analysis.commands.output import (
     VerifyOption,
     check_folder,
     names_in,
+    progress_spinner,
     save_json,
     save_report,
-    saying,
     scale_bounds,
     show,
 )
@@ -102,7 +102,7 @@ def anova(
         check_folder(out)
     elif verify_with_r:
         raise InputError("--verify-with-r needs the folder of a report: add e.g. --out results")
-    with saying("reading ratings"):
+    with progress_spinner("reading ratings"):
         data = read_long_table(
             file, participant, rating, factors, trial, scale_bounds(scale), groups, covariates
         )
@@ -130,7 +130,7 @@ def anova(
         # scipy.stats takes a second to import, which only those who ask for it pay
         from analysis.robust import companions_of
 
-        with saying("permutations"):
+        with progress_spinner("permutations"):
             analysis = replace(analysis, robust=companions_of(analysis.anova))
     contents = contents_of(analysis)
     # before what is printed, which `| head` may cut off

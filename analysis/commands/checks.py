@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from analysis.commands.output import saying
+from analysis.commands.output import progress_spinner
 
 if TYPE_CHECKING:
-    from analysis.capsule import Compared
+    from analysis.capsule import FileComparison
     from experiments.capsule import Capsule
 
 
@@ -138,7 +138,7 @@ def verify(
     """
     from experiments.capsule import REPORT_FOLDER, differences, open_capsule, present_software
 
-    with TemporaryDirectory(prefix="capsule-") as temporary, saying("verifying") as say:
+    with TemporaryDirectory(prefix="capsule-") as temporary, progress_spinner("verifying") as say:
         files, work = Path(temporary) / "files", Path(temporary) / "work"
         files.mkdir()
         work.mkdir()
@@ -175,7 +175,7 @@ def _check_software(listed: "Capsule", folder: Path) -> None:
         )
 
 
-def _tell(compared: "list[Compared]", versions: list[str]) -> None:
+def _tell(compared: "list[FileComparison]", versions: list[str]) -> None:
     """Say what differs; exit code 1 where a table does, or a figure under the same versions."""
     same = sum(one.kind == "same" for one in compared)
     typer.echo(f"the report made again: {same} of {len(compared)} files are the same byte for byte")

@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from analysis.commands.output import JsonOption, LevelsOption, save_json, saying, show_tables, show_text
+from analysis.commands.output import (
+    JsonOption,
+    LevelsOption,
+    progress_spinner,
+    save_json,
+    show_tables,
+    show_text,
+)
 
 if TYPE_CHECKING:
     from analysis.thresholds.answers import Answers
@@ -78,7 +85,7 @@ def pairs(
     from analysis.pairs.likelihood import Method
     from analysis.report.choice_tables import abilities_table, contrasts_table, factors_table, pairs_text
 
-    with saying("reading comparisons"):
+    with progress_spinner("reading comparisons"):
         # The items are levels of `left`; what else is ordered is a factor of theirs.
         orders = levels or []
         of_items = [one for one in orders if factors is None or one.partition("=")[0].strip() == left]
@@ -87,7 +94,7 @@ def pairs(
         design = None if factors is None else read_item_factors(factors, of_factors)
     usual: Method = "davidson" if comparisons.ties else "bradley-terry"
     chosen: Method = method.value if method else usual
-    with saying("fitting"):
+    with progress_spinner("fitting"):
         result = fit_abilities(comparisons, chosen, order_effect=order_effect, firth=firth, factors=design)
     save_json(json, asdict(result), comparisons.synthetic)
     show_text(pairs_text(result, file.stem, comparisons.synthetic))
@@ -175,14 +182,14 @@ def thresholds(
     if not 0 <= guess < 1:
         raise InputError(f"expected --guess from 0 to below 1, got {guess:g}")
     upper = _lapse(lapse, guess)
-    with saying("reading trials"):
+    with progress_spinner("reading trials"):
         answers = read_answers(file, x, response, participant, by, second, levels or ())
     if second is not None:
         if hierarchical:
             raise InputError("--hierarchical is of one stimulus variable; leave out --second or it")
         _planes(answers, function, guess, upper, (x, second), file.stem, json)
         return
-    with saying("fitting"):
+    with progress_spinner("fitting"):
         result = fit_thresholds(answers, function.value, guess, upper)
         if hierarchical:
             result = with_population(result, answers, function.value, guess, upper)
@@ -215,7 +222,7 @@ def _planes(
         raise InputError("--second: expected --function normal or logistic, whose thresholds may pass 0")
     if lapse is None:
         raise InputError("--second: expected --lapse as a number; it is not fitted beside a tilt")
-    with saying("fitting"):
+    with progress_spinner("fitting"):
         result = fit_planes(
             answers, "logistic" if function is FunctionChoice.LOGISTIC else "normal", guess, lapse
         )

@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from analysis.commands.output import JsonOption, LevelsOption, names_in, save_json, saying, show_tables
+from analysis.commands.output import (
+    JsonOption,
+    LevelsOption,
+    names_in,
+    progress_spinner,
+    save_json,
+    show_tables,
+)
 
 if TYPE_CHECKING:
     from analysis.read.model_csv import ModelInput
@@ -132,8 +139,8 @@ def mixed(
     )
 
     groups, numbers, further = names_in(between), names_in(covariate), names_in(random)
-    data = _read(file, participant, rating, within, item, levels, groups, numbers, further)
-    with saying("fitting") as say:
+    data = _read_model_input(file, participant, rating, within, item, levels, groups, numbers, further)
+    with progress_spinner("fitting") as say:
         result = fit_mixed(
             data.rows,
             participant,
@@ -202,9 +209,9 @@ def ordinal(
     )
 
     groups, numbers = names_in(between), names_in(covariate)
-    data = _read(file, participant, rating, within, item, levels, groups, numbers)
+    data = _read_model_input(file, participant, rating, within, item, levels, groups, numbers)
     clips = data.item if quadrature in (None, 1) or item else ()
-    with saying("fitting"):
+    with progress_spinner("fitting"):
         result = fit_ordinal(
             data.rows, participant, rating, data.within, clips, slopes.value, groups, numbers, quadrature
         )
@@ -216,7 +223,7 @@ def ordinal(
     )
 
 
-def _read(
+def _read_model_input(
     file: Path,
     participant: str,
     rating: str,
@@ -238,7 +245,7 @@ def _read(
     from analysis.read.text_table import refuse_ids_once
     from analysis.within.level_codes import in_given_order
 
-    with saying("reading ratings"):
+    with progress_spinner("reading ratings"):
         data = read_model_input(file, participant, rating, names_in(within), names_in(item), *further)
     refuse_ids_once(data.rows, participant, data.header, file.name)
     rows, ordered = in_given_order(data.rows, levels or ())

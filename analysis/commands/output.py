@@ -117,7 +117,7 @@ def save_report(contents: "Contents", folder: Path, more: bool = False, with_r: 
 
     if with_r:
         rscript()
-    with saying("writing") as say:
+    with progress_spinner("writing") as say:
         paths = write_report(contents, folder, more, say)
     files = ", ".join(path.name for path in paths)
     typer.echo("\n".join(wrap(f"written to {folder}: {files}")))
@@ -131,7 +131,7 @@ def _say_model(script: str) -> None:
 
 
 @contextmanager
-def saying(what: str) -> Iterator[Callable[[str], None]]:
+def progress_spinner(what: str) -> Iterator[Callable[[str], None]]:
     """A spinner on a terminal, silence elsewhere; gives a function that says which step is being taken."""
     from rich.console import Console
     from rich.text import Text

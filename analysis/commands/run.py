@@ -10,9 +10,9 @@ from analysis.commands.output import (
     JsonOption,
     VerifyOption,
     check_folder,
+    progress_spinner,
     save_json,
     save_report,
-    saying,
     show,
 )
 from experiments.errors import InputError
@@ -129,14 +129,14 @@ def run(
         raise InputError("--database and --csv exclude each other; give one")
     if verify_with_r and not report:
         raise InputError("--verify-with-r needs the report; leave --no-report out")
-    declared = _declared(experiment)
+    declared = _declared_experiment(experiment)
     reading = plan_of(declared.trial.kind).reading
     folder = out or Path("out") / "analysis" / declared.name
     if report:
         check_folder(folder)
     pool = Pool(PoolOrigin(origin.value) if origin else None, series, version)
     try:
-        with saying("reading answers"):
+        with progress_spinner("reading answers"):
             answers = (
                 load_csv(csv, declared, reading, study)
                 if csv is not None
@@ -156,7 +156,7 @@ def run(
     show(contents)
 
 
-def _declared(name_or_path: str) -> "Experiment":
+def _declared_experiment(name_or_path: str) -> "Experiment":
     from experiments.load import UnknownExperimentError, load_experiment
 
     try:

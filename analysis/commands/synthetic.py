@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from analysis.commands.output import JsonOption, save_json, saying, show_tables
+from analysis.commands.output import JsonOption, progress_spinner, save_json, show_tables
 from experiments.files import check_targets
 
 if TYPE_CHECKING:
@@ -128,7 +128,7 @@ def synthesise_command(
 
     check_targets([out])
     plans = make_plans(experiment, n, mean or (), effect or ())
-    with saying("searching"):
+    with progress_spinner("searching"):
         scales = [synthesise(plan, seed) for plan in plans]
     rows = write_ratings(scales, out)
     for plan, made in zip(plans, scales, strict=True):

@@ -25,9 +25,9 @@ from analysis.models.random_part import (
     degenerate_terms,
     fit_theta,
     formula_of,
+    indistinct_variances_note,
     terms_of,
     theta_names,
-    untold,
 )
 from analysis.models.reml import CrossProducts, Term, criterion, cross_products
 from experiments.errors import InputError
@@ -137,7 +137,7 @@ def fit_mixed(
         c = cross_products(x, units.scaled(data.rating), random_terms)
         with refused_where_exact(data, random_terms):
             theta = fit_theta(c)
-        fitted = _Fitted(data, random_terms, c, theta, units)
+        fitted = _RemlFit(data, random_terms, c, theta, units)
         notes += unmodelled_slopes(data, slopes)
         result = _result(fitted, effects, slopes, random_slopes, df_method, (*data.notes, *notes))
         if not intervals:
@@ -147,7 +147,7 @@ def fit_mixed(
 
 
 @dataclass(frozen=True)
-class _Fitted:
+class _RemlFit:
     """Coded trials, their random terms, cross-products in units of their own, the REML estimate's theta."""
 
     data: ModelData
@@ -158,7 +158,7 @@ class _Fitted:
 
 
 def _result(
-    fitted: _Fitted,
+    fitted: _RemlFit,
     labels: list[str],
     slopes: Slopes,
     random_slopes: RandomSlopes,
@@ -169,7 +169,9 @@ def _result(
     at = criterion(c, theta)
     sigma = at.sigma * units.scale
     known = uncertainty(c, theta, at)
-    notes += untold(known, theta_names(data, labels, slopes, random_slopes, c.blocks[0].theta.stop))
+    notes += indistinct_variances_note(
+        known, theta_names(data, labels, slopes, random_slopes, c.blocks[0].theta.stop)
+    )
     spread: Uncertainty | KenwardRoger = known
     if df_method == "kenward-roger":
         spread = kenward_roger(fitted.terms, c, theta, at)

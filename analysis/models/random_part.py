@@ -156,7 +156,7 @@ def theta_names(
     ]
 
 
-def untold(known: Uncertainty, names: list[str]) -> tuple[str, ...]:
+def indistinct_variances_note(known: Uncertainty, names: list[str]) -> tuple[str, ...]:
     """What is said of variances that any share of another explains as well.
 
     Raises

@@ -78,7 +78,7 @@ class Block:
         return np.asarray(upper + np.triu(upper, 1).T)
 
 
-def placed(terms: Sequence[Term], first: int) -> list[Block]:
+def blocks_of_terms(terms: Sequence[Term], first: int) -> list[Block]:
     """The blocks of terms, with term `first` taken out and the others side by side in their order."""
     blocks, theta, column = [], 0, 0
     for k, term in enumerate(terms):
@@ -101,7 +101,7 @@ MANY = 100_000
 """N p J^2 / p^2 from which sparse products, p^2 of which are waited for, may be faster than dense ones."""
 
 
-class Eliminated(Protocol):
+class EliminatedGrouping(Protocol):
     """Cross-products with the first grouping taken out, at one Lp; m is any number of columns."""
 
     def schur(self) -> Floats:
@@ -120,14 +120,14 @@ class Eliminated(Protocol):
         """Sum over levels of Q inner Q' (p, p), Q = P - Z'Z Lp W, inner (J, J) symmetric."""
 
 
-class Crossing(Protocol):
+class GroupingProducts(Protocol):
     """Cross-products of random-effect columns, (N, p, J)."""
 
-    def eliminated(self, lp: Floats, mp: Floats, gl: Floats) -> Eliminated:
+    def eliminated(self, lp: Floats, mp: Floats, gl: Floats) -> EliminatedGrouping:
         """Take the first grouping out: Lp (p, p), M (N, p, p), Z'Z Lp (N, p, p)."""
 
 
-def crossing(first: sparse.csr_matrix, rest: sparse.csr_matrix, p: int) -> Crossing:
+def grouping_products(first: sparse.csr_matrix, rest: sparse.csr_matrix, p: int) -> GroupingProducts:
     """Cross-products of `first` (n, N p), the p columns of a level side by side, with `rest` (n, J)."""
     sums = sparse.csr_matrix(first.T @ rest)
     rows, columns = sums.shape
@@ -144,14 +144,14 @@ class DenseCrossing:
     sums: Floats = field(repr=False)
 
     def eliminated(self, lp: Floats, mp: Floats, gl: Floats) -> "DenseEliminated":
-        """See `Crossing`."""
+        """See `GroupingProducts`."""
         v = lp.T @ self.sums
         return DenseEliminated(self.sums, v, np.asarray(np.linalg.solve(mp, v), dtype=np.float64), gl)
 
 
 @dataclass(frozen=True)
 class DenseEliminated:
-    """See `Eliminated`."""
+    """See `EliminatedGrouping`."""
 
     p: Floats = field(repr=False)
     v: Floats = field(repr=False)
@@ -159,23 +159,23 @@ class DenseEliminated:
     gl: Floats = field(repr=False)
 
     def schur(self) -> Floats:
-        """See `Eliminated`."""
+        """See `EliminatedGrouping`."""
         return np.asarray(_flat(self.v).T @ _flat(self.w))
 
     def to_rest(self, values: Floats) -> Floats:
-        """See `Eliminated`."""
+        """See `EliminatedGrouping`."""
         return np.asarray(_flat(self.v).T @ _flat(values))
 
     def from_rest(self, values: Floats) -> Floats:
-        """See `Eliminated`."""
+        """See `EliminatedGrouping`."""
         return np.asarray(self.w @ values)
 
     def plain(self, values: Floats) -> Floats:
-        """See `Eliminated`."""
+        """See `EliminatedGrouping`."""
         return np.asarray(self.p @ values)
 
     def quadratic(self, inner: Floats) -> Floats:
-        """See `Eliminated`."""
+        """See `EliminatedGrouping`."""
         q = self.p - self.gl @ self.w
         return summed_product(q @ inner, q)
 
@@ -201,7 +201,7 @@ class SparseCrossing:
     p: int
 
     def eliminated(self, lp: Floats, mp: Floats, gl: Floats) -> "SparseEliminated":
-        """See `Crossing`."""
+        """See `GroupingProducts`."""
         people = self.sums.shape[0] // self.p
         v = (_blocks(np.broadcast_to(lp.T, (people, self.p, self.p))) @ self.sums).tocsr()
         w = (_blocks(np.asarray(np.linalg.inv(mp), dtype=np.float64)) @ v).tocsr()
@@ -218,7 +218,7 @@ def _blocks(matrices: Floats) -> sparse.bsr_matrix:
 
 @dataclass(frozen=True)
 class SparseEliminated:
-    """See `Eliminated`."""
+    """See `EliminatedGrouping`."""
 
     sums: sparse.csr_matrix = field(repr=False)
     v: sparse.csr_matrix = field(repr=False)
@@ -227,23 +227,23 @@ class SparseEliminated:
     p: int
 
     def schur(self) -> Floats:
-        """See `Eliminated`."""
+        """See `EliminatedGrouping`."""
         return np.asarray((self.v.T @ self.w).toarray(), dtype=np.float64)
 
     def to_rest(self, values: Floats) -> Floats:
-        """See `Eliminated`."""
+        """See `EliminatedGrouping`."""
         return np.asarray(self.v.T @ values.reshape(-1, values.shape[2]))
 
     def from_rest(self, values: Floats) -> Floats:
-        """See `Eliminated`."""
+        """See `EliminatedGrouping`."""
         return np.asarray(self.w @ values).reshape(-1, self.p, values.shape[1])
 
     def plain(self, values: Floats) -> Floats:
-        """See `Eliminated`."""
+        """See `EliminatedGrouping`."""
         return np.asarray(self.sums @ values).reshape(-1, self.p, values.shape[1])
 
     def quadratic(self, inner: Floats) -> Floats:
-        """See `Eliminated`."""
+        """See `EliminatedGrouping`."""
         columns = [self.q[a :: self.p] for a in range(self.p)]
         total = np.empty((self.p, self.p))
         for a in range(self.p):
@@ -259,7 +259,7 @@ WELL_CONDITIONED = 0.02
 """Relative SDs above this let Z'V^-1 Z be read off the inverse of S."""
 
 
-class Rest:
+class SchurComplement:
     """The rest of the terms at one theta, by a dense Cholesky factor.
 
     K = Z'V_1^-1 Z (J, J) and `kb` = Z'V_1^-1 [X y] (J, m) are cross-products with the first term taken out.
@@ -270,7 +270,7 @@ class Rest:
         blocks: Sequence[Block],
         theta: Floats,
         cc: sparse.csr_matrix,
-        out: Eliminated,
+        out: EliminatedGrouping,
         kb: Floats,
     ) -> None:
         self._blocks = blocks
@@ -359,7 +359,7 @@ class CrossProducts:
     blocks: tuple[Block, ...]
     first: Block
     pp: Floats = field(repr=False)
-    crossed: Crossing = field(repr=False)
+    crossed: GroupingProducts = field(repr=False)
     cc: sparse.csr_matrix = field(repr=False)
     pb: Floats = field(repr=False)
     cb: Floats = field(repr=False)
@@ -380,7 +380,7 @@ def cross_products(x: Floats, y: Floats, terms: Sequence[Term]) -> CrossProducts
     """Cross-products of trials: x (n, f), y (n,)."""
     at = int(np.argmax([term.size for term in terms]))
     first, b = terms[at], np.column_stack([x, y])
-    blocks = placed(terms, at)
+    blocks = blocks_of_terms(terms, at)
     matrices = [term.matrix() for k, term in enumerate(terms) if k != at]
     rest = sparse.hstack(matrices, format="csr") if matrices else sparse.csr_matrix((len(y), 0))
     z = first.matrix()
@@ -392,7 +392,7 @@ def cross_products(x: Floats, y: Floats, terms: Sequence[Term]) -> CrossProducts
         tuple(blocks),
         blocks[at],
         pp,
-        crossing(z, rest, first.p),
+        grouping_products(z, rest, first.p),
         sparse.csr_matrix(rest.T @ rest),
         np.asarray(z.T @ b).reshape(first.levels, first.p, -1),
         np.asarray(rest.T @ b),
@@ -445,7 +445,7 @@ def criterion(c: CrossProducts, theta: Floats, reml: bool = True) -> Criterion:
     vb = lp.T @ c.pb
     wb: Floats = np.asarray(np.linalg.solve(mp, vb), dtype=np.float64)
     out = c.crossed.eliminated(lp, mp, gl)
-    rest = Rest(c.rest, theta, c.cc, out, c.cb - out.to_rest(wb))
+    rest = SchurComplement(c.rest, theta, c.cc, out, c.cb - out.to_rest(wb))
     xp = wb - out.from_rest(rest.solution)
     d = c.bb - vb.reshape(-1, f + 1).T @ wb.reshape(-1, f + 1) - rest.explained
     unscaled = np.asarray(np.linalg.inv(d[:f, :f]), dtype=np.float64)

@@ -15,7 +15,7 @@ from analysis.pairs.comparisons import (
     Comparisons,
     Transitivity,
     refuse_disconnected,
-    separated,
+    separated_items,
     transitivity,
 )
 from analysis.pairs.likelihood import (
@@ -23,7 +23,7 @@ from analysis.pairs.likelihood import (
     Fit,
     Method,
     Model,
-    counted,
+    count_outcomes,
     fit,
     free_abilities,
     sandwich,
@@ -320,7 +320,7 @@ def fit_abilities(
     """
     _refuse_unfit(comparisons, method, firth)
     ties = method == "davidson"
-    counts = counted(comparisons, ties=ties)
+    counts = count_outcomes(comparisons, ties=ties)
     design = free_abilities(len(comparisons.items)) if factors is None else factors.design(comparisons.items)
     model = Model(method, design, order_effect)
     fitted = fit(model, counts, firth=firth)
@@ -364,7 +364,7 @@ def _refuse_unfit(comparisons: Comparisons, method: Method, firth: bool) -> None
     if firth and method != "bradley-terry":
         raise InputError(f"--firth is for --method bradley-terry, got {method}")
     refuse_disconnected(comparisons)
-    always = separated(comparisons)
+    always = separated_items(comparisons)
     if always and not firth:
         raise InputError(
             f"{comparisons.source}: {always}, so that no finite ability fits; add --firth for finite "

@@ -227,7 +227,7 @@ def refuse_disconnected(comparisons: Comparisons) -> None:
         )
 
 
-def separated(comparisons: Comparisons) -> str | None:
+def separated_items(comparisons: Comparisons) -> str | None:
     """Say which items won (or lost) every comparison with the rest; None where none did.
 
     Ford (1957), American Mathematical Monthly 64(8), 28: the maximum exists if and only if, however the

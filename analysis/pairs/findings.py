@@ -8,7 +8,7 @@ from scipy import stats
 from scipy.special import xlogy
 
 from analysis.pairs.abilities import ItemFactors, PairsResult, Parameter, fit_abilities
-from analysis.pairs.comparisons import LEFT, RIGHT, Comparisons, separated
+from analysis.pairs.comparisons import LEFT, RIGHT, Comparisons, separated_items
 from analysis.pairs.likelihood import Method
 from experiments.errors import InputError
 
@@ -66,7 +66,7 @@ def findings_of(comparisons: Comparisons, factors: ItemFactors | None) -> Findin
     """
     method: Method = "davidson" if comparisons.ties else "bradley-terry"
     try:
-        firth = method == "bradley-terry" and separated(comparisons) is not None
+        firth = method == "bradley-terry" and separated_items(comparisons) is not None
         abilities = fit_abilities(comparisons, method, firth=firth)
     except InputError as error:
         return Findings(

@@ -71,7 +71,7 @@ def free_abilities(items: int) -> Array:
     return np.eye(items)[:, 1:]
 
 
-def counted(comparisons: Comparisons, *, ties: bool) -> Counts:
+def count_outcomes(comparisons: Comparisons, *, ties: bool) -> Counts:
     """Count outcomes by ordered pair."""
     items = len(comparisons.items)
     pair = comparisons.left * items + comparisons.right

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import special
 from scipy.optimize import linprog
 
-from analysis.paper.printed import PrintedMean, PrintedPaper, PrintedStudy, PrintedTest, Rounded
+from analysis.paper.printed import PrintedInterval, PrintedMean, PrintedPaper, PrintedStudy, PrintedTest
 from analysis.report.numbers import fixed, p_value
 
 # Whether printed means of margins and cells can hold at once in a balanced design.
@@ -41,7 +41,7 @@ def possible(study: PrintedStudy, means: Sequence[PrintedMean]) -> bool:
     """
     cells = list(product(*study.factors.values()))
     weights = np.array([_weights(study, mean, cells) for mean in means])
-    rounded = [Rounded.of(mean.mean) for mean in means]
+    rounded = [PrintedInterval.of(mean.mean) for mean in means]
     low, high = np.array([float(r.low) for r in rounded]), np.array([float(r.high) for r in rounded])
     room = np.ones((len(means), 1))
     upper = np.hstack([weights, room])
@@ -82,8 +82,8 @@ def _in_words(study: PrintedStudy, clash: list[PrintedMean]) -> str:
     for factor, levels in study.factors.items():
         parts = [m for level in levels for m in clash if m.at == {factor: level}]
         if len(parts) == len(levels):
-            low = sum((Rounded.of(m.mean).low for m in parts), Decimal(0))
-            high = sum((Rounded.of(m.mean).high for m in parts), Decimal(0))
+            low = sum((PrintedInterval.of(m.mean).low for m in parts), Decimal(0))
+            high = sum((PrintedInterval.of(m.mean).high for m in parts), Decimal(0))
             names = " + ".join(m.name for m in parts)
             sums.append((len(parts), f"{low} <= {names} < {high}"))
     if len(sums) * 2 < len(clash) or len(sums) < 2:
@@ -99,7 +99,7 @@ def _repairs(study: PrintedStudy, clash: list[PrintedMean]) -> str:
     """Which single figure, one unit off in its last digit, would make everything possible."""
     healed = []
     for mean in clash:
-        unit = Rounded.of(mean.mean).unit
+        unit = PrintedInterval.of(mean.mean).unit
         for step in (-unit, unit):
             changed = mean.model_copy(update={"mean": str(Decimal(mean.mean) + step)})
             others = [changed if other is mean else other for other in study.mean]
@@ -197,14 +197,14 @@ def _said(p: str) -> str:
 
 def _p_fits(test: PrintedTest, df: tuple[int, int]) -> bool:
     """Whether some F that rounds to the printed one has a p that rounds (or is cut) to the printed one."""
-    f = Rounded.of(test.f)
+    f = PrintedInterval.of(test.f)
     least, greatest = _p(float(f.high), df), _p(float(f.low), df)
     p = test.p or ""
     if p.startswith("<"):
         return least < float(p[1:])
     if p.startswith(">"):
         return greatest > float(p[1:])
-    printed = Rounded.of(p)
+    printed = PrintedInterval.of(p)
     return least < float(printed.high) and greatest >= float(printed.low)
 
 
@@ -213,7 +213,7 @@ def _printed_twice(study: PrintedStudy) -> Iterator[Finding]:
     for one, other in combinations(study.test, 2):
         if one.effect != other.effect or one.f == other.f:
             continue
-        coarse, fine = sorted((Rounded.of(one.f), Rounded.of(other.f)), key=lambda r: -r.unit)
+        coarse, fine = sorted((PrintedInterval.of(one.f), PrintedInterval.of(other.f)), key=lambda r: -r.unit)
         if coarse.low < fine.high and fine.low < coarse.high:
             continue
         about = f"{one.name} and {other.name}"
@@ -246,7 +246,7 @@ def _errors(study: PrintedStudy) -> Iterator[Finding]:
 def _too_large(study: PrintedStudy, mean: PrintedMean) -> bool:
     if mean.error is None:
         return False
-    least = float(Rounded.of(mean.error).low) * math.sqrt(study.participants)
+    least = float(PrintedInterval.of(mean.error).low) * math.sqrt(study.participants)
     return least > _largest_sd(study, float(mean.mean))
 
 
@@ -281,8 +281,8 @@ def _correlations(study: PrintedStudy) -> Iterator[Finding]:
 def _slack(means: list[PrintedMean], test: PrintedTest) -> float:
     """How far rounding of SEs and means may carry the implied correlation, to first order."""
     a, b = (float(m.error or 0) for m in means)
-    unit = max(float(Rounded.of(m.error or "0").unit) for m in means)
-    rough = float(Rounded.of(means[0].mean).unit) / math.sqrt(float(test.f))
+    unit = max(float(PrintedInterval.of(m.error or "0").unit) for m in means)
+    rough = float(PrintedInterval.of(means[0].mean).unit) / math.sqrt(float(test.f))
     difference = abs(float(means[0].mean) - float(means[1].mean)) / math.sqrt(float(test.f))
     return unit * (a + b) / (a * b) + 2 * rough * (difference + rough) / (a * b)
 

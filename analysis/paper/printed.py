@@ -18,7 +18,7 @@ Probability = Annotated[str, Field(pattern=r"^[<>]?[0-9]*\.?[0-9]+$")]
 
 
 @dataclass(frozen=True)
-class Rounded:
+class PrintedInterval:
     """What a printed number can have been before rounding: low <= value < high."""
 
     printed: Decimal
@@ -26,7 +26,7 @@ class Rounded:
     high: Decimal
 
     @classmethod
-    def of(cls, text: str) -> "Rounded":
+    def of(cls, text: str) -> "PrintedInterval":
         """Half a unit of the last printed digit to either side."""
         value = Decimal(text)
         half = Decimal(1).scaleb(int(value.as_tuple().exponent)) / 2
@@ -74,7 +74,7 @@ class PrintedTest(Declaration):
         return f"{self.effect} F{df} = {self.f}{bracketed}"
 
 
-class Corrected(Declaration):
+class CorrectionMention(Declaration):
     """A correction for multiple testing that the paper mentions, and for how many tests it would be."""
 
     what: str
@@ -90,7 +90,7 @@ class PrintedStudy(Declaration):
     scale: tuple[float, float] | None = None
     balanced: bool = True
     factors: dict[str, tuple[str, ...]]
-    corrected: Corrected | None = None
+    corrected: CorrectionMention | None = None
     mean: tuple[PrintedMean, ...] = ()
     test: tuple[PrintedTest, ...] = ()
 
@@ -151,4 +151,4 @@ def _first(error: ValidationError) -> str:
     return f"{path}: {message}"
 
 
-_MODELS = (PrintedPaper, PrintedStudy, PrintedMean, PrintedTest, Corrected)
+_MODELS = (PrintedPaper, PrintedStudy, PrintedMean, PrintedTest, CorrectionMention)

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from scipy import special
 
-from analysis.paper.printed import Rounded
+from analysis.paper.printed import PrintedInterval
 from analysis.report.numbers import share
 from analysis.within.eta_squared import partial_eta_squared_ci
 
@@ -60,7 +60,7 @@ def corners(printed: str, whole_is_exact: bool = False) -> tuple[float, ...]:
     """The ends of what rounds to a printed number."""
     if whole_is_exact and "." not in printed:
         return (float(printed),)
-    rounded = Rounded.of(printed)
+    rounded = PrintedInterval.of(printed)
     return float(rounded.low), float(rounded.high)
 
 

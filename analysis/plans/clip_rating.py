@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from analysis.plans.plan import Plan, Prepared, prepare, refuse_unknown, where
+from analysis.plans.plan import Plan, PlanRows, prepare, refuse_unknown, where
 from analysis.plans.result import Analysis, analyse_cells, labels_of
 from analysis.read.pool import Pool
 from analysis.read.reading import NoRatingsError, Reading
@@ -41,7 +41,7 @@ def on_scale(experiment: Experiment, rows: pd.DataFrame, name: str) -> pd.DataFr
     return rows[(rows["scale"] == name).to_numpy()]
 
 
-class Tested(NamedTuple):
+class CellTests(NamedTuple):
     """Cell means of prepared rows, and every effect."""
 
     cells: CellTable
@@ -49,15 +49,15 @@ class Tested(NamedTuple):
 
 
 # Decision 0130: The paper's table shows the multivariate test.
-def tested(prepared: Prepared) -> Tested:
+def run_tests(prepared: PlanRows) -> CellTests:
     """Average and test, and no more: what each choice of a multiverse needs."""
     cells, design = _averaged(prepared)
-    return Tested(
+    return CellTests(
         cells, linear_anova(cells.y, cells.factors, cells.levels, design or no_groups(len(cells.y)))
     )
 
 
-def _averaged(prepared: Prepared) -> tuple[CellTable, BetweenDesign | None]:
+def _averaged(prepared: PlanRows) -> tuple[CellTable, BetweenDesign | None]:
     """Cell means, and the groups where the design has some."""
     experiment, rows = prepared.experiment, prepared.rows
     factors = experiment.compared_factors
@@ -68,7 +68,7 @@ def _averaged(prepared: Prepared) -> tuple[CellTable, BetweenDesign | None]:
     return cells, groups_of(rows, cells.participants, between, levels) if between else None
 
 
-def analyse(prepared: Prepared, rating: str = "response") -> Analysis:
+def analyse(prepared: PlanRows, rating: str = "response") -> Analysis:
     """Average and test; `rating` names what was rated."""
     experiment = prepared.experiment
     cells, groups = _averaged(prepared)
@@ -87,7 +87,7 @@ def analyse(prepared: Prepared, rating: str = "response") -> Analysis:
     )
 
 
-def further_sections(analysis: Analysis, prepared: Prepared, progress: Progress) -> tuple[Section, ...]:
+def further_sections(analysis: Analysis, prepared: PlanRows, progress: Progress) -> tuple[Section, ...]:
     """Sensitivity analyses and the multiverse of one scale: the one `prepared` names, or the only one."""
     from analysis.plans.multiverse_section import multiverse_section
     from analysis.plans.sensitivity import sensitivity_sections
@@ -97,12 +97,12 @@ def further_sections(analysis: Analysis, prepared: Prepared, progress: Progress)
     return (*sections, multiverse_section(analysis, prepared, _tested_named))
 
 
-def _tested_named(prepared: Prepared) -> Tested:
+def _tested_named(prepared: PlanRows) -> CellTests:
     """The tests of one scale: the named one, or the only one."""
     if prepared.scale is None:
-        return tested(prepared)
+        return run_tests(prepared)
     rows = on_scale(prepared.experiment, prepared.rows, prepared.scale)
-    return tested(replace(prepared, exclusions=replace(prepared.exclusions, rows=rows)))
+    return run_tests(replace(prepared, exclusions=replace(prepared.exclusions, rows=rows)))
 
 
 def groups_of(
@@ -168,7 +168,7 @@ def analyse_study(experiment: Experiment, answers: StudyAnswers, pool: Pool = Po
     return analyse(prepare(experiment, PLAN, answers, pool))
 
 
-def contents(prepared: Prepared) -> Contents:
+def contents(prepared: PlanRows) -> Contents:
     """What the report says."""
     reported = _ratings(prepared)
     if clip_rating_of(prepared.experiment).reference is None:
@@ -178,7 +178,7 @@ def contents(prepared: Prepared) -> Contents:
     return with_degradation(reported, prepared)
 
 
-def _ratings(prepared: Prepared) -> Contents:
+def _ratings(prepared: PlanRows) -> Contents:
     from analysis.report.within_contents import contents_of
 
     if prepared.scale is not None:
@@ -207,7 +207,7 @@ METHODS = (
 )
 
 
-def contents_of_scales(prepared: Prepared) -> Contents:
+def contents_of_scales(prepared: PlanRows) -> Contents:
     """A part of the report for each scale, and one for all."""
     experiment = prepared.experiment
     scales = scales_of(experiment)
@@ -238,12 +238,12 @@ def contents_of_scales(prepared: Prepared) -> Contents:
     )
 
 
-def _of_scale(prepared: Prepared, scale: RatedScale) -> Analysis:
+def _of_scale(prepared: PlanRows, scale: RatedScale) -> Analysis:
     rows = on_scale(prepared.experiment, prepared.rows, scale.name)
     return analyse(replace(prepared, exclusions=replace(prepared.exclusions, rows=rows)), scale.name)
 
 
-def _part(scale: RatedScale, analysis: Analysis, prepared: Prepared) -> Part:
+def _part(scale: RatedScale, analysis: Analysis, prepared: PlanRows) -> Part:
     """The part of one scale; `prepared` names it."""
     title = f"{in_words(scale.name)}{' (reverse-keyed)' if scale.reverse else ''}"
 
@@ -253,7 +253,7 @@ def _part(scale: RatedScale, analysis: Analysis, prepared: Prepared) -> Part:
     return part_of(analysis, more, title).under(scale.name, title)
 
 
-def scale_cases(prepared: Prepared, scales: Sequence[RatedScale]) -> pd.DataFrame:
+def scale_cases(prepared: PlanRows, scales: Sequence[RatedScale]) -> pd.DataFrame:
     """A row a rated trial and a column a scale, reverse-keyed ones turned; trials with every scale alone."""
     rows = prepared.rows
     keys = [name for name in ("run", "trial_index", "play") if name in rows.columns]

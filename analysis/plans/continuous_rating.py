@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from analysis.plans.plan import Plan, Prepared, where
+from analysis.plans.plan import Plan, PlanRows, where
 from analysis.read.reading import Reading
 from analysis.report.contents import Contents
 from analysis.traces import ClipTraces, MeanTrace, lag_of, mean_trace
@@ -47,7 +47,7 @@ def _is_trace(text: str, trial: ContinuousRating) -> bool:
     )
 
 
-def analyse(prepared: Prepared) -> Contents:
+def analyse(prepared: PlanRows) -> Contents:
     """Mean traces of the cells, and the lag behind blinks."""
     from analysis.report.trace_contents import contents_of
 
@@ -56,7 +56,7 @@ def analyse(prepared: Prepared) -> Contents:
     return contents_of(prepared, cell_traces(prepared.experiment, clips), lag, len(clips))
 
 
-def clips_of(prepared: Prepared) -> list[ClipTraces]:
+def clips_of(prepared: PlanRows) -> list[ClipTraces]:
     """The traces of each clip of each cell; a person has as many as times they rated it.
 
     Clips without blinks are one file whatever their exemplar, so one file may be several trials.

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from analysis.plans.plan import Prepared
+from analysis.plans.plan import PlanRows
 from analysis.plans.result import labels_of
 from analysis.report.contents import Contents, Part, caption
 from analysis.report.formats import Table
@@ -64,7 +64,7 @@ class CellScore:
     differential_high: float | None
 
 
-def scores(prepared: Prepared) -> tuple[CellScore, ...]:
+def scores(prepared: PlanRows) -> tuple[CellScore, ...]:
     """The scores of each cell on each scale that `prepared` names, in the order of the design."""
     return tuple(
         score
@@ -74,7 +74,7 @@ def scores(prepared: Prepared) -> tuple[CellScore, ...]:
     )
 
 
-def _of_scale(prepared: Prepared, scale: RatedScale) -> list[CellScore]:
+def _of_scale(prepared: PlanRows, scale: RatedScale) -> list[CellScore]:
     means = _means(prepared, scale)
     labels = labels_of(prepared.experiment)
     return [
@@ -84,7 +84,7 @@ def _of_scale(prepared: Prepared, scale: RatedScale) -> list[CellScore]:
     ]
 
 
-def _means(prepared: Prepared, scale: RatedScale) -> Mapping[str, "pd.Series[float]"]:
+def _means(prepared: PlanRows, scale: RatedScale) -> Mapping[str, "pd.Series[float]"]:
     """Each participant's mean rating by cell, answers on a reverse-keyed scale turned."""
     rows = prepared.rows
     if len(scales_of(prepared.experiment)) > 1:
@@ -101,7 +101,7 @@ def _means(prepared: Prepared, scale: RatedScale) -> Mapping[str, "pd.Series[flo
     }
 
 
-def _references(prepared: Prepared) -> list[tuple[ClipSpec, str | None]]:
+def _references(prepared: PlanRows) -> list[tuple[ClipSpec, str | None]]:
     """A clip of each cell, and the cell of its reference; None where it is its own."""
     experiment = prepared.experiment
     declared = _reference_of(prepared)
@@ -113,7 +113,7 @@ def _references(prepared: Prepared) -> list[tuple[ClipSpec, str | None]]:
     ]
 
 
-def _reference_of(prepared: Prepared) -> RatingReference:
+def _reference_of(prepared: PlanRows) -> RatingReference:
     reference = clip_rating_of(prepared.experiment).reference
     if reference is None:
         raise ValueError("expected a declared reference")
@@ -143,7 +143,7 @@ def _interval(values: np.ndarray[Any, Any]) -> tuple[float, float, float, float]
     return mean, sd, mean - reach, mean + reach
 
 
-def with_degradation(contents: Contents, prepared: Prepared) -> Contents:
+def with_degradation(contents: Contents, prepared: PlanRows) -> Contents:
     """The report with a part of degradation scores, where the study shows a reference before each clip."""
     reference = clip_rating_of(prepared.experiment).reference
     if reference is None:
@@ -164,7 +164,7 @@ def _methods(every: tuple[CellScore, ...], reference: RatingReference) -> str:
     return METHODS + turned + (DIFFERENTIAL if reference.rate_itself else "")
 
 
-def _table(every: tuple[CellScore, ...], prepared: Prepared) -> Table:
+def _table(every: tuple[CellScore, ...], prepared: PlanRows) -> Table:
     rows = tuple(
         (
             f"{one.scale} (turned)" if one.turned else one.scale,

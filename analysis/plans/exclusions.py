@@ -45,7 +45,7 @@ class Exclusions:
 
 
 @dataclass(frozen=True)
-class Judged:
+class RuleVerdicts:
     """What every declared rule says of a study's rows; any choice among the rules is then quickly applied.
 
     Attributes
@@ -109,10 +109,10 @@ def apply_exclusions(experiment: Experiment, ratings: StudyAnswers) -> Exclusion
     Rules about participants see all their main trials; rules about trials see those of who remains. A
     participant's second run is left out, the first that no rule excludes counts.
     """
-    return judged(experiment, ratings).under([True] * len(experiment.exclusions))
+    return judge_rows(experiment, ratings).under([True] * len(experiment.exclusions))
 
 
-def judged(experiment: Experiment, ratings: StudyAnswers) -> Judged:
+def judge_rows(experiment: Experiment, ratings: StudyAnswers) -> RuleVerdicts:
     """Set aside what is no main trial, and ask every declared rule."""
     rows, aside = _with_run(ratings.rows), list[str]()
     kind = rows["kind"] if "kind" in rows.columns else pd.Series("main", index=rows.index)
@@ -130,7 +130,7 @@ def judged(experiment: Experiment, ratings: StudyAnswers) -> Judged:
     sources: dict[Source, pd.DataFrame] = {"rows": rows, "plays": plays, "attention": attention}
     lacking = tuple(_lacking(rule, rows) for rule in experiment.exclusions)
     usable = list(zip(experiment.exclusions, lacking, strict=True))
-    return Judged(
+    return RuleVerdicts(
         rules=tuple(experiment.exclusions),
         people=_people(main, rows),
         by_hand=tuple(_by_hand(rows)),

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from itertools import product
 from typing import Protocol
 
-from analysis.plans.exclusions import Exclusions, judged
-from analysis.plans.plan import Prepared
+from analysis.plans.exclusions import Exclusions, judge_rows
+from analysis.plans.plan import PlanRows
 from analysis.plans.result import plans_multivariate
 from analysis.within.anova import AnovaResult
 from analysis.within.cell_means import CellTable
@@ -59,7 +59,7 @@ class Multiverse:
     n_failed: int
 
 
-class Tested(Protocol):
+class TestedSample(Protocol):
     """What an analysis of prepared rows must have: who remains, and the tests."""
 
     @property
@@ -71,10 +71,10 @@ class Tested(Protocol):
         """Every effect."""
 
 
-Analyse = Callable[[Prepared], Tested]
+Analyse = Callable[[PlanRows], TestedSample]
 
 
-def multiverse(prepared: Prepared, analyse: Analyse) -> Multiverse:
+def multiverse(prepared: PlanRows, analyse: Analyse) -> Multiverse:
     """Analyse under every choice among the declared exclusion rules.
 
     Parameters
@@ -134,9 +134,9 @@ def _choices(n_rules: int) -> Iterator[tuple[bool, ...]]:
 class _Choice:
     """Analyses under choices of rules: a rule judges once, choices that keep the same rows share one."""
 
-    def __init__(self, prepared: Prepared, analyse: Analyse) -> None:
+    def __init__(self, prepared: PlanRows, analyse: Analyse) -> None:
         self._prepared, self._analyse = prepared, analyse
-        whole = judged(prepared.experiment, prepared.checked)
+        whole = judge_rows(prepared.experiment, prepared.checked)
         self._judged = replace(whole, main=whole.main.reset_index(drop=True))
         self._known: dict[bytes, tuple[AnovaResult, int] | InputError] = {}
 

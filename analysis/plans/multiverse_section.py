@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.plans.multiverse import MAX_RULES, Analyse, Multiverse, multiverse
-from analysis.plans.plan import Prepared
+from analysis.plans.plan import PlanRows
 from analysis.plans.result import Analysis
 from analysis.plans.sensitivity import MAX_RATINGS
 from analysis.report.contents import Section, caption
@@ -15,7 +15,7 @@ from analysis.within.simple_effects import SIGNIFICANCE
 TITLE = "Multiverse of exclusions"
 
 
-def multiverse_section(analysis: Analysis, prepared: Prepared, analyse: Analyse) -> Section:
+def multiverse_section(analysis: Analysis, prepared: PlanRows, analyse: Analyse) -> Section:
     """The section of the report: how far the tests hang on the rules."""
     if not prepared.experiment.exclusions:
         return Section(TITLE, "The experiment declares no exclusion rule, so that there is nothing to vary.")

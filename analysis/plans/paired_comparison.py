@@ -13,7 +13,7 @@ from analysis.pairs.abilities import ItemFactors, fit_abilities
 from analysis.pairs.comparisons import LEFT, RIGHT, TIE, Comparisons
 from analysis.pairs.findings import LikelihoodRatio, findings_of
 from analysis.pairs.likelihood import Method
-from analysis.plans.plan import Plan, Prepared, refuse_unknown
+from analysis.plans.plan import Plan, PlanRows, refuse_unknown
 from analysis.plans.result import labels_of
 from analysis.read.reading import Reading
 from analysis.report.contents import Contents, Part, caption
@@ -47,7 +47,7 @@ def cells_of(experiment: Experiment) -> list[tuple[str, tuple[str, ...]]]:
     return [("/".join(names), names) for names in levels]
 
 
-def comparisons_of(prepared: Prepared) -> Comparisons:
+def comparisons_of(prepared: PlanRows) -> Comparisons:
     """The comparisons as indices; two clips of one cell tell nothing of the cells and are left out."""
     rows, decisions = prepared.rows, list(prepared.decisions)
     same = (rows["left_cell"].astype(str) == rows["right_cell"].astype(str)).to_numpy()
@@ -109,7 +109,7 @@ def factors_of(experiment: Experiment, items: tuple[str, ...]) -> ItemFactors | 
 READING = Reading(COMPARISONS, texts=("winner", "left_cell", "right_cell", "arrangement"))
 
 
-def numbered(rows: pd.DataFrame) -> pd.DataFrame:
+def number_answers(rows: pd.DataFrame) -> pd.DataFrame:
     """Add the number of each answer, as its key has it: 1 left, 2 right, 3 tie."""
     return rows.assign(response=looked_up(rows["winner"], CODES, np.nan))
 
@@ -123,7 +123,7 @@ def check(experiment: Experiment, rows: pd.DataFrame, source: str) -> None:
         refuse_unknown(rows, column, cells, "cell of this experiment", source)
 
 
-def analyse(prepared: Prepared) -> Contents:
+def analyse(prepared: PlanRows) -> Contents:
     """Abilities of the cells and all that goes with them, in each group where groups see different cells."""
     if len(groups(prepared.experiment)) > 1:
         return contents_of_groups(prepared, analyse)
@@ -134,7 +134,7 @@ def analyse(prepared: Prepared) -> Contents:
     return contents_of(prepared, comparisons, findings_of(comparisons, factors), factors)
 
 
-PLAN = Plan(READING, check, analyse, numbered)
+PLAN = Plan(READING, check, analyse, number_answers)
 
 
 # Paired comparisons of groups of participants: the abilities in each group, and whether groups agree.
@@ -145,7 +145,7 @@ METHODS = (
 )
 
 
-def contents_of_groups(prepared: Prepared, analyse: Callable[[Prepared], Contents]) -> Contents:
+def contents_of_groups(prepared: PlanRows, analyse: Callable[[PlanRows], Contents]) -> Contents:
     """A part of the report for each group, and one that compares them; `analyse` is of one group."""
     experiment, labels = prepared.experiment, labels_of(prepared.experiment)
     made: list[tuple[str, Contents, Comparisons]] = []
@@ -176,7 +176,7 @@ def contents_of_groups(prepared: Prepared, analyse: Callable[[Prepared], Content
     )
 
 
-def _of_group(prepared: Prepared, experiment: Experiment) -> Prepared:
+def _of_group(prepared: PlanRows, experiment: Experiment) -> PlanRows:
     """What the participants of one group answered; the experiment is that of the group."""
     cells = ["/".join(level for _, level in cell) for cell in design.cells(experiment)]
     rows = prepared.rows
@@ -251,7 +251,7 @@ def _agreement_part(test: LikelihoodRatio | None, reason: str | None, name: str,
 
 
 def _numbers(
-    prepared: Prepared,
+    prepared: PlanRows,
     people: int,
     of_groups: Sequence[tuple[str, Contents]],
     test: LikelihoodRatio | None,

@@ -49,7 +49,7 @@ class Plan:
 
     reading: Reading
     check: "Callable[[Experiment, pd.DataFrame, str], None]"
-    analyse: "Callable[[Prepared], Contents]"
+    analyse: "Callable[[PlanRows], Contents]"
     numbered: Callable[[pd.DataFrame], pd.DataFrame] = as_they_are
     keys: tuple[str, ...] = ()
 
@@ -72,7 +72,7 @@ def plan_of(kind: str) -> Plan:
 
 
 @dataclass(frozen=True)
-class Prepared:
+class PlanRows:
     """What a plan analyses: the main trials that count, what was left out, and every decision on the way."""
 
     experiment: Experiment
@@ -94,7 +94,7 @@ class Prepared:
 # From a study's rows to those that count, whatever the kind of trial: one pool, declared exclusions.
 
 
-def prepare(experiment: Experiment, plan: Plan, answers: StudyAnswers, pool: Pool = Pool()) -> Prepared:
+def prepare(experiment: Experiment, plan: Plan, answers: StudyAnswers, pool: Pool = Pool()) -> PlanRows:
     """Check and exclude by the declared rules.
 
     Raises
@@ -117,7 +117,7 @@ def prepare(experiment: Experiment, plan: Plan, answers: StudyAnswers, pool: Poo
     exclusions = apply_exclusions(experiment, checked)
     _refuse_nobody(exclusions, answers, chosen, pool)
     decisions = (*answers.decisions, *pooling, *repeats)
-    return Prepared(experiment, answers.source, checked.synthetic, exclusions, decisions, checked)
+    return PlanRows(experiment, answers.source, checked.synthetic, exclusions, decisions, checked)
 
 
 def _main(rows: pd.DataFrame) -> pd.DataFrame:

@@ -10,7 +10,7 @@ from analysis.within.between import BetweenDesign, no_groups
 from analysis.within.cell_means import CellTable, name_cells
 from analysis.within.contrast_tests import Contrast, Equivalence, contrasts_of, equivalence, trends
 from analysis.within.marginal_means import MarginalMean, marginal_means
-from analysis.within.pairwise import Pair, one_factor_pairs, pairs_of, quoted
+from analysis.within.pairwise import Pair, one_factor_pairs, pairs_of, quote_level
 from analysis.within.simple_effects import SimpleEffect, reports_multivariate, simple_effects
 
 if TYPE_CHECKING:
@@ -51,7 +51,9 @@ class Labels:
         """Labels of the levels by their factors, which are named where a label holds a comma."""
         labels = {factor: self.level(factor, name) for factor, name in levels.items()}
         if len(labels) > 1 and any("," in label for label in labels.values()):
-            return ", ".join(f"{self.factor(factor)}={quoted(label)}" for factor, label in labels.items())
+            return ", ".join(
+                f"{self.factor(factor)}={quote_level(label)}" for factor, label in labels.items()
+            )
         return ", ".join(labels.values())
 
     def pair(self, cell_a: Mapping[str, str], cell_b: Mapping[str, str]) -> str:

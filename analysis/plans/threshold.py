@@ -5,10 +5,10 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
-from analysis.plans.plan import Plan, Prepared, refuse_unknown, where
+from analysis.plans.plan import Plan, PlanRows, refuse_unknown, where
 from analysis.read.reading import Reading
 from analysis.report.contents import Contents
-from analysis.thresholds.answers import Answers, counted
+from analysis.thresholds.answers import Answers, count_trials
 from analysis.thresholds.people import fit_thresholds
 from analysis.thresholds.plane_people import SeriesPlane, fit_planes, points_of
 from analysis.thresholds.series import Difference, SeriesFit, answers_of, differences, series_labels
@@ -21,7 +21,7 @@ from experiments.kinds.threshold_grid import model, series_of
 READING = Reading(THRESHOLDS, texts=("response", "series", "interval"), numbers=("value",))
 
 
-def numbered(rows: pd.DataFrame) -> pd.DataFrame:
+def number_answers(rows: pd.DataFrame) -> pd.DataFrame:
     """The answer's word as `said`, and its number as `response`."""
     words = rows["response"].astype(str)
     return rows.assign(said=words, response=words.map(CODES).astype(float))
@@ -38,7 +38,7 @@ def check(experiment: Experiment, rows: pd.DataFrame, source: str) -> None:
         raise InputError(f"{source}: {where(rows, at)}: expected the stimulus's number in 'value', got none")
 
 
-def analyse(prepared: Prepared) -> Contents:
+def analyse(prepared: PlanRows) -> Contents:
     """Every series over all people and of each person, and series compared."""
     if threshold_of(prepared.experiment).stimulus.second:
         return analyse_planes(prepared)
@@ -48,14 +48,14 @@ def analyse(prepared: Prepared) -> Contents:
     return contents_of(prepared, fits, differences([(fit.label, _thresholds(fit)) for fit in fits]))
 
 
-def fits_of(prepared: Prepared) -> tuple[SeriesFit, ...]:
+def fits_of(prepared: PlanRows) -> tuple[SeriesFit, ...]:
     """The fits of every series that has answers, in declared order."""
     trial, labels = threshold_of(prepared.experiment), series_labels(prepared.experiment)
     return tuple(_fit(name, labels[name], answers, trial) for name, answers in answers_of(prepared).items())
 
 
 def _fit(name: str, label: str, answers: Answers, trial: Threshold) -> SeriesFit:
-    trials, falling = counted(answers.x, answers.response), trial.direction == "falling"
+    trials, falling = count_trials(answers.x, answers.response), trial.direction == "falling"
     try:
         result = fit_thresholds(answers, trial.function, trial.task.guess, trial.lapse, falling)
     except InputError as error:
@@ -68,13 +68,13 @@ def _thresholds(series: SeriesFit) -> Mapping[str, float]:
     return {one.participant: one.fit.threshold for one in people if one.fit is not None}
 
 
-PLAN = Plan(READING, check, analyse, numbered)
+PLAN = Plan(READING, check, analyse, number_answers)
 
 
 # The analysis of thresholds over two factors: a function with a line of thresholds for each series.
 
 
-def analyse_planes(prepared: Prepared) -> Contents:
+def analyse_planes(prepared: PlanRows) -> Contents:
     """Every series over all people and of each person; thresholds and tilts of series compared."""
     from analysis.report.plane_contents import contents_of
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from analysis.pairs.abilities import Contrast, PairsResult
-from analysis.report.contents import caption, marked
+from analysis.report.contents import caption, mark_name
 from analysis.report.formats import Table
 from analysis.report.numbers import DASH, apa_p, decimals, fixed, interval, p_value
 from analysis.thresholds.likelihood import Interval
@@ -86,7 +86,7 @@ def pairs_text(result: PairsResult, name: str, synthetic: bool = False) -> str:
     """What was fitted and how well it holds, in words."""
     people = "" if result.n_participants is None else f" by {result.n_participants} raters"
     said = [
-        f"{marked(name, synthetic)}: {result.method}{' with Firth penalty' if result.firth else ''}, "
+        f"{mark_name(name, synthetic)}: {result.method}{' with Firth penalty' if result.firth else ''}, "
         f"{result.n_comparisons} comparisons of {len(result.items)} items{people}, {result.n_ties} ties."
     ]
     fit = result.goodness
@@ -241,7 +241,7 @@ def threshold_text(result: ThresholdsResult, name: str, synthetic: bool = False)
     first = next(iter(result.pooled.values()))
     lapse = "fitted lapse rate" if first.lapse_fitted else f"lapse rate {first.lapse:g}"
     said = [
-        f"{marked(name, synthetic)}: {first.shape} psychometric function, guess rate "
+        f"{mark_name(name, synthetic)}: {first.shape} psychometric function, guess rate "
         f"{first.guess:g}, {lapse}, {result.n_trials} trials; profile likelihood intervals."
     ]
     for condition, fit in result.pooled.items():
@@ -352,9 +352,9 @@ def plane_text(result: PlanesResult, variables: tuple[str, str], name: str, synt
     """What was fitted, in words."""
     first = next(iter(result.pooled.values()))
     said = [
-        f"{marked(name, synthetic)}: {first.shape} psychometric function of {variables[0]} whose threshold "
-        f"is a straight line over {variables[1]}, guess rate {first.guess:g}, lapse rate {first.lapse:g}, "
-        f"{result.n_trials} trials; profile likelihood intervals."
+        f"{mark_name(name, synthetic)}: {first.shape} psychometric function of {variables[0]} whose "
+        f"threshold is a straight line over {variables[1]}, guess rate {first.guess:g}, "
+        f"lapse rate {first.lapse:g}, {result.n_trials} trials; profile likelihood intervals."
     ]
     said += [
         f"{condition}: no function was fitted, {reason}." for condition, reason in result.reasons.items()

@@ -189,14 +189,14 @@ class DrawnPart:
 SYNTHETIC_MARK = " [SYNTHETIC DATA]"
 
 
-def marked(name: str, synthetic: bool) -> str:
+def mark_name(name: str, synthetic: bool) -> str:
     """The name of data, with the mark where no person gave them."""
     return f"{name}{SYNTHETIC_MARK if synthetic else ''}"
 
 
 def caption(what: str, name: str, synthetic: bool) -> str:
     """Title of a table: what it shows, of which data, and that they are synthetic where they are."""
-    return marked(f"{what}, {name}", synthetic)
+    return mark_name(f"{what}, {name}", synthetic)
 
 
 def in_words(name: str) -> str:

@@ -5,7 +5,7 @@ from typing import Any
 import pandas as pd
 
 from analysis.read.study_answers import VERDICT, RunEvidence
-from analysis.report.contents import Section, marked
+from analysis.report.contents import Section, mark_name
 from analysis.report.formats import Table
 from experiments.columns.base import VERDICTS
 from experiments.columns.runs import EVIDENCE_COLUMNS
@@ -38,7 +38,7 @@ def evidence_section(
     tables = [
         Table(
             "evidence-verdicts",
-            marked("Runs by verdict, before exclusions", synthetic),
+            mark_name("Runs by verdict, before exclusions", synthetic),
             ("Verdict", "Runs"),
             tuple((verdict.replace("_", " "), str(number)) for verdict, number in counts.items()),
         )
@@ -78,7 +78,7 @@ def _signals(signals: dict[str, dict[str, float]], synthetic: bool) -> Table:
     )
     return Table(
         "evidence-signals",
-        marked("Signals of the runs", synthetic),
+        mark_name("Signals of the runs", synthetic),
         ("Signal", "Runs", "Median", "Least", "Greatest"),
         rows,
     )

@@ -16,7 +16,7 @@ from scipy import special
 
 from analysis.plans.result import Analysis
 from analysis.report.contents import in_words
-from analysis.report.pictures import BESIDE, COLOURS, MARKERS, STYLE, new_figure, wrapped, write_note
+from analysis.report.pictures import BESIDE, COLOURS, MARKERS, STYLE, new_figure, wrap_text, write_note
 from analysis.within.anova import AnovaResult
 from analysis.within.estimates import margin_of
 from analysis.within.marginal_means import margin
@@ -194,10 +194,10 @@ def _conditions(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
             markeredgewidth=0.5,
             capsize=3.2,
             elinewidth=1.3,
-            label=wrapped(shades[shade], LEGEND_CHARACTERS),
+            label=wrap_text(shades[shade], LEGEND_CHARACTERS),
             zorder=3,
         )
-    axes.set_xticks(range(n_groups), [wrapped(name, AXIS_CHARACTERS // n_groups) for name in groups])
+    axes.set_xticks(range(n_groups), [wrap_text(name, AXIS_CHARACTERS // n_groups) for name in groups])
 
 
 def _cloud(axes: Axes, x: float, values: Floats, width: float, colour: str) -> None:
@@ -283,15 +283,15 @@ def _asked(what: str, scale: RatedScale, language: str) -> str:
 
 
 def _dress(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
-    axes.set_title(wrapped(spec.title, TITLE_CHARACTERS), fontsize=10, loc="left")
+    axes.set_title(wrap_text(spec.title, TITLE_CHARACTERS), fontsize=10, loc="left")
     along = " × ".join(analysis.labels.factor(name) for name in spec.along)
-    axes.set_xlabel(wrapped(along, TITLE_CHARACTERS))
-    axes.set_ylabel(wrapped(analysis.rating, HEIGHT_CHARACTERS))
+    axes.set_xlabel(wrap_text(along, TITLE_CHARACTERS))
+    axes.set_ylabel(wrap_text(analysis.rating, HEIGHT_CHARACTERS))
     if analysis.experiment is not None:
         scale = scale_called(analysis.experiment, None if analysis.rating == "response" else analysis.rating)
         what = "Rating" if analysis.rating == "response" else in_words(scale.name)
         asked = _asked(what, scale, analysis.experiment.languages[0])
-        axes.set_ylabel(wrapped(asked, HEIGHT_CHARACTERS))
+        axes.set_ylabel(wrap_text(asked, HEIGHT_CHARACTERS))
         margin = (scale.maximum - scale.minimum) / 30
         axes.set_ylim(scale.minimum - margin, scale.maximum + margin)
         if scale.type == "points":
@@ -299,5 +299,5 @@ def _dress(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
     axes.grid(axis="y", linewidth=0.4, alpha=0.5)
     axes.set_axisbelow(True)
     if spec.colour:
-        title = wrapped(analysis.labels.factor(spec.colour), LEGEND_CHARACTERS)
+        title = wrap_text(analysis.labels.factor(spec.colour), LEGEND_CHARACTERS)
         axes.legend(title=title, frameon=False, fontsize=8, title_fontsize=8, **BESIDE)

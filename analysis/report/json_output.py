@@ -10,7 +10,7 @@ from analysis.within.multivariate_tests import MultivariateTest
 
 if TYPE_CHECKING:
     from analysis.plans.exclusions import Exclusions
-    from analysis.plans.plan import Prepared
+    from analysis.plans.plan import PlanRows
 
 
 _OF_SIMPLE = ("univariate", "multivariate", "mauchly", "eta_sq_partial", "eta_sq_partial_ci")
@@ -129,7 +129,7 @@ def _multivariate(test: MultivariateTest) -> dict[str, Any]:
     }
 
 
-def study_data(prepared: "Prepared", people: int) -> dict[str, Any]:
+def study_data(prepared: "PlanRows", people: int) -> dict[str, Any]:
     """What the JSON document of a study of any kind begins with.
 
     Parameters

@@ -4,7 +4,7 @@ import re
 
 from analysis.report.contents import Contents, DrawnPart, Picture, Section
 from analysis.report.formats import Table, text_share
-from analysis.report.numbers import heading_pieces, pieces, signed, signed_cell
+from analysis.report.numbers import heading_pieces, pieces, signed_cell, with_minus
 
 NEEDS = r"\usepackage{array,booktabs,graphicx,longtable}"
 """What a document must load for the tables."""
@@ -129,7 +129,7 @@ def as_document(contents: Contents, parts: tuple[DrawnPart, ...], version: str) 
         body += _section(contents.evidence, "section", contents.synthetic)
     body += [
         r"\section{Method}",
-        latex_text(signed(contents.methods)),
+        latex_text(with_minus(contents.methods)),
         f"Made by palpebra {latex_text(version)}.",
     ]
     text = "\n\n".join([*body, r"\end{document}"]) + "\n"
@@ -168,7 +168,7 @@ def _lines(title: str, lines: tuple[str, ...]) -> list[str]:
 
 
 def _sentence(text: str) -> str:
-    return _in_italics(pieces(signed(text)))
+    return _in_italics(pieces(with_minus(text)))
 
 
 def _in_italics(split: list[tuple[str, bool]]) -> str:

@@ -15,7 +15,7 @@ from analysis.report.pictures import (
     STYLE,
     in_both_formats,
     new_figure,
-    wrapped,
+    wrap_text,
     write_note,
 )
 from analysis.within.simple_effects import SIGNIFICANCE
@@ -40,8 +40,8 @@ def multiverse_picture(analysis: Analysis, result: "Multiverse") -> Picture:
     with mpl.rc_context(STYLE):
         p = np.array([universe.p_values for universe in order])
         drawn = _drawn(p[[universe.declared for universe in order]][0])
-        names = [wrapped(analysis.labels.effect(result.effects[i]), LEGEND_CHARACTERS) for i in drawn]
-        rules = [wrapped(name.replace("_", " "), RULE_CHARACTERS) for name in result.rules]
+        names = [wrap_text(analysis.labels.effect(result.effects[i]), LEGEND_CHARACTERS) for i in drawn]
+        rules = [wrap_text(name.replace("_", " "), RULE_CHARACTERS) for name in result.rules]
         # as high as the lines of the legend, and of the names of rules, need
         above = max(2.4, LINE_INCHES * 1.25 * sum(_lines(name) for name in names) + 0.3)
         below = max(0.4, sum(LINE_INCHES * _lines(rule) + 0.1 for rule in rules))

@@ -121,7 +121,7 @@ def heading_pieces(header: Sequence[str]) -> list[list[tuple[str, bool]]]:
     ]
 
 
-def signed(text: str) -> str:
+def with_minus(text: str) -> str:
     """The text with a minus sign, no hyphen, before negative numbers; -3dB is a name."""
     return _MINUS.sub("−", text)
 
@@ -134,7 +134,7 @@ def signed_cell(cell: str, numeric: bool) -> str:
     >>> signed_cell("-0.31 (0.12)", True), signed_cell("id -7", True), signed_cell("-7", False)
     ('−0.31 (0.12)', 'id -7', '-7')
     """
-    return signed(cell) if numeric and not _LETTER.search(cell) else cell
+    return with_minus(cell) if numeric and not _LETTER.search(cell) else cell
 
 
 def _split(text: str, symbols: re.Pattern[str]) -> list[tuple[str, bool]]:

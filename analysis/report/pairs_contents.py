@@ -8,7 +8,7 @@ from typing import Any
 from analysis.pairs.abilities import FactorTest, ItemFactors, PairsResult
 from analysis.pairs.comparisons import Comparisons
 from analysis.pairs.findings import Findings
-from analysis.plans.plan import Prepared
+from analysis.plans.plan import PlanRows
 from analysis.plans.result import Labels, labels_of
 from analysis.report.choice_tables import abilities_table, contrasts_table, factors_table
 from analysis.report.contents import Contents, Part, Picture, caption
@@ -129,11 +129,11 @@ def item_labels(experiment: Experiment, items: tuple[str, ...]) -> dict[str, str
 
 
 def contents_of(
-    prepared: Prepared, comparisons: Comparisons, findings: Findings, factors: ItemFactors | None = None
+    prepared: PlanRows, comparisons: Comparisons, findings: Findings, factors: ItemFactors | None = None
 ) -> Contents:
     """What the report says."""
     experiment, items = prepared.experiment, item_labels(prepared.experiment, comparisons.items)
-    shown = labelled(findings, items, labels_of(experiment))
+    shown = labelled_findings(findings, items, labels_of(experiment))
     name, synthetic = experiment.name, prepared.synthetic
     people, number = len(comparisons.participants), comparisons.outcome.size
     said = sentences(shown, [items[item] for item in comparisons.items])
@@ -162,7 +162,7 @@ def contents_of(
     )
 
 
-def labelled(findings: Findings, items: Mapping[str, str], labels: Labels) -> Findings:
+def labelled_findings(findings: Findings, items: Mapping[str, str], labels: Labels) -> Findings:
     """The findings with labels in the place of names."""
 
     def of(result: PairsResult | None) -> PairsResult | None:
@@ -245,7 +245,7 @@ def checks_table(findings: Findings, result: PairsResult, name: str, synthetic: 
     return Table("pair-checks", title, ("Check", "Value", "p"), tuple(rows), 1)
 
 
-def numbers(prepared: Prepared, comparisons: Comparisons, findings: Findings) -> dict[str, Any]:
+def numbers(prepared: PlanRows, comparisons: Comparisons, findings: Findings) -> dict[str, Any]:
     """The JSON document: cells by their names, as the data have them."""
     experiment = prepared.experiment
     factors = () if findings.factors is None else findings.factors.factors

@@ -26,7 +26,7 @@ def _charmap(path: str) -> frozenset[int]:
     return frozenset(font_manager.get_font(path).get_charmap())
 
 
-def lacking(texts: list[str]) -> set[str]:
+def missing_characters(texts: list[str]) -> set[str]:
     """The characters of `texts` that the figures' own font lacks; those that print nothing aside."""
     known = _charmap(font_manager.findfont(FONT))
     characters = set("".join(texts))
@@ -72,7 +72,7 @@ def further_letters(figure: Figure) -> Iterator[None]:
     is installed.
     """
     texts = [text for text in figure.findobj(Text) if isinstance(text, Text)]
-    letters = lacking([text.get_text() for text in texts])
+    letters = missing_characters([text.get_text() for text in texts])
     if not letters:
         yield
         return
@@ -118,7 +118,7 @@ def new_figure(width: float = 7.2, height: float = 4.4) -> Figure:
     return figure
 
 
-def wrapped(text: str, characters: int) -> str:
+def wrap_text(text: str, characters: int) -> str:
     """The text in lines of at most so many characters, each of its own lines by itself."""
     lines = [
         piece
@@ -131,7 +131,7 @@ def wrapped(text: str, characters: int) -> str:
 def write_note(figure: Figure, note: str, synthetic: bool, what: str = "ratings") -> None:
     """A note below the figure, under a mark where no person gave the data."""
     mark = f"SYNTHETIC DATA: no person gave these {what}.\n" if synthetic else ""
-    note = wrapped(note, int(NOTE_CHARACTERS * figure.get_figwidth()))
+    note = wrap_text(note, int(NOTE_CHARACTERS * figure.get_figwidth()))
     figure.supxlabel(mark + note, fontsize=7, color="#8a1c1c" if synthetic else "#555555")
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from analysis.plans.plan import Prepared
+from analysis.plans.plan import PlanRows
 from analysis.report.choice_tables import interval_text, plane_tables
 from analysis.report.contents import Contents, Part, Picture, caption
 from analysis.report.formats import Table
@@ -35,7 +35,7 @@ METHODS = (
 
 
 def contents_of(
-    prepared: Prepared, fits: "Sequence[SeriesPlane]", differences: "Sequence[Difference]"
+    prepared: PlanRows, fits: "Sequence[SeriesPlane]", differences: "Sequence[Difference]"
 ) -> Contents:
     """What the report says."""
     experiment, trial = prepared.experiment, threshold_of(prepared.experiment)
@@ -72,7 +72,7 @@ def contents_of(
     )
 
 
-def _variables(prepared: Prepared) -> tuple[str, str]:
+def _variables(prepared: PlanRows) -> tuple[str, str]:
     """Labels of the two factors."""
     first, second = (
         prepared.experiment.factor(name).label for name in threshold_of(prepared.experiment).stimulus.factors
@@ -136,7 +136,7 @@ def _shares(fits: "Sequence[SeriesPlane]", variables: tuple[str, str], name: str
 
 
 def numbers(
-    prepared: Prepared, fits: "Sequence[SeriesPlane]", differences: "Sequence[Difference]", people: int
+    prepared: PlanRows, fits: "Sequence[SeriesPlane]", differences: "Sequence[Difference]", people: int
 ) -> dict[str, Any]:
     """The JSON document; conditions are the series' names."""
     names = {fit.label: fit.name for fit in fits}

@@ -16,7 +16,7 @@ from analysis.pairs.comparisons import Comparisons
 from analysis.pairs.findings import Findings
 from analysis.plans.result import Analysis
 from analysis.report.r_script import SCRIPT, as_csv, head_of_script, r_number
-from analysis.report.write import filled
+from analysis.report.write import fill_template
 from analysis.within.contrasts import effect_members
 from experiments.errors import InputError
 
@@ -61,7 +61,7 @@ def model_files(
     names = {name: f"f{i}" for i, name in enumerate(model.factors, start=1)}
     coded = (", ".join(f'"{names[name]}"' for name in slope.split(":")) for slope in slopes)
     with_df = isinstance(model, MixedResult) and not shared and not model.singular
-    text = filled(
+    text = fill_template(
         "verify-models.R.j2",
         **head_of_script(analysis.title, script, data),
         factors=[{"name": names[name], "levels": len(levels[name])} for name in model.factors],
@@ -183,7 +183,7 @@ def pairs_files(
     script, data = (f"{key}-{name}" if key else name for name in (SCRIPT, "comparisons.csv"))
     ties = bool(comparisons.ties)
     shown = factors if findings.factors is not None else None
-    text = filled(
+    text = fill_template(
         "verify-pairs.R.j2",
         **head_of_script(title, script, data),
         items=[" ".join(name.split()) for name in comparisons.items],
@@ -272,7 +272,7 @@ def threshold_files(
         for name, value in (("difference", d.difference), ("t", d.t), ("df", d.df), ("p", d.p)):
             printed.append([name, label, value])
         printed.append(["p Holm", label, d.p_holm])
-    text = filled(
+    text = fill_template(
         "verify-thresholds.R.j2",
         **head_of_script(title, script, data),
         series=[{"key": name, "label": " ".join(one.label.split())} for name, one in fitted.items()],

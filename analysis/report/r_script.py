@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from analysis.plans.result import Analysis
-from analysis.report.write import filled
+from analysis.report.write import fill_template
 from analysis.robust import TRIM, Companions
 from analysis.within.effects import Effect
 from analysis.within.homogeneity import box_test, levene_tests
@@ -116,7 +116,7 @@ def r_files(analysis: Analysis, key: str = "") -> dict[str, bytes]:
     """The script and the cell means that it reads, by file name; `key` tells the parts of a report apart."""
     script, data = (f"{key}-{name}" if key else name for name in (SCRIPT, DATA))
     names = safe_names(analysis)
-    text = filled(
+    text = fill_template(
         "verify.R.j2",
         **head_of_script(analysis.title, script, data),
         **design_in_r(analysis, names),
@@ -310,7 +310,7 @@ def robust_files(analysis: Analysis, companions: Companions, key: str = "") -> d
     script, data = (f"{key}-{name}" if key else name for name in (ROBUST_SCRIPT, DATA))
     names = safe_names(analysis)
     design = analysis.anova.between
-    text = filled(
+    text = fill_template(
         "verify-robust.R.j2",
         **head_of_script(analysis.title, script, data),
         **design_in_r(analysis, names),

@@ -7,7 +7,7 @@ from analysis.models.ordinal import OrdinalResult
 from analysis.models.random_part import MixedResult
 from analysis.opinion import OpinionResult
 from analysis.plans.result import Analysis
-from analysis.report.contents import Section, caption, marked
+from analysis.report.contents import Section, caption, mark_name
 from analysis.report.formats import Table
 from analysis.report.numbers import DASH, fixed, interval, p_value, share
 from analysis.report.r_script import robust_files
@@ -155,7 +155,7 @@ def opinion_text(result: OpinionResult, name: str, synthetic: bool = False) -> s
     """What was computed, in words; nobody is left out by the screening."""
     rejected = [person.name for person in result.participants if person.rejected_bt500]
     said = [
-        f"{marked(name, synthetic)}: {result.n_votes} votes on {len(result.items)} items "
+        f"{mark_name(name, synthetic)}: {result.n_votes} votes on {len(result.items)} items "
         f"by {len(result.participants)} people; intervals from t with n - 1 degrees of freedom."
     ]
     if rejected:
@@ -171,8 +171,8 @@ def reliability_text(result: Reliability, name: str, synthetic: bool = False) ->
     alpha = f"{share(result.alpha, 3)}, 95% CI {_interval_between(result.alpha_low, result.alpha_high)}"
     omega = result.omega_reason if result.omega is None else f"McDonald's omega = {share(result.omega, 3)}"
     said = (
-        f"{marked(name, synthetic)}: {len(result.items)} items, {result.n_cases} cases; Cronbach's alpha = "
-        f"{alpha}; {omega}."
+        f"{mark_name(name, synthetic)}: {len(result.items)} items, {result.n_cases} cases; Cronbach's "
+        f"alpha = {alpha}; {omega}."
     )
     return " ".join([said, *(f"{decision}." for decision in result.decisions)])
 
@@ -199,7 +199,7 @@ def agreement_text(result: Agreement, name: str, synthetic: bool = False) -> str
     interval = _interval_between(result.ci_low, result.ci_high)
     alpha = f"{share(result.krippendorff_alpha, 3)}, 95% CI {interval}"
     said = (
-        f"{marked(name, synthetic)}: {result.n_ratings} ratings of {result.n_items} items by "
+        f"{mark_name(name, synthetic)}: {result.n_ratings} ratings of {result.n_items} items by "
         f"{result.n_people} people; Krippendorff's alpha ({result.level}) = {alpha} (items resampled)."
     )
     reason = [f"{result.icc_reason}."] if result.icc_reason else []

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.plans.plan import Prepared
+from analysis.plans.plan import PlanRows
 from analysis.report.choice_tables import means_table, people_table, threshold_decimals, threshold_table
 from analysis.report.contents import Contents, Part, Picture, caption
 from analysis.report.formats import Table
@@ -37,7 +37,7 @@ WEIBULL = "The declaration's Weibull has its threshold where F is 1 - 1/e; here 
 
 
 def contents_of(
-    prepared: Prepared, fits: "Sequence[SeriesFit]", differences: "Sequence[Difference]"
+    prepared: PlanRows, fits: "Sequence[SeriesFit]", differences: "Sequence[Difference]"
 ) -> Contents:
     """What the report says."""
     experiment, trial = prepared.experiment, threshold_of(prepared.experiment)
@@ -74,7 +74,7 @@ def contents_of(
 
 
 def _r_files(
-    prepared: Prepared, fits: "Sequence[SeriesFit]", differences: "Sequence[Difference]", key: str
+    prepared: PlanRows, fits: "Sequence[SeriesFit]", differences: "Sequence[Difference]", key: str
 ) -> dict[str, bytes]:
     """The script that fits every function anew in R, and its trials."""
     return threshold_files(prepared.experiment.title, fits, answers_of(prepared), differences, key)
@@ -176,7 +176,7 @@ def difference_sentence(d: "Difference") -> str:
 
 
 def numbers(
-    prepared: Prepared,
+    prepared: PlanRows,
     fits: "Sequence[SeriesFit]",
     merged: ThresholdsResult,
     differences: "Sequence[Difference]",

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from analysis.plans.plan import Prepared
+from analysis.plans.plan import PlanRows
 from analysis.plans.result import labels_of
 from analysis.report.contents import Contents, Part, Picture, caption
 from analysis.report.formats import Table
@@ -23,7 +23,7 @@ SIGNIFICANCE = 0.05
 
 
 def contents_of(
-    prepared: Prepared, traces: Sequence[MeanTrace], lag: LagResult | None, clips: int
+    prepared: PlanRows, traces: Sequence[MeanTrace], lag: LagResult | None, clips: int
 ) -> Contents:
     """What the report says."""
     experiment, synthetic = prepared.experiment, prepared.synthetic
@@ -49,7 +49,7 @@ def contents_of(
     )
 
 
-def cell_label(prepared: Prepared, cell: str) -> str:
+def cell_label(prepared: PlanRows, cell: str) -> str:
     """The labels of a cell's levels."""
     labels, factors = labels_of(prepared.experiment), prepared.experiment.factors
     return ", ".join(
@@ -57,7 +57,7 @@ def cell_label(prepared: Prepared, cell: str) -> str:
     )
 
 
-def tables(prepared: Prepared, traces: Sequence[MeanTrace], lag: LagResult | None) -> tuple[Table, ...]:
+def tables(prepared: PlanRows, traces: Sequence[MeanTrace], lag: LagResult | None) -> tuple[Table, ...]:
     """The level of each cell, and the lag."""
     name, synthetic = prepared.experiment.name, prepared.synthetic
     rows = tuple(
@@ -102,7 +102,7 @@ def sentences(lag: LagResult | None) -> tuple[str, ...]:
 
 
 def numbers(
-    prepared: Prepared, traces: Sequence[MeanTrace], lag: LagResult | None, people: int
+    prepared: PlanRows, traces: Sequence[MeanTrace], lag: LagResult | None, people: int
 ) -> dict[str, Any]:
     """The JSON document."""
     return {
@@ -126,7 +126,7 @@ def _lists(result: MeanTrace | LagResult) -> dict[str, Any]:
     }
 
 
-def pictures(prepared: Prepared, traces: Sequence[MeanTrace], lag: LagResult | None) -> list[Picture]:
+def pictures(prepared: PlanRows, traces: Sequence[MeanTrace], lag: LagResult | None) -> list[Picture]:
     """The traces, moved earlier by the lag, and the correlation by lag."""
     # matplotlib takes a second to import, which commands that draw nothing need not pay
     import matplotlib as mpl

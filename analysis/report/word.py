@@ -8,7 +8,7 @@ from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from analysis.report.contents import Contents, DrawnPart, Picture, Section
 from analysis.report.formats import Table, widths_cm
-from analysis.report.numbers import heading_pieces, pieces, signed, signed_cell
+from analysis.report.numbers import heading_pieces, pieces, signed_cell, with_minus
 
 if TYPE_CHECKING:
     from docx.document import Document
@@ -92,7 +92,7 @@ def _add_lines(document: "Document", heading: str, lines: tuple[str, ...], of: s
 
 
 def _add_sentence(document: "Document", text: str) -> None:
-    _add_runs(document.add_paragraph(style="List Bullet"), pieces(signed(_sayable(text))))
+    _add_runs(document.add_paragraph(style="List Bullet"), pieces(with_minus(_sayable(text))))
 
 
 def _add_runs(paragraph: "Paragraph", split: list[tuple[str, bool]], points: float | None = None) -> None:
@@ -127,7 +127,7 @@ def _add_part(document: "Document", part: DrawnPart, synthetic: bool) -> None:
 
 def _add_section(document: "Document", section: Section, level: int, synthetic: bool) -> None:
     document.add_heading(_sayable(section.title), level)
-    _add_runs(document.add_paragraph(), pieces(signed(_sayable(section.text))))
+    _add_runs(document.add_paragraph(), pieces(with_minus(_sayable(section.text))))
     for picture in section.pictures:
         _add_picture(document, picture, synthetic)
     for table in section.tables:
@@ -184,7 +184,7 @@ def _add_note(document: "Document", text: str) -> None:
     """A note under a table or a figure, as APA has it."""
     paragraph = document.add_paragraph(style="Body Text 3")
     paragraph.add_run("Note. ").italic = True
-    _add_runs(paragraph, pieces(signed(text)))
+    _add_runs(paragraph, pieces(with_minus(text)))
 
 
 def _describe(grid: "Grid", table: Table) -> None:

@@ -10,7 +10,7 @@ from analysis.paper.statistics import check_text
 from analysis.report.contents import Contents, DrawnPart, Progress
 from analysis.report.formats import as_markdown
 from analysis.report.latex import NEEDS, as_document, as_latex
-from analysis.report.numbers import heading_pieces, pieces, signed, signed_cell
+from analysis.report.numbers import heading_pieces, pieces, signed_cell, with_minus
 from analysis.report.word import as_docx
 from experiments.errors import InputError
 from experiments.files import json_text, whole_file
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 # Fill the templates of a report.
 
 
-def filled(template: str, **values: Any) -> str:
+def fill_template(template: str, **values: Any) -> str:
     """A template of this folder with its values; HTML is escaped, every value must be given."""
     return _environment().get_template(template).render(**values)
 
@@ -42,7 +42,7 @@ def _environment() -> "Environment":
         keep_trailing_newline=True,
     )
     environment.filters["markdown_table"] = as_markdown
-    environment.filters["italics"] = lambda text: _in_italics(pieces(signed(text)))
+    environment.filters["italics"] = lambda text: _in_italics(pieces(with_minus(text)))
     environment.filters["headings"] = lambda header: [_in_italics(head) for head in heading_pieces(header)]
     environment.filters["signed_cell"] = signed_cell
     return environment
@@ -135,4 +135,4 @@ def self_check(said: tuple[str, ...]) -> str:
 
 
 def _render(template: str, contents: Contents, parts: tuple[DrawnPart, ...]) -> str:
-    return filled(template, contents=contents, parts=parts, version=version("palpebra"))
+    return fill_template(template, contents=contents, parts=parts, version=version("palpebra"))

@@ -83,7 +83,7 @@ class InventedMean(_Figures):
     mean: float
 
 
-class Published(_Figures):
+class PublishedFigures(_Figures):
     """Everything wanted of one experiment's synthetic data, and the invented rest."""
 
     experiment: str
@@ -102,15 +102,17 @@ class Published(_Figures):
     """Nothing is published: an effect is as large as its F and the usual spread of contrasts make it."""
 
 
-def load_published(name: str) -> Published:
+def load_published(name: str) -> PublishedFigures:
     """The shipped figures of `exp1`, `exp2` or `exp3`."""
-    return Published.model_validate(tomllib.loads((FOLDER / f"{name}.toml").read_text(encoding="utf-8")))
+    return PublishedFigures.model_validate(
+        tomllib.loads((FOLDER / f"{name}.toml").read_text(encoding="utf-8"))
+    )
 
 
-def assumed(name: str, scale: RatedScale) -> Published:
+def assumed(name: str, scale: RatedScale) -> PublishedFigures:
     """For a study that nobody has run: the middle of the scale, and people who differ as in Exp 1 to 3."""
     width = scale.maximum - scale.minimum
-    return Published(
+    return PublishedFigures(
         experiment=name,
         grand_mean=scale.minimum + width / 2,
         grand_sd=GRAND_SD * width,
@@ -220,8 +222,8 @@ class DesignSpace:
 
 
 def with_wishes(
-    published: Published, space: DesignSpace, means: Sequence[str], effects: Sequence[str]
-) -> Published:
+    published: PublishedFigures, space: DesignSpace, means: Sequence[str], effects: Sequence[str]
+) -> PublishedFigures:
     """Replace published figures by wishes.
 
     Figures that would contradict a wish (the order and the pairs of its factors, a mean at the same place,

@@ -151,7 +151,7 @@ KICK = 8
 
 
 @dataclass(frozen=True)
-class Missed:
+class UnmetTarget:
     """A target that the data do not hit."""
 
     name: str
@@ -161,21 +161,21 @@ class Missed:
 
 
 @dataclass(frozen=True)
-class Repaired:
+class RepairedSums:
     """Cell sums (n, cells), and the targets still missed."""
 
     sums: Integers = field(repr=False)
-    missed: tuple[Missed, ...]
+    missed: tuple[UnmetTarget, ...]
     steps: int
 
 
-def missed_targets(y: Floats, targets: Targets) -> tuple[Missed, ...]:
+def missed_targets(y: Floats, targets: Targets) -> tuple[UnmetTarget, ...]:
     """Targets whose statistic on cell means (n, cells) lies outside the window."""
     missed = []
     for target in targets.everything:
         value = value_of(y, target)
         if not target.low <= value <= target.high:
-            missed.append(Missed(target.name, value, target.low, target.high))
+            missed.append(UnmetTarget(target.name, value, target.low, target.high))
     return tuple(missed)
 
 
@@ -241,7 +241,7 @@ def repair(
     rng: np.random.Generator,
     progress: Callable[[int, int], None] | None = None,
     maximum_pairs: int = 60,
-) -> Repaired:
+) -> RepairedSums:
     """Find whole sums of `trials` ratings near `cell_means` (n, cells) that hit every target.
 
     Steepest descent over all changes of one point; where none helps, over random pairs of changes; from a
@@ -268,4 +268,4 @@ def repair(
         missed = missed_targets(search.sums / trials, targets)
         if progress is not None:
             progress(len(missed), step)
-    return Repaired(search.sums, missed, step)
+    return RepairedSums(search.sums, missed, step)

@@ -8,14 +8,14 @@ from numpy.typing import NDArray
 
 from analysis.synthetic.published import (
     DesignSpace,
-    Published,
+    PublishedFigures,
     assumed,
     load_published,
     refuse_off_scale,
     wishes_for,
     with_wishes,
 )
-from analysis.synthetic.repair import Repaired, repair, value_of
+from analysis.synthetic.repair import RepairedSums, repair, value_of
 from analysis.synthetic.targets import GivenWay, Steps, Targets, TestTarget, make_feasible, make_targets
 from experiments.declaration.experiment import Experiment
 from experiments.declaration.trial import RatedScale
@@ -40,7 +40,7 @@ class Population:
 
 
 def make_population(
-    published: Published, space: DesignSpace, targets: Targets, rng: np.random.Generator
+    published: PublishedFigures, space: DesignSpace, targets: Targets, rng: np.random.Generator
 ) -> Population:
     """Choose means by least change from a flat table, then error variances that give the wanted F's.
 
@@ -71,7 +71,7 @@ def make_population(
     return Population(means, _covariance(published, space, targets, variances))
 
 
-def _cell_means(published: Published, space: DesignSpace, targets: Targets) -> Floats:
+def _cell_means(published: PublishedFigures, space: DesignSpace, targets: Targets) -> Floats:
     means = np.full(space.n_cells, published.grand_mean)
     if published.invented_means:
         rows = np.stack([space.weights(m.at) for m in published.invented_means])
@@ -116,7 +116,7 @@ def _error_variance(z: Floats, target: TestTarget | None, n: int, sd: float, sha
 
 
 def _covariance(
-    published: Published, space: DesignSpace, targets: Targets, variances: dict[str, Floats]
+    published: PublishedFigures, space: DesignSpace, targets: Targets, variances: dict[str, Floats]
 ) -> Floats:
     """Put grand mean and effects together; wanted SDs of margins fix how effects go with the grand mean."""
     k = space.n_cells
@@ -162,7 +162,7 @@ WISHED_ATTEMPTS = 6
 
 
 @dataclass(frozen=True)
-class Reached:
+class ReachedFigure:
     """One wanted figure and what the synthetic data give."""
 
     name: str
@@ -192,12 +192,12 @@ class Synthetic:
     seed: int
     trials_per_cell: int
     sums: NDArray[np.int64] = field(repr=False)
-    reached: tuple[Reached, ...]
+    reached: tuple[ReachedFigure, ...]
     given_way: tuple[GivenWay, ...]
     attempts: int
 
     @property
-    def missed(self) -> tuple[Reached, ...]:
+    def missed(self) -> tuple[ReachedFigure, ...]:
         """Figures that the data do not have."""
         return tuple(figure for figure in self.reached if not figure.hit)
 
@@ -214,7 +214,7 @@ class Plan:
 
     experiment: Experiment
     space: DesignSpace
-    published: Published
+    published: PublishedFigures
     targets: Targets
     given_way: tuple[GivenWay, ...]
     scale: RatedScale
@@ -278,7 +278,7 @@ def _refuse_between(experiment: Experiment, space: DesignSpace) -> None:
         raise InputError(f"expected factors within participants, got '{between[0]}' between them")
 
 
-def _without_p(published: Published) -> Published:
+def _without_p(published: PublishedFigures) -> PublishedFigures:
     """The figures for another number of participants: a printed F then has another p."""
     tests = tuple(t if t.f is None else t.model_copy(update={"p": None}) for t in published.tests)
     return published.model_copy(update={"tests": tests})
@@ -314,7 +314,7 @@ def synthesise(plan: Plan, seed: int, progress: Callable[[int, int], None] | Non
     trials = plan.experiment.exemplars.per_cell * plan.experiment.blocks.repeats
     steps = Steps.of(plan.scale)
     targets = steps.targets(plan.targets)
-    repaired: list[Repaired] = []
+    repaired: list[RepairedSums] = []
     rounds = 0
     attempts = ATTEMPTS if plan.as_published else WISHED_ATTEMPTS
     while len(repaired) < attempts and not any(not f.missed for f in repaired):
@@ -324,7 +324,7 @@ def synthesise(plan: Plan, seed: int, progress: Callable[[int, int], None] | Non
         rounds += repaired[-1].steps
     best = min(repaired, key=lambda f: len(f.missed))
     y = ratings_of(best.sums, trials, steps)
-    reached = tuple(Reached(t.name, value_of(y, t), t.low, t.high) for t in plan.targets.everything)
+    reached = tuple(ReachedFigure(t.name, value_of(y, t), t.low, t.high) for t in plan.targets.everything)
     return Synthetic(
         plan.experiment,
         plan.space,

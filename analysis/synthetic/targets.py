@@ -16,7 +16,7 @@ from analysis.synthetic.published import (
     PrintedMean,
     PrintedPairs,
     PrintedTest,
-    Published,
+    PublishedFigures,
     decimals,
     window,
 )
@@ -93,7 +93,7 @@ def narrowed(printed: str) -> tuple[float, float, float]:
     return middle - SAFETY * half, middle + SAFETY * half, half
 
 
-def make_targets(published: Published, space: DesignSpace, n: int) -> Targets:
+def make_targets(published: PublishedFigures, space: DesignSpace, n: int) -> Targets:
     """Every figure of `published` as a target for `n` participants."""
     means = tuple(
         MeanTarget(f"mean {place_name(m.at)}", space.weights(m.at), *narrowed(m.printed))
@@ -230,7 +230,9 @@ class GivenWay:
         return f"{place_name(self.at)}: printed {self.printed} is impossible, made {self.used}; {self.reason}"
 
 
-def make_feasible(published: Published, space: DesignSpace) -> tuple[Published, tuple[GivenWay, ...]]:
+def make_feasible(
+    published: PublishedFigures, space: DesignSpace
+) -> tuple[PublishedFigures, tuple[GivenWay, ...]]:
     """Return figures whose means can all hold, changing one printed mean by one last digit where they cannot.
 
     Averaged over all levels, every factor of complete data gives the same grand mean, so printed means of

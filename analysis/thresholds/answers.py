@@ -125,7 +125,7 @@ def _binary(table: TextTable, response: str) -> Array:
     return values
 
 
-def counted(x: Array, response: Array) -> Trials:
+def count_trials(x: Array, response: Array) -> Trials:
     """Count trials and positive answers at each level of x."""
     levels, index = np.unique(x, return_inverse=True)
     n, k = np.zeros(levels.size), np.zeros(levels.size)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy import optimize, special, stats
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
-from analysis.thresholds.answers import Answers, counted
+from analysis.thresholds.answers import Answers, count_trials
 from analysis.thresholds.likelihood import CHI2_95, Array, Interval, Shape, Trials
 from analysis.thresholds.psychometric import Threshold, fit_threshold
 from experiments.errors import InputError
@@ -340,7 +340,7 @@ def _fitted(
         rows = labels == condition
         try:
             pooled[condition] = fit_threshold(
-                counted(answers.x[rows], answers.response[rows]), shape, guess, lapse, falling=falling
+                count_trials(answers.x[rows], answers.response[rows]), shape, guess, lapse, falling=falling
             )
         except InputError as error:
             where = "" if condition == "all" else f" ({condition})"
@@ -369,7 +369,7 @@ def with_population(
     for condition, pooled in result.pooled.items():
         own = np.ones(answers.x.size, bool) if answers.condition is None else answers.condition == condition
         rows = [own & (names == name) for name in sorted(set(names[own]))]
-        trials = [counted(answers.x[one], answers.response[one]) for one in rows]
+        trials = [count_trials(answers.x[one], answers.response[one]) for one in rows]
         populations[condition] = fit_population(trials, shape, guess, lapse, pooled.falling)
     return replace(result, population=populations)
 
@@ -388,7 +388,7 @@ def _people(
     for name in sorted({str(one) for one in names[rows]}) if names is not None else []:
         own = rows & (names == name)
         try:
-            trials = counted(answers.x[own], answers.response[own])
+            trials = count_trials(answers.x[own], answers.response[own])
             fit = fit_threshold(trials, shape, guess, lapse, falling=falling)
             fits.append(PersonThreshold(name, condition, fit, ""))
         except InputError as error:

@@ -336,14 +336,14 @@ def fit_planes(
     for condition in answers.conditions():
         rows = labels == condition
         down = _falls(answers, rows, guess) if falling is None else falling
-        fit, reason = fitted(points_of(answers, rows), shape, guess, lapse, down, middle)
+        fit, reason = fit_or_reason(points_of(answers, rows), shape, guess, lapse, down, middle)
         if fit is None:
             reasons[condition] = reason
         else:
             pooled[condition] = fit
         every = {name: points_of(answers, rows & (names == name)) for name in sorted({*names[rows]} - {""})}
         for name, mine in every.items():
-            fitted_own = fitted(mine, shape, guess, lapse, down, middle, along=False)
+            fitted_own = fit_or_reason(mine, shape, guess, lapse, down, middle, along=False)
             people.append(PersonPlane(str(name), condition, *fitted_own))
         if fit is not None and len(every) >= PEOPLE_MIN:
             population[condition] = fit_plane_population(list(every.values()), fit)
@@ -366,7 +366,7 @@ def points_of(answers: Answers, rows: NDArray[np.bool_] | slice = slice(None)) -
     return counted_points(answers.x[rows], second[rows], answers.response[rows])
 
 
-def fitted(
+def fit_or_reason(
     points: Points,
     shape: PlaneShape,
     guess: float,

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from analysis.plans.plan import Prepared, refuse_unknown
+from analysis.plans.plan import PlanRows, refuse_unknown
 from analysis.plans.result import labels_of
 from analysis.thresholds.answers import Answers
 from analysis.thresholds.likelihood import Trials
@@ -96,7 +96,7 @@ def series_labels(experiment: Experiment) -> dict[str, str]:
     }
 
 
-def answers_of(prepared: Prepared) -> dict[str, Answers]:
+def answers_of(prepared: PlanRows) -> dict[str, Answers]:
     """The answers of every series that has some, by name in declared order; 1 is yes, or right."""
     trial, rows = threshold_of(prepared.experiment), prepared.rows
     seen = (rows["said"] == "yes").to_numpy()
@@ -120,7 +120,7 @@ def answers_of(prepared: Prepared) -> dict[str, Answers]:
     return made
 
 
-def _seconds(prepared: Prepared) -> NDArray[np.float64] | None:
+def _seconds(prepared: PlanRows) -> NDArray[np.float64] | None:
     """The number along the second factor of each row; None where there is none."""
     second = threshold_of(prepared.experiment).stimulus.second
     if second is None:

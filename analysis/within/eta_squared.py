@@ -109,10 +109,10 @@ class SizeIntervals:
 
     def interval(self, at: int) -> tuple[float, float]:
         """Lower and upper bound of the F at a position."""
-        return self._every[at]
+        return self._all_intervals[at]
 
     @cached_property
-    def _every(self) -> list[tuple[float, float]]:
+    def _all_intervals(self) -> list[tuple[float, float]]:
         f_value, df_effect, df_error = np.array(self._tests, dtype=np.float64).T
         bounds = partial_eta_squared_ci(f_value, df_effect, df_error, self._confidence)
         return [(low, high) for low, high in bounds.tolist()]

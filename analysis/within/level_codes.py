@@ -25,7 +25,7 @@ def natural_order(names: Sequence[str]) -> list[str]:
     return sorted(names, key=lambda name: (name.casefold(), name))
 
 
-def factorized(column: pd.Series) -> tuple[Integers, Sequence[Any]]:
+def factorize_column(column: pd.Series) -> tuple[Integers, Sequence[Any]]:
     """Codes (n,) of a column into its values, in the order in which these appear; -1 where one is missing."""
     # of the array itself: an index of the values would take longer than the codes
     plain = isinstance(column.dtype, np.dtype) or getattr(column.dtype, "storage", None) == "python"
@@ -47,7 +47,7 @@ def level_codes(
     """
     if declared is None and (counted := _whole_numbers(column)) is not None:
         return counted
-    codes, uniques = factorized(column)
+    codes, uniques = factorize_column(column)
     if codes.min() < 0:
         raise InputError(f"'{name}' is empty in row {int(np.argmin(codes)) + 1}; every row needs one")
     texts = [str(text) for text in uniques]

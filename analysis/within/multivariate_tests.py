@@ -65,10 +65,10 @@ class MultivariateTests:
 
     def test(self, at: int) -> MultivariateTest | None:
         """The test of the hypothesis at a position; None where there is none."""
-        return self._every[at]
+        return self._all_tests[at]
 
     @cached_property
-    def _every(self) -> list[MultivariateTest | None]:
+    def _all_tests(self) -> list[MultivariateTest | None]:
         four = _four_statistics(self._hypotheses)
         first = [
             (np.nan, np.nan, np.nan)

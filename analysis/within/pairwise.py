@@ -72,10 +72,10 @@ def cell_texts(cells: Sequence[dict[str, str]]) -> list[str]:
         return [level for cell in cells for level in cell.values()]
     if not any(":" in level for cell in cells for level in cell.values()):
         return [":".join(cell.values()) for cell in cells]
-    return [", ".join(f"{factor}={quoted(level)}" for factor, level in cell.items()) for cell in cells]
+    return [", ".join(f"{factor}={quote_level(level)}" for factor, level in cell.items()) for cell in cells]
 
 
-def quoted(level: str) -> str:
+def quote_level(level: str) -> str:
     """A level as text that no separator cuts: in quotation marks where it holds one."""
     return json.dumps(level, ensure_ascii=False) if re.search(r'[,="]', level) else level
 

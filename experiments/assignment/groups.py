@@ -69,14 +69,14 @@ def clips_of(experiment: Experiment, seat: Seat) -> list[ClipSpec]:
 # Which group a participant comes into: by turn, by the link they came by, or by what they answer.
 
 
-class Deciding(NamedTuple):
+class DecidingQuestion(NamedTuple):
     """The question whose answer decides the group."""
 
     form: str
     field: str
 
 
-def deciding(experiment: Experiment) -> Deciding | None:
+def deciding_question(experiment: Experiment) -> DecidingQuestion | None:
     """The question whose answer decides the group; None where no answer does."""
     name = experiment.groups.question
     return next((where for where, field in _questions(experiment) if field.name == name), None)
@@ -103,10 +103,10 @@ def fault_of_grouping(experiment: Experiment) -> str | None:
     return _fault_of_question(experiment, declared.question)
 
 
-def _questions(experiment: Experiment) -> list[tuple[Deciding, Question]]:
+def _questions(experiment: Experiment) -> list[tuple[DecidingQuestion, Question]]:
     """The questions before the trials, with their places."""
     before = (form for form in experiment.forms if form.when == "before")
-    return [(Deciding(form.name, field.name), field) for form in before for field in form.fields]
+    return [(DecidingQuestion(form.name, field.name), field) for form in before for field in form.fields]
 
 
 def _fault_of_question(experiment: Experiment, name: str) -> str | None:
@@ -125,7 +125,7 @@ def _fault_of_question(experiment: Experiment, name: str) -> str | None:
     return _fault_of_answers(experiment, where, field.values)
 
 
-def _fault_of_answers(experiment: Experiment, where: Deciding, values: tuple[str, ...]) -> str | None:
+def _fault_of_answers(experiment: Experiment, where: DecidingQuestion, values: tuple[str, ...]) -> str | None:
     unknown = next((answer for answer in experiment.groups.answers if answer not in values), None)
     if unknown is not None:
         return f"groups.answers: '{where.field}' has no option '{unknown}'{did_you_mean(unknown, values)}"

@@ -51,7 +51,7 @@ def fault_of_lists(clips: Sequence[ClipSpec], lists: Sequence[Sequence[str]]) ->
 # A balanced sample of each cell's clips for each participant.
 
 
-def sampled(
+def sampled_clips(
     clips: Sequence[ClipSpec], per_cell: int, exemplars: int, seed: int, number: int
 ) -> frozenset[ClipSpec]:
     """The clips that one participant sees.
@@ -167,7 +167,7 @@ def share(experiment: Experiment, seat: Seat) -> frozenset[ClipSpec]:
     if declared.clips_per_cell is not None:
         of = experiment.exemplars
         turn = exemplar_turn(experiment, seat.number, declared.clips_per_cell)
-        return sampled(clips, declared.clips_per_cell, of.per_cell, of.seed, turn)
+        return sampled_clips(clips, declared.clips_per_cell, of.per_cell, of.seed, turn)
     return every_clip(clips)
 
 

@@ -59,7 +59,7 @@ class View:
     def create(self, dialect: Dialect) -> str:
         """The statement that makes the view, as every upgrade runs it."""
         selected = ",\n       ".join(
-            f"{spelled(column, dialect)} AS {column.name}" for column in self.columns
+            f"{column_sql(column, dialect)} AS {column.name}" for column in self.columns
         )
         return f"CREATE VIEW {self.name} AS\n-- {MADE_FROM}\nSELECT {selected}\n{self.rows_in(dialect)}"
 
@@ -107,7 +107,7 @@ def with_levels(row: Sequence[Any], index: int | None, factors: tuple[str, ...])
     return (*row[:index], *_level_cells(row[index], factors), *row[index + 1 :])
 
 
-def spelled(column: Column, dialect: Dialect) -> str:
+def column_sql(column: Column, dialect: Dialect) -> str:
     """The SQL behind a column in the words of one database, as the view selects it."""
     if column.member:
         member = _member(column, dialect)
@@ -193,7 +193,7 @@ class Stretches:
         return tuple(re.findall(rf"\b{CLIP_TABLE} (\w+)", self.view.rows_in(self.dialect)))
 
     def _of(self, column: Column, clips: frozenset[str]) -> tuple[str, ...]:
-        named = frozenset(_ALIAS.findall(spelled(column, self.dialect)))
+        named = frozenset(_ALIAS.findall(column_sql(column, self.dialect)))
         if named and named <= RUN_ALIASES:
             return _OF_THE_RUN
         return tuple(sorted(named)) if named <= clips else ()
@@ -202,9 +202,9 @@ class Stretches:
     def order(self) -> tuple[str, ...]:
         """SQL of what the rows of a run are sorted by."""
         return tuple(
-            f"coalesce({spelled(column, self.dialect)}, '')"
+            f"coalesce({column_sql(column, self.dialect)}, '')"
             if column.type == "text"
-            else spelled(column, self.dialect)
+            else column_sql(column, self.dialect)
             for name in _ORDER
             if name in self.view.names
             for column in self.view.pick(name)
@@ -240,6 +240,6 @@ class Stretches:
 
     def _cells(self, stretch: Stretch) -> Iterator[str]:
         for column in stretch.columns:
-            sql = spelled(column, self.dialect)
+            sql = column_sql(column, self.dialect)
             # PostgreSQL has true and false where the CSV and SQLite have 1 and 0.
             yield f"CAST({sql} AS INTEGER)" if column.type == "boolean" else sql

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from experiments.declaration.base import Declaration, LevelName, Name, refuse_repeats
 from experiments.declaration.rendering import RenderOverrides
-from experiments.errors import shown
+from experiments.errors import as_toml
 
 _VERSION = re.compile(r"(?<=.)@\d+$")
 
@@ -29,7 +29,7 @@ def names_listed(value: Any) -> tuple[str, ...]:
     """The characters of a list; ValueError where it is none or one of them is no name."""
     names = tuple(value) if isinstance(value, list | tuple) else ()
     if not names or not all(isinstance(name, str) and _names_a_folder(name) for name in names):
-        raise ValueError(f'character: expected a list such as ["alder@8", "birch@6"], got {shown(value)}')
+        raise ValueError(f'character: expected a list such as ["alder@8", "birch@6"], got {as_toml(value)}')
     return names
 
 

@@ -288,7 +288,9 @@ def assign(experiment: Experiment, seed: int, slot: int) -> list[Trial]:
 
     trials = single_clips(experiment, seed, slot, asked)
     reference = clip_rating_of(experiment).reference
-    return trials if reference is None else [_after(reference, experiment, trial) for trial in trials]
+    return (
+        trials if reference is None else [_with_reference(reference, experiment, trial) for trial in trials]
+    )
 
 
 def check_choices(experiment: Experiment) -> int:
@@ -297,7 +299,7 @@ def check_choices(experiment: Experiment) -> int:
     return scale.maximum - scale.minimum + 1
 
 
-def _after(reference: RatingReference, experiment: Experiment, trial: Trial) -> Trial:
+def _with_reference(reference: RatingReference, experiment: Experiment, trial: Trial) -> Trial:
     """The trial with its reference; checks have none."""
     if trial.clip is None or trial.check is not None:
         return trial

@@ -44,7 +44,7 @@ Edge = tuple[int, int]
 
 
 @dataclass
-class Stored:
+class StoredComparisons:
     """What is stored of the comparisons of two items, the lower number first.
 
     Attributes
@@ -91,7 +91,7 @@ def _share(difference: float) -> float:
     return 1 / (1 + exp(-max(-30.0, min(30.0, difference))))
 
 
-def posterior(items: int, stored: Mapping[Edge, Stored]) -> Posterior:
+def posterior(items: int, stored: Mapping[Edge, StoredComparisons]) -> Posterior:
     """Scores by eq. 1, item after item until none moves by more than 0.01 logits; precisions by eq. 2."""
     met: list[list[tuple[int, float, float]]] = [[] for _ in range(items)]
     for (one, other), answers in stored.items():
@@ -120,7 +120,11 @@ def posterior(items: int, stored: Mapping[Edge, Stored]) -> Posterior:
 
 
 def batch(
-    items: int, edges: Sequence[Edge], stored: Mapping[Edge, Stored], number: int, rng: random.Random
+    items: int,
+    edges: Sequence[Edge],
+    stored: Mapping[Edge, StoredComparisons],
+    number: int,
+    rng: random.Random,
 ) -> list[Edge]:
     """The pairs of items to compare next, the most telling first; none twice where there are others.
 
@@ -206,7 +210,7 @@ class _Choice:
         self._shown = Counter[tuple[str, str]]()
         self._number: dict[str, int] = {}
         self._edges: dict[Edge, list[Pair]] = {}
-        self._stored: dict[Edge, Stored] = {}
+        self._stored: dict[Edge, StoredComparisons] = {}
         numbers = count()
         item_of_clip: dict[str, int] = {}
         for pair in self.pairs:
@@ -225,7 +229,7 @@ class _Choice:
         one, other = item_of_clip.get(row.left), item_of_clip.get(row.right)
         if one is None or other is None or one == other:
             return
-        stored = self._stored.setdefault((min(one, other), max(one, other)), Stored())
+        stored = self._stored.setdefault((min(one, other), max(one, other)), StoredComparisons())
         if row.winner is None:
             stored.open += row.times
         else:

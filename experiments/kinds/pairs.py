@@ -96,7 +96,7 @@ def _across_groups(experiment: Experiment, trial: PairedComparison) -> str | Non
 def _fault_of_blocks(experiment: Experiment, trial: PairedComparison) -> str | None:
     if not isinstance(trial.dealing, IncompleteBlocks):
         return None
-    clips, size = len(alike(experiment)[0]), trial.dealing.clips_per_block
+    clips, size = len(comparable_sets(experiment)[0]), trial.dealing.clips_per_block
     if size > clips:
         return (
             f"trial.dealing.clips_per_block: expected at most the {clips} clips that are compared, got {size}"
@@ -111,7 +111,7 @@ def _fault_of_blocks(experiment: Experiment, trial: PairedComparison) -> str | N
 
 
 def _no_pairs_or_split(experiment: Experiment) -> str | None:
-    pairs, split = list(islice(_every(experiment), MAX_PAIRS + 1)), experiment.blocks.split_by
+    pairs, split = list(islice(_all_pairs(experiment), MAX_PAIRS + 1)), experiment.blocks.split_by
     if not pairs:
         return "trial.pairs: the design has no two clips to compare; give the factor two levels or more"
     if len(pairs) > MAX_PAIRS:
@@ -134,7 +134,7 @@ def every_pair(experiment: Experiment) -> list[Pair]:
     """
     lead: dict[ClipSpec, int] = {}
     pairs = []
-    for pair in _every(experiment):
+    for pair in _all_pairs(experiment):
         placed = pair if lead.get(pair.left, 0) <= lead.get(pair.right, 0) else pair.swapped
         lead[placed.left] = lead.get(placed.left, 0) + 1
         lead[placed.right] = lead.get(placed.right, 0) - 1
@@ -142,13 +142,13 @@ def every_pair(experiment: Experiment) -> list[Pair]:
     return pairs
 
 
-def _every(experiment: Experiment) -> Iterator[Pair]:
+def _all_pairs(experiment: Experiment) -> Iterator[Pair]:
     declared, clips = paired_comparison_of(experiment).pairs, design.clips(experiment)
     if isinstance(declared, AllPairs):
         matched = declared.exemplars == "matched"
         yield from (Pair(a, b) for a, b in combinations(clips, 2) if not matched or a.exemplar == b.exemplar)
     elif isinstance(declared, WithinFactor):
-        for group in alike(experiment):
+        for group in comparable_sets(experiment):
             yield from starmap(Pair, combinations(group, 2))
     else:
         at = {(clip.cell, clip.exemplar): clip for clip in clips}
@@ -160,7 +160,7 @@ def _every(experiment: Experiment) -> Iterator[Pair]:
             yield from (Pair(at[cells.cell, number], at[cells.other, number]) for number in numbers)
 
 
-def alike(experiment: Experiment) -> list[list[ClipSpec]]:
+def comparable_sets(experiment: Experiment) -> list[list[ClipSpec]]:
     """Sets of clips: every two of one are compared, none with another set's. Not for lists of pairs."""
     declared, sets = paired_comparison_of(experiment).pairs, dict[object, list[ClipSpec]]()
     for clip in design.clips(experiment):
@@ -270,7 +270,9 @@ class BlockDeal(Deal):
     def __init__(self, experiment: Experiment, declared: IncompleteBlocks) -> None:
         super().__init__(experiment)
         self._per_person, size = declared.blocks_per_person, declared.clips_per_block
-        self._sets = [self._shuffled(number, clips) for number, clips in enumerate(alike(experiment))]
+        self._sets = [
+            self._shuffled(number, clips) for number, clips in enumerate(comparable_sets(experiment))
+        ]
         self.blocks = balanced_blocks(len(self._sets[0]), size) or ()
         self.each = self._per_person * size * (size - 1) // 2
 

@@ -49,8 +49,8 @@ def _stimulus_faults(experiment: Experiment, trial: Threshold) -> Iterator[str]:
     yield from _level_faults("trial.stimulus.values", factor, trial.stimulus.values, levels)
     if isinstance(trial.task, TwoInterval):
         yield from _level_faults("trial.task.standard", factor, [trial.task.standard], levels)
-    yield from _number_faults("trial.stimulus", factor, trial.stimulus.values, tested(trial, levels))
-    numbers = [number_of(trial.stimulus.values, name) for name in tested(trial, levels)]
+    yield from _number_faults("trial.stimulus", factor, trial.stimulus.values, tested_levels(trial, levels))
+    numbers = [number_of(trial.stimulus.values, name) for name in tested_levels(trial, levels)]
     yield from _function_faults(trial, min((one for one in numbers if one is not None), default=0.0))
 
 
@@ -195,7 +195,7 @@ def _series_faults(experiment: Experiment, trial: Threshold) -> Iterator[str]:
         )
 
 
-def tested(trial: Threshold, levels: list[str]) -> list[str]:
+def tested_levels(trial: Threshold, levels: list[str]) -> list[str]:
     """The levels that are stimuli: all but the standard."""
     standard = trial.task.standard if isinstance(trial.task, TwoInterval) else None
     return [level for level in levels if level != standard]
@@ -252,7 +252,7 @@ def stimuli(experiment: Experiment) -> dict[float, str]:
     """Level of the stimulus factor by its number, ascending."""
     trial = threshold_of(experiment)
     levels = [level.name for level in experiment.factor(trial.stimulus.factor).levels]
-    return _by_number(trial.stimulus.values, tested(trial, levels))
+    return _by_number(trial.stimulus.values, tested_levels(trial, levels))
 
 
 def seconds(experiment: Experiment) -> dict[float, str]:

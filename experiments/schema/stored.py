@@ -41,7 +41,7 @@ FORMAT = 1 + len(STEPS)
 """The format of this program. A declaration without a number is of format 1."""
 
 
-def upgraded(data: Mapping[str, Any], number: object, steps: Sequence[Step] = STEPS) -> dict[str, Any]:
+def upgrade_data(data: Mapping[str, Any], number: object, steps: Sequence[Step] = STEPS) -> dict[str, Any]:
     """A copy of `data`, of format `number`, as the newest format has it; InputError for formats not known."""
     newest = 1 + len(steps)
     if isinstance(number, bool) or not isinstance(number, int) or number < 1:
@@ -81,7 +81,7 @@ def _rename(data: Any, path: Sequence[str], name: str) -> None:
 
 def load_stored(definition: Mapping[str, Any], number: int = 1) -> Experiment:
     """The declaration stored as JSON data of format `number`; InputError where it cannot be read."""
-    data = upgraded(definition, number)
+    data = upgrade_data(definition, number)
     try:
         experiment = Experiment.model_validate(data)
     except ValidationError as error:

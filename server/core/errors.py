@@ -6,7 +6,7 @@ from typing import Any, ClassVar, TypeVar
 from fastapi.responses import JSONResponse, Response
 from pydantic import BaseModel, Field
 
-from experiments.errors import counted, expectation, shown
+from experiments.errors import as_toml, counted, expectation
 
 # What a request should have held and what it held, in words that repeat no password or token.
 
@@ -50,7 +50,7 @@ def _problem(detail: Mapping[str, Any]) -> str:
     expected = FORMS.get(kind) or expectation(detail)
     if expected is None:
         return str(detail["msg"]).removeprefix("Value error, ")
-    came = shown(given) if detail["loc"][0] == "query" else _kind(given)
+    came = as_toml(given) if detail["loc"][0] == "query" else _kind(given)
     return f"expected {JSON_WORDS.get(expected, expected)}, got {came}"
 
 

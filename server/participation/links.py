@@ -7,7 +7,7 @@ from uuid import UUID
 
 from sqlalchemy.orm import Session
 
-from experiments.assignment.groups import deciding
+from experiments.assignment.groups import deciding_question
 from experiments.declaration.experiment import Experiment
 from experiments.declaration.tables import Display
 from experiments.errors import did_you_mean
@@ -257,7 +257,7 @@ def _new_run(
         written = recruiter.participant(start.query) or ""
         known_as = ParticipantIdentity(written, without_signature(recruiter, start.query))
         identities.store_identity(session, run, study.pseudonym_key, known_as, identifier)
-    if deciding(loaded.experiment) is None:
+    if deciding_question(loaded.experiment) is None:
         group = _group(loaded.experiment, link)
         assign_slot(
             session, run, loaded, places.open_turns(session, loaded.experiment, version_id, origin, group)

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from sqlalchemy.orm import Session
 
-from experiments.assignment.groups import deciding, group_of_answer
+from experiments.assignment.groups import deciding_question, group_of_answer
 from experiments.declaration.experiment import Experiment
 from experiments.declaration.forms import Form, is_empty
 from experiments.errors import did_you_mean
@@ -349,7 +349,7 @@ def save_form(
 ) -> Saved:
     """Store a form's answers once they fit the declaration; sending it again replaces them."""
     loaded = versions.get(session, find_run(session, token).version_id)
-    asked = deciding(loaded.experiment)
+    asked = deciding_question(loaded.experiment)
     decides = asked is not None and asked.form == name
     if decides:
         # The study first, as in a start: two requests that lock in two orders would wait for each other.

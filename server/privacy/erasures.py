@@ -4,7 +4,7 @@ import secrets
 
 from sqlalchemy.orm import Session
 
-from experiments.assignment.groups import deciding
+from experiments.assignment.groups import deciding_question
 from server.accounts.audit import record
 from server.accounts.identity import Identity, Operator
 from server.accounts.repository import entries_on_run
@@ -84,7 +84,7 @@ def forget(session: Session, run: StudyRun) -> int:
     run.participant, run.device = "erased", {}
     run.exclusion_reason, run.px_per_mm, run.viewing_distance_mm = None, None, None
     run.completion_code = ""
-    if deciding(definition_of(run.version)) is not None:
+    if deciding_question(definition_of(run.version)) is not None:
         # The group, and the slot that it follows from, say what was answered.
         run.group_name, run.slot = "", NO_SLOT
     if run.link.kind == "personal":

@@ -11,7 +11,7 @@ from sqlalchemy.orm import Session
 from experiments.declaration.experiment import Experiment
 from experiments.level_leaks import reported_leaks
 from experiments.manifest import Manifest
-from experiments.wording import silent_on_flicker, suggested_sentence, unfilled, untranslated
+from experiments.wording import silent_on_flicker, suggested_sentence, unfilled_texts, untranslated
 from server.accounts.identity import Identity
 from server.core.errors import Conflict
 from server.models import Study, StudyVersion
@@ -94,7 +94,7 @@ def _to_launch(session: Session, study: Study, version: StudyVersion) -> LaunchS
 
 def _placeholders(launch: LaunchState) -> Iterator[LaunchCheck]:
     """Texts that still have marks such as [Title]."""
-    for text in unfilled(launch.experiment):
+    for text in unfilled_texts(launch.experiment):
         yield LaunchCheck(kind="placeholders", blocks=text.certain, text=str(text))
 
 

@@ -31,7 +31,7 @@ def arch(u: float) -> float:
 
 
 @compiled
-def rounded(u: float) -> float:
+def rounded_arch(u: float) -> float:
     """The arch to the power 3/4: steep at the canthi, flat in the middle."""
     root = sqrt(arch(u))
     return root * sqrt(root)
@@ -40,13 +40,15 @@ def rounded(u: float) -> float:
 @compiled
 def upper_open(u: float) -> float:
     """Margin of the upper lid of the open eye, v at u."""
-    return float(-0.25 * rounded(u) * (1.0 + 0.22 * u) + TILT * u)
+    return float(-0.25 * rounded_arch(u) * (1.0 + 0.22 * u) + TILT * u)
 
 
 @compiled
 def lower_margin(u: float, closure: float) -> float:
     """Margin of the lower lid, v at u."""
-    return float(0.115 * rounded(u) * (1.0 - 0.15 * u) + TILT * u - LOWER_LIFT * max(closure, 0.0) * arch(u))
+    return float(
+        0.115 * rounded_arch(u) * (1.0 - 0.15 * u) + TILT * u - LOWER_LIFT * max(closure, 0.0) * arch(u)
+    )
 
 
 @compiled

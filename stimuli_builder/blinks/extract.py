@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from experiments.errors import InputError, counted
-from stimuli_builder.blinks.events.recognise import Recognised
+from stimuli_builder.blinks.events.recognise import RecognisedEvents
 from stimuli_builder.blinks.events.rules import LidEvent
 from stimuli_builder.blinks.labelling import (
     LabelledBlink,
@@ -24,7 +24,7 @@ from stimuli_builder.blinks.measure import (
     lid_motion_at_300,
     measure_blinks,
     not_below,
-    smoothed,
+    smooth_distance,
 )
 from stimuli_builder.blinks.profile import OPEN_PERCENTILE, Array, BlinkProfile, Eye
 from stimuli_builder.blinks.series import BlinkSeries, scaled_frames
@@ -35,7 +35,7 @@ CUT = "its beginning or end lies in a gap or outside the recording"
 
 
 def recognised_blinks(
-    series: BlinkSeries, recognised: Recognised, options: LabelOptions
+    series: BlinkSeries, recognised: RecognisedEvents, options: LabelOptions
 ) -> tuple[list[LabelledBlink], list[RefusedMinimum]]:
     """Turn the blinks among the events of one eye into labelled blinks.
 
@@ -44,7 +44,7 @@ def recognised_blinks(
     blinks, refused
         Blinks cut by a gap or by an end of the recording are refused.
     """
-    smooth = smoothed(series, options)
+    smooth = smooth_distance(series, options)
     events = _parted([event for event in recognised.events if event.kind == "blink"], smooth, series.fps)
     blinks = [_labelled(event, touches, smooth, series.fps, options) for event, touches in events]
     refused = [RefusedMinimum(frame, CUT) for frame in recognised.cut]
@@ -107,7 +107,7 @@ class EyeBlinks:
     smooth: Array
     blinks: tuple[MeasuredBlink, ...]
     refused: tuple[RefusedMinimum, ...]
-    recognised: Recognised | None = None
+    recognised: RecognisedEvents | None = None
 
     @property
     def events(self) -> tuple[LidEvent, ...]:
@@ -142,7 +142,7 @@ def blinks_of(
     closed_distance: float | None = None,
     complete_from: float = 0.95,
     edges: Mapping[int, tuple[int, int]] = MappingProxyType({}),
-    recognised: Recognised | None = None,
+    recognised: RecognisedEvents | None = None,
 ) -> EyeBlinks:
     """Label and measure one series.
 
@@ -161,7 +161,7 @@ def blinks_of(
     measured, flat = measure_blinks(
         series, labelled, options, closed_distance=closed_distance, complete_from=complete_from
     )
-    return EyeBlinks(series, smoothed(series, options), tuple(measured), (*refused, *flat), recognised)
+    return EyeBlinks(series, smooth_distance(series, options), tuple(measured), (*refused, *flat), recognised)
 
 
 def _moved(series: BlinkSeries, blink: LabelledBlink, edges: tuple[int, int] | None) -> LabelledBlink:

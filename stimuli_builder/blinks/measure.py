@@ -90,7 +90,7 @@ def not_below(closed: float, what: str, opening: float) -> InputError:
     )
 
 
-def smoothed(series: BlinkSeries, options: LabelOptions) -> Array:
+def smooth_distance(series: BlinkSeries, options: LabelOptions) -> Array:
     """Filtered distance; frames next to a gap are averaged over what there is, gaps stay NaN."""
     known = np.isfinite(series.distance)
     width = scaled_frames(options.filter_frames, series.fps)
@@ -123,7 +123,7 @@ def measure_blinks(
     """
     if not blinks:
         return [], []
-    smooth = smoothed(series, options)
+    smooth = smooth_distance(series, options)
     closed = closed_level(smooth, blinks, closed_distance)
     levels = [open_levels(smooth, blink) for blink in blinks]
     fit = [blink for blink, around in zip(blinks, levels, strict=True) if closed < min(around)]

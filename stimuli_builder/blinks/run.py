@@ -292,13 +292,13 @@ def run_blinks(job: BlinksJob) -> None:
         summarise(eye, frame, [p for p in profiles if p.eye == name and _is_of(p, eye)])
         for eye, name in zip(accepted, names, strict=True)
     ]
-    written = _write(job, _Labelled(eyes, frame, profiles, summaries, decided, reviews))
+    written = _write(job, _LabelledRecording(eyes, frame, profiles, summaries, decided, reviews))
     print_blinks(summaries, lost, closed_given=job.closed is not None)
     print_written(len(frame), written)
 
 
 @dataclass(frozen=True, eq=False)
-class _Labelled:
+class _LabelledRecording:
     """A labelled and reviewed recording, as it is written; `decided` and `reviews` as of `_reviewed`."""
 
     eyes: Sequence[EyeBlinks]
@@ -309,7 +309,7 @@ class _Labelled:
     reviews: Sequence[Review]
 
 
-def _write(job: BlinksJob, labelled: _Labelled) -> list[Path | None]:
+def _write(job: BlinksJob, labelled: _LabelledRecording) -> list[Path | None]:
     """Write what the job asks for; without a blink the table of profiles is empty. Return the files."""
     more = job.more.prepared(job.series, labelled.eyes, labelled.frame, job.closed)
     _write_figures(job, labelled.eyes, labelled.decided, labelled.profiles)

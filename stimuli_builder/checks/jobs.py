@@ -57,7 +57,7 @@ def shape(answer: int) -> Mask:
     return np.asarray((abs(down) < 6.5) | (abs(across) < 6.5))
 
 
-def placed(shown: Mask, rng: Generator) -> Mask:
+def placed_mask(shown: Mask, rng: Generator) -> Mask:
     """A mask of the whole lattice with `shown` near its middle."""
     mask = np.zeros((LATTICE, LATTICE), bool)
     top, left = ((LATTICE - side) // 2 + int(rng.integers(-JITTER, JITTER + 1)) for side in shown.shape)
@@ -278,7 +278,7 @@ class CheckJob:
         if self.check == "direction":
             return Motion(EVERYWHERE, self.answer, coherence, self._steps)
         shown = digit(self.answer) if self.check == "digit" else shape(self.answer)
-        return Motion(placed(shown, rng), int(rng.integers(1, 5)), coherence, self._steps)
+        return Motion(placed_mask(shown, rng), int(rng.integers(1, 5)), coherence, self._steps)
 
     @property
     def _steps(self) -> int:

@@ -18,12 +18,12 @@ from stimuli_builder.characters.colour import LINEAR_OF_CODE, srgb_to_linear
 from stimuli_builder.characters.declaration import LowerLid as DeclaredLowerLid
 from stimuli_builder.clips.geometry import Geometry
 from stimuli_builder.clips.kernels import FULL_SCALE
-from stimuli_builder.clips.levels import LevelSet, Light, LowerLid, Window, quantised, window_inside
+from stimuli_builder.clips.levels import LevelSet, Light, LowerLid, Window, quantise_light, window_inside
 
 # A baked character as clips need it: its atlas at its own size, or resampled in linear light.
 
 MARGIN_PX = 4
-LIGHT_OF_CODE = quantised(LINEAR_OF_CODE)
+LIGHT_OF_CODE = quantise_light(LINEAR_OF_CODE)
 """16-bit linear light of every sRGB code value."""
 CODE_OF_LIGHT = np.searchsorted(LIGHT_OF_CODE, np.arange(FULL_SCALE + 1)).astype(np.uint8)
 """The code value of every 16-bit linear light that `LIGHT_OF_CODE` holds."""
@@ -100,7 +100,7 @@ def atlas_levels(character: Atlas, geometry: Geometry, size_px: tuple[int, int])
 
 
 @dataclass(frozen=True, eq=False)
-class _Content:
+class _LevelContents:
     """The whole frame and the window's levels; `level_srgb` where code values can be had from them."""
 
     base: Light
@@ -108,10 +108,10 @@ class _Content:
     level_srgb: LevelCodes | None = None
 
 
-def _read_at_own_size(character: Atlas, _: tuple[int, int], shown: slice, window: Window) -> _Content:
+def _read_at_own_size(character: Atlas, _: tuple[int, int], shown: slice, window: Window) -> _LevelContents:
     """Each code value has one value of light, so a table gives it, and the code value again."""
     rows, columns = character.crop
-    base = quantised(character.base_linear())
+    base = quantise_light(character.base_linear())
     levels = np.empty((len(character.closures), window.height, window.width, 3), np.uint16)
     levels[:] = base[shown][window.slices]
     first_row, first_column = shown.start + window.y, window.x
@@ -127,19 +127,19 @@ def _read_at_own_size(character: Atlas, _: tuple[int, int], shown: slice, window
         codes: NDArray[np.uint8] = CODE_OF_LIGHT[crops[index]]
         return codes
 
-    return _Content(np.ascontiguousarray(base[shown]), levels, level_srgb)
+    return _LevelContents(np.ascontiguousarray(base[shown]), levels, level_srgb)
 
 
-def _read_resized(character: Atlas, scaled: tuple[int, int], shown: slice, window: Window) -> _Content:
+def _read_resized(character: Atlas, scaled: tuple[int, int], shown: slice, window: Window) -> _LevelContents:
     frame = character.base_linear()
     levels = np.empty((len(character.closures), window.height, window.width, 3), np.uint16)
     for index in range(len(levels)):
         frame[character.crop] = srgb_to_linear(character.level_srgb(index))
         scaled_frame = _resized(frame, scaled)[shown]
-        levels[index] = quantised(scaled_frame[window.slices])
+        levels[index] = quantise_light(scaled_frame[window.slices])
         if index == 0:
-            base = quantised(scaled_frame)
-    return _Content(base, levels)
+            base = quantise_light(scaled_frame)
+    return _LevelContents(base, levels)
 
 
 def _scaled_lower_lid(
@@ -225,4 +225,4 @@ def _light_of_code(code: NDArray[np.float32]) -> Light:
     """16-bit linear light of gamma-encoded sRGB in 0-1."""
     code = np.clip(code, 0.0, 1.0)
     linear = np.where(code <= 0.04045, code / 12.92, ((code + np.float32(0.055)) / np.float32(1.055)) ** 2.4)
-    return quantised(linear.astype(np.float32))
+    return quantise_light(linear.astype(np.float32))

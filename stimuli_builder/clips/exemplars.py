@@ -194,7 +194,7 @@ def _blink(
     for textbook in TEXTBOOK_KINDS:
         if kind == textbook:
             return _textbook(textbook, settings, family, number, seed), False
-    profiles = read_closure_file(_beside(kind, beside))
+    profiles = read_closure_file(_path_next_to(kind, beside))
     if separate and any(profile.closure_other is None for profile in profiles):
         raise InputError(f"{kind}: eyes = 'separate' needs a column closure_other for the right eye")
     return _in_turn(profiles, number, seed, family)[-1]
@@ -232,5 +232,5 @@ def _paired_model() -> BlinkModel:
     return BlinkModel.fit(load_library(paired=True))
 
 
-def _beside(file: str, folder: Path | None) -> Path:
+def _path_next_to(file: str, folder: Path | None) -> Path:
     return (folder or Path()) / file

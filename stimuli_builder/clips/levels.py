@@ -215,6 +215,6 @@ def window_inside(x: float, y: float, width: float, height: float, size_px: tupl
     return Window(x0, y0, x1 - x0, y1 - y0)
 
 
-def quantised(light: NDArray[np.float32]) -> Light:
+def quantise_light(light: NDArray[np.float32]) -> Light:
     """16-bit code of linear light in 0-1, clipped."""
     return (np.clip(light, 0.0, 1.0) * np.float32(FULL_SCALE) + np.float32(0.5)).astype(np.uint16)

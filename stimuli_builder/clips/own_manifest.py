@@ -258,12 +258,12 @@ def _levels_read(placed: Placed) -> Iterator[str]:
 def _slips(placed: Placed) -> Iterator[str]:
     for name, counts in _counts(placed).items():
         for rare, usual in permutations(counts, 2):
-            if counts[usual] >= RARER * counts[rare] and _alike(rare, usual):
+            if counts[usual] >= RARER * counts[rare] and _named_alike(rare, usual):
                 file = next(file for file, (levels, _) in placed.items() if levels[name] == rare)
                 yield f"'{rare}' of {name} ({file}) looks like '{usual}': correct the name if it is meant"
 
 
-def _alike(one: str, other: str) -> bool:
+def _named_alike(one: str, other: str) -> bool:
     # Levels that differ in a number, as 2ms and 20ms, are levels.
     if re.findall(r"\d+", one) != re.findall(r"\d+", other):
         return False

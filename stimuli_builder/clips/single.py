@@ -34,7 +34,7 @@ class SingleClip:
 
 
 @dataclass(frozen=True)
-class Made:
+class RenderedClip:
     """A clip that was written."""
 
     curve: ClipCurve
@@ -42,7 +42,7 @@ class Made:
     onset_frame: int
 
 
-def render_single(clip: SingleClip, out: Path) -> Made:
+def render_single(clip: SingleClip, out: Path) -> RenderedClip:
     """Render one clip into `out`, whole or not at all."""
     settings = clip.settings
     character = geometry(settings.character)
@@ -54,7 +54,7 @@ def render_single(clip: SingleClip, out: Path) -> Made:
     job = ClipJob(look_of(settings, Options(barcode=clip.barcode)), curve)
     with whole_file(out) as temporary:
         temporary.write_bytes(render(job))
-    return Made(curve, job.frames, int(curve.onset_sample / samples_per_frame(settings.fps)))
+    return RenderedClip(curve, job.frames, int(curve.onset_sample / samples_per_frame(settings.fps)))
 
 
 def _blink(clip: SingleClip) -> Exemplar:

@@ -6,7 +6,7 @@ import av
 import numpy as np
 import webrtcvad
 
-from blink_engine.speech import Speech, joined
+from blink_engine.speech import Speech, join_speech
 from experiments.errors import InputError
 
 RATE_HZ = 16_000
@@ -59,5 +59,5 @@ def speech_in_audio(path: Path) -> tuple[list[Speech], float]:
         for start in range(0, len(samples) - size + 1, size)
         if detector.is_speech(samples[start : start + size], RATE_HZ)
     ]
-    stretches = joined(spoken, HANGOVER_FRAMES * step_s)
-    return joined([one for one in stretches if one.end_s - one.start_s > SPEECH_MIN_S]), duration_s
+    stretches = join_speech(spoken, HANGOVER_FRAMES * step_s)
+    return join_speech([one for one in stretches if one.end_s - one.start_s > SPEECH_MIN_S]), duration_s

@@ -11,7 +11,7 @@ from rich.console import Console
 from webvtt.models import Caption
 
 from blink_engine import Performance, StateName, default_parameters, perform
-from blink_engine.speech import Speech, joined, seed_of_speaker, speech_events, speech_states
+from blink_engine.speech import Speech, join_speech, seed_of_speaker, speech_events, speech_states
 from experiments.errors import InputError, counted, did_you_mean
 from experiments.files import check_targets, whole_text
 from stimuli_builder.blinks.export import AnimationCurve, CurveTarget, check_format, write_curve
@@ -50,7 +50,7 @@ def speech_in_subtitles(path: Path, speaker: str | None = None) -> tuple[list[Sp
         raise InputError(f"{path}: nobody is called '{speaker}'{did_you_mean(speaker, voices)}{spoken}")
     length_s = max((_seconds(caption.end) for caption in captions), default=0.0)
     own = [caption for caption in captions if speaker is None or caption.voice == speaker]
-    return joined([_stretch(path, caption) for caption in own]), length_s
+    return join_speech([_stretch(path, caption) for caption in own]), length_s
 
 
 def _captions(path: Path) -> list[Caption]:

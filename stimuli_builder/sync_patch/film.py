@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import InputError
-from stimuli_builder.video import opened, scan_video
+from stimuli_builder.video import open_video, scan_video
 
 # What the nine fields of the patch say.
 #
@@ -193,7 +193,7 @@ def _times_ms(path: Path, camera_fps: float | None) -> NDArray[np.float64]:
 
 
 def _pictures(path: Path) -> Iterator[Grey]:
-    with opened(path) as (container, stream):
+    with open_video(path) as (container, stream):
         for frame in container.decode(stream):
             yield frame.to_ndarray(format="gray")
 

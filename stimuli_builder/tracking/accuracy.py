@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from experiments.errors import InputError
 from stimuli_builder.tracking.fit import Fit, Fitter
-from stimuli_builder.tracking.mesh import reduced, restored_points
+from stimuli_builder.tracking.mesh import reduce_picture, restored_points
 from stimuli_builder.tracking.model import CoupledModel, TrainingOptions, train
 from stimuli_builder.tracking.search import Finder
 from stimuli_builder.tracking.shapes import EYE_POINTS, LidMarkers, Points, inter_eyelid_distances, widths
@@ -96,7 +96,7 @@ def cross_validate(
 def _held_out(
     model: CoupledModel, finder: Finder, frame: int, fold: int, picture: Picture, label: Points
 ) -> HeldOut:
-    small = reduced(picture, model.reduction)
+    small = reduce_picture(picture, model.reduction)
     middle = np.median(model.poses, axis=0)
     fits = [fit for fit in (finder.anywhere(small), finder.near(small, middle)) if fit is not None]
     if not fits:
@@ -139,7 +139,7 @@ def refined_labels(
         model = train([pictures[f] for f in frames], np.array([refined[f] for f in frames]), markers, plain)
         fitter = Fitter(model)
         for index, frame in enumerate(frames):
-            small = reduced(pictures[frame], model.reduction)
+            small = reduce_picture(pictures[frame], model.reduction)
             fit = fitter.fit(small, model.examples[index], model.poses[index])
             if fit.iterations:
                 moved = fit.vertices[: EYE_POINTS * markers.eyes].astype(np.float64)

@@ -10,7 +10,7 @@ from stimuli_builder.compiled import compiled, compiled_over
 from stimuli_builder.tracking import shapes
 from stimuli_builder.tracking.accuracy import HeldOut
 from stimuli_builder.tracking.fit import Fit
-from stimuli_builder.tracking.model import CoupledModel, believing
+from stimuli_builder.tracking.model import CoupledModel, with_residual_limits
 from stimuli_builder.tracking.shapes import CANTHI, EYE_POINTS, LOWER_LID, UPPER_LID, Points, widths
 
 Values = NDArray[np.float64]
@@ -38,7 +38,7 @@ def with_errors(model: CoupledModel, held_out: Sequence[HeldOut], limits: Values
     """
     seen = [one for one in held_out if _would_be_taken(one, limits)]
     if not seen:
-        return believing(model, limits)
+        return with_residual_limits(model, limits)
     residuals = np.array([one.residuals for one in seen])
     usual = np.median(residuals, axis=0)
     excess = np.log(np.maximum((residuals / usual).max(1), 1e-3))
@@ -48,7 +48,7 @@ def with_errors(model: CoupledModel, held_out: Sequence[HeldOut], limits: Values
     slope = float(np.clip(slope, 0, STEEPEST)) * len(seen) / (len(seen) + 10)
     scale = np.maximum((residuals / usual).max(1), 1.0) ** slope
     errors = np.array([one.point_errors_px for one in seen]) / scale[:, None]
-    return believing(model, limits, usual, np.sqrt((errors**2).mean(0)), slope)
+    return with_residual_limits(model, limits, usual, np.sqrt((errors**2).mean(0)), slope)
 
 
 def _would_be_taken(one: HeldOut, limits: Values) -> bool:

@@ -169,7 +169,7 @@ def train(
     from experiments.files import check_ending, check_targets
     from stimuli_builder.progress import step_progress
     from stimuli_builder.tracking.cli_track import report_modes, warn
-    from stimuli_builder.tracking.labels import load_labels, unreviewed
+    from stimuli_builder.tracking.labels import load_labels, unreviewed_note
     from stimuli_builder.tracking.learn import learn, open_video, training_steps
     from stimuli_builder.tracking.model import save_model
 
@@ -179,7 +179,7 @@ def train(
     if out is not None:
         check_ending(out, (".npz",), "a model")
     info = open_video(video, accept_variable_rate)
-    warn(unreviewed(load_labels(labels)))
+    warn(unreviewed_note(load_labels(labels)))
     options = _options(shape_variance, appearance_variance, coupled_variance, paper_modes, base_pixels)
     with step_progress("training", training_steps(folds, refine)) as advance:
         lesson = learn(info, labels, options, one_eye=one_eye, folds=folds, refine=refine, advance=advance)

@@ -12,7 +12,7 @@ from experiments.files import check_ending, check_targets, temporary_beside
 from stimuli_builder.blinks.plots import check_figure_name
 from stimuli_builder.progress import frame_progress, step_progress
 from stimuli_builder.tracking.labelfree import label_free_lesson, worst_frames, write_relabel
-from stimuli_builder.tracking.labels import Labels, by_hand, load_labels, unmarked, unreviewed
+from stimuli_builder.tracking.labels import Labels, by_hand, load_labels, unmarked_note, unreviewed_note
 from stimuli_builder.tracking.learn import Lesson, check_eyes, learn, open_video, training_steps
 from stimuli_builder.tracking.model import CoupledModel, TrainingOptions, load_model
 from stimuli_builder.tracking.preview import plot_track, write_preview
@@ -189,7 +189,7 @@ def _check(job: TrackJob) -> None:
 def _model(job: TrackJob, info: VideoInfo) -> tuple[CoupledModel, Hints]:
     """A model from labels, from a file, or from what the detector sees; then with its detections."""
     if job.labels is not None:
-        warn(unreviewed(load_labels(job.labels)))
+        warn(unreviewed_note(load_labels(job.labels)))
         with step_progress("training", training_steps(job.folds, job.refine)) as advance:
             lesson = learn(
                 info,
@@ -238,7 +238,7 @@ def _by_hand(job: TrackJob, info: VideoInfo) -> Labels | None:
         return None
     labels = load_labels(job.relabel, info.size_px, info.frame_count, fewest=1)
     check_eyes(labels, job.one_eye)
-    warn(unmarked(labels))
+    warn(unmarked_note(labels))
     return by_hand(labels)
 
 

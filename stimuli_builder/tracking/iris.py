@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from experiments.errors import InputError
 from experiments.files import whole_text
 from stimuli_builder.compiled import compiled
-from stimuli_builder.tracking.mesh import reduced, reduced_points, restored_points
+from stimuli_builder.tracking.mesh import reduce_picture, reduced_points, restored_points
 from stimuli_builder.tracking.shapes import EYE_POINTS, Points, eye_axis
 from stimuli_builder.tracking.table import numbers, point_columns, track_rows
 from stimuli_builder.video import Picture, VideoInfo, frames
@@ -73,7 +73,7 @@ def measure_iris(picture: Picture, eye: Points) -> Iris | None:
     factor = max(1, int(eye_axis(eye)[2] / FINE_PX))
     if factor == 1:
         return _measured(picture, eye)
-    seen = _measured(reduced(picture, factor), reduced_points(eye, factor))
+    seen = _measured(reduce_picture(picture, factor), reduced_points(eye, factor))
     if seen is None:
         return None
     x, y = restored_points(np.array([seen.x, seen.y]), factor)

@@ -14,7 +14,7 @@ from stimuli_builder.tracking.sampling_kernels import (
     bounds,
     look_up,
     outside,
-    packed,
+    pack_pixels,
     posed_vertices,
     warp,
 )
@@ -154,7 +154,7 @@ def fit(picture, c, pose, max_iterations, tolerance, mesh, model, buffers):
         bounds(vertices, height, width, 1, needed)
         if outside(needed, box):
             bounds(vertices, height, width, MARGIN, box)
-            cells = packed(picture, box)
+            cells = pack_pixels(picture, box)
         warp(vertices, mesh.triangles, mesh.starts, mesh.forms, mesh.x, mesh.y, buffers.gx, buffers.gy)
         look_up(cells, box, height, width, buffers.gx, buffers.gy, buffers.sampled)
         compare(model.appearance, model.weights, c, buffers.sampled, buffers.look, error, change)

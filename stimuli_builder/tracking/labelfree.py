@@ -16,9 +16,9 @@ from stimuli_builder.tracking.shapes import (
     EYE_POINTS,
     LidMarkers,
     Points,
+    apply_pose,
     default_markers,
     mean_shape,
-    moved,
     similarity_between,
     widths,
 )
@@ -45,7 +45,7 @@ def plausible(labels: dict[int, Points]) -> dict[int, Points]:
     numbers = sorted(labels)
     shapes = np.array([labels[n] for n in numbers])
     mean = mean_shape(shapes)
-    rows = np.array([moved(shape, similarity_between(shape, mean)) for shape in shapes])
+    rows = np.array([apply_pose(shape, similarity_between(shape, mean)) for shape in shapes])
     rows = rows.reshape(len(rows), -1)
     rest = np.array([_unexplained(np.delete(rows, k, axis=0), rows[k]) for k in range(len(rows))])
     limit = max(
@@ -67,7 +67,7 @@ def most_varied(shapes: dict[int, Points], count: int) -> list[int]:
     """Frames whose shapes, freed of position, size and turn, lie farthest from one another; ascending."""
     numbers = sorted(shapes)
     first = shapes[numbers[0]]
-    rows = np.array([moved(shapes[n], similarity_between(shapes[n], first)).ravel() for n in numbers])
+    rows = np.array([apply_pose(shapes[n], similarity_between(shapes[n], first)).ravel() for n in numbers])
     chosen = [int(((rows - np.median(rows, axis=0)) ** 2).sum(1).argmin())]
     distance: NDArray[np.float64] = np.full(len(numbers), np.inf)
     while len(chosen) < min(count, len(numbers)):

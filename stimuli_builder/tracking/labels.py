@@ -311,7 +311,7 @@ def by_hand(labels: Labels) -> Labels:
     return replace(labels, frames={n: points for n, points in labels.frames.items() if n not in waiting})
 
 
-def unreviewed(labels: Labels) -> str:
+def unreviewed_note(labels: Labels) -> str:
     """A line where labels given to be learnt from hold frames that nobody saw; empty where none is known."""
     waiting, count = len(as_proposed(labels)), len(labels.frames)
     if waiting:
@@ -327,7 +327,7 @@ def unreviewed(labels: Labels) -> str:
     return ""
 
 
-def unmarked(labels: Labels) -> str:
+def unmarked_note(labels: Labels) -> str:
     """A line where a file of `--relabel` is of a version that marked no proposals; empty else."""
     if labels.proposed is not None or labels.origin != TRACKED:
         return ""

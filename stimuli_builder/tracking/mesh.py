@@ -173,7 +173,7 @@ def _claim(owner: NDArray[np.int64], number: int, form: NDArray[np.float64], cor
 # Pictures reduced by a whole factor, and points carried along.
 
 
-def reduced(picture: Picture, factor: int) -> Picture:
+def reduce_picture(picture: Picture, factor: int) -> Picture:
     """Mean of factor x factor blocks; rows and columns that fill no block are left out."""
     if factor == 1:
         return picture

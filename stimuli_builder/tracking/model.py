@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from experiments.errors import InputError
 from experiments.files import whole_file
-from stimuli_builder.tracking.mesh import BaseMesh, build_mesh, mesh_from, reduced, reduced_points
+from stimuli_builder.tracking.mesh import BaseMesh, build_mesh, mesh_from, reduce_picture, reduced_points
 from stimuli_builder.tracking.sampling_kernels import sample
 from stimuli_builder.tracking.shapes import (
     EYE_POINTS,
@@ -18,7 +18,7 @@ from stimuli_builder.tracking.shapes import (
     Points,
     mean_shape,
     similarity_between,
-    unmoved,
+    undo_pose,
     with_border,
 )
 from stimuli_builder.video import Picture
@@ -88,7 +88,7 @@ class CoupledModel:
         return self.markers.eyes
 
 
-def believing(
+def with_residual_limits(
     model: CoupledModel,
     limits: Values,
     usual: Values | None = None,
@@ -214,18 +214,20 @@ def train(
 
     Returns
     -------
-    A model whose `residual_limits` are infinite; `believing` sets them from frames left out of training.
+    A model whose `residual_limits` are infinite; `with_residual_limits` sets them from frames left out.
     """
     height, width = pictures[0].shape
     mesh, reduction, shapes = _base(points, options)
-    small = [reduced(picture, reduction) for picture in pictures]
+    small = [reduce_picture(picture, reduction) for picture in pictures]
     poses = np.array([similarity_between(mesh.vertices, shape) for shape in shapes])
-    aligned = np.array([unmoved(shape, pose) for shape, pose in zip(shapes, poses, strict=True)])
+    aligned = np.array([undo_pose(shape, pose) for shape, pose in zip(shapes, poses, strict=True)])
     deviations = (aligned - mesh.vertices).reshape(len(shapes), -1)
     shape_basis, shape_values, kept_shape = principal(
         deviations, options.shape_variance, options.fewest_shape_modes
     )
-    textures = np.array([warped(mesh, picture, shape) for picture, shape in zip(small, shapes, strict=True)])
+    textures = np.array(
+        [warp_picture(mesh, picture, shape) for picture, shape in zip(small, shapes, strict=True)]
+    )
     mean = textures.mean(0)
     look_basis, look_values, kept_look = principal(
         textures - mean, options.appearance_variance, options.fewest_appearance_modes
@@ -311,7 +313,7 @@ def _unexplained(others: Values, rest: Values, modes: int) -> Values:
     return np.asarray(rest - (directions[:, kept] @ share) @ others)
 
 
-def warped(mesh: BaseMesh, picture: Picture, shape: Points) -> Values:
+def warp_picture(mesh: BaseMesh, picture: Picture, shape: Points) -> Values:
     """The picture pulled back from `shape` (V, 2) to the base frame: grey levels (N,)."""
     out = np.empty(mesh.pixel_count, np.float32)
     pull: Any = sample

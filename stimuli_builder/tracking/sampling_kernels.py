@@ -51,7 +51,7 @@ def outside(needed, box):
 
 
 @compiled
-def packed(picture, box):
+def pack_pixels(picture, box):
     """Four pixels of every cell of a box in one number, int32: one look-up a sample instead of four."""
     cells = np.empty((box[1] - box[0], box[3] - box[2]), np.int32)
     for row in range(cells.shape[0]):
@@ -159,7 +159,7 @@ def sample(picture, vertices, triangles, starts, forms, px, py, out):
     xs = np.empty_like(out)
     ys = np.empty_like(out)
     warp(vertices, triangles, starts, forms, px, py, xs, ys)
-    look_up(packed(picture, box), box, height, width, xs, ys, out)
+    look_up(pack_pixels(picture, box), box, height, width, xs, ys, out)
 
 
 @compiled

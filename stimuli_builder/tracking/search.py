@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stimuli_builder.tracking.fit import Fit, Fitter
-from stimuli_builder.tracking.mesh import reduced
+from stimuli_builder.tracking.mesh import reduce_picture
 from stimuli_builder.tracking.model import CoupledModel
 from stimuli_builder.tracking.sampling_kernels import grey_spreads
 from stimuli_builder.tracking.shapes import EYE_POINTS, inter_eyelid_distances
@@ -32,7 +32,7 @@ class Finder:
         height, width = model.patches.shape[1:]
         self._factor = max(1, height // PATCH_HEIGHT_PX)
         self._templates = [
-            (number, scale, cv2.resize(reduced(patch, self._factor), None, fx=scale, fy=scale))
+            (number, scale, cv2.resize(reduce_picture(patch, self._factor), None, fx=scale, fy=scale))
             for number, patch in enumerate(model.patches)
             for scale in SCALES
             if min(height, width) * scale >= 4 * self._factor
@@ -52,7 +52,7 @@ class Finder:
         return min(good or [fit for fit in fits if fit.iterations], key=_worst, default=None)
 
     def _starts(self, picture: Picture) -> Iterator[tuple[Values, Values]]:
-        small = reduced(picture, self._factor)
+        small = reduce_picture(picture, self._factor)
         matches = []
         for number, scale, template in self._templates:
             if template.shape[0] > small.shape[0] or template.shape[1] > small.shape[1]:

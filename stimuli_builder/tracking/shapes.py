@@ -130,13 +130,13 @@ def similarity_between(source: Points, target: Points) -> NDArray[np.float64]:
     return np.array([turn.real, turn.imag, shift.real, shift.imag])
 
 
-def moved(points: Points, pose: NDArray[np.float64]) -> Points:
+def apply_pose(points: Points, pose: NDArray[np.float64]) -> Points:
     """Apply a similarity (a, b, tx, ty) to (points, 2)."""
     a, b, tx, ty = pose
     return np.asarray(points @ np.array([[a, b], [-b, a]]) + [tx, ty])
 
 
-def unmoved(points: Points, pose: NDArray[np.float64]) -> Points:
+def undo_pose(points: Points, pose: NDArray[np.float64]) -> Points:
     """Undo a similarity (a, b, tx, ty) on (points, 2)."""
     a, b, tx, ty = pose
     return np.asarray((points - [tx, ty]) @ np.array([[a, -b], [b, a]]) / (a * a + b * b))
@@ -147,8 +147,8 @@ def mean_shape(shapes: Points, rounds: int = 20) -> Points:
     mean = shapes[0]
     size = np.mean([_size(shape) for shape in shapes])
     for _ in range(rounds):
-        mean = np.mean([moved(shape, similarity_between(shape, mean)) for shape in shapes], axis=0)
-        mean = moved(mean, similarity_between(mean, shapes[0]))
+        mean = np.mean([apply_pose(shape, similarity_between(shape, mean)) for shape in shapes], axis=0)
+        mean = apply_pose(mean, similarity_between(mean, shapes[0]))
         mean = mean.mean(0) + (mean - mean.mean(0)) * size / _size(mean)
     return np.asarray(mean)
 

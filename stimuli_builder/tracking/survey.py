@@ -294,7 +294,7 @@ def _looked(
     seen: dict[int, list[Detection]] = {}
     further, in_parts = [0], step * max(1, -(-info.frame_count // step // LOOKED_AT_IN_PARTS))
     with open_detector(one_eye=one_eye, first=_first(info, step) if one_eye else ()) as detector:
-        pictures = frames(info.path, read=_every(step))
+        pictures = frames(info.path, read=_read_every(step))
         for number, picture in enumerate(islice(pictures, info.frame_count)):
             if not picture.size:
                 continue
@@ -331,11 +331,11 @@ def further_faces(mesh: FaceMesh, picture: Picture, seen: Sequence[Detection]) -
 def _first(info: VideoInfo, step: int) -> list[Picture]:
     """Pictures across the first minute or so, to find a close-up's eye in."""
     every = max(step, 8)
-    pictures = frames(info.path, read=_every(every))
+    pictures = frames(info.path, read=_read_every(every))
     return list(islice(pictures, 0, min(info.frame_count, 40 * every), every))
 
 
-def _every(step: int) -> Callable[[Any], Picture]:
+def _read_every(step: int) -> Callable[[Any], Picture]:
     """Read every step-th frame's colours and nothing of the others: turning a frame into RGB costs most."""
     counter = count()
 

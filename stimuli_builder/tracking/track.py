@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from experiments.errors import InputError
 from stimuli_builder.compiled import compiled
-from stimuli_builder.tracking.mesh import reduced, reduced_points
+from stimuli_builder.tracking.mesh import reduce_picture, reduced_points
 from stimuli_builder.tracking.model import CoupledModel
 from stimuli_builder.tracking.shapes import Points, widths
 from stimuli_builder.tracking.stillness import Stillness
@@ -60,7 +60,7 @@ class Hindsight:
         self._repeats: deque[int] = deque()
         self._earlier: TrackedFrame | None = None
 
-    def after(self, picture: Picture, frame: TrackedFrame) -> Iterator[TrackedFrame]:
+    def push(self, picture: Picture, frame: TrackedFrame) -> Iterator[TrackedFrame]:
         """Take in the next frame and its reduced picture; give on what is now two seconds old, if any."""
         self._run = self._run + 1 if self._like_first(picture) else 1
         if self._run == 1:
@@ -76,7 +76,7 @@ class Hindsight:
         if len(self._held) > self._window:
             yield self._released()
 
-    def rest(self) -> Iterator[TrackedFrame]:
+    def flush(self) -> Iterator[TrackedFrame]:
         """Give on all that is held, at the end of the recording."""
         while self._held:
             yield self._released()
@@ -91,7 +91,9 @@ class Hindsight:
             self._first = picture[self._part].copy()
 
     def _like_first(self, picture: Picture) -> bool:
-        return self._first is not None and alike(picture[self._part], self._first, self._levels, ALIKE_SHARE)
+        return self._first is not None and pictures_alike(
+            picture[self._part], self._first, self._levels, ALIKE_SHARE
+        )
 
     def _doubt(self, count: int) -> None:
         """Make the last frames doubtful that no more has been said of."""
@@ -156,7 +158,7 @@ def evenly_repeated(repeats: list[int], longest: int) -> bool:
 
 
 @compiled
-def alike(one: Picture, other: Picture, levels: int, share: float) -> bool:
+def pictures_alike(one: Picture, other: Picture, levels: int, share: float) -> bool:
     """Whether at most a share of the pixels of two grey pictures differs by more grey levels than given."""
     allowed = share * one.shape[0] * one.shape[1]
     count = 0
@@ -203,19 +205,19 @@ def track_video(
     begun = time.perf_counter()
     # a second thread for matrices this small only waits, on the core that decodes
     with threadpool_limits(1, "blas"), TrackWriter(out, model.eyes) as writer:
-        pictures = frames(info.path, lambda full: reduced(full, model.reduction))
+        pictures = frames(info.path, lambda full: reduce_picture(full, model.reduction))
         for number, picture in enumerate(islice(pictures, info.frame_count)):
             before = time.thread_time()
             hint = hints.get(number)
             if hint is not None:
                 tracker.look(hint)
             frame = tracker.step(picture, None if isinstance(hint, str) else hint)
-            known = list(hindsight.after(picture, frame))
+            known = list(hindsight.push(picture, frame))
             summary.fit_s += time.thread_time() - before
             _write(known, info, writer, summary)
             if advance is not None:
                 advance(summary)
-        _write(hindsight.rest(), info, writer, summary)
+        _write(hindsight.flush(), info, writer, summary)
         if advance is not None:
             advance(summary)
         summary.repeated = hindsight.repeated

@@ -24,7 +24,7 @@ from stimuli_builder.tracking.shapes import (
     Points,
     inter_eyelid_distances,
     similarity_between,
-    unmoved,
+    undo_pose,
     widths,
     with_border,
 )
@@ -51,7 +51,7 @@ class DetectedStart:
         shape = reduced_points(with_border(points), model.reduction)
         mean = model.mesh.vertices
         pose = similarity_between(mean, shape)
-        away = (unmoved(shape, pose) - mean).ravel()
+        away = (undo_pose(shape, pose) - mean).ravel()
         limit = MAX_SD * model.sd
         return self._fitter.fit(picture, np.clip(self._to_parameters @ away, -limit, limit), pose)
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from experiments.kinds.pair_choice import Posterior, Stored, batch, posterior
+from experiments.kinds.pair_choice import Posterior, StoredComparisons, batch, posterior
 
 
 def test_gain_is_the_mutual_information_of_answer_and_score() -> None:
@@ -32,7 +32,10 @@ def _coin(p: float) -> float:
 def test_scores_are_the_mode_of_the_posterior() -> None:
     """The slope of the log posterior is zero there, each term written out."""
     rng = random.Random(3)
-    stored = {edge: Stored(n := rng.randint(0, 9), rng.randint(0, n)) for edge in combinations(range(6), 2)}
+    stored = {
+        edge: StoredComparisons(n := rng.randint(0, 9), rng.randint(0, n))
+        for edge in combinations(range(6), 2)
+    }
     scores = posterior(6, stored).scores
     for item in range(6):
         slope = -scores[item] / 4.0
@@ -48,7 +51,11 @@ def test_scores_are_the_mode_of_the_posterior() -> None:
 def test_a_batch_holds_together_and_no_pair_twice(items: int, number: int, seed: int) -> None:
     rng = random.Random(seed)
     edges = list(combinations(range(items), 2))
-    stored = {edge: Stored(n := rng.randint(0, 5), rng.randint(0, n)) for edge in edges if rng.random() < 0.7}
+    stored = {
+        edge: StoredComparisons(n := rng.randint(0, 5), rng.randint(0, n))
+        for edge in edges
+        if rng.random() < 0.7
+    }
     chosen = batch(items, edges, stored, number, random.Random(seed))
     assert len(chosen) == len(set(chosen)) == min(number, len(edges))
     assert chosen == batch(items, edges, stored, number, random.Random(seed))
@@ -60,11 +67,19 @@ def test_a_batch_holds_together_and_no_pair_twice(items: int, number: int, seed:
 
 def test_what_is_known_is_not_asked_again() -> None:
     """Two items that are far apart, and two that nobody has compared: the latter come first."""
-    stored = {(0, 1): Stored(40, 40), (0, 2): Stored(40, 20), (1, 2): Stored(40, 1)}
+    stored = {
+        (0, 1): StoredComparisons(40, 40),
+        (0, 2): StoredComparisons(40, 20),
+        (1, 2): StoredComparisons(40, 1),
+    }
     edges = list(combinations(range(4), 2))
     first = batch(4, edges, stored, 1, random.Random(1))
     assert 3 in first[0]
     # What others are just being asked counts as known, though nobody has answered.
-    waiting = {(0, 3): Stored(open=200), (1, 3): Stored(open=200), (2, 3): Stored(open=200)}
+    waiting = {
+        (0, 3): StoredComparisons(open=200),
+        (1, 3): StoredComparisons(open=200),
+        (2, 3): StoredComparisons(open=200),
+    }
     known = posterior(4, stored | waiting)
     assert max(known.gain(edge) for edge in waiting) < posterior(4, stored).gain((2, 3)) / 3

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from experiments.load import locate, parse_experiment
-from experiments.wording import unfilled, untranslated
+from experiments.wording import unfilled_texts, untranslated
 from tests.helpers.studies import SHORT
 
 BANK = Path(__file__).parents[2] / "frontend/src/admin/builder/bank.ts"
@@ -29,7 +29,7 @@ def with_consent(text: str, language: str = "en") -> str:
 )  # fmt: skip
 @pytest.mark.parametrize("language", ["en", "de"])
 def test_marks_that_nobody_filled_in_are_found_in_every_language(mark: str, language: str) -> None:
-    [found] = unfilled(parse_experiment(with_consent(f"# A study\n\nOf {mark}: yes.", language)))
+    [found] = unfilled_texts(parse_experiment(with_consent(f"# A study\n\nOf {mark}: yes.", language)))
     assert found.certain
     assert (found.path, found.language, found.marks) == (
         f"texts.{language}.consent",
@@ -54,19 +54,19 @@ def test_marks_that_nobody_filled_in_are_found_in_every_language(mark: str, lang
     ],
 )
 def test_links_keys_and_quoted_marks_are_no_placeholders(text: str) -> None:
-    assert unfilled(parse_experiment(with_consent(text))) == []
+    assert unfilled_texts(parse_experiment(with_consent(text))) == []
 
 
 @pytest.mark.parametrize("mark", ["{name}", "<name>", "XX", "____", "???"])
 def test_marks_that_may_be_meant_as_they_are_do_not_block(mark: str) -> None:
-    [found] = unfilled(parse_experiment(with_consent(f"It takes {mark} minutes.")))
+    [found] = unfilled_texts(parse_experiment(with_consent(f"It takes {mark} minutes.")))
     assert (found.certain, found.marks) == (False, (mark,))
 
 
 def test_questions_labels_and_titles_are_looked_at_too() -> None:
     text = SHORT.replace("How natural?", "How [adjective]?").replace("Glasses", "[Option]")
     text = text.replace('title = "A short study"', 'title = "[Title]"')
-    assert [found.path for found in unfilled(parse_experiment(text))] == [
+    assert [found.path for found in unfilled_texts(parse_experiment(text))] == [
         "title",
         "trial.scale.question.en",
         "forms.1.fields.2.options.1.label.en",
@@ -75,7 +75,7 @@ def test_questions_labels_and_titles_are_looked_at_too() -> None:
 
 def test_a_language_that_nobody_is_offered_is_not_looked_at() -> None:
     text = with_consent("[Titel]", "de").replace('["en", "de"]', '["en"]')
-    assert unfilled(parse_experiment(text)) == []
+    assert unfilled_texts(parse_experiment(text)) == []
 
 
 def test_every_mark_of_the_consent_forms_that_come_with_the_builder_is_found() -> None:
@@ -83,14 +83,14 @@ def test_every_mark_of_the_consent_forms_that_come_with_the_builder_is_found() -
     consents = re.findall(r"`(#[^`]*)`", written)
     assert len(consents) >= 4
     for consent in consents:
-        [found] = unfilled(parse_experiment(with_consent(consent)))
+        [found] = unfilled_texts(parse_experiment(with_consent(consent)))
         assert set(found.marks) == set(re.findall(r"\[[^\]]+\]", consent))
 
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_shipped_studies_have_none(name: str) -> None:
     declared = parse_experiment(locate(name).read_text(encoding="utf-8"))
-    assert unfilled(declared) == []
+    assert unfilled_texts(declared) == []
     assert untranslated(declared) == {}
 
 

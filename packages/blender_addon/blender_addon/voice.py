@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from blink_engine.speech import Speech, joined
+from blink_engine.speech import Speech, join_speech
 
 FRAME_S = 0.03
 SPEECH_MIN_S = 0.15
@@ -27,5 +27,5 @@ def speech_in_samples(samples: npt.NDArray[np.float32], rate_hz: float) -> list[
     noise, loud = np.percentile(level_db, [10, 95])
     threshold = max(noise + ABOVE_NOISE_DB, loud - BELOW_LOUD_DB, SILENCE_DB)
     spoken = [Speech(n * FRAME_S, (n + 1) * FRAME_S) for n in np.flatnonzero(level_db > threshold)]
-    stretches = joined(spoken, HANGOVER_S)
-    return joined([one for one in stretches if one.end_s - one.start_s > SPEECH_MIN_S])
+    stretches = join_speech(spoken, HANGOVER_S)
+    return join_speech([one for one in stretches if one.end_s - one.start_s > SPEECH_MIN_S])

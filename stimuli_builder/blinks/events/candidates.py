@@ -151,11 +151,11 @@ def candidate_at(depth: Depth, peak: int, prominence: float) -> Candidate:
     """The dip whose deepest frame is `peak`, as it rises by `prominence` (a depth) above its surroundings."""
     height = float(depth.smooth[peak])
     levels = [height - prominence + part * prominence for part in LEVELS]
-    left, right = ([crossing(depth, peak, level, step) for level in levels] for step in (-1, 1))
+    left, right = ([level_crossing(depth, peak, level, step) for level in levels] for step in (-1, 1))
     return Candidate(peak, height, prominence, (left[0], left[1], left[2]), (right[0], right[1], right[2]))
 
 
-def crossing(depth: Depth, peak: int, level: float, step: int) -> float:
+def level_crossing(depth: Depth, peak: int, level: float, step: int) -> float:
     """Where the depth first falls below a level on one side of the peak, between frames."""
     reach = int(REACH_S * depth.fps) + 1
     first = max(0, peak - reach)
@@ -217,7 +217,7 @@ def _row(c: Candidate, depth: Depth, deep: float, other: Array | None) -> list[f
     opening = (c.right[0] - c.right[2]) / fps
     before, after = _base(smooth, c.left[0], -1, fps), _base(smooth, c.right[0], 1, fps)
     like, rough = _surroundings(c, depth)
-    beside, has_other = _beside(c, other, deep)
+    beside, has_other = _other_eye_depths(c, other, deep)
     return [
         np.log(max(c.depth, 0.02)), min(c.depth / deep, 3.0), c.prominence / max(c.depth, 0.02),
         min(c.prominence / deep, 3.0), np.log(max(half, least)), np.log(max(narrow, least)),
@@ -249,7 +249,7 @@ def _surroundings(c: Candidate, depth: Depth) -> tuple[float, float]:
     return like, rough
 
 
-def _beside(c: Candidate, other: Array | None, deep: float) -> tuple[float, float]:
+def _other_eye_depths(c: Candidate, other: Array | None, deep: float) -> tuple[float, float]:
     if other is None:
         return 0.0, 0.0
     part = other[max(0, c.peak - 1) : c.peak + 2]

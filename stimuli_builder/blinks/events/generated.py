@@ -39,7 +39,7 @@ class Motion:
 
 
 @dataclass(frozen=True, eq=False)
-class Generated:
+class GeneratedSeries:
     """A series of one or two eyes, (eyes, n) distances, and what happened in it."""
 
     distances: Array
@@ -79,7 +79,7 @@ def draw(kind: Kind, onset: float, rng: np.random.Generator) -> Motion:
     )
 
 
-def closing(share: Array, sharpness: float) -> Array:
+def smooth_step(share: Array, sharpness: float) -> Array:
     """Smooth step from 0 to 1 over share 0 to 1; greater sharpness moves it towards the end."""
     x = np.clip(share, 0, 1) ** sharpness
     return np.asarray(x * x * (3 - 2 * x))
@@ -96,11 +96,11 @@ def course(motion: Motion, times: Array, rng: np.random.Generator) -> Array:
         c(t) &= d \, s\{(t - t_0) / T_d\}, \text{ then } d \, [1 - s\{(t - t_0 - T_d - T_h) / T_u\}] \tag{2}
 
     t_0 is the onset; T_d, T_h and T_u last closing, hold and opening; d is the depth and a the sharpness
-    (`closing`). Squints and closed eyes tremble, gaze shifts drift.
+    (`smooth_step`). Squints and closed eyes tremble, gaze shifts drift.
     """
-    down = closing((times - motion.onset_s) / motion.down_s, rng.uniform(0.9, 1.3))
+    down = smooth_step((times - motion.onset_s) / motion.down_s, rng.uniform(0.9, 1.3))
     back = (times - motion.onset_s - motion.down_s - motion.hold_s) / motion.up_s
-    up = closing(back, rng.uniform(0.55, 0.95))
+    up = smooth_step(back, rng.uniform(0.55, 0.95))
     shape = np.where(back <= 0, down, 1 - up)
     if motion.kind in ("squint", "closed_eye"):
         wobble = np.sin(2 * np.pi * rng.uniform(0.5, 3) * times + rng.uniform(0, 6.3)) * rng.uniform(0, 0.12)
@@ -126,7 +126,7 @@ def plan(seconds: float, rng: np.random.Generator) -> list[Motion]:
     return motions
 
 
-def generate(rng: np.random.Generator, seconds: float = 40.0, fps: float | None = None) -> Generated:
+def generate(rng: np.random.Generator, seconds: float = 40.0, fps: float | None = None) -> GeneratedSeries:
     """One recording: events, closed level, drift, wobble of a talking face, noise, glitches, 1 or 2 eyes."""
     rate = float(fps or rng.choice(RATES))
     finer = max(1, int(np.ceil(120 / rate)))
@@ -139,7 +139,7 @@ def generate(rng: np.random.Generator, seconds: float = 40.0, fps: float | None 
     floor, bend = rng.uniform(0, 0.6), rng.uniform(0.7, 1.6)
     shared = _drift(closure.size, rate, rng)
     distances = [_measured(closure, floor, bend, shared, rate, rng) for _ in range(eyes)]
-    return Generated(np.array(distances), rate, tuple(motions))
+    return GeneratedSeries(np.array(distances), rate, tuple(motions))
 
 
 def _closure(motions: list[Motion], times: Array, seed: int) -> Array:

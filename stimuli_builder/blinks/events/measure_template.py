@@ -38,7 +38,7 @@ def phases(profile: BlinkProfile) -> tuple[Array, Array, tuple[float, float, flo
     return closing, 1 - opening, seconds
 
 
-def rising(mean: Array) -> Array:
+def make_rising(mean: Array) -> Array:
     """Make a mean form rise strictly from 0 to 1."""
     form = np.maximum.accumulate((mean - mean[0]) / (mean[-1] - mean[0])) + np.linspace(0, 1e-6, mean.size)
     return np.asarray(form / form[-1])
@@ -53,8 +53,8 @@ def main() -> None:
     document = {
         "made_by": "python -m stimuli_builder.blinks.events.measure_template",
         "profiles": [profile.profile_id for profile in deep],
-        "closing": np.round(rising(np.mean(closings, axis=0)), 6).tolist(),
-        "opening": np.round(rising(np.mean(openings, axis=0)), 6).tolist(),
+        "closing": np.round(make_rising(np.mean(closings, axis=0)), 6).tolist(),
+        "opening": np.round(make_rising(np.mean(openings, axis=0)), 6).tolist(),
         "log_s": np.round(np.median(np.log(seconds), axis=0), 4).tolist(),
         "log_sd": list(SPREAD),
     }

@@ -98,7 +98,7 @@ SHORTEST_PIECE_S = 0.8
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class MeasuredPiece:
     """A gapless piece of one eye with its dips.
 
     Attributes
@@ -129,7 +129,7 @@ class Measured:
 
 
 @dataclass(frozen=True, eq=False)
-class Piece(Measured):
+class Piece(MeasuredPiece):
     """A piece after the first look.
 
     Attributes
@@ -146,11 +146,11 @@ def looked_at(eyes: Sequence[BlinkSeries]) -> list[list[Piece]]:
     network = shipped_network(FIRST_LOOK)
     return [
         [Piece(**vars(piece), probabilities=network.probabilities(piece.features)) for piece in of_eye]
-        for of_eye in measured(eyes)
+        for of_eye in measure_pieces(eyes)
     ]
 
 
-def measured(eyes: Sequence[BlinkSeries]) -> list[list[Measured]]:
+def measure_pieces(eyes: Sequence[BlinkSeries]) -> list[list[MeasuredPiece]]:
     """Pieces of each series with what the first look is told of their dips."""
     pieces = [_dips_of(series) for series in eyes]
     others = partners(pieces)
@@ -163,25 +163,27 @@ def measured(eyes: Sequence[BlinkSeries]) -> list[list[Measured]]:
     ]
 
 
-def _dips_of(series: BlinkSeries) -> list[Measured]:
+def _dips_of(series: BlinkSeries) -> list[MeasuredPiece]:
     """Pieces of a series with their dips, of which nothing is told yet."""
     pieces = []
     for start, stop in runs(np.isfinite(series.distance)):
         if stop - start >= max(5, SHORTEST_PIECE_S * series.fps):
             depth = depth_of(series.distance[start:stop], series.fps)
             candidates = find_candidates(depth)
-            pieces.append(Measured(start, depth, candidates, deep_level(candidates, depth), np.empty((0, 0))))
+            pieces.append(
+                MeasuredPiece(start, depth, candidates, deep_level(candidates, depth), np.empty((0, 0)))
+            )
     return pieces
 
 
-def partners(eyes: Sequence[Sequence[Measured]]) -> list[Array | None]:
+def partners(eyes: Sequence[Sequence[MeasuredPiece]]) -> list[Array | None]:
     """Depth of each eye's other eye, to the end of its last piece; None where there are not two."""
     if len(eyes) != 2:
         return [None] * len(eyes)
     return [_whole(eyes[1 - number]) for number in range(2)]
 
 
-def _whole(pieces: Sequence[Measured]) -> Array:
+def _whole(pieces: Sequence[MeasuredPiece]) -> Array:
     """Depth of an eye to the end of its last piece, its deep level 1; NaN in gaps."""
     ends = [piece.start + piece.depth.smooth.size for piece in pieces]
     whole = np.full(max(ends, default=0), np.nan)
@@ -190,7 +192,7 @@ def _whole(pieces: Sequence[Measured]) -> Array:
     return whole
 
 
-def of_piece(whole: Array | None, piece: Measured) -> Array | None:
+def of_piece(whole: Array | None, piece: MeasuredPiece) -> Array | None:
     """The part of a whole series that lies beside a piece, as long as it; NaN beyond the end."""
     if whole is None:
         return None

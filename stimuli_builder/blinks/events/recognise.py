@@ -6,19 +6,33 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from stimuli_builder.blinks.columns import eye_pair
-from stimuli_builder.blinks.events.candidates import LEVELS, RIPPLE, Candidate, Depth, candidate_at, crossing
+from stimuli_builder.blinks.events.candidates import (
+    LEVELS,
+    RIPPLE,
+    Candidate,
+    Depth,
+    candidate_at,
+    level_crossing,
+)
 from stimuli_builder.blinks.events.generated import CLASSES, CLOSED_EYE_S
 from stimuli_builder.blinks.events.network import Piece, looked_at, partners, second_look
 from stimuli_builder.blinks.events.rules import (
     Asymmetry,
     LidEvent,
     PhaseFit,
-    apart,
     asymmetry,
+    separate_events,
     with_long_closures,
     with_winks,
 )
-from stimuli_builder.blinks.events.template import CLOSED, Rest, Timing, bounds_of, rests_about, timing_of
+from stimuli_builder.blinks.events.template import (
+    CLOSED,
+    RestingLid,
+    Timing,
+    bounds_of,
+    rests_about,
+    timing_of,
+)
 from stimuli_builder.blinks.profile import Array
 from stimuli_builder.blinks.series import BlinkSeries
 
@@ -45,7 +59,7 @@ ONE_BLINK_S = 0.2
 
 
 @dataclass(frozen=True)
-class Recognised:
+class RecognisedEvents:
     """Events of one eye in order of time, and the deepest frames of blinks whose start or end is missing.
 
     An eye may blink or be shut while it is lowered (squint, gaze shift); else no two of its events overlap.
@@ -60,7 +74,7 @@ class Recognised:
 
 
 @dataclass(frozen=True, eq=False)
-class _Told:
+class _PieceEvents:
     """Events of a piece, what a blink is instead where a squint may well explain it, and cut blinks.
 
     `squints` and `cut` are by the deepest frame of the series.
@@ -79,7 +93,7 @@ class _Look:
     told: list[Array]
 
 
-def recognise(eyes: Sequence[BlinkSeries]) -> list[Recognised]:
+def recognise(eyes: Sequence[BlinkSeries]) -> list[RecognisedEvents]:
     """Return the events of each series; two series are taken as the two eyes of one face.
 
     Of three and more, those that one left and one right eye is named by are; others are judged by themselves.
@@ -89,7 +103,7 @@ def recognise(eyes: Sequence[BlinkSeries]) -> list[Recognised]:
     return [of_pair.get(k) or _recognised(_looks([eye])[0], eye, None) for k, eye in enumerate(eyes)]
 
 
-def _of_one_face(eyes: Sequence[BlinkSeries]) -> list[Recognised]:
+def _of_one_face(eyes: Sequence[BlinkSeries]) -> list[RecognisedEvents]:
     """The events of both eyes; one is judged by itself where it does not move, or its fellow much less."""
     together = _looks(eyes)
     alone = [_looks([eye])[0] for eye in eyes]
@@ -120,19 +134,19 @@ def _looks(eyes: Sequence[BlinkSeries]) -> list[_Look]:
     return [_Look(*look) for look in zip(pieces, second_look(pieces), strict=True)]
 
 
-def _recognised(look: _Look, eye: BlinkSeries, side: Asymmetry | None) -> Recognised:
+def _recognised(look: _Look, eye: BlinkSeries, side: Asymmetry | None) -> RecognisedEvents:
     events: list[LidEvent] = []
     cut: list[int] = []
     for piece, of_piece in zip(look.pieces, look.told, strict=True):
         told = _judged(piece, of_piece, eye.fps)
         cut += told.cut
-        events += apart(_listed(told), piece.depth.smooth, piece.start, eye.fps)
-    return Recognised(tuple(with_long_closures(eye.distance, eye.fps, events)), tuple(cut), side)
+        events += separate_events(_listed(told), piece.depth.smooth, piece.start, eye.fps)
+    return RecognisedEvents(tuple(with_long_closures(eye.distance, eye.fps, events)), tuple(cut), side)
 
 
-def _judged(piece: Piece, probabilities: Array, fps: float) -> _Told:
+def _judged(piece: Piece, probabilities: Array, fps: float) -> _PieceEvents:
     """What each dip of a piece is, by its probabilities (dips, kinds)."""
-    told = _Told([], {}, [])
+    told = _PieceEvents([], {}, [])
     bounds = bounds_of(piece.candidates, piece.depth)
     for candidate, row, bound in zip(piece.candidates, probabilities, bounds, strict=True):
         shares = dict(zip(CLASSES, row.tolist(), strict=True))
@@ -172,7 +186,7 @@ def _is_ripple(timing: Timing, candidate: Candidate, probability: float) -> bool
     return timing.fitted.amplitude < RIPPLE_SHARE * candidate.prominence
 
 
-def _listed(told: _Told) -> list[LidEvent]:
+def _listed(told: _PieceEvents) -> list[LidEvent]:
     """The events, squints in place of blinks that they explain; a ripple of a closed eye stays a blink."""
     closed = [event for event in told.events if event.kind == "closed_eye"]
     listed = []
@@ -230,14 +244,14 @@ def _timed(candidate: Candidate, depth: Depth, bounds: tuple[int, int]) -> Timin
     return timing if inside and seen and falls else _crossed_to(candidate, rests, depth)
 
 
-def _crossed_to(candidate: Candidate, rests: tuple[Rest, Rest], depth: Depth) -> Timing:
+def _crossed_to(candidate: Candidate, rests: tuple[RestingLid, RestingLid], depth: Depth) -> Timing:
     """Phases of a blink that no template fits: the crossings of its way from one rest and to the other."""
     fps, peak = depth.fps, candidate.peak
     sides = []
     for step, rest in zip((-1, 1), rests, strict=True):
         way = candidate.depth - rest.level
         levels = [rest.level + part * way for part in (LEVELS[0], CLOSED)]
-        sides.append([crossing(depth, peak, level, step) / fps for level in levels])
+        sides.append([level_crossing(depth, peak, level, step) / fps for level in levels])
     before, after = sides
     return Timing(before[0], before[1], peak / fps, after[1], after[0])
 

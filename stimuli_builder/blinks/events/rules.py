@@ -114,7 +114,7 @@ def with_long_closures(distance: Array, fps: float, events: Sequence[LidEvent]) 
     ]
     for shut_eye in longer:
         events = [event for event in events if not _holds(shut_eye, event)]
-    parted = [_beside(shut_eye, events) for shut_eye in longer]
+    parted = [_closed_eye_between(shut_eye, events) for shut_eye in longer]
     return sorted([*events, *parted], key=lambda event: event.minimum_s)
 
 
@@ -129,7 +129,7 @@ def _holds(shut_eye: LidEvent, event: LidEvent) -> bool:
     return shut_eye.closed_from_s <= event.minimum_s <= shut_eye.closed_to_s
 
 
-def _beside(shut_eye: LidEvent, events: Sequence[LidEvent]) -> LidEvent:
+def _closed_eye_between(shut_eye: LidEvent, events: Sequence[LidEvent]) -> LidEvent:
     """The closed eye from the end of the blink before it to the beginning of the one after it."""
     before = [event.end_s for event in events if event.minimum_s < shut_eye.closed_from_s]
     after = [event.onset_s for event in events if event.minimum_s > shut_eye.closed_to_s]
@@ -166,7 +166,7 @@ LOWERED = frozenset({"squint", "gaze_shift"})
 """A lid may blink or stay shut while it is lowered; else an eye does one thing at a time."""
 
 
-def apart(events: Sequence[LidEvent], depth: Array, start: int, fps: float) -> list[LidEvent]:
+def separate_events(events: Sequence[LidEvent], depth: Array, start: int, fps: float) -> list[LidEvent]:
     """Events of one piece in order of time, of which those that shut do not overlap, nor those that lower.
 
     Of two events that are no blinks, where the deepest moment of one lies in the other, the longer stays: a
@@ -213,8 +213,8 @@ def _parted(events: Sequence[LidEvent], depth: Array, start: int, fps: float) ->
         low, high = sorted((first.frame - start, second.frame - start))
         widest = (low + int(np.argmin(depth[low : high + 1])) + start) / fps
         at = float(np.clip(widest, first.minimum_s, second.minimum_s))
-        parted[number] = _within(parted[number], parted[number].onset_s, at)
-        parted[number + 1] = _within(second, at, second.end_s)
+        parted[number] = _cut_to_times(parted[number], parted[number].onset_s, at)
+        parted[number + 1] = _cut_to_times(second, at, second.end_s)
     whole = [event for event, part in zip(events, parted, strict=True) if event == part or _lasts(part)]
     return parted if len(whole) == len(events) else _parted(whole, depth, start, fps)
 
@@ -224,7 +224,7 @@ def _lasts(part: LidEvent) -> bool:
     return part.kind != "closed_eye" or part.closed_to_s - part.closed_from_s >= CLOSED_EYE_S
 
 
-def _within(event: LidEvent, onset_s: float, end_s: float) -> LidEvent:
+def _cut_to_times(event: LidEvent, onset_s: float, end_s: float) -> LidEvent:
     """The event cut to a time that holds its deepest moment."""
     closed_from_s, closed_to_s = np.clip([event.closed_from_s, event.closed_to_s], onset_s, end_s).tolist()
     return replace(event, onset_s=onset_s, closed_from_s=closed_from_s, closed_to_s=closed_to_s, end_s=end_s)

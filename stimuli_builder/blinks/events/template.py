@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import least_squares
 
-from stimuli_builder.blinks.events.candidates import SMOOTHING_S, Candidate, Depth, crossing
+from stimuli_builder.blinks.events.candidates import SMOOTHING_S, Candidate, Depth, level_crossing
 from stimuli_builder.blinks.profile import Array
 
 # Where the lid rests just before and just after a dip, and how far that rest reaches.
@@ -40,7 +40,7 @@ NOISES = 4.0
 
 
 @dataclass(frozen=True)
-class Rest:
+class RestingLid:
     """The resting lid on one side of a dip.
 
     Parameters
@@ -56,7 +56,7 @@ class Rest:
     level: float
 
 
-def rests_about(candidate: Candidate, depth: Depth, bounds: tuple[int, int]) -> tuple[Rest, Rest]:
+def rests_about(candidate: Candidate, depth: Depth, bounds: tuple[int, int]) -> tuple[RestingLid, RestingLid]:
     """The rests before and after a dip, neither beyond `bounds` (frames of the piece)."""
     return _rest(candidate, depth, bounds[0], -1), _rest(candidate, depth, bounds[1], 1)
 
@@ -81,7 +81,7 @@ def bounds_of(candidates: Sequence[Candidate], depth: Depth) -> list[tuple[int, 
     return list(zip(before, after, strict=True))
 
 
-def _rest(candidate: Candidate, depth: Depth, bound: int, step: int) -> Rest:
+def _rest(candidate: Candidate, depth: Depth, bound: int, step: int) -> RestingLid:
     side, fps, peak = int(step > 0), depth.fps, candidate.peak
     half = (candidate.right if side else candidate.left)[1]
     reach = abs(half - peak) + (CLOSING_S, OPENING_S)[side] * fps
@@ -92,10 +92,10 @@ def _rest(candidate: Candidate, depth: Depth, bound: int, step: int) -> Rest:
     near = _first_rest(values, width, noise)
     if near is None:
         lowest = int(np.argmin(values))
-        return Rest(peak + step * lowest, peak + step * lowest, float(values[lowest]))
+        return RestingLid(peak + step * lowest, peak + step * lowest, float(values[lowest]))
     far = _end_of_rest(values, near, width, max(width, round(REST_TO_S[side] * fps)), noise)
     level = float(np.median(values[near : far + 1]))
-    return Rest(peak + step * near, peak + step * far, level)
+    return RestingLid(peak + step * near, peak + step * far, level)
 
 
 def _smooth_noise(depth: Depth) -> float:
@@ -161,7 +161,7 @@ class Forms:
 
 
 @dataclass(frozen=True)
-class Fitted:
+class BlinkFit:
     """The fitted curve of a blink, as depths: amplitude, resting levels before and after, misfit.
 
     `misfit` is the root mean square distance from the samples as part of the amplitude; `errors_s` are the
@@ -184,7 +184,7 @@ class Timing:
     minimum_s: float
     closed_to_s: float
     end_s: float
-    fitted: Fitted | None = None
+    fitted: BlinkFit | None = None
 
     @property
     def closed_s(self) -> float:
@@ -200,7 +200,7 @@ def shipped_forms() -> Forms:
 
 
 def timing_of(
-    candidate: Candidate, depth: Depth, rests: tuple[Rest, Rest], forms: Forms | None = None
+    candidate: Candidate, depth: Depth, rests: tuple[RestingLid, RestingLid], forms: Forms | None = None
 ) -> Timing:
     """Fit the template about one dip, between the rests before and after it.
 
@@ -309,7 +309,7 @@ class _Fit:
             minimum,
             closed_to,
             end,
-            Fitted(amplitude, before, after, self.misfit(p), self.errors(p)),
+            BlinkFit(amplitude, before, after, self.misfit(p), self.errors(p)),
         )
 
     def errors(self, p: Array) -> tuple[float, float, float]:
@@ -347,7 +347,7 @@ def _step(depth: Depth) -> int:
     return max(1, round(depth.fps / FITTED_FPS))
 
 
-def _window(rests: tuple[Rest, Rest], depth: Depth) -> tuple[Array, Array]:
+def _window(rests: tuple[RestingLid, RestingLid], depth: Depth) -> tuple[Array, Array]:
     """Samples between the far ends of two rests, thinned by averaging where the series is fast."""
     fps, step = depth.fps, _step(depth)
     first, last = rests[0].far, rests[1].far + 1
@@ -357,14 +357,16 @@ def _window(rests: tuple[Rest, Rest], depth: Depth) -> tuple[Array, Array]:
     return np.asarray(times, np.float64), np.asarray(values, np.float64)
 
 
-def _starts(candidate: Candidate, rests: tuple[Rest, Rest], depth: Depth, forms: Forms) -> list[Array]:
+def _starts(
+    candidate: Candidate, rests: tuple[RestingLid, RestingLid], depth: Depth, forms: Forms
+) -> list[Array]:
     """Where the fit begins: phases from the crossings of the way to either rest, and the usual ones."""
     fps, peak = depth.fps, candidate.peak
     at = {}
     for step, rest in zip((-1, 1), rests, strict=True):
         way = candidate.depth - rest.level
         for part in (0.2, 0.85):
-            at[step, part] = crossing(depth, peak, rest.level + part * way, step) / fps
+            at[step, part] = level_crossing(depth, peak, rest.level + part * way, step) / fps
     down = max((at[-1, 0.85] - at[-1, 0.2]) * 1.5, 0.03)
     up = max((at[1, 0.2] - at[1, 0.85]) * 1.6, 0.05)
     hold = max(at[1, 0.85] - at[-1, 0.85] - 0.04, 0.004)

@@ -20,16 +20,16 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.neural_network import MLPClassifier
 
 from stimuli_builder.blinks.events.candidates import FEATURES, Candidate, Depth
-from stimuli_builder.blinks.events.generated import CLASSES, Generated, Motion, generate
+from stimuli_builder.blinks.events.generated import CLASSES, GeneratedSeries, Motion, generate
 from stimuli_builder.blinks.events.network import (
     CONTEXT,
     FIRST_LOOK,
     SECOND_LOOK,
-    Measured,
+    MeasuredPiece,
     Network,
     contexts,
     looked_at,
-    measured,
+    measure_pieces,
     store,
 )
 from stimuli_builder.blinks.profile import Array
@@ -58,12 +58,12 @@ STAGES = ((2e-3, 6), (5e-4, 4), (1e-4, 3))
 NEAR_HOLD_S = 0.1
 
 
-def labelled_features(look: str, series: Generated) -> tuple[Array, list[str]]:
+def labelled_features(look: str, series: GeneratedSeries) -> tuple[Array, list[str]]:
     """What a look is told of every dip of every eye, and what each is."""
     eyes = [BlinkSeries(distance=d, fps=series.fps, column="d", is_px=False) for d in series.distances]
-    pieces: Sequence[Sequence[Measured]]
+    pieces: Sequence[Sequence[MeasuredPiece]]
     if look == "first":
-        pieces = measured(eyes)
+        pieces = measure_pieces(eyes)
         told = [[piece.features for piece in of_eye] for of_eye in pieces]
     else:
         pieces = seen = looked_at(eyes)
@@ -124,7 +124,7 @@ def training_data(look: str, count: int) -> tuple[NDArray[np.float32], list[str]
     return np.concatenate(rows), kinds
 
 
-def trained(features: NDArray[np.float32], classes: NDArray[np.int64], lesson: Lesson) -> MLPClassifier:
+def train_network(features: NDArray[np.float32], classes: NDArray[np.int64], lesson: Lesson) -> MLPClassifier:
     """Train the network on standardised features (n, features), stage by stage."""
     network = MLPClassifier(
         lesson.units, activation="tanh", alpha=1e-4, batch_size=512, random_state=SEED, warm_start=True
@@ -146,7 +146,7 @@ def learn(look: str, count: int, weights: Path) -> str:
     features -= mean.astype(np.float32)
     features /= spread.astype(np.float32)
     np.clip(features, -6, 6, out=features)
-    network = trained(features, np.array([CLASSES.index(k) for k in kinds]), lesson)
+    network = train_network(features, np.array([CLASSES.index(k) for k in kinds]), lesson)
     layers = tuple(
         (matrix.astype(np.float64), offsets.astype(np.float64))
         for matrix, offsets in zip(network.coefs_, network.intercepts_, strict=True)

@@ -137,7 +137,7 @@ def _about(picture: Picture, views: Sequence[Region]) -> tuple[Picture, list[Reg
     return part, [view._replace(x=view.x - left, y=view.y - top) for view in views]
 
 
-def mirrored(face: Detection, width_px: int) -> Detection:
+def unmirrored_face(face: Detection, width_px: int) -> Detection:
     """A face of a picture's mirror image, as the picture itself has it."""
     right = width_px - 1
     points = face.points.reshape(2, -1, 2)[::-1] * [-1, 1] + [right, 0]
@@ -146,7 +146,7 @@ def mirrored(face: Detection, width_px: int) -> Detection:
     return Detection(points.reshape(-1, 2), iris, np.array([right - end, top, right - left, low]), ())
 
 
-def apart(face: Detection, other: Detection) -> tuple[float, ...]:
+def face_distances(face: Detection, other: Detection) -> tuple[float, ...]:
     """Mean distance of each eye's points from those of another face, in widths of the first's eyes."""
     away = np.hypot(*(face.points - other.points).T).reshape(2, -1).mean(1)
     return tuple((away / widths(face.points)).tolist())
@@ -154,8 +154,8 @@ def apart(face: Detection, other: Detection) -> tuple[float, ...]:
 
 def in_both(face: Detection, others: Sequence[Detection]) -> Detection:
     """The mean of a face and of itself in the mirror image (`others`); the face where it is not there."""
-    nearest = min(others, key=lambda other: max(apart(face, other)), default=None)
-    shares = (np.inf, np.inf) if nearest is None else apart(face, nearest)
+    nearest = min(others, key=lambda other: max(face_distances(face, other)), default=None)
+    shares = (np.inf, np.inf) if nearest is None else face_distances(face, nearest)
     if nearest is None or np.mean(shares) > SAME_FACE:
         return replace(face, mirror_shares=(np.inf, np.inf))
     points, iris = (face.points + nearest.points) / 2, (face.iris + nearest.iris) / 2
@@ -209,7 +209,7 @@ class FaceMesh:
             return []
         # Eyes of 10 px in the picture may be read a little smaller here.
         turned = self._of_size(np.ascontiguousarray(picture[:, ::-1]), LEAST_EYE_PX / 2)
-        others = [mirrored(face, picture.shape[1]) for face in turned]
+        others = [unmirrored_face(face, picture.shape[1]) for face in turned]
         return [in_both(face, others) for face in faces]
 
     def _faces_in_margin(self, picture: Picture) -> list[Detection]:
@@ -388,4 +388,4 @@ def _shows_a_face(mesh: FaceMesh, picture: Picture) -> bool:
     seen, turned = mesh.faces(picture), mesh.faces(np.ascontiguousarray(picture[:, ::-1]))
     if not seen or not turned:
         return False
-    return bool(np.mean(apart(seen[0], mirrored(turned[0], picture.shape[1]))) < SAME_FACE)
+    return bool(np.mean(face_distances(seen[0], unmirrored_face(turned[0], picture.shape[1]))) < SAME_FACE)

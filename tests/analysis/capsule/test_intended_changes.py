@@ -5,7 +5,7 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
-from analysis.capsule import INTENDED, Compared, compare_reports, intended_change
+from analysis.capsule import INTENDED, FileComparison, compare_reports, intended_change
 
 OLD, NEW = date(2026, 11, 27), date(2026, 12, 24)
 WAS = {
@@ -16,7 +16,7 @@ WAS = {
 REPORT = "# Title\n\n## Results\n\nF = 5.25\n\n## Ordinal mixed model\n\nchi2 = 18.42\n"
 
 
-def compared(tmp_path: Path, name: str, was: str, now: str, made: date) -> Compared:
+def compared(tmp_path: Path, name: str, was: str, now: str, made: date) -> FileComparison:
     for folder, content in (("before", was), ("after", now)):
         (tmp_path / folder).mkdir()
         (tmp_path / folder / name).write_text(content)
@@ -24,7 +24,7 @@ def compared(tmp_path: Path, name: str, was: str, now: str, made: date) -> Compa
     return one
 
 
-def of_results(tmp_path: Path, changes: dict[str, Any], made: date) -> Compared:
+def of_results(tmp_path: Path, changes: dict[str, Any], made: date) -> FileComparison:
     return compared(tmp_path, "results.json", json.dumps(WAS), json.dumps(WAS | changes), made)
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from analysis.paper.check import Finding, check_paper, check_study, possible
-from analysis.paper.printed import SHIPPED, PrintedStudy, Rounded, load_figures
+from analysis.paper.printed import SHIPPED, PrintedInterval, PrintedStudy, load_figures
 from experiments.errors import InputError
 
 
@@ -114,7 +114,7 @@ def test_an_impossible_correlation_is_found() -> None:
 
 
 def test_rounding_keeps_the_printed_digits() -> None:
-    number = Rounded.of("4.10")
+    number = PrintedInterval.of("4.10")
     assert (str(number.low), str(number.high), str(number.unit)) == ("4.095", "4.105", "0.01")
 
 

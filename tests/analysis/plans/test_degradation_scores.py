@@ -12,7 +12,7 @@ import pytest
 
 from analysis.plans.degradation import CellScore, extremes, scores
 from analysis.plans.exclusions import Exclusions
-from analysis.plans.plan import Prepared
+from analysis.plans.plan import PlanRows
 from analysis.read.study_answers import StudyAnswers
 from experiments.load import parse_experiment
 from tests.conftest import REPOSITORY
@@ -44,7 +44,7 @@ def scored(votes: Mapping[str, str]) -> dict[str, CellScore]:
         ]
     )
     exclusions, answers = Exclusions((), (), (), (), 26, rows), StudyAnswers(rows, "golden", (), {})
-    return {one.cell: one for one in scores(Prepared(experiment, "golden", False, exclusions, (), answers))}
+    return {one.cell: one for one in scores(PlanRows(experiment, "golden", False, exclusions, (), answers))}
 
 
 def test_scores_are_those_that_another_program_publishes() -> None:

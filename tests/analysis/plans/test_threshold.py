@@ -15,7 +15,7 @@ from analysis.cli import app
 from analysis.plans.plan import study_contents
 from analysis.plans.threshold import READING
 from analysis.read.study_answers import load_csv
-from analysis.thresholds.answers import counted
+from analysis.thresholds.answers import count_trials
 from analysis.thresholds.psychometric import fit_threshold
 from experiments import rules
 from experiments.errors import InputError
@@ -88,7 +88,9 @@ def test_each_series_is_the_fit_of_its_own_trials(tmp_path, rows) -> None:
         mine = [row for row in rows if row["series"] == series.name]
         x, y = np.array([float(row["value"]) for row in mine]), np.array([positive(row) for row in mine])
         falling = trial.direction == "falling"
-        fit = fit_threshold(counted(x, y), trial.function, trial.task.guess, trial.lapse, falling=falling)
+        fit = fit_threshold(
+            count_trials(x, y), trial.function, trial.task.guess, trial.lapse, falling=falling
+        )
         assert numbers["pooled"][series.name]["threshold"] == pytest.approx(fit.threshold)
         values = list(stimuli(EXPERIMENT))
         assert values[0] < fit.threshold < values[-1]

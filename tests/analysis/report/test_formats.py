@@ -6,9 +6,9 @@ import docx
 
 from analysis.report.contents import Contents, DrawnPart
 from analysis.report.formats import Table, as_text, wrap
-from analysis.report.numbers import heading_pieces, signed, signed_cell
+from analysis.report.numbers import heading_pieces, signed_cell, with_minus
 from analysis.report.word import as_docx
-from analysis.report.write import filled
+from analysis.report.write import fill_template
 
 
 def lines_of(header: tuple[str, ...], *rows: tuple[str, ...], text_columns: int = 1) -> list[str]:
@@ -60,10 +60,10 @@ def test_levels_called_as_a_symbol_are_not_in_italics() -> None:
 
 def test_minus_stands_before_numbers_alone() -> None:
     assert (
-        signed("t(11) = -6.28, [-.05, 0.30], 7-9, P-1 and x - y")
+        with_minus("t(11) = -6.28, [-.05, 0.30], 7-9, P-1 and x - y")
         == "t(11) = −6.28, [−.05, 0.30], 7-9, P-1 and x - y"
     )
-    assert signed("-3dB, -1.5dB, a/-3 and 1.2e-5, -1.2e-5") == "-3dB, -1.5dB, a/-3 and 1.2e-5, −1.2e-5"
+    assert with_minus("-3dB, -1.5dB, a/-3 and 1.2e-5, -1.2e-5") == "-3dB, -1.5dB, a/-3 and 1.2e-5, −1.2e-5"
 
 
 def test_ids_and_labels_in_tables_keep_their_hyphens() -> None:
@@ -78,7 +78,7 @@ def test_tables_of_reports_keep_the_names_in_their_first_column() -> None:
     table = Table("k", "Title", ("Gender", "M", "F"), (("-3dB", "-1.5", "id -7"), ("-7", "2", "-.5")), 1)
     contents = Contents("n", "Study", "Led", "rows.csv", False, 2, (), (), (), "Method", {})
     part = DrawnPart("", (), table, (), (), "", (), ())
-    html = filled("report.html.j2", contents=contents, parts=(part,), version="1")
+    html = fill_template("report.html.j2", contents=contents, parts=(part,), version="1")
     rows = docx.Document(BytesIO(as_docx(contents, (part,), "1"))).tables[0].rows
     cells = [cell.text for row in rows for cell in row.cells]
     assert cells == ["Gender", "M", "F", "-3dB", "−1.5", "id -7", "-7", "2", "−.5"]

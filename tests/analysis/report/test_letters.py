@@ -14,7 +14,7 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from analysis.plans.result import analyse_cells
 from analysis.report import pictures
 from analysis.report.figures import draw, figures_of
-from analysis.report.pictures import STYLE, further_letters, in_both_formats, lacking, new_figure
+from analysis.report.pictures import STYLE, further_letters, in_both_formats, missing_characters, new_figure
 from analysis.within.cell_means import cell_table
 
 CHINESE = "眨眼"
@@ -82,7 +82,7 @@ def test_a_font_of_the_machine_draws_what_the_own_font_lacks(monkeypatch) -> Non
 
 
 def test_a_figure_of_known_letters_is_the_same_whatever_is_installed(no_further_fonts) -> None:
-    assert lacking(["Größe", "глаз", "ηₚ²", "× – ≤\n"]) == set()
+    assert missing_characters(["Größe", "глаз", "ηₚ²", "× – ≤\n"]) == set()
     figure = new_figure()
     figure.supxlabel("N = 3.")
     with further_letters(figure):

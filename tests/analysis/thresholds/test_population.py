@@ -8,14 +8,14 @@ import pandas as pd
 import pytest
 from scipy import special
 
-from analysis.thresholds.answers import Answers, counted
+from analysis.thresholds.answers import Answers, count_trials
 from analysis.thresholds.likelihood import Trials
 from analysis.thresholds.people import PopulationLikelihood, fit_population, fit_thresholds, with_population
 from experiments.errors import InputError
 
 GOLDEN = Path(__file__).parents[2] / "golden" / "r"
 ROWS = pd.read_csv(GOLDEN / "population.csv")
-TRIALS = [counted(g["x"].to_numpy(), g["y"].to_numpy(float)) for _, g in ROWS.groupby("id")]
+TRIALS = [count_trials(g["x"].to_numpy(), g["y"].to_numpy(float)) for _, g in ROWS.groupby("id")]
 
 
 def test_with_one_spread_it_is_glmer() -> None:

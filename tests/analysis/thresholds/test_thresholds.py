@@ -12,7 +12,7 @@ from scipy import optimize, special
 from typer.testing import CliRunner
 
 from analysis.cli import app
-from analysis.thresholds.answers import counted, read_answers
+from analysis.thresholds.answers import count_trials, read_answers
 from analysis.thresholds.likelihood import Trials
 from analysis.thresholds.people import PersonThreshold, mean_threshold
 from analysis.thresholds.psychometric import Threshold, fit_threshold
@@ -24,7 +24,7 @@ REFERENCE: dict[str, Any] = json.loads((FOLDER / "reference.json").read_text(enc
 
 def trials(name: str) -> Trials:
     answers = read_answers(FOLDER / f"{name}.csv", "duration", "seen")
-    return counted(answers.x, answers.response)
+    return count_trials(answers.x, answers.response)
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from experiments.errors import InputError
 from experiments.load import DefinitionError, load_experiment, locate, parse_experiment
 from experiments.schema.canonical import canonical, definition_sha256
 from experiments.schema.effects import keys
-from experiments.schema.stored import FORMAT, Step, earlier_names, load_stored, upgraded
+from experiments.schema.stored import FORMAT, Step, earlier_names, load_stored, upgrade_data
 from tests.conftest import REPOSITORY
 
 FORMATS = sorted((REPOSITORY / "tests" / "golden" / "definitions").glob("format_*"))
@@ -86,7 +86,7 @@ PARTS = st.lists(st.builds(Part, label=st.sampled_from("ab"), width=st.sampled_f
 
 @given(st.builds(Before, size=st.integers(1, 4), parts=PARTS.map(tuple)))
 def test_new_and_renamed_keys_leave_the_canonical_form_alone(before: Before) -> None:
-    after = After.model_validate(upgraded(before.model_dump(), 1, STEPS))
+    after = After.model_validate(upgrade_data(before.model_dump(), 1, STEPS))
     assert [part.breadth for part in after.parts] == [part.width for part in before.parts]
     form = canonical(before, ALWAYS, {})
     assert form == before.model_dump(mode="json", exclude_none=False) | {"parts": form["parts"]}
@@ -98,8 +98,8 @@ def test_new_and_renamed_keys_leave_the_canonical_form_alone(before: Before) -> 
 def test_a_key_renamed_twice_is_hashed_under_its_first_name() -> None:
     steps = (Step(renamed={"trial.a": "b"}), Step(renamed={"trial.b": "c"}))
     assert earlier_names(steps) == {"trial.c": "a"}
-    assert upgraded({"trial": {"a": 1}}, 1, steps) == {"trial": {"c": 1}}
-    assert upgraded({"trial": {"b": 1}}, 2, steps) == {"trial": {"c": 1}}
+    assert upgrade_data({"trial": {"a": 1}}, 1, steps) == {"trial": {"c": 1}}
+    assert upgrade_data({"trial": {"b": 1}}, 2, steps) == {"trial": {"c": 1}}
 
 
 def test_a_step_may_do_more_than_rename() -> None:
@@ -107,14 +107,14 @@ def test_a_step_may_do_more_than_rename() -> None:
         data["size"] *= 2
 
     stored = {"size": 2}
-    assert upgraded(stored, 1, (Step(change=double),)) == {"size": 4}
+    assert upgrade_data(stored, 1, (Step(change=double),)) == {"size": 4}
     assert stored == {"size": 2}
 
 
 @pytest.mark.parametrize("number", [0, -1, FORMAT + 1, "1", True, None, 1.0])
 def test_a_format_that_nobody_knows_is_one_line(number: object) -> None:
     with pytest.raises(InputError, match=r"^format: ") as raised:
-        upgraded({}, number)
+        upgrade_data({}, number)
     assert "\n" not in str(raised.value)
     assert str(FORMAT) in str(raised.value)
 

@@ -9,7 +9,7 @@ import pytest
 
 from stimuli_builder.blinks.both_eyes import asymmetry_lines
 from stimuli_builder.blinks.events.generated import Motion, course, plan
-from stimuli_builder.blinks.events.recognise import Recognised, recognise
+from stimuli_builder.blinks.events.recognise import RecognisedEvents, recognise
 from stimuli_builder.blinks.extract import blinks_of
 from stimuli_builder.blinks.labelling import LabelOptions
 from stimuli_builder.blinks.profile import Array
@@ -31,11 +31,11 @@ def face(seed: int, fps: float, share: float, noise: float = 0.02) -> tuple[list
     return motions, [np.maximum(eye, 0) * 0.3 for eye in eyes]
 
 
-def recognised(eyes: list[Array], fps: float) -> list[Recognised]:
+def recognised(eyes: list[Array], fps: float) -> list[RecognisedEvents]:
     return recognise([BlinkSeries(distance=eye, fps=fps, column="d", is_px=False) for eye in eyes])
 
 
-def blinks(one: Recognised) -> list[float]:
+def blinks(one: RecognisedEvents) -> list[float]:
     return [event.minimum_s for event in one.events if event.kind == "blink"]
 
 
@@ -120,7 +120,7 @@ def test_the_still_eye_is_named_on_screen_in_report_and_summary(stimuli, palsy: 
     assert "nan" not in ended.out
 
 
-def lines_of(told: list[Recognised], eyes: list[Array], columns: tuple[str, str]) -> list[str]:
+def lines_of(told: list[RecognisedEvents], eyes: list[Array], columns: tuple[str, str]) -> list[str]:
     series = [
         BlinkSeries(distance=eye, fps=120.0, column=name, is_px=False)
         for eye, name in zip(eyes, columns, strict=True)

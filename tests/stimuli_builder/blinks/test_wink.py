@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from stimuli_builder.blinks.events.recognise import Recognised, recognise
+from stimuli_builder.blinks.events.recognise import RecognisedEvents, recognise
 from stimuli_builder.blinks.profile import Array
 from stimuli_builder.blinks.series import BlinkSeries
 
@@ -25,7 +25,7 @@ def face(make_known, fps: float, noise: float, *, wink: float = 0.97, other: flo
     return eyes
 
 
-def told(eyes: list[Array], fps: float) -> list[Recognised]:
+def told(eyes: list[Array], fps: float) -> list[RecognisedEvents]:
     names = ("EAR_l", "EAR_r")
     return recognise(
         [
@@ -35,7 +35,7 @@ def told(eyes: list[Array], fps: float) -> list[Recognised]:
     )
 
 
-def blinks(one: Recognised) -> list[float]:
+def blinks(one: RecognisedEvents) -> list[float]:
     return [event.minimum_s for event in one.events if event.kind == "blink"]
 
 

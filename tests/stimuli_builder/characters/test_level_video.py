@@ -13,7 +13,7 @@ from stimuli_builder.characters.declaration import Declaration, Level, read_decl
 from stimuli_builder.characters.level_video import decode_level_video, write_level_video
 from stimuli_builder.characters.writing import CLOSURES, CROP, draw_crop, write_declaration
 from stimuli_builder.clips.characters import find_character
-from stimuli_builder.clips.levels import quantised
+from stimuli_builder.clips.levels import quantise_light
 
 
 def textured(closure: float) -> np.ndarray:
@@ -81,9 +81,9 @@ def test_levels_at_their_own_size_are_the_atlas_to_the_code_value(
     frame = atlas.base_linear()
     for index in range(len(CLOSURES)):
         frame[atlas.crop] = srgb_to_linear(atlas.level_srgb(index))
-        np.testing.assert_array_equal(levels.levels[index], quantised(frame)[levels.window.slices])
+        np.testing.assert_array_equal(levels.levels[index], quantise_light(frame)[levels.window.slices])
     frame[atlas.crop] = srgb_to_linear(atlas.level_srgb(0))
-    np.testing.assert_array_equal(levels.base, quantised(frame))
+    np.testing.assert_array_equal(levels.base, quantise_light(frame))
 
 
 @pytest.mark.parametrize("spare", [-1, 1])

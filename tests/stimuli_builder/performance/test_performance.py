@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from blink_engine.speech import Speech, joined, speech_events, speech_states
+from blink_engine.speech import Speech, join_speech, speech_events, speech_states
 from experiments.declaration.rendering import RenderSettings
 from experiments.errors import InputError
 from stimuli_builder.cli import app
@@ -131,7 +131,7 @@ def test_subtitles_out_of_order_and_by_voice(tmp_path: Path) -> None:
 
 
 def test_what_the_engine_is_told() -> None:
-    stretches = joined([Speech(3.0, 4.0), Speech(1.0, 2.0), Speech(2.05, 2.4), Speech(7.0, 8.0)])
+    stretches = join_speech([Speech(3.0, 4.0), Speech(1.0, 2.0), Speech(2.05, 2.4), Speech(7.0, 8.0)])
     assert stretches == [Speech(1.0, 2.4), Speech(3.0, 4.0), Speech(7.0, 8.0)]
     assert [(event.kind, event.time_s) for event in speech_events(stretches)] == [
         ("utterance_start", 1.0),

@@ -10,7 +10,7 @@ import pytest
 
 from stimuli_builder.tracking.labels import load_labels
 from stimuli_builder.tracking.model import save_model
-from stimuli_builder.video import VideoWriter, opened, scan_video
+from stimuli_builder.video import VideoWriter, open_video, scan_video
 
 
 def write_frames(path, pictures, stamps=None, fps=100, options=None):
@@ -84,7 +84,7 @@ def test_pictures_that_follow_one_another_in_a_file_are_a_video(tmp_path):
     stream = tmp_path / "camera.mjpeg"
     jpeg = cv2.imencode(".jpg", np.zeros((24, 32, 3), np.uint8))[1].tobytes()
     stream.write_bytes(jpeg * 20)
-    with opened(stream) as (container, _):
+    with open_video(stream) as (container, _):
         assert sum(1 for _ in container.decode(video=0)) == 20
 
 

@@ -12,7 +12,13 @@ from stimuli_builder.characters.atlas import SHIPPED, load_atlas
 from stimuli_builder.characters.colour import linear_to_srgb
 from stimuli_builder.environments import cache_folder
 from stimuli_builder.tracking.detector.detection import Detection
-from stimuli_builder.tracking.detector.mesh import SAME_FACE, FaceMesh, in_both, mirrored, open_detector
+from stimuli_builder.tracking.detector.mesh import (
+    SAME_FACE,
+    FaceMesh,
+    in_both,
+    open_detector,
+    unmirrored_face,
+)
 from stimuli_builder.tracking.shapes import widths
 from stimuli_builder.tracking.survey import _require_agreement
 from stimuli_builder.video import VideoInfo, frames, rgb
@@ -30,14 +36,14 @@ def face(shift: float = 0.0) -> Detection:
 
 
 def test_a_face_mirrored_twice_is_itself():
-    back = mirrored(mirrored(face(), WIDTH_PX), WIDTH_PX)
+    back = unmirrored_face(unmirrored_face(face(), WIDTH_PX), WIDTH_PX)
     assert back.points == pytest.approx(face().points)
     assert back.iris == pytest.approx(face().iris)
     assert back.box == pytest.approx(face().box)
 
 
 def test_a_mirrored_face_has_its_image_left_eye_first_from_the_outer_canthus():
-    turned = mirrored(face(), WIDTH_PX).points
+    turned = unmirrored_face(face(), WIDTH_PX).points
     assert turned[0, 0] < turned[5, 0] < turned[14, 0] < turned[9, 0]
     assert turned[:, 1] == pytest.approx(face().points[:, 1])
 
@@ -121,7 +127,7 @@ def test_a_picture_and_its_mirror_image_have_the_same_lids(mesh, shared_data):
     for picture in pictures:
         seen = mesh.detect(picture)[0]
         turned = mesh.detect(np.ascontiguousarray(picture[:, ::-1]))[0]
-        assert mirrored(turned, picture.shape[1]).points == pytest.approx(seen.points, abs=1e-3)
+        assert unmirrored_face(turned, picture.shape[1]).points == pytest.approx(seen.points, abs=1e-3)
 
 
 @pytest.mark.parametrize("name", ["alder-face@2", "cedar-face@2"])

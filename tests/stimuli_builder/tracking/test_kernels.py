@@ -9,8 +9,8 @@ from stimuli_builder.tracking import kernels
 from stimuli_builder.tracking.certainty import jump_px, lid_difference, lid_offsets
 from stimuli_builder.tracking.fit import Fitter
 from stimuli_builder.tracking.mesh import build_mesh, same_picture, shows_something
-from stimuli_builder.tracking.model import warped
-from stimuli_builder.tracking.shapes import moved, with_border
+from stimuli_builder.tracking.model import warp_picture
+from stimuli_builder.tracking.shapes import apply_pose, with_border
 
 EYE = np.array([[0, 5], [10, -4], [20, -8], [30, -8], [40, -4], [50, 5], [38, 12], [25, 14], [12, 12]], float)
 SHAPE = with_border(EYE + 70)
@@ -37,11 +37,11 @@ def mesh():
 @given(seed=st.integers(0, 10_000), x=st.floats(-150, 150), y=st.floats(-150, 150), size=st.floats(0.3, 2))
 def test_samples_equal_the_plain_formula_inside_and_outside(mesh, seed, x, y, size):
     picture = np.random.default_rng(seed).integers(0, 256, (150, 190), np.uint8)
-    shape = moved(SHAPE, np.array([size, 0.1, x, y]))
+    shape = apply_pose(SHAPE, np.array([size, 0.1, x, y]))
     corners = shape.astype(np.float32).astype(float)[mesh.triangles[mesh.triangle_of]]
     at = np.einsum("nk,nkd->nd", mesh.weights(), corners)
     # A position in float32 is good to some 1e-5 px, a step between pixels is up to 255.
-    assert np.allclose(warped(mesh, picture, shape), bilinear(picture, *at.T), atol=0.05)
+    assert np.allclose(warp_picture(mesh, picture, shape), bilinear(picture, *at.T), atol=0.05)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e30])
@@ -49,14 +49,14 @@ def test_no_sample_is_taken_outside_the_picture_whatever_the_shape(mesh, bad):
     picture = np.full((40, 40), 7, np.uint8)
     shape = SHAPE.copy()
     shape[3] = bad
-    assert set(np.unique(warped(mesh, picture, shape))) <= {7.0}
+    assert set(np.unique(warp_picture(mesh, picture, shape))) <= {7.0}
 
 
 def test_a_fit_that_wanders_across_the_picture_equals_one_begun_anew_at_each_step(lesson, recording):
     """Cells are packed once around the mesh; a mesh that leaves them has them packed again."""
     picture, model = recording.pictures[0], lesson.model
     c, pose = model.examples[0], model.poses[0] + [0, 0, 9.0, 0]
-    start = moved(model.mesh.vertices + np.tensordot(c, model.shape_modes, 1), pose)
+    start = apply_pose(model.mesh.vertices + np.tensordot(c, model.shape_modes, 1), pose)
     whole = Fitter(model, stop_px=0.0).fit(picture, c, pose, 12)
     assert start[:, 0].min() - whole.vertices[:, 0].min() > kernels.MARGIN + 1
     fitter = Fitter(model, stop_px=0.0)
@@ -70,10 +70,12 @@ def test_a_fit_that_wanders_across_the_picture_equals_one_begun_anew_at_each_ste
 def test_residuals_are_weighted_root_mean_squares_of_each_eye(lesson, recording):
     model = lesson.model
     fitter = Fitter(model)
-    start = moved(model.mesh.vertices + np.tensordot(model.examples[0], model.shape_modes, 1), model.poses[0])
+    start = apply_pose(
+        model.mesh.vertices + np.tensordot(model.examples[0], model.shape_modes, 1), model.poses[0]
+    )
     fit = fitter.fit(recording.pictures[0], model.examples[0], model.poses[0], 1)
     look = model.appearance[0] + model.examples[0] @ model.appearance[1:]
-    squares = model.weights * (look - warped(model.mesh, recording.pictures[0], start)) ** 2
+    squares = model.weights * (look - warp_picture(model.mesh, recording.pictures[0], start)) ** 2
     eye = model.mesh.eye_of[model.mesh.triangle_of]
     expected = [np.sqrt(squares[eye == e].sum() / model.weights[eye == e].sum()) for e in range(model.eyes)]
     assert fit.residuals == pytest.approx(expected, rel=1e-4)

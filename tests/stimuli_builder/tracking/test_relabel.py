@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from stimuli_builder.tracking.labelfree import proposed_labels, write_relabel
-from stimuli_builder.tracking.labels import as_proposed, by_hand, load_labels, unmarked
+from stimuli_builder.tracking.labels import as_proposed, by_hand, load_labels, unmarked_note
 from stimuli_builder.tracking.shapes import default_markers
 from stimuli_builder.tracking.survey import Survey
 from stimuli_builder.video import scan_video
@@ -91,14 +91,16 @@ def test_what_the_page_saves_of_proposals_is_by_hand_to_the_last_frame(proposals
     changed(proposals, as_the_page_saves_one_accepted)
     labels = load_labels(proposals, fewest=1)
     assert by_hand(labels).frames.keys() == labels.frames.keys()
-    assert unmarked(labels) == ""
+    assert unmarked_note(labels) == ""
 
 
 def test_a_file_of_before_without_proposals_counts_whole_and_is_told(proposals):
     changed(proposals, lambda document: document.pop("proposed"))
     labels = load_labels(proposals)
     assert by_hand(labels).frames.keys() == labels.frames.keys()
-    assert "keeps no proposals, so that all its 4 frames count as corrected; remove it" in unmarked(labels)
+    assert "keeps no proposals, so that all its 4 frames count as corrected; remove it" in unmarked_note(
+        labels
+    )
 
 
 def test_a_file_of_two_eyes_is_refused_for_one(proposals, stimuli, recording, tmp_path):

@@ -9,7 +9,7 @@ import pytest
 from stimuli_builder.actor.recording import Actor, ActorOptions
 from stimuli_builder.tracking.stillness import Stillness
 from stimuli_builder.tracking.table import TrackedFrame
-from stimuli_builder.tracking.track import STOOD, Hindsight, alike, evenly_repeated, track_video
+from stimuli_builder.tracking.track import STOOD, Hindsight, evenly_repeated, pictures_alike, track_video
 from stimuli_builder.tracking.tracker import FROZEN, STILL, Tracker
 from stimuli_builder.video import scan_video
 
@@ -100,8 +100,8 @@ def test_a_repeat_of_a_doubtful_frame_is_doubtful_for_the_same_reason():
         picture = rng.integers(0, 255, (40, 120)).astype(np.uint8)
         seen = ("doubtful", "jump") if number // 2 % 5 == 0 else ("tracked", "")
         given = ("doubtful", FROZEN) if number % 2 else seen
-        out += hindsight.after(picture, TrackedFrame(*given, EYE, np.ones(1), 1.0, 3))
-    out += hindsight.rest()
+        out += hindsight.push(picture, TrackedFrame(*given, EYE, np.ones(1), 1.0, 3))
+    out += hindsight.flush()
     said = [(frame.status, frame.reason) for frame in out]
     assert said[1::2] == said[::2]
     assert said.count(("doubtful", "jump")) == 48
@@ -134,10 +134,10 @@ def test_even_repeats(repeats, even):
 def test_pictures_are_alike_where_few_pixels_differ_by_much():
     one = np.full((20, 50), 100, np.uint8)
     other = one + np.uint8(3)
-    assert alike(one, other, 3, 0.003)
+    assert pictures_alike(one, other, 3, 0.003)
     other[3, :4] = 104
-    assert not alike(one, other, 3, 0.003)
-    assert alike(one, other, 3, 0.004)
+    assert not pictures_alike(one, other, 3, 0.003)
+    assert pictures_alike(one, other, 3, 0.004)
 
 
 def test_the_actor_who_holds_still_between_blinks_is_tracked(lesson):

@@ -5,14 +5,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stimuli_builder.tracking.mesh import build_mesh, reduced, reduced_points, restored_points
-from stimuli_builder.tracking.model import warped
+from stimuli_builder.tracking.mesh import build_mesh, reduce_picture, reduced_points, restored_points
+from stimuli_builder.tracking.model import warp_picture
 from stimuli_builder.tracking.shapes import (
+    apply_pose,
     default_markers,
     inter_eyelid_distances,
-    moved,
     similarity_between,
-    unmoved,
+    undo_pose,
     with_border,
 )
 
@@ -28,8 +28,8 @@ poses = st.tuples(st.floats(0.3, 3), st.floats(-2, 2), st.floats(-200, 200), st.
 @settings(deadline=None, max_examples=60)
 @given(pose=poses)
 def test_similarity_there_and_back(pose):
-    there = moved(SHAPE, pose)
-    assert np.allclose(unmoved(there, pose), SHAPE)
+    there = apply_pose(SHAPE, pose)
+    assert np.allclose(undo_pose(there, pose), SHAPE)
     assert np.allclose(similarity_between(SHAPE, there), pose)
 
 
@@ -47,8 +47,8 @@ def test_warp_there_and_back(mesh, seed):
     weights, corners = mesh.weights(), mesh.triangles[mesh.triangle_of]
     at = np.einsum("nk,nkd->nd", weights, shape[corners])
     y, x = np.mgrid[:160, :200]
-    read_x = warped(mesh, x.astype(np.uint8), shape)
-    read_y = warped(mesh, y.astype(np.uint8), shape)
+    read_x = warp_picture(mesh, x.astype(np.uint8), shape)
+    read_y = warp_picture(mesh, y.astype(np.uint8), shape)
     assert np.allclose(np.stack([read_x, read_y], axis=1), at, atol=1e-3)
     back = np.einsum("nk,nkd->nd", weights, mesh.vertices[corners])
     assert np.allclose(back, np.stack([mesh.x, mesh.y], axis=1), atol=1e-3)
@@ -62,13 +62,13 @@ def test_mesh_has_about_the_wanted_pixels_and_no_pixel_twice(mesh):
 
 def test_outside_the_picture_its_edge_is_repeated(mesh):
     picture = np.full((40, 40), 7, np.uint8)
-    assert np.allclose(warped(mesh, picture, SHAPE + 500), 7)
+    assert np.allclose(warp_picture(mesh, picture, SHAPE + 500), 7)
 
 
 @pytest.mark.parametrize("factor", [1, 2, 3, 4])
 def test_reduced_pictures_and_points_agree(factor):
     y, x = np.mgrid[:48, :60]
-    small = reduced((2 * x + y).astype(np.uint8), factor)
+    small = reduce_picture((2 * x + y).astype(np.uint8), factor)
     point = np.array([[31.0, 20.0]])
     column, row = reduced_points(point, factor)[0]
     assert np.allclose(restored_points(reduced_points(point, factor), factor), point)
@@ -83,7 +83,7 @@ def test_distance_is_square_to_the_canthi_and_turns_with_the_head():
     eye[:, 1] -= 5
     distance = inter_eyelid_distances(eye, default_markers(1))
     assert distance == pytest.approx([14 - -8])
-    turned = moved(eye, np.array([np.cos(0.4), np.sin(0.4), 3, 4]))
+    turned = apply_pose(eye, np.array([np.cos(0.4), np.sin(0.4), 3, 4]))
     assert inter_eyelid_distances(turned, default_markers(1)) == pytest.approx(distance)
     mirrored = eye * [-1, 1]
     assert inter_eyelid_distances(mirrored, default_markers(1)) == pytest.approx(distance)

@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from analysis.plans.plan import Plan, Prepared
+from analysis.plans.plan import Plan, PlanRows
 from analysis.read.reading import Reading
 from analysis.report.contents import Contents, Part, caption
 from analysis.report.formats import Table
@@ -20,7 +20,7 @@ def check(_experiment: Experiment, _rows: pd.DataFrame, _source: str) -> None:
     return None
 
 
-def analyse(prepared: Prepared) -> Contents:
+def analyse(prepared: PlanRows) -> Contents:
     share, people = float(prepared.rows["same"].mean()), prepared.rows["participant"].nunique()
     name, synthetic = prepared.experiment.name, prepared.synthetic
     table = Table("alike", caption("Alike", name, synthetic), ("Pairs", "Share"), (("all", fixed(share)),))
