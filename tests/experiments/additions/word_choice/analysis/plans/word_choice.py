@@ -3,7 +3,7 @@
 import pandas as pd
 from experiments.kinds.word_choice import KIND
 
-from analysis.plans.plan import Plan, Prepared
+from analysis.plans.plan import Plan, PlanRows
 from analysis.read.reading import Reading
 from analysis.report.contents import Contents, Part, caption
 from analysis.report.formats import Table
@@ -21,7 +21,7 @@ def check(_experiment: Experiment, _rows: pd.DataFrame, _source: str) -> None:
     """Every row fits."""
 
 
-def analyse(prepared: Prepared) -> Contents:
+def analyse(prepared: PlanRows) -> Contents:
     """The share of the second word, of each person first."""
     experiment, rows = prepared.experiment, prepared.rows
     factors = list(experiment.factor_names)
