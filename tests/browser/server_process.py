@@ -68,12 +68,12 @@ class ServerProcess:
         return f"http://localhost:{self.port}"
 
     def add_study(self, folder: Path, declaration: str, frames: int = 8) -> StudyInDatabase:
-        """Take in a declaration with tiny clips, live; its `link_token` leads to /run/."""
+        """Add a declaration with tiny clips, live; its `link_token` leads to /run/."""
         with self.services() as services:
             return add_study(services, folder, declaration, frames=frames)
 
     def add_built_study(self, folder: Path, declaration: str) -> StudyInDatabase:
-        """Take in a declaration with the clips that `stimuli build` made for it, live."""
+        """Add a declaration with the clips that `stimuli build` made for it, live."""
         experiment, manifest = parse_experiment(declaration), read_manifest(folder)
         with self.services() as services:
             store_clips(services.clips, manifest, folder)

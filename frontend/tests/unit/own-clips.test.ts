@@ -66,7 +66,7 @@ describe("sizes of clips", () => {
 
   it("are remarked where one is upright among others", () => {
     expect(sizeRemark([wide("a.mp4"), { name: "b.mp4", width_px: 360, height_px: 640 }, wide("c.mp4")])).toBe(
-      "b.mp4 is 360 x 640 pixels, most are 640 x 360. Is one turned the wrong way? Participants see the size, too: is it meant?",
+      "b.mp4 is 360 x 640 pixels, most are 640 x 360. Is one rotated incorrectly? Participants will notice the size difference. Is this intended?",
     );
   });
 

@@ -86,9 +86,9 @@ def dashboard(busy_server: ServerProcess, chromium: Browser) -> Iterator[Dashboa
     page.on("console", note)
     page.on("pageerror", lambda error: found.complaints.append(str(error)))
     page.goto(f"{busy_server.address}/admin/invitation#{token}")
-    page.get_by_label("Name to sign in with").fill("ada")
+    page.get_by_label("User name").fill("ada")
     page.locator("input[autocomplete=new-password]").fill(PASSWORD)
-    page.get_by_role("button", name="Make the account").click()
+    page.get_by_role("button", name="Create account").click()
     page.get_by_role("heading", name="Studies").wait_for()
     yield found
     context.close()

@@ -76,7 +76,7 @@ def test_links_of_recruiters_are_offered_once_a_recruiter_is_set(dashboard: Dash
     page.get_by_role("dialog").get_by_role("button", name="Close", exact=True).last.click()
     page.get_by_role("button", name="Set live").click()
     page.get_by_role("dialog").get_by_role("button", name="Set live").click()
-    opened = page.get_by_role("dialog").filter(has_text="Participants can begin")
+    opened = page.get_by_role("dialog").filter(has_text="Participants can start")
     expect(opened).to_contain_text("first choose the service under")
     expect(opened).not_to_contain_text("PROLIFIC_PID")
     picture(page, "opened")

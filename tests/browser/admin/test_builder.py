@@ -25,13 +25,13 @@ def opened(dashboard: Dashboard, section: str) -> Page:
 
 
 def text_of(page: Page) -> str:
-    expect(page.get_by_text("Not saved yet; kept in this browser.")).to_be_visible()
+    expect(page.get_by_text("Not saved; your work is in this browser only.")).to_be_visible()
     return str(page.get_by_label("Definition", exact=True).input_value())
 
 
 def test_a_form_changes_its_own_line_of_the_text(dashboard: Dashboard) -> None:
     page = opened(dashboard, "order")
-    page.get_by_role("switch", name="TOML beside").click()
+    page.get_by_role("switch", name="Show TOML").click()
     before = page.get_by_label("Definition", exact=True).input_value()
     page.get_by_label("Trials", exact=True).fill("7")
     expect(page.get_by_label("Definition", exact=True)).to_have_value(re.compile(r"trials = 7"))
@@ -45,19 +45,19 @@ def test_a_form_changes_its_own_line_of_the_text(dashboard: Dashboard) -> None:
 
 def test_the_text_changes_the_forms(dashboard: Dashboard) -> None:
     page = opened(dashboard, "study")
-    page.get_by_role("switch", name="TOML beside").click()
+    page.get_by_role("switch", name="Show TOML").click()
     editor = page.get_by_label("Definition", exact=True)
     editor.fill(f"# mine\n{editor.input_value()}".replace('title = "', 'title = "New: '))
     expect(page.get_by_role("textbox", name="Title", exact=True)).to_have_value(re.compile("^New: "))
     editor.fill("title = ")
-    expect(page.get_by_text("The text is no TOML at the moment")).to_be_visible()
+    expect(page.get_by_text("This is not valid TOML")).to_be_visible()
     page.get_by_role("button", name="Undo").click()
     expect(page.get_by_role("textbox", name="Title", exact=True)).to_be_visible()
 
 
 def test_a_scale_whose_points_are_all_labelled_is_drawn(dashboard: Dashboard) -> None:
     page = opened(dashboard, "trial")
-    page.get_by_role("switch", name="TOML beside").click()
+    page.get_by_role("switch", name="Show TOML").click()
     editor = page.get_by_label("Definition", exact=True)
     text = re.sub(r"^(low|high|minimum|maximum|labels) = .*\n", "", editor.input_value(), flags=re.MULTILINE)
     labels = 'maximum = 2\nlabels = [{ en = "annoying" }, { en = "imperceptible" }]\n'
@@ -81,19 +81,19 @@ def test_steps_are_undone_and_done_again(dashboard: Dashboard) -> None:
 def test_work_is_kept_over_a_reload_and_a_lost_sign_in(dashboard: Dashboard) -> None:
     page = opened(dashboard, "texts")
     page.get_by_label("Debrief (Markdown)").fill("Kept words.")
-    expect(page.get_by_text("Not saved yet; kept in this browser.")).to_be_visible()
+    expect(page.get_by_text("Not saved; your work is in this browser only.")).to_be_visible()
     page.get_by_role("tab", name="Clips").click()
     # A way back before the other tab is shown leaves the builder where it is: nothing is to be brought back.
     page.get_by_role("button", name="Save as a new version").wait_for(state="detached")
     page.get_by_role("tab", name="Build").click()
-    expect(page.get_by_text("that was not saved is back")).to_be_visible()
+    expect(page.get_by_text("was restored")).to_be_visible()
     cookies = page.context.cookies()
     page.context.clear_cookies()
     page.goto(f"{dashboard.server.address}/admin/studies/short/build?section=texts")
     page.get_by_label("Name").fill("ada")
     page.locator("input[autocomplete=current-password]").fill(PASSWORD)
     page.get_by_role("button", name="Sign in").click()
-    expect(page.get_by_text("that was not saved is back")).to_be_visible()
+    expect(page.get_by_text("was restored")).to_be_visible()
     assert page.context.cookies() != cookies
     opened(dashboard, "texts")
     expect(page.get_by_label("Debrief (Markdown)")).to_have_value("Kept words.")
@@ -115,10 +115,10 @@ def test_words_typed_as_the_sign_in_is_lost_are_kept(dashboard: Dashboard) -> No
 def test_an_edit_that_changes_what_is_measured_is_said_before_it_is_saved(dashboard: Dashboard) -> None:
     page = opened(dashboard, "trial")
     page.get_by_label("Maximum", exact=True).first.fill("5")
-    expect(page.get_by_text("Saving begins a new data series")).to_be_visible()
+    expect(page.get_by_text("Saving starts a new data series")).to_be_visible()
     expect(page.get_by_text("trial.scale.maximum: 7 becomes 5")).to_be_visible()
-    page.get_by_role("button", name="As saved").click()
-    expect(page.get_by_text("Saving begins a new data series")).to_be_hidden()
+    page.get_by_role("button", name="Discard changes").click()
+    expect(page.get_by_text("Saving starts a new data series")).to_be_hidden()
 
 
 def test_what_is_wrong_is_named_and_led_to(dashboard: Dashboard) -> None:
@@ -138,7 +138,7 @@ def test_a_form_of_the_bank_is_saved_as_a_new_version(dashboard: Dashboard) -> N
     expect(save).to_be_enabled()
     save.click()
     expect(page.get_by_text("short, version 2")).to_be_visible()
-    expect(page.get_by_text("As saved, version 2.")).to_be_visible()
-    page.get_by_role("switch", name="TOML beside").click()
+    expect(page.get_by_text("Discard changes, version 2.")).to_be_visible()
+    page.get_by_role("switch", name="Show TOML").click()
     said = tomllib.loads(str(page.get_by_label("Definition", exact=True).input_value()))
     assert said["forms"][-1]["name"] == "comments"

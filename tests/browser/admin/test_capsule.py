@@ -17,7 +17,7 @@ def test_a_capsule_is_made_downloaded_and_deleted(dashboard: Dashboard) -> None:
     dashboard.complaints.clear()
     page = dashboard.open("/studies/short/data")
     page.get_by_role("switch", name="with mixed and ordinal models").press("Space")
-    page.get_by_role("button", name="Make a capsule").click()
+    page.get_by_role("button", name="Create capsule").click()
     kept = page.get_by_role("status", name="Capsules")
     download = kept.get_by_role("link", name="Download").first
     expect(download).to_be_visible(timeout=LONG_MS)
@@ -28,5 +28,5 @@ def test_a_capsule_is_made_downloaded_and_deleted(dashboard: Dashboard) -> None:
     assert dashboard.complaints == []
     kept.get_by_role("button", name="Delete").first.click()
     page.get_by_role("dialog").get_by_role("button", name="Delete the capsule").click()
-    expect(page.get_by_text("The capsule is deleted")).to_be_visible()
+    expect(page.get_by_text("Capsule deleted")).to_be_visible()
     assert dashboard.complaints == []

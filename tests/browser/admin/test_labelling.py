@@ -106,7 +106,7 @@ def test_points_are_labelled_undone_and_saved_as_stimuli_reads_them(
         page.keyboard.press("a")
         expect(page.get_by_text(f"Frame {accepted + 1} of {FRAMES}")).to_be_visible()
         page.locator(".stage").wait_for()
-    expect(page.get_by_text("Proposed from the labelled frames")).to_be_visible()
+    expect(page.get_by_text("Proposed from the labeled frames")).to_be_visible()
     assert shown_frame(page) == 5
     shoot(dashboard, "labelling")
 
@@ -130,7 +130,7 @@ def test_the_first_points_lie_on_eyes_that_blink(dashboard: Dashboard, tmp_path:
     open_file(page, "Open video", tmp_path / "actor.mp4")
     page.locator('circle.point[data-point="2"]').focus(timeout=60_000)
     expect(page.get_by_text("Two eyes found by 3 blinks")).to_be_visible()
-    expect(page.get_by_text("Laid on the eyes found by their blinks")).to_be_visible()
+    expect(page.get_by_text("Placed on the detected eyes")).to_be_visible()
 
     buttons = page.get_by_role("group", name="Frames to label").get_by_role("button")
     chosen = [int(re.findall(r"\d+", label)[0]) for label in buttons.all_inner_texts()]
@@ -186,7 +186,7 @@ def test_blinks_are_reviewed_and_the_review_is_read_by_stimuli(dashboard: Dashbo
     expect(page.get_by_text("Next, open")).to_have_count(0)
     page.get_by_role("button", name="Choose blink 2").click()
     page.keyboard.press("r")
-    page.get_by_label("Reason to reject it").fill("talking")
+    page.get_by_label("Reason for rejection").fill("talking")
     page.keyboard.press("Enter")
     expect(page.get_by_text("rejected: talking")).to_be_visible()
 

@@ -32,7 +32,7 @@ def test_a_clip_chosen_by_mistake_is_left_out_and_what_was_typed_stays(
     expect(panel.get_by_text("3 clips received")).to_be_visible()
     expect(panel.get_by_role("status", name="Left out")).to_contain_text("Probe.mp4 is left out.")
     expect(panel.get_by_label("Pattern", exact=True)).to_have_value("{factor1}_{factor2}_1.mp4")
-    expect(panel.get_by_role("region", name="What became of each file")).to_be_focused()
+    expect(panel.get_by_role("region", name="Result for each file")).to_be_focused()
     assert axe_violations(page) == []
     shoot(dashboard, "left-out")
 
@@ -74,7 +74,7 @@ def test_a_file_that_is_no_clip_keeps_no_other_from_coming(dashboard: Dashboard,
     panel.get_by_role("button", name="Create", exact=True).click()
     expect(panel.get_by_text("expected clips in all 4 cells of the design, got 3 of them")).to_be_visible()
     assert axe_violations(page) == []
-    panel.get_by_role("button", name="Begin anew").click()
+    panel.get_by_role("button", name="Start over").click()
 
 
 def test_all_clips_can_be_left_out_and_come_back(dashboard: Dashboard, tmp_path: Path) -> None:
@@ -88,5 +88,5 @@ def test_all_clips_can_be_left_out_and_come_back(dashboard: Dashboard, tmp_path:
     expect(panel.get_by_text("Still needed: clips that have been looked into")).to_be_visible()
     panel.get_by_role("button", name="Put back a_1.mp4").click()
     expect(panel.get_by_text("1 clip received")).to_be_visible()
-    panel.get_by_role("button", name="Begin anew").click()
-    expect(panel.get_by_role("button", name="Begin anew")).to_have_count(0)
+    panel.get_by_role("button", name="Start over").click()
+    expect(panel.get_by_role("button", name="Start over")).to_have_count(0)

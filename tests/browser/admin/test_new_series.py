@@ -11,7 +11,7 @@ pytestmark = pytest.mark.browser
 
 def test_a_new_series_is_confirmed_and_says_where_the_answers_are(dashboard: Dashboard) -> None:
     page = dashboard.open("/studies/short/build")
-    page.get_by_label("TOML beside").locator("xpath=..").click()
+    page.get_by_label("Show TOML").locator("xpath=..").click()
     text = page.get_by_label("Definition")
     saved = text.input_value()
     text.fill(saved.replace("[trial.scale]\n", "[trial.scale]\nmaximum = 9\n"))
@@ -25,7 +25,7 @@ def test_a_new_series_is_confirmed_and_says_where_the_answers_are(dashboard: Das
     dialog.get_by_role("button", name="Cancel").click()
     expect(page.get_by_text("short, version 1")).to_be_visible()
     button.click()
-    dialog.get_by_role("button", name="Save and begin series 2").click()
+    dialog.get_by_role("button", name="Save and start series 2").click()
     page.get_by_text("short, version 2").wait_for()
 
     page = dashboard.open("/studies/short/results")
@@ -39,10 +39,10 @@ def test_a_new_series_is_confirmed_and_says_where_the_answers_are(dashboard: Das
     expect(page.get_by_text("How clips were shown")).to_be_visible()
 
     page = dashboard.open("/studies/short/build")
-    page.get_by_label("TOML beside").locator("xpath=..").click()
+    page.get_by_label("Show TOML").locator("xpath=..").click()
     text = page.get_by_label("Definition")
     text.fill(text.input_value() + "\n# more\n")
     text.fill(text.input_value().replace('title = "A short study"', 'title = "A shorter study"'))
     status = page.get_by_role("status").filter(has_text="has no runs yet")
     expect(status).to_contain_text("Series 2 has no runs yet; 4 runs are in series 1 (version 1).")
-    expect(page.get_by_text("No run has been made yet")).to_have_count(0)
+    expect(page.get_by_text("No one has taken part yet")).to_have_count(0)

@@ -91,20 +91,20 @@ def test_own_clips_to_a_live_link(dashboard: Dashboard, clips: list[Path]) -> No
 
     hand.press("Set live")
     asked = page.get_by_role("dialog")
-    expect(asked.get_by_text("The plan is not sealed: that can only be done before")).to_be_visible()
+    expect(asked.get_by_text("The plan is not sealed. You can seal it only before")).to_be_visible()
     expect(asked.get_by_text("Phones are turned away: a window of at least 800 x 500 px")).to_be_visible()
     confirm = asked.get_by_role("button", name="Set live")
     # Blue, as what begins something; red is for what is lost.
     red, blue = confirm.evaluate("(b) => getComputedStyle(b).backgroundColor.match(/\\d+/g)")[::2]
     assert int(blue) > int(red)
     hand.click(confirm)
-    expect(page.get_by_text("Participants can begin", exact=True)).to_be_visible()
+    expect(page.get_by_text("Participants can start", exact=True)).to_be_visible()
     dialog = page.get_by_role("dialog")
     link = dialog.locator("code").first.inner_text()
     assert "/run/" in link
     # No recruiter is set: a link of Prolific would lead to visits without an id and a code that pays nobody.
     expect(dialog.locator("code")).to_have_count(1)
-    expect(dialog.get_by_text("To recruit through Prolific, SONA or MTurk, first choose")).to_be_visible()
+    expect(dialog.get_by_text("To recruit with Prolific, SONA or MTurk, first choose")).to_be_visible()
     assert hand.interactions <= MAX_INTERACTIONS, f"{hand.interactions} interactions"
     assert page.title() == "Build – Robots – Palpebra"
 
@@ -117,4 +117,4 @@ def test_demonstrations_that_are_not_built_are_named_with_their_commands(dashboa
     page.get_by_role("link", name="New study").click()
     expect(page.get_by_role("listitem").filter(has_text="stimuli build pairs-demo --out ")).to_have_count(1)
     page.goto(f"{dashboard.server.address}/nothing")
-    expect(page.get_by_role("heading", name="Nothing is here")).to_be_visible()
+    expect(page.get_by_role("heading", name="Page not found")).to_be_visible()

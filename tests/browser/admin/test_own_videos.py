@@ -45,8 +45,8 @@ def test_videos_of_any_format_become_a_study(
     panel = page.get_by_role("tabpanel", name="From your own clips")
     files = panel.locator('input[type="file"]').first
     files.set_input_files([*videos, write_sound(tmp_path / "fast_3.mp4")])
-    expect(panel.get_by_text("3 converted, 1 that cannot be used")).to_be_visible(timeout=60_000)
-    table = panel.get_by_role("region", name="What became of each file")
+    expect(panel.get_by_text("3 converted, 1 unusable")).to_be_visible(timeout=60_000)
+    table = panel.get_by_role("region", name="Result for each file")
     expect(table.get_by_text("it holds audio and no picture; expected a video")).to_be_visible()
     assert axe_violations(page) == []
     shoot(dashboard, "upload-refused")
@@ -57,7 +57,7 @@ def test_videos_of_any_format_become_a_study(
     expect(panel.get_by_text("5 clips received: 2 unchanged, 3 converted")).to_be_visible(timeout=60_000)
     expect(table.get_by_text("fast_3.mp4")).to_have_count(0)
 
-    panel.get_by_role("button", name="Begin anew").click()
+    panel.get_by_role("button", name="Start over").click()
     files.set_input_files(videos)
     expect(panel.get_by_text("4 clips received: 1 unchanged, 3 converted")).to_be_visible(timeout=60_000)
     expect(table.get_by_text("encoded as H.264, was vp9")).to_be_visible()
@@ -107,8 +107,8 @@ def test_a_clip_that_the_participant_page_does_not_play_is_named_with_its_reason
     page.get_by_role("tab", name="From your own clips").click()
     panel = page.get_by_role("tabpanel", name="From your own clips")
     panel.locator('input[type="file"]').first.set_input_files(clips)
-    expect(panel.get_by_text("2 unchanged, 1 that cannot be used")).to_be_visible(timeout=60_000)
-    table = panel.get_by_role("region", name="What became of each file")
+    expect(panel.get_by_text("2 unchanged, 1 unusable")).to_be_visible(timeout=60_000)
+    table = panel.get_by_role("region", name="Result for each file")
     expect(table.get_by_text("the participant's page does not play it in this browser")).to_have_count(1)
     expect(table.get_by_text("unsupported or unrecognizable format")).to_be_visible()
     panel.get_by_label("Pattern", exact=True).fill("{speed}_{exemplar}.mp4")

@@ -12,9 +12,9 @@ def test_the_monitor_comes_back_after_a_restart_of_the_server(dashboard: Dashboa
     page = dashboard.open("/studies/short/monitor")
     expect(page.locator("canvas").first).to_be_visible()
     dashboard.server.kill()
-    expect(page.get_by_text("The connection is interrupted")).to_be_visible()
+    expect(page.get_by_text("Connection lost")).to_be_visible()
     dashboard.server.start()
-    expect(page.get_by_text("The connection is interrupted")).to_be_hidden(timeout=30_000)
+    expect(page.get_by_text("Connection lost")).to_be_hidden(timeout=30_000)
     expect(page.locator("canvas").first).to_be_visible()
     dashboard.complaints.clear()
 

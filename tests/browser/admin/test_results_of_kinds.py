@@ -74,7 +74,7 @@ def test_results_say_whose_answers_there_are_and_show_them_by_label(dashboard: D
     runs = counted(PEOPLE[demo], "run")
     expect(page.get_by_text(f"the only answers are those of {runs} of simulated people")).to_be_visible()
     page.get_by_role("button", name="Show simulated").click()
-    expect(page.get_by_text("nobody gave these answers")).to_be_visible()
+    expect(page.get_by_text("no person gave these answers")).to_be_visible()
     expect(page.get_by_text(LABELS[demo]).first).to_be_visible()
     assert axe_violations(page) == []
     page.set_viewport_size({"width": 390, "height": 844})

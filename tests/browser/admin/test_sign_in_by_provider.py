@@ -46,7 +46,7 @@ def test_a_person_signs_in_by_her_university_and_sees_who_she_is(server: ServerP
     page.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
     page.goto(f"{server.address}/admin/account")
     page.get_by_role("button", name="Sign in with ORCID").click()
-    page.get_by_text("nobody here belongs to that login").wait_for(timeout=PATIENCE_MS)
+    page.get_by_text("No account here uses that login").wait_for(timeout=PATIENCE_MS)
     page.goto(f"{server.address}/admin/account")
     page.get_by_role("button", name="Sign in with The University").click()
     page.get_by_role("heading", name="My account").wait_for(timeout=PATIENCE_MS)

@@ -32,7 +32,7 @@ def builder(page: Page, dashboard: Dashboard, section: str = "texts") -> Page:
 
 def typed(page: Page, words: str) -> None:
     page.get_by_label(DEBRIEF).fill(words)
-    expect(page.get_by_text("Not saved yet; kept in this browser.")).to_be_visible()
+    expect(page.get_by_text("Not saved; your work is in this browser only.")).to_be_visible()
 
 
 @pytest.fixture
@@ -49,11 +49,11 @@ def test_saving_in_one_tab_keeps_the_unsaved_work_of_the_other(dashboard: Dashbo
     typed(second, "Words of the second tab.")
     expect(second.get_by_role("button", name=SAVE)).to_be_enabled()
     second.get_by_role("button", name=SAVE).click()
-    expect(second.get_by_text(re.compile(r"As saved, version \d+"))).to_be_visible()
+    expect(second.get_by_text(re.compile(r"Discard changes, version \d+"))).to_be_visible()
     first.reload()
-    expect(first.get_by_text("that was not saved is back")).to_be_visible()
+    expect(first.get_by_text("was restored")).to_be_visible()
     expect(first.get_by_label(DEBRIEF)).to_have_value("Words of the first tab.")
-    expect(first.get_by_text("The study was changed since it began")).to_be_visible()
+    expect(first.get_by_text("The study has changed since then")).to_be_visible()
 
 
 def test_discarding_in_one_tab_keeps_the_unsaved_work_of_the_other(
@@ -63,8 +63,8 @@ def test_discarding_in_one_tab_keeps_the_unsaved_work_of_the_other(
     typed(first, "To be kept.")
     builder(second, dashboard)
     typed(second, "To be given up.")
-    second.get_by_role("button", name="As saved").click()
-    expect(second.get_by_text(re.compile(r"As saved, version \d+"))).to_be_visible()
+    second.get_by_role("button", name="Discard changes").click()
+    expect(second.get_by_text(re.compile(r"Discard changes, version \d+"))).to_be_visible()
     first.reload()
     expect(first.get_by_label(DEBRIEF)).to_have_value("To be kept.")
 
@@ -108,7 +108,7 @@ def test_what_was_typed_on_a_page_is_there_after_signing_in_again(dashboard: Das
     field.fill("typed-before")
     end_sessions(dashboard)
     page.get_by_role("button", name=re.compile("^Copy")).click()
-    dialog = page.get_by_role("dialog", name="Your session has ended")
+    dialog = page.get_by_role("dialog", name="Your session has expired")
     expect(dialog.get_by_label("Name")).to_have_value("ada")
     dialog.locator("input[autocomplete=current-password]").fill(PASSWORD)
     dialog.get_by_role("button", name="Sign in", exact=True).click()
@@ -126,9 +126,9 @@ def looking(dashboard: Dashboard) -> Iterator[BrowserContext]:
     context = browser.new_context(viewport={"width": 1280, "height": 800}, locale="en-GB")
     page = context.new_page()
     page.goto(f"{dashboard.server.address}/admin/invitation#{token}")
-    page.get_by_label("Name to sign in with").fill(f"Vera {token[:6]}")
+    page.get_by_label("User name").fill(f"Vera {token[:6]}")
     page.locator("input[autocomplete=new-password]").fill(PASSWORD)
-    page.get_by_role("button", name="Make the account").click()
+    page.get_by_role("button", name="Create account").click()
     page.get_by_role("heading", name="Studies").wait_for()
     yield context
     context.close()

@@ -33,18 +33,18 @@ PAGES = {
     "build-analysis": ("/studies/short/build?section=analysis", "Statistic"),
     "clips": ("/studies/short/clips", "8 clips"),
     "links": ("/studies/short/links", "New links"),
-    "monitor": ("/studies/short/monitor", "How far people come"),
+    "monitor": ("/studies/short/monitor", "Progress"),
     "results": ("/studies/short/results", "Analysis reports"),
     "data": ("/studies/short/data", "Psych-DS dataset"),
     "participants": ("/studies/short/participants", "12 of 12"),
     "settings": ("/studies/short/settings", "No period is declared"),
-    "people": ("/people", "Invite somebody"),
-    "workspaces": ("/workspaces", "Take in the account"),
+    "people": ("/people", "Invite someone"),
+    "workspaces": ("/workspaces", "Add member"),
     "backups": ("/backups", "The server does not know where its backups are"),
     "audit": ("/audit", "account created: account ada"),
     "account": ("/account", "API tokens"),
     "blinks": ("/blinks", "Component 1"),
-    "labelling": ("/labelling", "Points round the eyes"),
+    "labelling": ("/labelling", "Mark points around the eyes"),
     "review": ("/blink-review", "The blinks that"),
 }
 
@@ -121,7 +121,7 @@ def test_a_figure_is_saved_as_picture_and_numbers(dashboard: Dashboard) -> None:
     header, *rows = list(csv.reader(io.StringIO(saved["CSV"])))
     assert header[2:] == ["mean", "se_within", "participants"]
     assert {cell for row in rows for cell in row[:2]} <= texts
-    assert "Bars: one within-participant standard error up and down." in texts
+    assert "Bars: ± one within-participant standard error." in texts
     assert float(picture.attrib["height"]) > 250
     assert "var(--mantine" not in saved["SVG"]
 
@@ -172,7 +172,7 @@ def test_files_and_capsule_are_of_the_series_chosen(dashboard: Dashboard) -> Non
         file = page.get_by_role("link", name="Download ratings.csv")
         expect(file).to_have_attribute("href", re.compile(r"ratings\.csv\?series=2$"))
         expect(page.get_by_text("server capsule short --series 2 --out")).to_be_visible()
-        page.get_by_role("button", name="Make a capsule").click()
+        page.get_by_role("button", name="Create capsule").click()
         page.get_by_text("Not now.").wait_for()
         assert [order["series"] for order in asked] == [2]
     finally:
@@ -190,7 +190,7 @@ def test_a_notice_covers_neither_tabs_nor_a_dialog_on_a_phone(dashboard: Dashboa
         lambda route: held.append(route) if route.request.method == "POST" else route.continue_(),
     )
     try:
-        dashboard.open("/studies/short/data").get_by_role("button", name="Make a capsule").click()
+        dashboard.open("/studies/short/data").get_by_role("button", name="Create capsule").click()
         page.get_by_role("button", name="Close", exact=True).click()
         page.get_by_role("dialog").get_by_role("button", name="Cancel").wait_for()
         page.evaluate(WATCH_FOR_A_NOTICE)
@@ -224,10 +224,10 @@ def test_the_second_factor_is_set_up_and_turned_off(dashboard: Dashboard) -> Non
     secret = page.locator("pre").first.inner_text().strip()
     assert axe_violations(page) == []
     shoot(dashboard, "second-factor")
-    page.get_by_label("Code of the app").locator("input").first.click()
+    page.get_by_label("Code from the app").locator("input").first.click()
     page.keyboard.type(pyotp.TOTP(secret).now())
     expect(page.get_by_text("Keep these recovery codes")).to_be_visible()
-    page.get_by_label("Password, to turn it off").fill(PASSWORD)
+    page.get_by_label("Password to turn it off").fill(PASSWORD)
     page.get_by_role("button", name="Turn off").click()
     expect(page.get_by_role("button", name="Set up")).to_be_visible()
 

@@ -328,7 +328,7 @@ def test_further_kinds_of_h264(browsers: Browsers) -> None:
 
 
 def check(browsers: Browsers, names: list[str]) -> tuple[dict[str, Prepared], dict[str, str]]:
-    """Every clip, as it came or once converted, is for both pages what the rule says; clips and refusals."""
+    """Every clip, unchanged or once converted, is for both pages what the rule says; clips and refusals."""
     folder = browsers.folder
     outcomes = {name: outcome(folder / name, folder) for name in names}
     made = {name: record for name, record in outcomes.items() if isinstance(record, Prepared)}

@@ -38,7 +38,7 @@ function AddLogin({ id, label }: Schemas["ProviderOut"]) {
         <Stack component="form" onSubmit={submit}>
           <PasswordField
             label="Your password"
-            description="Where the account has none: a code of your authenticator app, or a recovery code."
+            description="If the account has no password: a code from your authenticator app, or a recovery code."
             value={proof}
             onChange={setProof}
             data-autofocus
@@ -59,7 +59,7 @@ function LoginsCard() {
   const logins = useQuery({ queryKey: ["logins"], queryFn: () => unwrap(api.GET("/api/admin/logins")) });
   const remove = useChange((login_id: number) => unwrap(api.DELETE("/api/admin/logins/{login_id}", { params: { path: { login_id } } })), {
     touches: [["logins"]],
-    done: "The login is removed.",
+    done: "Login removed.",
   });
   const providers = ways.data?.providers ?? [];
   if (providers.length === 0) return null;
@@ -76,7 +76,7 @@ function LoginsCard() {
             <DataTable
               rows={rows}
               rowKey={(row) => row.id}
-              empty="None but name and password."
+              empty="Only name and password."
               columns={[
                 { title: "Service", cell: (row) => labels.get(row.provider) ?? row.issuer },
                 { title: "As", cell: (row) => row.label },
@@ -87,7 +87,7 @@ function LoginsCard() {
                     <ConfirmButton
                       size="xs"
                       label="Remove"
-                      question={`“${row.label}” will not sign in to this account any more.`}
+                      question={`“${row.label}” will no longer sign in to this account.`}
                       confirm="Remove"
                       onConfirm={() => remove.mutate(row.id)}
                     />
@@ -103,7 +103,7 @@ function LoginsCard() {
           ))}
         </Group>
         <Text size="sm" c="dimmed">
-          You go to the service, say who you are there, and come back.
+          You sign in at the service and return here.
         </Text>
       </Stack>
     </Card>
@@ -119,12 +119,12 @@ function MailCard() {
   const [password, setPassword] = useState("");
   const change = useChange(() => unwrap(api.PUT("/api/admin/mail", { body: { address, password } })), {
     touches: [],
-    done: "A letter is on its way; open the link in it within half an hour.",
+    done: "Check your email and open the link within half an hour.",
     then: () => setPassword(""),
   });
   const remove = useChange(() => unwrap(api.DELETE("/api/admin/mail", { body: { password } })), {
     touches: [["mail"]],
-    done: "The address is removed.",
+    done: "Address removed.",
     then: () => setPassword(""),
   });
   if (ways.data?.resets_by_mail !== true) return null;
@@ -137,10 +137,10 @@ function MailCard() {
     <Card withBorder component="form" onSubmit={submit}>
       <Stack align="flex-start">
         <Title order={2} size="h4">
-          Address of mail
+          Email address
         </Title>
         <Text size="sm">
-          {known === null ? "None: a forgotten password cannot be reset by mail." : `Links for a new password go to ${known}.`}
+          {known === null ? "None: without an address you cannot reset a forgotten password." : `Password reset links go to ${known}.`}
         </Text>
         <TextInput
           w="100%"
@@ -155,7 +155,7 @@ function MailCard() {
         <PasswordField w="100%" maw={360} label="Your password" value={password} onChange={setPassword} />
         <Group>
           <Button type="submit" loading={change.isPending}>
-            Send a letter to confirm it
+            Send a confirmation email
           </Button>
           {known !== null && (
             <Button variant="default" disabled={password === ""} onClick={() => remove.mutate(undefined)}>
@@ -189,10 +189,10 @@ function PasswordCard() {
         <Title order={2} size="h4">
           Password
         </Title>
-        <PasswordField w="100%" maw={360} label="Present password" value={password} onChange={setPassword} />
+        <PasswordField w="100%" maw={360} label="Current password" value={password} onChange={setPassword} />
         <PasswordField w="100%" maw={360} label="New password" fresh value={fresh} onChange={setFresh} />
         <Button type="submit" loading={change.isPending}>
-          Change the password
+          Change password
         </Button>
       </Stack>
     </Card>
@@ -243,12 +243,12 @@ function Confirm({ setup, done }: { setup: Schemas["SecondFactorSetup"]; done: (
   const picture = `data:image/svg+xml;utf8,${encodeURIComponent(setup.qr_svg)}`;
   return (
     <>
-      <Text size="sm">Scan this with your authenticator app, or type the secret in; then enter the code that the app shows.</Text>
+      <Text size="sm">Scan this with your authenticator app, or type in the secret. Then enter the code that the app shows.</Text>
       <img src={picture} alt="QR code of the secret" width={200} height={200} className="qr" />
       <Code block className="wrap-anywhere">
         {setup.secret}
       </Code>
-      <PinInput length={6} type="number" oneTimeCode aria-label="Code of the app" onComplete={(code) => confirm.mutate(code)} />
+      <PinInput length={6} type="number" oneTimeCode aria-label="Code from the app" onComplete={(code) => confirm.mutate(code)} />
     </>
   );
 }
@@ -256,7 +256,7 @@ function Confirm({ setup, done }: { setup: Schemas["SecondFactorSetup"]; done: (
 function RecoveryCodes({ codes }: { codes: string[] }) {
   return (
     <Alert title="Keep these recovery codes" color="yellow">
-      <Text mb="xs">Each signs you in once without the phone. They are shown only now.</Text>
+      <Text mb="xs">Each code signs you in once without your phone. They are shown only now.</Text>
       <Code block>{codes.join("\n")}</Code>
     </Alert>
   );
@@ -266,15 +266,15 @@ function Remove() {
   const [password, setPassword] = useState("");
   const remove = useChange(() => unwrap(api.DELETE("/api/admin/second-factor", { body: { password } })), {
     touches: [sessionQuery.queryKey],
-    done: "The second factor is off.",
+    done: "Second factor turned off.",
   });
   return (
     <Group align="end">
       <Text w="100%" size="sm">
-        On: signing in asks for the code of your authenticator app.
+        On: signing in requires the code from your authenticator app.
       </Text>
       <PasswordField
-        label="Password, to turn it off (without one: a code)"
+        label="Password to turn it off (or a code, if you have no password)"
         required={false}
         value={password}
         onChange={setPassword}
@@ -291,7 +291,7 @@ function SessionsCard() {
   const sessions = useQuery({ queryKey: ["sessions"], queryFn: () => unwrap(api.GET("/api/admin/sessions")) });
   const end = useChange(
     (session_id: number) => unwrap(api.DELETE("/api/admin/sessions/{session_id}", { params: { path: { session_id } } })),
-    { touches: [["sessions"]], done: "That browser is signed out." },
+    { touches: [["sessions"]], done: "Browser signed out." },
   );
   return (
     <Card withBorder>
@@ -340,7 +340,7 @@ function TokensCard() {
   );
   const revoke = useChange((token_id: number) => unwrap(api.DELETE("/api/admin/tokens/{token_id}", { params: { path: { token_id } } })), {
     touches: [["tokens"]],
-    done: "The token is revoked.",
+    done: "Token revoked.",
   });
   return (
     <Card withBorder>
@@ -348,9 +348,9 @@ function TokensCard() {
         <Title order={2} size="h4">
           API tokens
         </Title>
-        <Text size="sm">For scripts: send it as “Authorization: Bearer …”. A token can do no more than you.</Text>
+        <Text size="sm">For scripts: send it as “Authorization: Bearer …”. A token has your rights at most.</Text>
         {fresh !== null && (
-          <Alert title="Your new token, shown only now" color="yellow">
+          <Alert title="Your new token (shown only now)" color="yellow">
             <Code block className="wrap-anywhere">
               {fresh}
             </Code>
@@ -366,7 +366,7 @@ function TokensCard() {
             </Group>
           </Checkbox.Group>
           <Button disabled={name === "" || scopes.length === 0} onClick={() => create.mutate(undefined)}>
-            Make a token
+            Create token
           </Button>
         </Group>
         <Answer of={tokens}>

@@ -8,9 +8,9 @@ import { Answer } from "../ui/Answer";
 import { EntryForm, EntryPage, NameField, PasswordField, ProviderButtons, useEntered } from "./entry";
 
 const CLOSED: Record<string, string> = {
-  used: "This link has been used already.",
+  used: "This link has already been used.",
   expired: "This link was valid for a week and has expired.",
-  not_found: "This link is not complete, or was withdrawn.",
+  not_found: "This link is incomplete or was withdrawn.",
 };
 
 export function InvitationPage() {
@@ -37,7 +37,7 @@ function Closed({ why }: { why: string }) {
   return (
     <Alert color="yellow" title={CLOSED[why] ?? CLOSED["not_found"]} role="alert">
       <Text size="sm" mb="xs">
-        Ask an owner of this server for a new one: People, “Make a one-time link”.
+        Ask an owner of this server for a new one (People, “Create one-time link”).
       </Text>
       <Anchor component={Link} to="/sign-in" size="sm">
         I have an account
@@ -47,9 +47,9 @@ function Closed({ why }: { why: string }) {
 }
 
 const MAY: Record<Schemas["InvitationState"]["role"], string> = {
-  owner: "You will be an owner: you may do everything in your workspace, and manage this server.",
-  experimenter: "You will be an experimenter: you may make and change studies.",
-  viewer: "You will be a viewer: you may look at studies and their data.",
+  owner: "You will be an owner: you can do everything in your workspace and manage this server.",
+  experimenter: "You will be an experimenter: you can create and change studies.",
+  viewer: "You will be a viewer: you can see studies and their data.",
 };
 
 function MakeAccount({ token, role }: { token: string; role: Schemas["InvitationState"]["role"] }) {
@@ -61,9 +61,9 @@ function MakeAccount({ token, role }: { token: string; role: Schemas["Invitation
   });
   return (
     <>
-      <EntryForm sending={accept} button="Make the account">
+      <EntryForm sending={accept} button="Create account">
         <Text size="sm">{MAY[role]}</Text>
-        <NameField label="Name to sign in with" value={name} onChange={setName} />
+        <NameField label="User name" value={name} onChange={setName} />
         <PasswordField label="Password" fresh value={password} onChange={setPassword} />
       </EntryForm>
       <ProviderButtons invitation={token} />

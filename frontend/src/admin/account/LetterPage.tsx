@@ -12,16 +12,16 @@ function ForgottenPage() {
   const [name, setName] = useState("");
   const send = useMutation({ mutationFn: () => unwrap(api.POST("/api/admin/session/forgotten", { body: { name } })) });
   return (
-    <EntryPage title="Forgotten password">
+    <EntryPage title="Forgot your password?">
       {send.isSuccess ? (
-        <Alert title="Look into your mail" role="status">
-          If an account has this name or address, and a confirmed address, a link for a new password is on its way. It works once, for half
-          an hour.
+        <Alert title="Check your email" role="status">
+          If an account has this name or address and a confirmed email address, we have sent a link for a new password. It works once, for
+          half an hour.
         </Alert>
       ) : (
-        <EntryForm sending={send} button="Send me a link">
+        <EntryForm sending={send} button="Send link">
           <TextInput
-            label="Name to sign in with, or your address of mail"
+            label="User name or email address"
             autoComplete="username"
             required
             value={name}
@@ -44,16 +44,16 @@ function MailPage() {
   const [token] = useState(() => window.location.hash.slice(1));
   const send = useMutation({ mutationFn: () => unwrap(api.POST("/api/admin/session/mail", { body: { token: token || "-" } })) });
   return (
-    <EntryPage title="Confirm your address">
+    <EntryPage title="Confirm your email address">
       {send.isSuccess ? (
-        <Alert title="The address is confirmed" role="status">
+        <Alert title="Email address confirmed" role="status">
           <Anchor component={Link} to="/">
             Go on
           </Anchor>
         </Alert>
       ) : (
         <EntryForm sending={send} button="Confirm">
-          <Text size="sm">Links for a new password will go to this address.</Text>
+          <Text size="sm">Password reset links will go to this address.</Text>
         </EntryForm>
       )}
     </EntryPage>
@@ -71,14 +71,14 @@ function NewPasswordPage() {
   return (
     <EntryPage title="New password">
       {send.isSuccess ? (
-        <Alert title="Your password is changed" role="status">
-          Everybody who was signed in to the account is signed out, and its API tokens have ended.{" "}
+        <Alert title="Password changed" role="status">
+          All sessions of this account were signed out and its API tokens revoked.{" "}
           <Anchor component={Link} to="/sign-in">
             Sign in
           </Anchor>
         </Alert>
       ) : (
-        <EntryForm sending={send} button="Change the password">
+        <EntryForm sending={send} button="Change password">
           <PasswordField label="New password" fresh value={password} onChange={setPassword} />
         </EntryForm>
       )}

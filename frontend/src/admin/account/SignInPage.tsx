@@ -28,7 +28,7 @@ function CodeForm() {
 function CodeField({ value, onChange }: { value: string; onChange: (value: string) => void }) {
   return (
     <TextInput
-      label="Code of your authenticator app, or a recovery code"
+      label="Code from your authenticator app, or a recovery code"
       autoComplete="one-time-code"
       autoFocus
       value={value}
@@ -76,8 +76,7 @@ function ByPassword({ known = "", then }: ByPasswordProps) {
     <>
       {session.data?.accounts_exist === false && (
         <Alert title="No account yet" mb="md">
-          The first account is made with the one-time link that the server printed when it started. Lost it? Run{" "}
-          <code>server admin link</code>.
+          Create the first account with the one-time link that the server printed at its start. Lost it? Run <code>server admin link</code>.
         </Alert>
       )}
       <EntryForm sending={signIn} button="Sign in">
@@ -87,13 +86,13 @@ function ByPassword({ known = "", then }: ByPasswordProps) {
       </EntryForm>
       {then === undefined && ways.data?.resets_by_mail === true && (
         <Anchor component={Link} to="/letter/forgotten" size="sm" display="block" ta="center" mt="sm">
-          Forgotten your password?
+          Forgot your password?
         </Anchor>
       )}
       <ProviderButtons next={next} elsewhere={then !== undefined} />
       {then === undefined && (
         <Text size="sm" c="dimmed" ta="center" mt="md">
-          Participants do not sign in: they open the link they were given.
+          Participants do not sign in; they open the link they received.
         </Text>
       )}
     </>

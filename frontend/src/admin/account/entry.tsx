@@ -65,11 +65,7 @@ type PasswordProps = Field & Omit<PasswordInputProps, "onChange" | "value"> & { 
 
 /** `fresh`: a password to be chosen, not the present one. */
 export function PasswordField({ onChange, fresh = false, ...rest }: PasswordProps) {
-  const chosen = {
-    description: "At least 12 characters; a few uncommon words in a row do well.",
-    autoComplete: "new-password",
-    minLength: 12,
-  };
+  const chosen = { description: "At least 12 characters. A few uncommon words work well.", autoComplete: "new-password", minLength: 12 };
   return (
     <PasswordInput
       required
@@ -96,12 +92,11 @@ export function useEntered(next = "/") {
 export const waysQuery = { queryKey: ["ways"], queryFn: () => unwrap(api.GET("/api/admin/session/ways")), staleTime: 60_000 };
 
 const REFUSED: Record<string, string> = {
-  not_admitted:
-    "That service knows you, but nobody here belongs to that login. Sign in by password and add it under My account, or ask an owner.",
-  provider_away: "That service does not answer as it should. Please try again later.",
-  too_many_requests: "Too many sign-ins come from your network at this moment. Please begin again in a minute.",
-  conflict: "That login belongs to another account of this server, or the invitation was used already.",
-  sign_in_again: "Please sign in again for this change: you did so more than 15 minutes ago.",
+  not_admitted: "No account here uses that login. Sign in with your password and add the login under My account, or ask an owner.",
+  provider_away: "That service did not respond correctly. Please try again later.",
+  too_many_requests: "Too many sign-ins from your network. Please try again in a minute.",
+  conflict: "That login belongs to another account, or the invitation was already used.",
+  sign_in_again: "Please sign in again for this change: your last sign-in was more than 15 minutes ago.",
 };
 
 /** Why a sign-in by a provider came to nothing, in words of our own: the address is anybody's to write. */
@@ -110,7 +105,7 @@ export function Refusal() {
   if (typeof refused !== "string") return null;
   return (
     <Alert color="yellow" mb="md" role="alert" title="Not signed in">
-      {REFUSED[refused] ?? "The sign-in was not confirmed. Please begin it again."}
+      {REFUSED[refused] ?? "The sign-in was not confirmed. Please start over."}
     </Alert>
   );
 }
@@ -145,7 +140,7 @@ export function ProviderButtons({ next = "/", invitation, elsewhere = false }: P
       {providers.map(({ id, label }) => (
         <Button key={id} variant="default" loading={begin.isPending && begin.variables === id} onClick={() => begin.mutate(id)}>
           Sign in with {label}
-          {elsewhere && " (in another tab; then come back)"}
+          {elsewhere && " (in another tab, then return here)"}
         </Button>
       ))}
     </Stack>

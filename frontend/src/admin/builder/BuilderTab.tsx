@@ -49,7 +49,7 @@ function Begun({ detail }: { detail: Schemas["StudyDetail"] }) {
   const note =
     kept === null || from.toml !== kept.toml
       ? null
-      : `Work of ${when(kept.at)} that was not saved is back.${kept.revision === revision ? "" : " The study was changed since it began; what saving would change is listed below."}`;
+      : `Unsaved work from ${when(kept.at)} was restored.${kept.revision === revision ? "" : " The study has changed since then; the changes that saving would make are listed below."}`;
   return (
     <Answer of={start}>
       {(read) => (
@@ -64,14 +64,14 @@ function Begun({ detail }: { detail: Schemas["StudyDetail"] }) {
           )}
           {others.map((draft) => (
             <Group key={draft.key} gap="xs" role="status">
-              <span>{`Another tab has unsaved work of ${when(draft.at)} on this study${draft.revision === revision ? "" : ", begun from an earlier version"}.`}</span>
+              <span>{`Another tab has unsaved work from ${when(draft.at)} on this study${draft.revision === revision ? "" : ", based on an earlier version"}.`}</span>
               <Button size="compact-xs" variant="default" onClick={() => open(draft)}>
                 Open it here
               </Button>
               <ConfirmButton
                 size="compact-xs"
                 label="Discard it there"
-                question={`The unsaved work of ${when(draft.at)} is deleted for good.`}
+                question={`The unsaved work from ${when(draft.at)} is deleted permanently.`}
                 confirm="Discard the work"
                 onConfirm={() => discard(draft)}
               />

@@ -128,7 +128,7 @@ function ConsentMenu({ language }: { language: string }) {
         </Menu.Dropdown>
       </Menu>
       <Text size="xs" c="dimmed">
-        Words in [brackets] are yours to fill in. Undo brings the text back.
+        Fill in the words in [brackets]. Undo restores the text.
       </Text>
     </Group>
   );

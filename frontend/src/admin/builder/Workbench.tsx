@@ -1,4 +1,4 @@
-/** What is edited: pages of forms, the TOML beside them, and the bar that saves. */
+/** What is edited: pages of forms, the Show TOML them, and the bar that saves. */
 
 import { Alert, List, Button, Group, Modal, NavLink, Select, Stack, Switch, Text, TextInput, Title } from "@mantine/core";
 import { useDebouncedValue, useHotkeys } from "@mantine/hooks";
@@ -47,7 +47,7 @@ function JudgedEdit({ detail, toml }: { detail: Schemas["StudyDetail"]; toml: st
 }
 
 function title(edit: Schemas["JudgedEdit"]): string {
-  if (edit.begins_series) return "Saving begins a new data series";
+  if (edit.begins_series) return "Saving starts a new data series";
   return edit.series === edit.present_series ? "Answers may be pooled" : `Answers join series ${edit.series}`;
 }
 
@@ -61,7 +61,7 @@ function consequence(edit: Schemas["JudgedEdit"], { series, definition }: Schema
   const scale = edit.changes.some(({ path }) => path.startsWith("trial.scale")) ? adminKind(trial.kind).scaleEnds?.(trial) : null;
   const on = scale ? ` on ${scale.minimum}-${scale.maximum}` : "";
   const kept = present === undefined ? `series ${edit.present_series}` : present.name;
-  return `${raters} answered${on}. A new data series begins with this version (series ${edit.series}): the answers so far stay separate, in ${kept}. Results, reports and analyses keep the two apart.`;
+  return `${raters} answered${on}. This version starts a new data series (series ${edit.series}). Existing answers stay separate, in ${kept}; results and reports do not combine the two.`;
 }
 
 /** Where the runs are if the present series has none. */
@@ -77,9 +77,9 @@ function effect(edit: Schemas["JudgedEdit"], detail: Schemas["StudyDetail"]): st
   if (edit.begins_series) return `This changes what is measured. ${consequence(edit, detail)}`;
   if (edit.runs === 0) {
     const others = elsewhere(detail, edit.present_series);
-    return others === "" ? "No run has been made yet." : `Series ${edit.present_series} has no runs yet; ${others}.`;
+    return others === "" ? "No one has taken part yet." : `Series ${edit.present_series} has no runs yet; ${others}.`;
   }
-  return `Further runs are of series ${edit.series}, like those of its other versions.`;
+  return `Further runs belong to series ${edit.series}.`;
 }
 
 interface Props {
@@ -118,7 +118,7 @@ export function Workbench({ detail, start }: Props) {
             </Text>
           </div>
           {builder.broken ? (
-            <Alert color="yellow">The text is no TOML at the moment. Correct it beside, or undo; the forms come back then.</Alert>
+            <Alert color="yellow">This is not valid TOML. Correct the text or undo; the forms return then.</Alert>
           ) : (
             <Page section={section} />
           )}
@@ -161,7 +161,7 @@ interface BeginSeriesProps {
 /** Asked before an edit is saved that keeps the answers so far apart from those to come. */
 function BeginSeries({ edit, detail, onClose, onConfirm }: BeginSeriesProps) {
   return (
-    <Modal opened onClose={onClose} title={`Begin data series ${edit.series}?`} closeButtonProps={{ "aria-label": "Close" }}>
+    <Modal opened onClose={onClose} title={`Start data series ${edit.series}?`} closeButtonProps={{ "aria-label": "Close" }}>
       <Text>{consequence(edit, detail)}</Text>
       <List size="sm" mt="xs">
         {edit.changes
@@ -175,7 +175,7 @@ function BeginSeries({ edit, detail, onClose, onConfirm }: BeginSeriesProps) {
           Cancel
         </Button>
         <Button color="red" onClick={onConfirm}>
-          Save and begin series {edit.series}
+          Save and start series {edit.series}
         </Button>
       </Group>
     </Modal>
@@ -247,17 +247,17 @@ function Bar({ detail, builder, beside, onBeside }: BarProps) {
           Redo
         </Button>
         <Button variant="default" disabled={!builder.changed} onClick={builder.reset}>
-          As saved
+          Discard changes
         </Button>
-        <Switch label="TOML beside" checked={beside} onChange={(event) => onBeside(event.currentTarget.checked)} mb={6} />
+        <Switch label="Show TOML" checked={beside} onChange={(event) => onBeside(event.currentTarget.checked)} mb={6} />
       </Group>
       <Text size="xs" c="dimmed" role="status" mt={4}>
         {builder.error !== null
-          ? `${builder.error.message} Your work is kept in this browser.`
+          ? `${builder.error.message} Your work is still in this browser.`
           : builder.changed
-            ? "Not saved yet; kept in this browser."
-            : `As saved, version ${detail.summary.version}.`}
-        {status === "live" && " This study is live: a change makes a new version; runs under way keep theirs."}
+            ? "Not saved; your work is in this browser only."
+            : `Saved as version ${detail.summary.version}.`}
+        {status === "live" && " This study is live: saving creates a new version. Runs in progress keep theirs."}
       </Text>
     </div>
   );
@@ -266,7 +266,7 @@ function Bar({ detail, builder, beside, onBeside }: BarProps) {
 function Sections({ study, builder, current }: { study: string; builder: Builder; current: string }) {
   const navigate = useNavigate();
   const count = (section: Section) => builder.problems.filter((problem) => sectionOf(problem.path)?.id === section.id).length;
-  const mark = (section: Section) => (count(section) > 0 ? `${section.label} (${count(section)} to mend)` : section.label);
+  const mark = (section: Section) => (count(section) > 0 ? `${section.label} (${count(section)} to fix)` : section.label);
   return (
     <>
       <Select
@@ -293,7 +293,7 @@ function Sections({ study, builder, current }: { study: string; builder: Builder
 
 function Wrong({ study, builder }: { study: string; builder: Builder }) {
   return (
-    <Alert color="red" variant="light" title="Not usable yet" role="status">
+    <Alert color="red" variant="light" title="Not ready yet" role="status">
       {builder.problems.slice(0, 12).map((problem) => (
         <Text size="sm" key={`${problem.path}${problem.message}`}>
           <Link to="/studies/$study/build" params={{ study }} search={{ section: sectionOf(problem.path)?.id ?? "study" }}>

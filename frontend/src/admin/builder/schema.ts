@@ -243,10 +243,11 @@ const NAMED: readonly Section[] = [
   {
     id: "factors",
     label: "Factors and clips",
-    about: "The factors and their levels make the cells; each cell has as many clips as exemplars. Order is that of tables and figures.",
+    about:
+      "The factors and their levels form the cells of the design. Each cell has as many clips as exemplars. Tables and figures keep this order.",
     keys: ["factors", "exemplars", "render"],
   },
-  { id: "trial", label: "Trial", about: "What one trial shows and asks.", keys: ["trial"] },
+  { id: "trial", label: "Trial", about: "What a trial shows and asks.", keys: ["trial"] },
   {
     id: "order",
     label: "Practice and order",
@@ -263,20 +264,20 @@ const NAMED: readonly Section[] = [
   {
     id: "screen",
     label: "Screen and playback",
-    about: "Size and surround of the clips, what the device must offer, and when a play counts.",
+    about: "Size and background of the clips, device requirements, and when a play counts.",
     keys: ["display", "playback", "session"],
   },
   {
     id: "rules",
     label: "Checks and exclusions",
-    about: "Attention and motion checks, who is screened out or warned while taking part, and whose data the analysis leaves out.",
+    about: "Attention and motion checks, screening, warnings, and exclusions from the analysis.",
     keys: ["attention", "evidence", "screening", "warnings", "exclusions"],
   },
-  { id: "analysis", label: "Analysis", about: "The analysis, fixed before the data.", keys: ["analysis"] },
+  { id: "analysis", label: "Analysis", about: "The analysis plan, fixed before data collection.", keys: ["analysis"] },
   {
     id: "dataset",
-    label: "Keeping and handing on",
-    about: "How long data of persons are kept, and who may use the data under which licence.",
+    label: "Retention and sharing",
+    about: "How long personal data are kept, and the license for shared data.",
     keys: ["retention", "dataset"],
   },
 ];
@@ -287,7 +288,7 @@ const further = Object.keys(EXPERIMENT.properties ?? {}).filter((key) => !placed
 /** Every key of the declaration stands on one of these pages; a key that none names is on the last. */
 export const SECTIONS: readonly Section[] = [
   ...NAMED,
-  ...(further.length > 0 ? [{ id: "further", label: "Further", about: "Further keys of the declaration.", keys: further }] : []),
+  ...(further.length > 0 ? [{ id: "further", label: "Further", about: "Other keys of the declaration.", keys: further }] : []),
 ];
 
 /** The page on which the key at the beginning of a path is edited. */

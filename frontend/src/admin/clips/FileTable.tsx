@@ -28,7 +28,7 @@ export function FileTable({ files, leftOut, upload }: Props) {
   return (
     <Stack gap="xs">
       {upload.notLeftOut !== null && (
-        <Alert color="red" variant="light" title="That did not work" role="alert">
+        <Alert color="red" variant="light" title="Something went wrong" role="alert">
           {upload.notLeftOut.message}
         </Alert>
       )}
@@ -76,7 +76,7 @@ function Rows({ files, frame, ...does }: RowProps & { files: Props["files"]; fra
       style={{ maxBlockSize: ROW_PX * MAX_ROWS }}
       tabIndex={0}
       role="region"
-      aria-label="What became of each file"
+      aria-label="Result for each file"
     >
       <ul style={{ blockSize: rows.getTotalSize() }}>
         {rows.getVirtualItems().map(({ key, index, start }) => {
@@ -101,7 +101,7 @@ function Rows({ files, frame, ...does }: RowProps & { files: Props["files"]; fra
 
 function OneFile({ file, onReplace, onLeaveOut }: RowProps & { file: Schemas["UploadedFile"] }) {
   const { state, source } = file;
-  const [colour, word] = state === "refused" ? ["red", "refused"] : source != null ? ["blue", "converted"] : ["gray", "as it came"];
+  const [colour, word] = state === "refused" ? ["red", "refused"] : source != null ? ["blue", "converted"] : ["gray", "unchanged"];
   return (
     <Group justify="space-between" align="start" wrap="nowrap" gap="xs">
       <div>

@@ -23,9 +23,9 @@ export function sizeRemark(files: readonly Sized[]): string | null {
   if (usual === undefined || first === undefined) return null;
   const named = odd.length === 1 ? `${first.name} is` : `${first.name} and ${odd.length - 1} more are`;
   const sizes = others.slice(0, 3).flatMap(([one]) => (one === undefined ? [] : sizeOf(one)));
-  const turned = odd.some((file) => isUpright(file) !== isUpright(usual)) ? " Is one turned the wrong way?" : "";
+  const turned = odd.some((file) => isUpright(file) !== isUpright(usual)) ? " Is one rotated incorrectly?" : "";
   const rest = most.length > odd.length ? "most" : "others";
-  return `${named} ${sizes.join(" or ")} pixels, ${rest} are ${sizeOf(usual)}.${turned} Participants see the size, too: is it meant?`;
+  return `${named} ${sizes.join(" or ")} pixels, ${rest} are ${sizeOf(usual)}.${turned} Participants will notice the size difference. Is this intended?`;
 }
 
 const MAX_PAIRS = 8;
@@ -61,7 +61,7 @@ export function UploadClips({ upload, label = "Clips", description, accept = `.z
           label={label}
           description={
             description ??
-            "Videos of any usual format, or a zip of them; a CSV of levels may be among them. Sound is left out. Choose them here, or drop them on this field."
+            "Videos in any common format, or a zip file. A CSV with the levels may be included. Sound is removed. Choose files, or drop them here."
           }
           placeholder="Choose files"
           accept={accept}
@@ -72,8 +72,11 @@ export function UploadClips({ upload, label = "Clips", description, accept = `.z
       </div>
       <Select
         label="Frame rate"
-        description="A video of variable rate gets the rate of most of its frames; frames are repeated or left out, never blended."
-        data={[{ value: "own", label: "Each clip's own" }, ...RATES.map((rate) => ({ value: rate, label: `${rate} frames per second` }))]}
+        description="A video with a variable rate gets its most common rate. Frames are repeated or dropped, never blended."
+        data={[
+          { value: "own", label: "Keep each clip's rate" },
+          ...RATES.map((rate) => ({ value: rate, label: `${rate} frames per second` })),
+        ]}
         value={upload.fps === null ? "own" : String(upload.fps)}
         allowDeselect={false}
         onChange={(value) => upload.askFps(value === null || value === "own" ? null : Number(value))}
@@ -117,9 +120,9 @@ function UploadProgress({ upload: { sending, broken, progress, goOn } }: { uploa
       )}
       {isLooking && (
         <Bar
-          words={`Looking into clips and converting: ${count(looked)} of ${count(progress.files)}`}
+          words={`Checking and converting clips: ${count(looked)} of ${count(progress.files)}`}
           share={looked / progress.files}
-          name="Clips looked into"
+          name="Clips checked"
         />
       )}
     </div>
@@ -153,23 +156,23 @@ function Received({ upload, received }: { upload: Upload; received: Schemas["Upl
           {!received.has_manifest && `: ${summary(files.length - refused - changed, changed, refused)}`}.
         </Text>
         <Button size="compact-sm" variant="default" onClick={upload.forget}>
-          Begin anew
+          Start over
         </Button>
       </Group>
       {refused > 0 && (
-        <Alert color="red" variant="light" title={`${count(refused)} of the files cannot be used`}>
-          <Text size="sm">Correct them as the table says, and choose the corrected file beside each: the others stay.</Text>
+        <Alert color="red" variant="light" title={`${count(refused)} files cannot be used`}>
+          <Text size="sm">Correct them as described in the table, then choose the corrected files there. The other files stay.</Text>
         </Alert>
       )}
       {upload.plays === null && (
         <Text size="sm" role="status">
-          Trying the clips in this browser…
+          Testing the clips in this browser…
         </Text>
       )}
       {upload.plays === "unknown" && (
         <Alert color="yellow">
-          This browser could not try whether participants will see these clips: it has no decoder for H.264 frame by frame, or the address
-          is not https. Open this page in a current Chrome, Edge, Firefox or Safari to try them.
+          This browser cannot test whether participants will see these clips: it has no H.264 decoder, or the address is not https. Open
+          this page in a current Chrome, Edge, Firefox or Safari.
         </Alert>
       )}
       {upload.isReplacing && (
@@ -211,7 +214,7 @@ function summary(shown: number, changed: number, refused: number): string {
   const parts = [
     shown > 0 && `${count(shown)} unchanged`,
     changed > 0 && `${count(changed)} converted`,
-    refused > 0 && `${count(refused)} that cannot be used`,
+    refused > 0 && `${count(refused)} unusable`,
   ];
   return parts.filter(Boolean).join(", ");
 }

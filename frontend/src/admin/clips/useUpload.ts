@@ -173,7 +173,7 @@ async function problemOf(bytes: ArrayBuffer, file: UploadedFile): Promise<string
 const shapeOf = (frames: unknown, width: unknown, height: unknown) =>
   `${String(frames)} frames of ${String(width)} x ${String(height)} pixels`;
 
-/** The upload with the clips that do not play among those that cannot be used. */
+/** The upload with the clips that do not play among those unusable. */
 function withTried(upload: Schemas["UploadOut"], tried: Tried | undefined): Schemas["UploadOut"] {
   if (!tried || tried.problems.size === 0) return upload;
   const files = upload.files.map((file): UploadedFile => {
@@ -195,7 +195,7 @@ export interface Upload {
   broken: Error | null;
   goOn: () => void;
   progress: Schemas["UploadProgress"] | null;
-  /** What became of each file, once none waits. */
+  /** Result for each file, once none waits. */
   received: Schemas["UploadOut"] | null;
   /** The same as it was last, while files are sent or looked into: what stands beside it need not go. */
   last: Schemas["UploadOut"] | null;
@@ -212,7 +212,7 @@ export interface Upload {
   /** Leave a file out of what is made of the upload, or put it back. */
   leaveOut: (name: string, leftOut: boolean) => void;
   notLeftOut: Error | null;
-  /** Begin anew; what was sent is deleted by the server within a day. */
+  /** Start over; what was sent is deleted by the server within a day. */
   forget: () => void;
 }
 

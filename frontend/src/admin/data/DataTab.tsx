@@ -51,9 +51,9 @@ function CapsuleCard({ study, origin, series }: { study: string; origin: DataOri
         Capsule
       </Title>
       <Text size="sm" mt={4} mb="md" maw={720}>
-        Everything that can be handed on, in one zip: de-identified data, clips, definition, sealed plan, report and software versions, as
-        Psych-DS and RO-Crate. Whoever has it makes the report again with <Code>analysis verify</Code>. Its report is of one data series:
-        the one chosen above, or that of the active version beside the data of every series.
+        Everything you can share, in one zip: de-identified data, clips, definition, sealed plan, report and software versions, as Psych-DS
+        and RO-Crate. Anyone can regenerate the report with <Code>analysis verify</Code>. Its report is of one data series: the one chosen
+        above, or that of the active version beside the data of every series.
       </Text>
       {mayMake && (
         <Group mb="sm">
@@ -64,7 +64,7 @@ function CapsuleCard({ study, origin, series }: { study: string; origin: DataOri
             onChange={(event) => setSensitivity(event.currentTarget.checked)}
           />
           <Button onClick={() => make.mutate(undefined)} loading={make.isPending} disabled={busy}>
-            Make a capsule
+            Create capsule
           </Button>
         </Group>
       )}
@@ -92,7 +92,7 @@ function One({ study, capsule, mayOpen, mayRemove }: OneProps) {
   const { id, status, progress, message, bytes, sha256 } = capsule;
   const remove = useChange(
     () => unwrap(api.DELETE("/api/admin/studies/{study}/capsules/{capsule}", { params: { path: { study, capsule: id } } })),
-    { touches: [["capsules", study]], done: "The capsule is deleted." },
+    { touches: [["capsules", study]], done: "Capsule deleted." },
   );
   return (
     <Group gap="sm">
@@ -123,7 +123,7 @@ function One({ study, capsule, mayOpen, mayRemove }: OneProps) {
         <ConfirmButton
           size="compact-sm"
           label="Delete"
-          question={`The capsule of ${when(capsule.created_at)} is deleted for good. The data stay, and another can be made of them.`}
+          question={`The capsule of ${when(capsule.created_at)} is deleted permanently. The data stay; you can create another capsule.`}
           confirm="Delete the capsule"
           onConfirm={() => remove.mutate(undefined)}
         />
@@ -142,7 +142,7 @@ function SealCard({ study }: { study: string }) {
         Sealed plan
       </Title>
       <Text size="sm" mt={4} mb="sm">
-        Design, exclusions, analysis plan and power, fixed with a hash before the first participant. Reports list each deviation from it.
+        Design, exclusions, analysis plan and power, fixed with a hash before the first participant. Reports list every deviation.
       </Text>
       <Answer of={seal}>
         {(record) => (record.sealed_at === null ? <Unsealed study={study} seal={record} /> : <Sealed study={study} seal={record} />)}
@@ -181,14 +181,14 @@ function Unsealed({ study, seal }: Props) {
   const [power, setPower] = useState<Record<string, unknown> | null>(null);
   const make = useChange(() => unwrap(api.POST("/api/admin/studies/{study}/seal", { params: { path: { study } }, body: { power } })), {
     touches: [["study", study, "seal"]],
-    done: "The plan is sealed.",
+    done: "Plan sealed.",
   });
-  if (seal.participants > 0) return <Text size="sm">Not sealed: begun already by {counted(seal.participants, "participant")}.</Text>;
+  if (seal.participants > 0) return <Text size="sm">Not sealed: already started by {counted(seal.participants, "participant")}.</Text>;
   if (!mayChange) return <Text size="sm">Not sealed yet.</Text>;
   return (
     <Group align="end">
       <FileInput
-        label="Power (may be left out)"
+        label="Power (optional)"
         description="JSON that analysis power --json wrote"
         accept=".json"
         clearable
@@ -197,7 +197,7 @@ function Unsealed({ study, seal }: Props) {
       />
       <ConfirmButton
         label="Seal the plan"
-        question="A seal is never replaced: what is declared in this version is what reports will be held against."
+        question="A seal is permanent. Reports are compared with what this version declares."
         confirm="Seal"
         harmless
         onConfirm={() => make.mutate(undefined)}
@@ -215,33 +215,33 @@ async function readObject(file: File | null): Promise<Record<string, unknown> | 
   } catch {
     // Said below, as for JSON of another kind.
   }
-  notify({ title: "That did not work", message: `${file.name}: expected the JSON of analysis power, got another file.`, color: "red" });
+  notify({ title: "Something went wrong", message: `${file.name}: expected the JSON of analysis power, got another file.`, color: "red" });
   return null;
 }
 
 const FILES: [file: string, title: string, words: string][] = [
-  ["ratings.csv", "Answers", "Tidy CSV: one row a play, one column a factor, with how each clip was shown."],
-  ["wide.csv", "Wide table", "One row a visit, as SPSS and JASP want it: a column a cell of the design, with its mean rating."],
-  ["runs.csv", "Runs", "One row a visit: times, version, seed, exclusions, and a column a question of the forms."],
-  ["ratings.sav", "Answers for SPSS", "One row a play, with labels of variables and levels."],
-  ["wide.sav", "Wide table for SPSS", "One row a visit, with labels of variables and of the answers to forms."],
-  ["ratings.parquet", "Answers as Parquet", "One row a play, with types and levels: for pandas, Polars, Arrow and DuckDB."],
-  ["analysis.R", "Script for R", "Analyses the answers with afex, emmeans and lme4. Save it beside the answers."],
-  ["analysis.py", "Script for Python", "Analyses the answers with pandas and statsmodels. Save it beside the answers."],
+  ["ratings.csv", "Answers", "Tidy CSV: one row per presentation, one column per factor, with playback details."],
+  ["wide.csv", "Wide table", "One row per participant and one column per cell with its mean rating, as SPSS and JASP expect."],
+  ["runs.csv", "Runs", "One row per participant: times, version, seed, exclusions, and one column per form question."],
+  ["ratings.sav", "Answers for SPSS", "One row per presentation, with labels of variables and levels."],
+  ["wide.sav", "Wide table for SPSS", "One row per participant, with labels of variables and form answers."],
+  ["ratings.parquet", "Answers as Parquet", "One row per presentation, with types and levels, for pandas, Polars, Arrow and DuckDB."],
+  ["analysis.R", "Script for R", "Analyses the answers with afex, emmeans and lme4. Save it next to the answers."],
+  ["analysis.py", "Script for Python", "Analyses the answers with pandas and statsmodels. Save it next to the answers."],
   [
     "psych-ds.zip",
     "Psych-DS dataset",
     "De-identified data, metadata, codebook, scripts and definition in the community's standard folder.",
   ],
   ["codebook.md", "Codebook", "What every column means, with type and unit."],
-  ["raw.ndjson", "Raw data", "Everything stored, one JSON object a run: every drawn frame and its time."],
+  ["raw.ndjson", "Raw data", "Everything stored, one JSON object per run, with every drawn frame and its time."],
 ];
 
 /** For owners alone; each download is in the audit log. */
 const IDENTITIES: (typeof FILES)[number] = [
   "identities.csv",
   "Identities",
-  "Recruiters’ ids beside the pseudonyms, for payment. Kept apart from all data, and noted in the audit log.",
+  "Recruiter ids with their pseudonyms, for payment. Stored separately; each download is in the audit log.",
 ];
 
 type ExportOrigin = DataOrigin | "all";
@@ -277,8 +277,8 @@ export function DataTab() {
         <SegmentedControl aria-label="Data of" value={origin} onChange={setOrigin} data={WHOSE} />
         <SeriesChooser every={detail?.series} chosen={series} choose={setSeries} without="every data series" />
         <Text size="sm">
-          {origin === "all" ? "Data of all origins are told apart by the column run_origin. " : ""}
-          {series === null && (detail?.series.length ?? 1) > 1 ? "The data series are told apart by the column data_series. " : ""}
+          {origin === "all" ? "The column run_origin identifies the origin. " : ""}
+          {series === null && (detail?.series.length ?? 1) > 1 ? "The column data_series identifies the data series. " : ""}
           Excluded runs are in the files, marked in their column; previews and erased people are not.
         </Text>
       </Group>
@@ -286,7 +286,7 @@ export function DataTab() {
         checked={excel}
         onChange={(event) => setExcel(event.currentTarget.checked)}
         label="For Excel"
-        description="CSV files begin with a mark that shows Excel how letters are encoded. In every CSV file, an apostrophe before = + - @ keeps a text from running as a formula; analysis run removes it again."
+        description="CSV files start with a byte order mark so that Excel reads special characters correctly. In every CSV file, an apostrophe before = + - @ keeps texts from running as formulas; analysis run removes it."
       />
       <Switch
         checked={oldOrder}
@@ -319,7 +319,7 @@ export function DataTab() {
         ))}
       </SimpleGrid>
       <Text size="sm">
-        The same on the server's command line, and the analysis; the{" "}
+        The same on the command line, and the analysis; the{" "}
         <Anchor underline="always" href={`/api/admin/studies/${study}/versions/${version}`} download={`${study}.toml`}>
           definition
         </Anchor>{" "}

@@ -18,8 +18,8 @@ export function FiguresPage() {
     <Stack>
       <Title order={1}>Blinks</Title>
       <Text maw={720}>
-        The blinks that clips are made from: recorded ones, and the PCA model fitted to them; and the engine that makes whole performances.
-        Closure is 0 with the eye open and 1 with it closed, at 300 samples a second.
+        The recorded blinks that clips use, the PCA model fitted to them, and the engine for whole performances. Closure is 0 for an open
+        eye and 1 for a closed eye, at 300 samples per second.
       </Text>
       <Answer of={library}>
         {(data) => (

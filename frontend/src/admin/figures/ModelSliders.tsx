@@ -103,14 +103,14 @@ export function ModelSliders({ library }: { library: Schemas["BlinkLibrary"] }) 
               Mean blink
             </Button>
             <Button variant="default" onClick={() => setDeviations(model.coefficient_sd.map(() => 2 * Math.random() - 1))}>
-              A random blink
+              Random blink
             </Button>
             <Button variant="default" onClick={() => downloadText("model-blink.csv", curveCsv(closure))}>
               Download this curve
             </Button>
           </Group>
           <Text size="sm" c="dimmed">
-            The model draws coefficients within one standard deviation, the marks on the sliders.
+            The model samples coefficients within one standard deviation (the marks on the sliders).
           </Text>
         </Stack>
       </Card>
@@ -122,7 +122,7 @@ export function ModelSliders({ library }: { library: Schemas["BlinkLibrary"] }) 
         </Text>
         {!valid && (
           <Alert color="yellow" mt="sm">
-            The lids would overlap: the model drops such a blink.
+            The lids would overlap; the model rejects such blinks.
           </Alert>
         )}
       </Card>

@@ -11,7 +11,7 @@ export function Playground() {
   return (
     <>
       <Text maw={720} mb="md">
-        Blinks as they come with these settings, beside the uniform timer that most programs have. The engine is the one of{" "}
+        Blinks with these settings, compared with a uniform timer as in most programs. It is the same engine as{" "}
         <code>stimuli performance</code>, of the Blender add-on and of the package for the web: the same seed gives the same blinks there.
       </Text>
       <WithStrips>{(strips) => <Mounted strips={strips} />}</WithStrips>

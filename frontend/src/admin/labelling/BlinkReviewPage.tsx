@@ -35,7 +35,7 @@ function BlinkCard({ review, blink }: { review: BlinkReview; blink: Blink }) {
           <Group align="end" gap="xs">
             <TextInput
               id="reject-reason"
-              label="Reason to reject it"
+              label="Reason for rejection"
               placeholder="talking"
               value={reason}
               onChange={(event) => setReason(event.currentTarget.value)}
@@ -123,7 +123,7 @@ export function BlinkReviewPage() {
         </Button>
       </Group>
       {review.problem !== null && (
-        <Alert color="red" variant="light" role="alert" title="That does not fit">
+        <Alert color="red" variant="light" role="alert" title="That does not match">
           {review.problem}
         </Alert>
       )}

@@ -15,13 +15,13 @@ type Labelling = ReturnType<typeof useLabelling>;
 
 const STARTS = {
   template:
-    "A shape to begin with: drag each point to its place. Shift and drag moves the eye, Alt and drag of a corner turns and scales it.",
-  eyes: "Laid on the eyes found by their blinks: drag each point to its place. Shift and drag moves the eye, Alt and drag of a corner turns and scales it.",
-  nearest: `The points of the nearest labelled frame. From ${FRAMES_BEFORE_PROPOSALS} accepted frames on, they are proposed.`,
-  proposal: "Proposed from the labelled frames: correct what is off, then accept.",
+    "This is a starting shape. Drag each point into place. Shift and drag moves the eye, Alt and drag of a corner turns and scales it.",
+  eyes: "Placed on the detected eyes. Drag each point into place. Shift and drag moves the eye, Alt and drag of a corner turns and scales it.",
+  nearest: `Points of the nearest labeled frame. After ${FRAMES_BEFORE_PROPOSALS} accepted frames, points are proposed.`,
+  proposal: "Proposed from the labeled frames. Correct errors, then accept.",
 } as const;
 
-const WAITING = "Not accepted yet: correct what is off, then accept. Only accepted frames are saved.";
+const WAITING = "Not accepted yet. Correct errors, then accept. Only accepted frames are saved.";
 
 export function LabellingPage() {
   const work = useLabelling();
@@ -31,8 +31,8 @@ export function LabellingPage() {
     <Stack>
       <Title order={1}>Label video</Title>
       <Text maw={720}>
-        Points round the eyes on about 20 frames, from which <code>stimuli track</code> learns to follow the lids. The video is opened in
-        this page only: nothing is uploaded.
+        Mark points around the eyes in about 20 frames, from which <code>stimuli track</code> learns to follow the lids. The video is opened
+        in this page only: nothing is uploaded.
       </Text>
       <Group>
         <OpenFile label="Open video" accept="video/*,.mp4,.mov,.webm,.mkv" primary={work.video === null} onOpen={work.open} />
@@ -125,7 +125,7 @@ function Frame({ work }: { work: Labelling }) {
           {frame !== undefined && (
             <ConfirmButton
               label="Remove"
-              question={`Remove the points of frame ${work.current}? Undo brings them back.`}
+              question={`Remove the points of frame ${work.current}? Undo restores them.`}
               confirm="Remove"
               onConfirm={work.remove}
             />
@@ -144,7 +144,7 @@ function Frame({ work }: { work: Labelling }) {
         {work.startedFrom === null
           ? frame?.accepted === false
             ? WAITING
-            : "The points of this frame are yours."
+            : "You placed the points of this frame."
           : STARTS[work.startedFrom]}
       </Text>
       {work.picture !== null && work.shape !== null && (
@@ -167,7 +167,7 @@ function Frames({ work }: { work: Labelling }) {
     <Card withBorder>
       <Text mb="xs">
         {work.acceptedCount} of {work.chosen.length} frames accepted.{" "}
-        {missing > 0 && `stimuli needs at least ${FEWEST_FRAMES}, about 20 are good. `}
+        {missing > 0 && `stimuli needs at least ${FEWEST_FRAMES}; about 20 is best. `}
         {work.unsaved && "There is unsaved work."}
       </Text>
       <Group gap={6} role="group" aria-label="Frames to label">

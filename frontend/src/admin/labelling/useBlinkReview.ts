@@ -146,8 +146,8 @@ function firstWindow(last: number, fps: number): Window {
 
 /** What is still to be opened before anything is drawn; null where nothing is, or where nothing is open at all. */
 function nextStep(series: Table | null, table: BlinkTable | null): string | null {
-  if (series !== null && table === null) return `${series.name} is open. Next, open its blinks: the CSV that “stimuli blinks” wrote of it.`;
-  if (series === null && table !== null) return "The blinks are open. Next, open the series or track that they were found in.";
+  if (series !== null && table === null) return `${series.name} is open. Next, open its blinks: the CSV from “stimuli blinks”.`;
+  if (series === null && table !== null) return "The blinks are open. Next, open their series or track.";
   return null;
 }
 

@@ -36,7 +36,7 @@ export function FailingClips({ study, all = false }: { study: string; all?: bool
     <Alert
       role={all ? "status" : "alert"}
       color={all ? "yellow" : "red"}
-      title={all ? `${which} could not be shown to some participants` : `${which} cannot be shown to participants`}
+      title={all ? `${which} failed for some participants` : `${which} cannot be shown to participants`}
     >
       <List size="sm">
         {clips.slice(0, MAX_LISTED).map((clip) => (

@@ -13,7 +13,7 @@ function Funnel({ steps }: { steps: Schemas["FunnelStep"][] }) {
     <Card withBorder>
       <Stack gap={4}>
         <Title order={2} size="h4">
-          How far people come
+          Progress
         </Title>
         {steps.map((step) => (
           <Group key={step.stage} gap="sm" wrap="nowrap">
@@ -50,7 +50,7 @@ function Groups({ groups }: { groups: Schemas["GroupCount"][] }) {
               </Text>
               <Progress.Root size="lg" flex={1}>
                 <Progress.Section value={(100 * complete) / all} aria-label={`${complete} complete in ${name}`} />
-                <Progress.Section value={(100 * active) / all} color="gray" aria-label={`${active} under way in ${name}`} />
+                <Progress.Section value={(100 * active) / all} color="gray" aria-label={`${active} in progress in ${name}`} />
               </Progress.Root>
               <Text size="sm" miw={150} ta="end" className="number">
                 {complete} complete, {active} under way, {of}
@@ -115,15 +115,14 @@ function Quality({ runs, of }: { runs: Schemas["MonitoredRun"][]; of: number }) 
         ))}
         <Text size="sm" c="dimmed" mt={4}>
           {doubtful.length === 0
-            ? "No run has more than a tenth of its clips flagged or failed."
-            : `${doubtful.length} ${doubtful.length === 1 ? "run has" : "runs have"} more than a tenth of the clips flagged or failed: ${doubtful
+            ? "No run has more than 10% of its clips flagged or failed."
+            : `${doubtful.length} ${doubtful.length === 1 ? "run has" : "runs have"} more than 10% of the clips flagged or failed: ${doubtful
                 .slice(0, 3)
                 .map((run) => run.participant)
                 .join(", ")}${doubtful.length > 3 ? " …" : ""}`}
         </Text>
         <Text size="sm" c="dimmed">
-          Flagged or failed: pictures of the clip were left out or came late, or the page was left, zoomed or loaded anew meanwhile. A
-          failed clip is shown again.
+          Flagged or failed: frames were missing or late, or the page was left, zoomed or reloaded. Failed clips are repeated.
         </Text>
       </Stack>
     </Card>
@@ -304,7 +303,7 @@ export function MonitorTab() {
   const { snapshot, connected } = useMonitor(study, chosen);
   const interrupted = connected ? null : (
     <Alert color="yellow" role="status">
-      The connection is interrupted; trying again.
+      Connection lost; reconnecting.
     </Alert>
   );
   if (snapshot === null)
@@ -335,7 +334,7 @@ export function MonitorTab() {
         ]}
       />
       {snapshot.runs.length === 0 ? (
-        <Text c="dimmed">No run of origin {snapshot.origin} yet. Whoever opens a link appears here within two seconds.</Text>
+        <Text c="dimmed">No runs of origin {snapshot.origin} yet. Whoever opens a link appears here within two seconds.</Text>
       ) : (
         <>
           <SimpleGrid cols={{ base: 1, md: 2 }}>

@@ -59,11 +59,16 @@ export function ParticipantsTab() {
             onChange={(word) => setShow(SHOW.find(({ value }) => value === word)?.value ?? "everybody")}
             w={160}
           />
-          <Switch label="Simulated people too" checked={simulated} onChange={(event) => setSimulated(event.currentTarget.checked)} mb={8} />
+          <Switch
+            label="Include simulated participants"
+            checked={simulated}
+            onChange={(event) => setSimulated(event.currentTarget.checked)}
+            mb={8}
+          />
         </Group>
       )}
       <PagedAnswer of={runs} shown={rows.length} total={total} more="Earlier participants">
-        <RunsTable study={study} rows={rows} empty={chosen ? "Nobody fits." : "Nobody has begun yet."} />
+        <RunsTable study={study} rows={rows} empty={chosen ? "No matches." : "No one has started yet."} />
       </PagedAnswer>
     </Stack>
   );
@@ -101,7 +106,7 @@ function ParticipantCell({ study, run }: { study: string; run: Run }) {
         </Badge>
       )}
       {run.refused > 0 && (
-        <Badge color="orange.9" size="sm" title="Answers or views that could not be stored. Open the participant to read why.">
+        <Badge color="orange.9" size="sm" title="Answers or views that could not be stored. Open the participant to see why.">
           {run.refused} not stored
         </Badge>
       )}

@@ -48,7 +48,7 @@ function Identity({ study, run }: IdentityProps) {
             </Text>
           ))}
           <Text size="sm" c="dimmed">
-            The audit log notes that you have looked.
+            This access is recorded in the audit log.
           </Text>
         </Stack>
       )}
@@ -71,17 +71,17 @@ function RunActions({ study, summary, mayErase }: ActionsProps) {
   ];
   const include = useChange(() => unwrap(api.DELETE("/api/admin/studies/{study}/runs/{run}/exclusion", path)), {
     touches,
-    done: "The run counts again.",
+    done: "Run included again.",
   });
   const exclude = useChange(
     (reason: string) => unwrap(api.PUT("/api/admin/studies/{study}/runs/{run}/exclusion", { ...path, body: { reason } })),
-    { touches, done: "The run is excluded." },
+    { touches, done: "Run excluded." },
   );
   const erase = useChange(
     (confirm: string) => unwrap(api.POST("/api/admin/studies/{study}/runs/{run}/erase", { ...path, body: { confirm } })),
     {
       touches,
-      done: "The person's data are erased, in every visit known to be theirs. Reports made before still hold them: make those again.",
+      done: "The person's data were erased in all of their known visits. Existing reports still contain them; create those again.",
     },
   );
   return (
@@ -93,7 +93,7 @@ function RunActions({ study, summary, mayErase }: ActionsProps) {
       ) : (
         <Ask
           label="Exclude"
-          words="The data stay, marked as excluded, with your reason beside them. You can undo this."
+          words="The data stay, marked as excluded with your reason. You can undo this."
           field="Reason"
           ready={(text) => text.trim().length >= 3}
           onDone={(reason) => exclude.mutate(reason)}
@@ -102,7 +102,7 @@ function RunActions({ study, summary, mayErase }: ActionsProps) {
       {mayErase && (
         <Ask
           label="Erase this person's data"
-          words={`Ratings, questionnaires and events of this person are deleted for good. To go on, type ${summary.run}.`}
+          words={`Ratings, questionnaires and events of this person are deleted permanently. To continue, type ${summary.run}.`}
           field="Identifier of the run"
           ready={(text) => text === summary.run}
           onDone={(confirm) => erase.mutate(confirm)}
@@ -255,7 +255,7 @@ function calibrationFacts(one: Schemas["TimelineCalibration"]): Record<string, s
     measurements: one.repeats,
     "spread, %": one.spread_percent,
     "ruler says": one.ruler_check && words(one.ruler_check),
-    "off at a later look, %": one.recheck_percent,
+    "difference at recheck, %": one.recheck_percent,
     "distance, mm": one.viewing_distance_mm,
     "distance by": one.distance_method && words(one.distance_method),
     "distance spread, mm": one.distance_spread_mm,
@@ -306,7 +306,7 @@ export function TimelinePage() {
                       component="a"
                       variant="default"
                       href={`/api/admin/studies/${study}/runs/${run}/subject-access`}
-                      title="Everything stored of this person, as JSON"
+                      title="Everything stored about this person, as JSON"
                       download
                     >
                       Subject access
@@ -355,7 +355,7 @@ function RefusedRecords({ events }: { events: Schemas["TimelineEvent"][] }) {
       <Title order={3} size="h5">
         Not stored: {refused.length}
       </Title>
-      <Text size="sm">The participant went on without these records. They count as given; the exports do not contain them.</Text>
+      <Text size="sm">The participant continued without these records. They count as answered; the exports do not contain them.</Text>
       {refused.map(({ received_at, data }, index) => (
         <Text size="sm" key={`${received_at}${String(index)}`} className="wrap-anywhere">
           {when(received_at)}: {data["trial_index"] === undefined ? plain(data["path"]) : `trial ${plain(data["trial_index"])}`},{" "}

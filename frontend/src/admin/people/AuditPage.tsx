@@ -20,7 +20,7 @@ export function AuditPage() {
       <div>
         <Title order={1}>Audit log</Title>
         <Text size="sm" c="dimmed">
-          Every change that an account or the command line made, latest first.
+          Every change by an account or the command line, latest first.
         </Text>
       </div>
       <PagedAnswer of={log} shown={rows.length} more="Earlier entries">

@@ -15,7 +15,7 @@ export function BackupsPage() {
       <div>
         <Title order={1}>Backups</Title>
         <Text size="sm" c="dimmed">
-          Each week the server brings the newest one back beside its data and examines it.
+          Every week the server restores the newest backup to a temporary copy and checks it.
         </Text>
       </div>
       <Answer of={backups}>{(data) => (data.watched ? <Watched backups={data} /> : <Unwatched />)}</Answer>
@@ -26,7 +26,7 @@ export function BackupsPage() {
 function Unwatched() {
   return (
     <Alert color="yellow" title="Not watched">
-      The server does not know where its backups are. Set PALPEBRA_BACKUP_FOLDER to their folder or bucket, and run{" "}
+      The server does not know where its backups are. Set PALPEBRA_BACKUP_FOLDER to their folder or bucket and run{" "}
       <code>server backup</code> each day.
     </Alert>
   );
@@ -44,7 +44,7 @@ function Watched({ backups }: { backups: Backups }) {
 function Newest({ backups }: { backups: Backups }) {
   if (backups.problem !== "") {
     return (
-      <Alert color="red" title="The backups cannot be looked at">
+      <Alert color="red" title="The backups cannot be read">
         {backups.problem}
       </Alert>
     );
@@ -55,8 +55,8 @@ function Newest({ backups }: { backups: Backups }) {
         Newest backup
       </Title>
       {backups.old && (
-        <Alert color="red" mb="sm" title={backups.newest === null ? "There is none" : "It is more than two days old"}>
-          See why none is made: <code>server backup</code> should run each day.
+        <Alert color="red" mb="sm" title={backups.newest === null ? "No backup" : "It is more than two days old"}>
+          Check why none was created: <code>server backup</code> should run each day.
         </Alert>
       )}
       <Text size="sm" className="wrap-anywhere">
@@ -86,7 +86,7 @@ function Drill({ backups: { drill, drilled_elsewhere } }: { backups: Backups }) 
           {(drill.seconds ?? 0).toFixed(0)} s.
         </Text>
       ) : (
-        <Alert color="red" title={`${drill.backup} did not come back on ${when(drill.at)}`}>
+        <Alert color="red" title={`${drill.backup} could not be restored on ${when(drill.at)}`}>
           {drill.said}
         </Alert>
       )}

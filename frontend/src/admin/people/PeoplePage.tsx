@@ -16,7 +16,7 @@ function Invitations() {
     <Card withBorder>
       <Stack>
         <Title order={2} size="h4">
-          Invite somebody
+          Invite someone
         </Title>
         <Invite />
         <OpenInvitations />
@@ -55,11 +55,11 @@ function Invite() {
           />
         )}
         <Button onClick={() => invite.mutate(undefined)} loading={invite.isPending}>
-          Make a one-time link
+          Create one-time link
         </Button>
       </Group>
       {url !== null && (
-        <Alert title="Send this link; it works once, for a week, and is shown only now" color="yellow">
+        <Alert title="Send this link. It works once, for one week, and is shown only now." color="yellow">
           <Code block className="wrap-anywhere" mb="xs">
             {url}
           </Code>
@@ -80,7 +80,7 @@ function OpenInvitations() {
   const open = useQuery({ queryKey: ["invitations"], queryFn: () => unwrap(api.GET("/api/admin/invitations")) });
   const withdraw = useChange(
     (invitation_id: number) => unwrap(api.DELETE("/api/admin/invitations/{invitation_id}", { params: { path: { invitation_id } } })),
-    { touches: [["invitations"]], done: "The link is withdrawn." },
+    { touches: [["invitations"]], done: "Link withdrawn." },
   );
   return (
     <Answer of={open}>
@@ -88,7 +88,7 @@ function OpenInvitations() {
         rows.length === 0 ? null : (
           <>
             <Text size="sm" c="dimmed">
-              Links that have not been used yet
+              Unused links
             </Text>
             <DataTable
               rows={rows}
@@ -131,8 +131,8 @@ export function PeoplePage() {
       <div>
         <Title order={1}>People</Title>
         <Text size="sm" c="dimmed">
-          The role on this server: owners manage accounts and workspaces, experimenters may make workspaces. What somebody may do with
-          studies is set under{" "}
+          The role on this server: owners manage accounts and workspaces, experimenters can create workspaces. Rights on studies are set
+          under{" "}
           <Anchor component={Link} to="/workspaces" underline="always">
             Workspaces
           </Anchor>
@@ -165,7 +165,7 @@ export function PeoplePage() {
                 title: "Active",
                 cell: (row) => (
                   <Switch
-                    aria-label={`${row.name} may sign in`}
+                    aria-label={`${row.name} can sign in`}
                     checked={!row.disabled}
                     onChange={(event) => change.mutate({ id: row.id, disabled: !event.currentTarget.checked })}
                   />

@@ -26,7 +26,7 @@ function Members({ workspace }: { workspace: string }) {
   const remove = useChange(
     (account: string) =>
       unwrap(api.DELETE("/api/admin/workspaces/{workspace}/members/{account}", { params: { path: { workspace, account } } })),
-    { touches, done: "Taken out." },
+    { touches, done: "Member removed." },
   );
   return (
     <>
@@ -35,7 +35,7 @@ function Members({ workspace }: { workspace: string }) {
           <DataTable
             rows={rows}
             rowKey={(row) => row.account}
-            empty="Nobody yet."
+            empty="No members yet."
             columns={[
               { title: "Name", cell: (row) => row.account },
               {
@@ -63,7 +63,7 @@ function Members({ workspace }: { workspace: string }) {
                   <ConfirmButton
                     size="xs"
                     label="Take out"
-                    question={`${row.account} will no longer see the studies of this workspace; rights on single studies stay.`}
+                    question={`${row.account} will no longer see the studies of this workspace. Rights on single studies stay.`}
                     confirm="Take out"
                     onConfirm={() => remove.mutate(row.account)}
                   />
@@ -84,7 +84,7 @@ function TakeIn({ workspace, onAdd }: { workspace: string; onAdd: (account: stri
   return (
     <Group align="end">
       <TextInput
-        label="Take in the account"
+        label="Add member"
         description="its name, exactly"
         value={account}
         onChange={(event) => setAccount(event.currentTarget.value)}
@@ -105,7 +105,7 @@ function TakeIn({ workspace, onAdd }: { workspace: string; onAdd: (account: stri
           setAccount("");
         }}
       >
-        Take in
+        Add
       </Button>
     </Group>
   );
@@ -122,14 +122,14 @@ export function WorkspacesPage() {
       <div>
         <Title order={1}>Workspaces</Title>
         <Text size="sm" c="dimmed">
-          Studies belong to a workspace and are open to its people alone: viewers look and download, experimenters make and run studies,
-          owners see who participants are to the recruiter and decide who belongs. Single studies are shared under their settings.
+          A study belongs to a workspace and is visible to its members only. Viewers see and download, experimenters create and run studies,
+          owners see recruiter ids and manage members. To share a single study, use its settings.
         </Text>
       </div>
       <Answer of={useQuery(workspacesQuery)}>
         {(rows) => (
           <>
-            {rows.length === 0 && <Alert color="yellow">You belong to no workspace yet. Ask an owner of one to take you in.</Alert>}
+            {rows.length === 0 && <Alert color="yellow">You are not a member of any workspace yet. Ask an owner to add you.</Alert>}
             {rows.map((row) => (
               <OneWorkspace key={row.name} workspace={row} manages={manages} />
             ))}
@@ -175,7 +175,7 @@ function Settings({ workspace, mayDelete }: { workspace: Workspace; mayDelete: b
   });
   const remove = useChange(() => unwrap(api.DELETE("/api/admin/workspaces/{workspace}", path)), {
     touches: TOUCHED,
-    done: "The workspace is deleted.",
+    done: "Workspace deleted.",
   });
   const { second_factor_required } = workspace;
   return (
@@ -189,14 +189,14 @@ function Settings({ workspace, mayDelete }: { workspace: Workspace; mayDelete: b
         Save
       </Button>
       <Switch
-        label="Ask for a second factor"
+        label="Require a second factor"
         checked={second_factor_required}
         onChange={(event) => change.mutate({ title: workspace.title, second_factor_required: event.currentTarget.checked })}
       />
       {mayDelete && workspace.studies === 0 && workspace.name !== "default" && (
         <ConfirmButton
           label="Delete"
-          question="The workspace is deleted; accounts stay."
+          question="The workspace is deleted; the accounts stay."
           confirm="Delete"
           onConfirm={() => remove.mutate(undefined)}
         />
@@ -215,7 +215,7 @@ function NewWorkspace() {
     .slice(0, 60);
   const create = useChange(() => unwrap(api.POST("/api/admin/workspaces", { body: { name, title } })), {
     touches: TOUCHED,
-    done: "The workspace is made; you own it.",
+    done: "Workspace created; you are its owner.",
     then: () => setTitle(""),
   });
   return (
@@ -232,7 +232,7 @@ function NewWorkspace() {
           onChange={(event) => setTitle(event.currentTarget.value)}
         />
         <Button disabled={name === ""} loading={create.isPending} onClick={() => create.mutate(undefined)}>
-          Make it
+          Create
         </Button>
       </Group>
     </Card>

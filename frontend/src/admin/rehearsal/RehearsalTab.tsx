@@ -57,7 +57,7 @@ function Summary({ result }: Props) {
 
 function Report({ result, address }: Props & { address: string }) {
   return (
-    <Part title="The report they would give">
+    <Part title="Resulting report">
       {result.report_problem !== "" && <Text>No report: {result.report_problem}</Text>}
       <Group gap="sm">
         {result.report.map((file) => (
@@ -74,7 +74,7 @@ function PowerOfPlan({ result: { power, power_problem } }: Props) {
   return (
     <Part title="Power of the plan">
       {power === null ? (
-        <Text>Not reckoned: {power_problem}.</Text>
+        <Text>Not computed: {power_problem}.</Text>
       ) : (
         <>
           <Text mb="sm">Assumed: {power.assumed}. Only you know whether that fits; this is the command to change:</Text>
@@ -186,12 +186,11 @@ export function RehearsalTab() {
     <Stack>
       <Card withBorder>
         <Title order={2} size="h4">
-          Dress rehearsal
+          Rehearsal
         </Title>
         <Text size="sm" mt={4} mb="md" maw={720}>
-          Simulated people go through the whole study in a database of its own, which is thrown away: in which order they see what, how long
-          it takes, the columns that you will get, the report that they would give, and the power of the plan. Nothing of it meets the data
-          of people. Their answers say nothing about people.
+          Simulated participants complete the whole study in a temporary database that is deleted afterwards. You see the order, the time,
+          the columns, the report and the power of the plan. Your data are untouched. Simulated answers say nothing about people.
         </Text>
         {mayBegin && (
           <Group align="end">

@@ -120,7 +120,7 @@ export function Player({ replay, trial }: Props) {
   const [number, setNumber] = useState(trial.plays[0]?.play ?? 1);
   const { pictures, problem, isReady } = usePictures(trial.clips);
   const play = trial.plays.find((one) => one.play === number);
-  if (play === undefined) return <Text>This trial was not reached: nothing was shown and nothing answered.</Text>;
+  if (play === undefined) return <Text>This trial was not reached.</Text>;
   return (
     <Stack>
       {trial.plays.length > 1 && (
@@ -183,12 +183,12 @@ function OnePlay({ replay, trial, play, pictures, isReady }: OnePlayProps) {
       ) : hasLog ? (
         <Stage arranged={arranged} display={replay.display} pictures={pictures} play={play} shown={shown} at_ms={at_ms} />
       ) : (
-        <Text>No frame of this play was logged{play.method === "none" ? ": it was simulated, or nothing was shown" : ""}.</Text>
+        <Text>No frames of this play were logged{play.method === "none" ? ": it was simulated, or nothing was shown" : ""}.</Text>
       )}
       {hasLog && (
         <>
           <Group gap="xs">
-            <Button size="xs" variant="default" onClick={back} aria-label="Frame before">
+            <Button size="xs" variant="default" onClick={back} aria-label="Previous frame">
               ◂ Frame
             </Button>
             <Button size="xs" onClick={toggle} disabled={!isReady} w={72}>
@@ -217,8 +217,8 @@ function OnePlay({ replay, trial, play, pictures, isReady }: OnePlayProps) {
           </Group>
           <Timeline played={played} time={time} marks={marks} trace={trace} at_ms={at_ms} onSeek={seek} />
           <Text size="xs" c="dimmed">
-            Blue: a frame as long as it stood. Red: it stood longer than it should. Yellow line: frames before it were never drawn. Times
-            count from the start key; a wait of more than 1.5 s is drawn as 1.5 s.
+            Blue: a frame for as long as it was shown. Red: shown too long. Yellow line: frames before it were never drawn. Times count from
+            the start key; waits above 1.5 s are drawn as 1.5 s.
           </Text>
         </>
       )}

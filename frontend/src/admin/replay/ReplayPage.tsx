@@ -46,7 +46,7 @@ function Trials({ study, replay }: { study: string; replay: Replay }) {
   // A key that is held down would load every trial on its way.
   const goOnce = (to: number) => (event: KeyboardEvent) => event.repeat || go(to);
   useShortcuts({ arrowup: goOnce(row - 1), arrowdown: goOnce(row + 1) });
-  if (replay.erased) return <Text>This person’s data were erased: there is nothing to play back.</Text>;
+  if (replay.erased) return <Text>This person’s data were erased; nothing can be replayed.</Text>;
   if (trial === undefined) return <Text>This run has no trials yet.</Text>;
   return (
     <Stack>
@@ -55,7 +55,7 @@ function Trials({ study, replay }: { study: string; replay: Replay }) {
       </Title>
       <Group align="end" gap="xs">
         <Button variant="default" onClick={() => go(row - 1)} disabled={row === 0}>
-          Trial before
+          Previous trial
         </Button>
         <Select
           label="Trial"

@@ -99,7 +99,7 @@ function LaneRow({ role, lanes, x }: { role: string; lanes: readonly Lane[]; x: 
   const path = (some: readonly Stand[]): string =>
     some.map(({ from_ms, to_ms }) => `M${x(from_ms)} 2H${x(to_ms)}V${HEIGHT - 2}H${x(from_ms)}Z`).join("");
   return (
-    <Row label={`${role === "shown" ? "clip" : role}: ${stands.length} frames stood, ${held.length} too long`}>
+    <Row label={`${role === "shown" ? "clip" : role}: ${stands.length} frames shown, ${held.length} too long`}>
       <path d={path(stands.filter((_, row) => row % 2 === 0))} className="replay-even" />
       <path d={path(stands.filter((_, row) => row % 2 === 1))} className="replay-odd" />
       <path d={path(held)} className="replay-held" />
@@ -144,7 +144,7 @@ export function ViewFacts({ play, played, events }: { play: Play; played: Played
                 <Table.Th>View</Table.Th>
                 <Table.Th>Clip</Table.Th>
                 <Table.Th>Never drawn</Table.Th>
-                <Table.Th>Stood longest</Table.Th>
+                <Table.Th>Shown longest</Table.Th>
                 <Table.Th>Disturbed by</Table.Th>
               </Table.Tr>
             </Table.Thead>
@@ -154,7 +154,7 @@ export function ViewFacts({ play, played, events }: { play: Play; played: Played
       )}
       {played.scenes.some(({ view }) => view.from_answer) && (
         <Text size="sm" c="dimmed">
-          This run is older than the ledger of views: what was shown is rebuilt from the answer’s own log.
+          This run is older than the record of views. What was shown is reconstructed from the answer’s log.
         </Text>
       )}
       {events.length > 0 && (

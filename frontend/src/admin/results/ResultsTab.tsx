@@ -93,7 +93,7 @@ function MethodsCard({ study, origin, series, every, choose }: MethodsProps) {
             <Text>{data.paragraph}</Text>
             <Elsewhere every={every} shown={data.series} origin={origin} choose={choose} />
             <Text size="sm" c="dimmed">
-              What each declared rule left out stands in the methods files of a report.
+              The methods files of a report list what each rule excluded.
             </Text>
             {shown && (
               <Code block tabIndex={0} aria-label="Sources of the numbers">
@@ -193,7 +193,7 @@ function Reports({ study, origin, series }: { study: string; origin: DataOrigin;
       <Answer of={reports}>
         {(rows) =>
           rows.length === 0 ? (
-            <Text c="dimmed">None yet. A report holds the tables, figures and the analysis of variance of this study.</Text>
+            <Text c="dimmed">None yet. A report contains the tables, figures and the analysis of this study.</Text>
           ) : (
             <Stack gap="xs">
               {rows.map((row) => (
@@ -228,7 +228,7 @@ function Report({ study, report, mayOpen }: { study: string; report: Schemas["Re
             {file}
           </Anchor>
         ))}
-      {!mayOpen && report.files.length > 0 && <Text size="sm">Its files hold rows of single persons: they need the right “export”.</Text>}
+      {!mayOpen && report.files.length > 0 && <Text size="sm">Its files contain individual data; the right “export” is required.</Text>}
     </Group>
   );
 }

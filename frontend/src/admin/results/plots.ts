@@ -84,8 +84,8 @@ export function marginPlot(margin: Schemas["Margin"], { scale }: Results, factor
     height: 250,
     marginBottom: belowOf(across.all),
     caption: rows.some(({ low, high }) => low < high)
-      ? "Bars: one within-participant standard error up and down."
-      : "No bars: a standard error needs two participants whose answers differ.",
+      ? "Bars: ± one within-participant standard error."
+      : "No bars: a standard error needs at least two participants with different answers.",
     x: { type: "point", padding: 0.6, label: null, domain: across.all.length > 0 ? across.all : rows.map((row) => row.x) },
     y: { domain: [scale.minimum, scale.maximum], grid: true, label: `mean ${scale.name}` },
     color: { legend: crossed, scheme: "observable10", ...(crossed ? { domain: beside.all } : {}) },

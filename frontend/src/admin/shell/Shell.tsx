@@ -30,7 +30,7 @@ function AccountMenu({ account }: { account: Schemas["AccountOut"] }) {
         </Menu.Item>
         {(["auto", "light", "dark"] as const).map((scheme) => (
           <Menu.Item key={scheme} onClick={() => setColorScheme(scheme)} disabled={scheme === colorScheme}>
-            {scheme === "auto" ? "As the system" : scheme === "light" ? "Light" : "Dark"}
+            {scheme === "auto" ? "System" : scheme === "light" ? "Light" : "Dark"}
           </Menu.Item>
         ))}
         <Menu.Divider />

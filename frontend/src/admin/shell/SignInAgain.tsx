@@ -38,13 +38,13 @@ export function SignInAgain({ account, ended, onDone }: Props) {
       closeOnEscape={!ended}
       closeOnClickOutside={false}
       overlayProps={ended ? { backgroundOpacity: 0.95, blur: 8 } : {}}
-      title={ended ? "Your session has ended" : "Sign in again"}
+      title={ended ? "Your session has expired" : "Sign in again"}
       closeButtonProps={{ "aria-label": "Close" }}
     >
       <Text size="sm" mb="sm">
         {ended
-          ? "Sign in to go on. What you typed on this page is still there."
-          : "This change needs a sign-in of the last 15 minutes. Sign in, then press the button again; what you typed is still there."}
+          ? "Sign in to continue. Your input on this page is preserved."
+          : "This change requires a sign-in within the last 15 minutes. Sign in, then press the button again. Your input is preserved."}
       </Text>
       <SignInHere name={account.name} then={entered} />
       {ended && (

@@ -28,7 +28,7 @@ export function BeforeOpening({ study, status }: { study: string; status: string
       )}
       {canBeSealed && (
         <Text size="sm" mt="sm">
-          The plan is not sealed: that can only be done before the first participant, under{" "}
+          The plan is not sealed. You can seal it only before the first participant, under{" "}
           <Link to="/studies/$study/data" params={{ study }}>
             Data
           </Link>

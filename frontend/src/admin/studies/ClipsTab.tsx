@@ -46,9 +46,9 @@ function AddClips({ study }: { study: string }) {
       <summary>Add or replace clips</summary>
       <Stack gap="sm" mt="xs">
         <Text size="sm">
-          A clip takes the place of the one with the same levels and exemplar. Clips of a level that is not declared yet: add the level in
-          the builder, leave it unsaved there, and come back: both are saved together.
-          {kept !== null && " The unsaved work of the builder will be saved with them."}
+          A clip replaces the one with the same levels and exemplar. For a new level, add the level in the builder first, leave it unsaved,
+          and return here; both are saved together.
+          {kept !== null && " Unsaved work of the builder will be saved with them."}
         </Text>
         <UploadClips upload={sent} />
         {upload !== null && upload.files.length > 0 && (

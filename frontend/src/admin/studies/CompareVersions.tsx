@@ -64,10 +64,10 @@ function Compared({ study, old, latest }: { study: string; old: number; latest: 
 }
 
 function verdict({ keys, clips_differing, pooled }: Schemas["Comparison"]): string {
-  if (keys.length === 0 && clips_differing === 0) return "Nothing differs.";
+  if (keys.length === 0 && clips_differing === 0) return "No differences.";
   return pooled
-    ? "Both measure the same, by the same clips: their answers may be pooled."
-    : "They do not measure the same, or not by the same clips: their answers are kept apart.";
+    ? "Both measure the same with the same clips. Their answers are pooled."
+    : "They differ in what they measure or in their clips. Their answers are kept separate.";
 }
 
 function Words({ piece: { kind, text } }: { piece: Schemas["Piece"] }) {
@@ -76,7 +76,7 @@ function Words({ piece: { kind, text } }: { piece: Schemas["Piece"] }) {
   return <span>{text}</span>;
 }
 
-const CLIP_WORDS: Record<Schemas["ClipDifference"]["kind"], string> = { gone: "gone", new: "new", replaced: "has other bytes" };
+const CLIP_WORDS: Record<Schemas["ClipDifference"]["kind"], string> = { gone: "gone", new: "new", replaced: "has different bytes" };
 
 function Clips({ comparison }: { comparison: Schemas["Comparison"] }) {
   return (

@@ -71,7 +71,7 @@ function useCreate(taken: (message: string) => void, created?: () => void, told 
   const navigate = useNavigate();
   return useChange((body: Schemas["NewStudy"]) => unwrap(api.POST("/api/admin/studies", { body })), {
     touches: [["studies"]],
-    done: "The study is created, as a draft.",
+    done: "Study created as a draft.",
     refused: (error) => {
       if (!isTaken(error)) return told;
       taken(error.message);
@@ -122,8 +122,8 @@ function FromDefinition({ name, onTaken }: { name: string; onTaken: (message: st
         label="Clips built for it"
         description={
           <>
-            A zip of the folder that <code>stimuli build</code> or <code>stimuli manifest</code> wrote, or of clips alone. Not needed where
-            the clips of the experiment chosen above fit.
+            A zip file of the folder that <code>stimuli build</code> or <code>stimuli manifest</code> wrote, or of clips alone. Not needed
+            where the clips of the experiment chosen above fit.
           </>
         }
         accept=".zip"
@@ -203,15 +203,14 @@ const TEMPLATES: readonly [Words, ...Words[]] = [
   {
     value: "pairs",
     label: "Paired comparisons",
-    about: "Two clips side by side: which of them? Every clip meets every other of the same exemplar number.",
+    about: "Two clips side by side. Every clip is compared with every other of the same exemplar number.",
     question: "Which clip looked more natural?",
     ends: false,
   },
   {
     value: "just_noticeable",
     label: "Just-noticeable difference",
-    about:
-      "Two clips in turn, the standard and a stimulus, in adaptive series. One factor has numbers as its levels; the lowest is the standard.",
+    about: "Two clips in turn, the standard and a stimulus, in adaptive series. One factor has numeric levels; the lowest is the standard.",
     question: "In which of the two clips was the effect stronger?",
     ends: false,
   },
@@ -301,7 +300,7 @@ function Levels({ name, upload, isLooked, notPlayed, onTaken, onCreated }: Level
             <TextInput
               key={field}
               label={`What are ${inWords(levels)}?`}
-              description={`The name of this factor in tables and figures: what they are levels of, as slow and fast are of ‘speed’. Left open it is called ${field}.`}
+              description={`The name of this factor in tables and figures, such as ‘speed’ for slow and fast. Default: ${field}.`}
               value={names[field] ?? ""}
               onChange={(event) => setNames({ ...names, [field]: event.currentTarget.value })}
               maw={400}
@@ -313,7 +312,7 @@ function Levels({ name, upload, isLooked, notPlayed, onTaken, onCreated }: Level
         <Textarea
           className="editor"
           label="Table (CSV)"
-          description="Column file, then one column a factor; exemplar is optional."
+          description="The column file, then one column per factor. The column exemplar is optional."
           autosize
           minRows={6}
           maxRows={16}
@@ -375,7 +374,7 @@ function LevelsTable({ pattern, files }: { pattern: string; files: string[] }) {
         {strays === 0
           ? `All ${files.length} file names fit the pattern.`
           : `${strays} of ${files.length} file names do not fit the pattern.`}
-        {rows.length > MAX_ROWS && ` Shown are ${MAX_ROWS} of them.`}
+        {rows.length > MAX_ROWS && ` The first ${MAX_ROWS} are shown.`}
       </Text>
       <div className="long-list levels" tabIndex={0} role="region" aria-label="Levels of the files">
         <Table aria-label="What the pattern reads">
@@ -412,7 +411,7 @@ function FromShipped({ name, onTaken }: { name: string; onTaken: (message: strin
       {(experiments) => (
         <Stack>
           <Text size="sm">
-            The three experiments of the paper, and demonstrations whose clips are built here; you can change texts and settings afterwards.
+            The three experiments of the paper, and demonstrations whose clips are on this server. You can change texts and settings later.
           </Text>
           <SimpleGrid cols={{ base: 1, sm: 3 }}>
             {experiments
@@ -444,7 +443,7 @@ function FromShipped({ name, onTaken }: { name: string; onTaken: (message: strin
                     </Group>
                   ) : (
                     <Alert color="yellow" className="wrap-anywhere">
-                      Its clips are not built on this server. Run <code>{experiment.build}</code> there, or upload them.
+                      Its clips are not on this server. Run <code>{experiment.build}</code> there, or upload them.
                     </Alert>
                   )}
                 </Card>
@@ -467,7 +466,7 @@ function Unbuilt({ demos }: { demos: Shipped[] }) {
   if (demos.length === 0) return null;
   return (
     <Text size="sm" component="div">
-      Demonstrations whose clips are not built yet, each with the command that builds them on the server:
+      Demonstrations without clips on this server, each with the command that builds them:
       <ul>
         {demos.map(({ name, title, build }) => (
           <li key={name}>
@@ -487,7 +486,7 @@ export function CreatePage() {
 function NoWorkspace() {
   return (
     <Alert color="yellow" title="You cannot create studies yet">
-      Creating a study needs the role experimenter or owner in a workspace. Ask an owner of a workspace.
+      To create a study you need the role experimenter or owner in a workspace. Ask an owner of a workspace.
     </Alert>
   );
 }
@@ -509,7 +508,7 @@ function NewStudy() {
       <Title order={1}>New study</Title>
       <TextInput
         label="Short name"
-        description="Letters, digits, - and _: it names the study in addresses and files."
+        description="Letters, digits, - and _. Used in URLs and file names."
         ref={field}
         value={name}
         error={wrong ? "Expected letters, digits, - and _ only, at most 60." : taken}

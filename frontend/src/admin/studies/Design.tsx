@@ -116,7 +116,7 @@ export function TomlText({ toml, onChange, problems, rows = 28 }: Props) {
         onChange={(event) => onChange(event.currentTarget.value)}
       />
       {problems.length > 0 && (
-        <Alert color="red" variant="light" title="Not usable yet" my="sm" role="status">
+        <Alert color="red" variant="light" title="Not ready yet" my="sm" role="status">
           <List size="sm">
             {problems.map((problem) => (
               <List.Item key={`${String(problem.line)}${problem.path}${problem.message}`}>

@@ -20,7 +20,7 @@ export function LifeCycle({ detail }: { detail: Schemas["StudyDetail"] }) {
           {summary.archived_at !== null || summary.status === "draft" || summary.status === "closed" ? (
             <Archive summary={summary} />
           ) : (
-            <Text size="sm">Close the study before it goes into the archive.</Text>
+            <Text size="sm">Close the study before you archive it.</Text>
           )}
           {summary.status === "draft" && mayEdit && <Delete name={summary.name} />}
         </Group>
@@ -45,15 +45,11 @@ function Copy({ detail: { summary, versions } }: { detail: Schemas["StudyDetail"
           body: { name, version: Number(version), workspace },
         }),
       ),
-    {
-      touches: [["studies"]],
-      done: "The study is copied, as a draft.",
-      then: (made) => void navigate({ to: `/studies/${made.summary.name}` }),
-    },
+    { touches: [["studies"]], done: "Study copied as a draft.", then: (made) => void navigate({ to: `/studies/${made.summary.name}` }) },
   );
   return (
     <>
-      <Text size="sm">A copy has the declaration and the clips. Answers, links, quota and recruiter stay here.</Text>
+      <Text size="sm">A copy contains the declaration and the clips, but no answers, links, quota or recruiter.</Text>
       <Group align="end">
         <TextInput label="Short name of the copy" value={name} onChange={(event) => setName(event.currentTarget.value)} />
         <Select
@@ -96,14 +92,11 @@ function Archive({ summary }: { summary: Schemas["StudySummary"] }) {
           body: { revision: summary.revision, archived },
         }),
       ),
-    {
-      touches: [["study", summary.name], ["studies"]],
-      done: archived ? "The study is in the archive." : "The study is out of the archive.",
-    },
+    { touches: [["study", summary.name], ["studies"]], done: archived ? "Study archived." : "Study restored." },
   );
   return (
     <Button variant="default" loading={change.isPending} onClick={() => change.mutate(undefined)}>
-      {archived ? "Put into the archive" : "Take out of the archive"}
+      {archived ? "Archive" : "Restore from archive"}
     </Button>
   );
 }
@@ -112,13 +105,13 @@ function Delete({ name }: { name: string }) {
   const navigate = useNavigate();
   const remove = useChange(() => unwrap(api.DELETE("/api/admin/studies/{study}", { params: { path: { study: name } } })), {
     touches: [["studies"]],
-    done: "The draft is deleted.",
+    done: "Draft deleted.",
     then: () => void navigate({ to: "/" }),
   });
   return (
     <ConfirmButton
       label="Delete this draft"
-      question="The draft and its versions are deleted for good."
+      question="The draft and its versions are deleted permanently."
       confirm="Delete"
       onConfirm={() => remove.mutate(undefined)}
     />

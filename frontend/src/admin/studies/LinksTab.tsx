@@ -52,7 +52,7 @@ interface TableProps {
 function LinkTable({ study, rows, recruiter, owns }: TableProps) {
   const revoke = useChange(
     (link: string) => unwrap(api.DELETE("/api/admin/studies/{study}/links/{link}", { params: { path: { study, link } } })),
-    { touches: [["links", study]], done: "The link is withdrawn." },
+    { touches: [["links", study]], done: "Link withdrawn." },
   );
   return (
     <DataTable
@@ -80,7 +80,7 @@ function LinkTable({ study, rows, recruiter, owns }: TableProps) {
               <ConfirmButton
                 size="compact-xs"
                 label="Withdraw"
-                question="Nobody can begin by this link any more; those who have begun may finish."
+                question="This link no longer starts new runs. Runs in progress can finish."
                 confirm="Withdraw"
                 onConfirm={() => revoke.mutate(row.id)}
               />

@@ -6,9 +6,9 @@ import { api, type Schemas, unwrap, studyQuery } from "../api";
 import { useChange } from "../ui/useChange";
 
 const MEANS: Record<Schemas["NewLinks"]["kind"], string> = {
-  general: "Any number of people begin by the same link.",
-  personal: "Each link is for one person, who may go on from another device.",
-  preview: "For yourself: works on drafts too, and its answers are not kept.",
+  general: "Any number of people use the same link.",
+  personal: "Each link is for one person, who can continue on another device.",
+  preview: "For you: works for drafts too; answers are not kept.",
 };
 const RECRUITERS = ["none", "prolific", "sona", "mturk", "generic"] as const;
 
@@ -35,7 +35,7 @@ export function NewLinks({ study }: { study: string }) {
       const body = { kind, label, group, labels: kind === "personal" ? labels : [], count: Number(count) || 1, recruiter: sent };
       return unwrap(api.POST("/api/admin/studies/{study}/links", { params: { path: { study } }, body }));
     },
-    { touches: [["links", study]], done: "The links are made." },
+    { touches: [["links", study]], done: "Links created." },
   );
   return (
     <Card withBorder>
@@ -84,7 +84,7 @@ export function NewLinks({ study }: { study: string }) {
         </Group>
         {kind === "personal" && (
           <Textarea
-            label="Or one name a line"
+            label="Or one name per line"
             autosize
             minRows={2}
             maxRows={8}

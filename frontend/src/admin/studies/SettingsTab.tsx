@@ -34,8 +34,8 @@ function PageLanguages() {
         The page&rsquo;s own words
       </Title>
       <Text size="sm" mb="sm">
-        Buttons, hints and errors of the participants&rsquo; page. In any other language they are English; your own texts stay yours. Read
-        an unreviewed language, or have it read, before people take part in it.
+        Buttons, hints and errors of the participant page; other languages use English. Have an unreviewed language checked before people
+        take part in it.
       </Text>
       <DataTable
         label="Languages of the page"
@@ -63,9 +63,9 @@ function PageLanguages() {
 type Preview = Schemas["RetentionPreview"];
 
 const WHAT: Record<Preview["periods"][number]["what"], string> = {
-  identifiers: "Who took part (recruiters’ ids, parameters of addresses, completion codes, labels of personal links)",
-  unfinished: "Visits that were not completed, answers and all",
-  answers: "Every visit, answers and all",
+  identifiers: "Identifiers (recruiter ids, URL parameters, completion codes, labels of personal links)",
+  unfinished: "Incomplete visits with their answers",
+  answers: "All visits with their answers",
 };
 
 function RetentionCard({ study }: { study: string }) {
@@ -102,7 +102,7 @@ function Undeclared({ preview }: { preview: Preview }) {
   return (
     <>
       <Text size="sm">
-        No period is declared: data stay until somebody erases them. Declare one under “Keeping and handing on” of the design.
+        No period is declared: data stay until someone erases them. Declare one in the builder under “Retention and sharing”.
       </Text>
       <Coming preview={preview} />
     </>
@@ -115,7 +115,7 @@ function Coming({ preview }: { preview: Preview }) {
   return (
     <Text size="sm" mt="xs">
       {due > 0 &&
-        `Within the hour the server erases ${counted(preview.visits, "visit")}, and who took part in ${String(preview.identifiers)} more. `}
+        `Within the hour the server erases ${counted(preview.visits, "visit")}, and the identifiers of ${String(preview.identifiers)} more. `}
       {preview.next_at !== null && `The next is due ${when(preview.next_at)}.`}
     </Text>
   );
@@ -127,14 +127,14 @@ type Kind = NonNullable<Schemas["Recruiter"]["kind"]>;
 const KINDS: Kind[] = ["prolific", "sona", "mturk", "generic"];
 
 const FIELDS = {
-  code_complete: ["Completion code", "empty: a different one for each run"],
-  code_screened_out: ["Code where screened out", "empty: none is shown"],
-  code_failed_check: ["Code where checks failed", "empty: the completion code"],
-  redirect_screened_out: ["Address for who is screened out", "empty: none, on Prolific by the code"],
-  redirect_declined: ["Address for who takes no part", "empty: none, on Prolific its start page"],
-  id_parameter: ["Address parameter of their id", "empty: the recruiter's usual one"],
-  signature_parameter: ["Address parameter of its signature", "empty: addresses are not signed"],
-  secret_name: ["Name of the signing secret", "another name makes another secret"],
+  code_complete: ["Completion code", "empty: a different code for each run"],
+  code_screened_out: ["Code: screened out", "empty: no code"],
+  code_failed_check: ["Code: failed checks", "empty: the completion code"],
+  redirect_screened_out: ["Redirect URL: screened out", "empty: none (on Prolific the code is enough)"],
+  redirect_declined: ["Redirect URL: declined consent", "empty: none (on Prolific: its start page)"],
+  id_parameter: ["URL parameter of the participant id", "empty: the recruiter's default"],
+  signature_parameter: ["URL parameter of the signature", "empty: URLs are not signed"],
+  secret_name: ["Name of the signing secret", "a new name creates a new secret"],
 } as const;
 type Field = keyof typeof FIELDS;
 
@@ -176,9 +176,16 @@ function Running({ detail }: { detail: Schemas["StudyDetail"] }) {
         <Title order={2} size="h4">
           Running
         </Title>
-        <Switch label="Paused: nobody can begin" checked={paused} onChange={(event) => setPaused(event.currentTarget.checked)} />
+        <Switch label="Paused: no new participants" checked={paused} onChange={(event) => setPaused(event.currentTarget.checked)} />
         <Group align="end">
-          <NumberInput label="Close at this many complete runs" placeholder="no limit" min={1} value={quota} onChange={setQuota} w={280} />
+          <NumberInput
+            label="Close after this many complete runs"
+            placeholder="no limit"
+            min={1}
+            value={quota}
+            onChange={setQuota}
+            w={280}
+          />
           <Select
             label="Recruited through"
             placeholder="nobody"
@@ -192,8 +199,8 @@ function Running({ detail }: { detail: Schemas["StudyDetail"] }) {
         {Boolean(detail.recruiter?.["signature_parameter"]) && <SigningButton study={name} />}
         {kind === "prolific" && texts.code_complete === "" && (
           <Text size="sm" c="orange.9">
-            Enter the completion code of the Prolific study: without it participants get a random code, which Prolific does not accept, and
-            the study cannot go live.
+            Enter the completion code of the Prolific study. Without it participants get a random code that Prolific rejects, and the study
+            cannot go live.
           </Text>
         )}
         <Button onClick={() => save.mutate(undefined)} loading={save.isPending}>
@@ -225,8 +232,8 @@ function RecruiterFields({ texts, onChange }: FieldsProps) {
       </SimpleGrid>
       <TextInput
         w="100%"
-        label="Address to go to at the end"
-        description="{code}, {run} and the parameters of the recruiter's address are filled in. Empty: the recruiter's usual one."
+        label="Redirect URL: completed"
+        description="{code}, {run} and the recruiter's URL parameters are filled in. Empty: the recruiter's default."
         value={texts.redirect_url}
         onChange={(event) => onChange({ ...texts, redirect_url: event.currentTarget.value })}
       />

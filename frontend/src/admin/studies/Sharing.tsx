@@ -41,7 +41,7 @@ export function Sharing({ summary }: { summary: Schemas["StudySummary"] }) {
             <DataTable
               rows={rows}
               rowKey={(row) => row.account}
-              empty="Nobody has rights of their own on this study."
+              empty="No one has separate rights on this study."
               columns={[
                 { title: "Account", cell: (row) => row.account },
                 { title: "May", wrap: true, cell: (row) => row.rights.join(", ") },
@@ -92,7 +92,7 @@ function Move({ summary }: { summary: Schemas["StudySummary"] }) {
   const move = useChange(
     (workspace: string) =>
       unwrap(api.PUT("/api/admin/studies/{study}/workspace", { params: { path: { study: summary.name } }, body: { workspace } })),
-    { touches: [["study", summary.name], ["studies"], ["workspaces"]], done: "The study is moved." },
+    { touches: [["study", summary.name], ["studies"], ["workspaces"]], done: "Study moved." },
   );
   if (others.length === 0) return null;
   return (

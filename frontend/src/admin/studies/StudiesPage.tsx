@@ -24,7 +24,7 @@ export function StudiesPage() {
       </Group>
       {closed.map(({ name, title }) => (
         <Alert key={name} color="yellow" title={`The studies of “${title}” are closed to you`}>
-          It asks for a second factor. Set one up under{" "}
+          It requires a second factor. Set one up under{" "}
           <Anchor component={Link} to="/account" underline="always">
             My account
           </Anchor>
@@ -52,9 +52,9 @@ function Listed({ rows, columns }: { rows: Schemas["StudySummary"][]; columns: t
   return (
     <>
       {archived > 0 && (
-        <Switch checked={all} onChange={(event) => setAll(event.currentTarget.checked)} label={`Also those in the archive (${archived})`} />
+        <Switch checked={all} onChange={(event) => setAll(event.currentTarget.checked)} label={`Include archived studies (${archived})`} />
       )}
-      <DataTable rows={shown} rowKey={(row) => row.name} columns={columns} empty="No studies but those in the archive." />
+      <DataTable rows={shown} rowKey={(row) => row.name} columns={columns} empty="All studies are archived." />
     </>
   );
 }
@@ -64,8 +64,8 @@ function Nothing({ mayCreate }: { mayCreate: boolean }) {
     <Paper withBorder p="xl">
       <Text>
         {mayCreate
-          ? "No studies yet. Start from one of the three that ship with Palpebra, from a definition, or from your own clips."
-          : "No study is open to you yet. Ask an owner of your workspace."}
+          ? "No studies yet. Start with one of the three that ship with Palpebra, a definition, or your own clips."
+          : "You have no access to any study yet. Ask an owner of your workspace."}
       </Text>
     </Paper>
   );

@@ -25,14 +25,14 @@ function OpenedDialog({ study, onClose }: Props) {
   const recruiter = detail?.recruiter;
   const kind = typeof recruiter?.["kind"] === "string" ? recruiter["kind"] : null;
   return (
-    <Modal opened onClose={onClose} title="Participants can begin" size="lg" closeButtonProps={{ "aria-label": "Close" }}>
+    <Modal opened onClose={onClose} title="Participants can start" size="lg" closeButtonProps={{ "aria-label": "Close" }}>
       <Answer of={link}>
         {({ url }) => (
           <Stack>
             <Address label="Link for participants" url={url} />
             {kind === null ? (
               <Text size="sm">
-                To recruit through Prolific, SONA or MTurk, first choose the service under{" "}
+                To recruit with Prolific, SONA or MTurk, first choose the service under{" "}
                 <Link to="/studies/$study/settings" params={{ study }} onClick={onClose}>
                   Settings
                 </Link>
@@ -41,7 +41,7 @@ function OpenedDialog({ study, onClose }: Props) {
               </Text>
             ) : (
               <Address
-                label={`For ${RECRUITER_NAMES[kind] ?? kind}, which fills in each participant's id`}
+                label={`For ${RECRUITER_NAMES[kind] ?? kind}, which fills in the participant's id`}
                 url={addressFor(url, recruiter)}
               />
             )}
@@ -72,7 +72,7 @@ async function generalLink(study: string): Promise<{ url: string }> {
   if (known !== undefined) return known;
   const body = { kind: "general" as const, label: "everybody", labels: [], count: 1 };
   const [made] = await unwrap(api.POST("/api/admin/studies/{study}/links", { ...path, body }));
-  if (made === undefined) throw new Error("expected a new link, got none; make one under Links");
+  if (made === undefined) throw new Error("expected a new link, got none; create one under Links");
   return made;
 }
 
@@ -101,10 +101,10 @@ const BeforeOpening = onDemand(async () => (await import("./BeforeOpening")).Bef
 type Status = Schemas["StudySummary"]["status"];
 const NEXT: Record<Status, Status[]> = { draft: ["pilot", "live"], pilot: ["draft", "live", "closed"], live: ["closed"], closed: ["live"] };
 const WORDS: Record<Status, [label: string, question: string]> = {
-  draft: ["Back to draft", "Participants can no longer begin; pilot data stay."],
-  pilot: ["Open as pilot", "Participants can begin; their data are marked as pilot."],
-  live: ["Set live", "Participants can begin and their data count. Changes from now on make new versions."],
-  closed: ["Close", "Nobody can begin any more; those under way may finish."],
+  draft: ["Back to draft", "Participants can no longer start; pilot data stay."],
+  pilot: ["Open as pilot", "Participants can start; their data are marked as pilot."],
+  live: ["Set live", "Participants can start and their data count. Changes now create new versions."],
+  closed: ["Close", "No one can start any more. Runs in progress can finish."],
 };
 
 const isOpen = (status: Status) => status === "live" || status === "pilot";
@@ -117,7 +117,7 @@ function StatusButtons({ summary }: { summary: Schemas["StudySummary"] }) {
     {
       touches: [["study", summary.name], ["studies"]],
       // The dialog with the link says so itself; a message in the corner would lie over it on a phone.
-      done: ({ summary: { status } }) => (isOpen(status) ? null : "The status is changed."),
+      done: ({ summary: { status } }) => (isOpen(status) ? null : "Status changed."),
       then: (detail) => setOpened(isOpen(detail.summary.status)),
     },
   );
@@ -142,7 +142,7 @@ function StatusButtons({ summary }: { summary: Schemas["StudySummary"] }) {
         <ConfirmButton
           key={status}
           label={WORDS[status][0]}
-          question={`${WORDS[status][1]}${keptWork(summary.name) === null && otherWork(summary.name).length === 0 ? "" : " The work in the builder is not saved and not part of it."}`}
+          question={`${WORDS[status][1]}${keptWork(summary.name) === null && otherWork(summary.name).length === 0 ? "" : " Unsaved work in the builder is not included."}`}
           confirm={WORDS[status][0]}
           harmless={status !== "closed"}
           blocked={status === "live" && isBlocked}
@@ -208,7 +208,7 @@ export function StudyLayout() {
               <Text c="dimmed" size="sm">
                 {summary.name}, version {summary.version}
                 {summary.paused && ", paused: nobody can begin"}
-                {summary.archived_at !== null && ", in the archive: it can be read, and not changed"}
+                {summary.archived_at !== null && ", archived: read only"}
               </Text>
             </div>
             {summary.rights.includes("run") && summary.archived_at === null && <StatusButtons summary={summary} />}

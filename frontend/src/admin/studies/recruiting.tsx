@@ -39,7 +39,7 @@ function Signing({ study, link }: SigningProps) {
     <Answer of={signing}>
       {(data) => (
         <Stack gap="xs">
-          <Text>Secret, for the recruiter’s side alone:</Text>
+          <Text>Secret, for the recruiter only:</Text>
           <Code block tabIndex={0}>
             {data.secret}
           </Code>
@@ -56,7 +56,7 @@ function Signing({ study, link }: SigningProps) {
             {data.shell}
           </Code>
           <Text size="sm" c="dimmed">
-            Who has a signed address goes on with that visit, on any device. The audit log notes that you have looked.
+            Anyone with a signed address can continue that visit on any device. This access is recorded in the audit log.
           </Text>
         </Stack>
       )}

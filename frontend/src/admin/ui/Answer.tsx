@@ -9,7 +9,7 @@ import { Link } from "@tanstack/react-router";
 
 export function ErrorAlert({ error, retry }: { error: Error; retry?: () => void }) {
   return (
-    <Alert color="red" variant="light" title="That did not work" role="alert" my="sm">
+    <Alert color="red" variant="light" title="Something went wrong" role="alert" my="sm">
       {error.message}
       {retry !== undefined && (
         <Button mt="sm" size="xs" variant="default" onClick={retry} display="block">
@@ -75,7 +75,7 @@ export function PagedAnswer<Page>({ of, shown, total, more, children }: Props<Pa
 export function NotFound() {
   return (
     <Container size="sm" py="xl">
-      <Title order={1}>Nothing is here</Title>
+      <Title order={1}>Page not found</Title>
       <Text my="md">The address may be mistyped, or the study was deleted.</Text>
       <Anchor component={Link} to="/">
         All studies

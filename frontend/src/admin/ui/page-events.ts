@@ -41,12 +41,12 @@ export function useShortcuts(shortcuts: Shortcuts): void {
 
 /** Whether work may be replaced by other: saved, or given up by who is asked. */
 export function mayReplace(unsaved: boolean): boolean {
-  return !unsaved || window.confirm("There is work that is not saved. Open another file in its place all the same?");
+  return !unsaved || window.confirm("You have unsaved work. Open another file anyway?");
 }
 
 export function useUnsaved(unsaved: boolean): void {
   useBlocker({
-    shouldBlockFn: () => unsaved && !window.confirm("There is work that is not saved. Leave all the same?"),
+    shouldBlockFn: () => unsaved && !window.confirm("You have unsaved work. Leave anyway?"),
     enableBeforeUnload: () => unsaved,
   });
 }

@@ -36,7 +36,7 @@ export function useChange<Input, T>(change: (input: Input) => Promise<T>, { touc
       then?.(result);
     },
     onError: (error) => {
-      if (!refused?.(error)) notify({ title: "That did not work", message: error.message, color: "red" });
+      if (!refused?.(error)) notify({ title: "Something went wrong", message: error.message, color: "red" });
     },
   });
 }

@@ -27,7 +27,7 @@ function Translations(props: FieldProps) {
         <Textarea
           key={language}
           label={builder.languages.length > 1 ? `${label}, ${languageName(language)}` : label}
-          description={index === 0 ? `${help} Here: one a line.` : undefined}
+          description={index === 0 ? `${help} One per line.` : undefined}
           error={index === 0 ? problem : null}
           autosize
           minRows={2}
@@ -47,7 +47,7 @@ function Numbers(props: FieldProps) {
   return (
     <Textarea
       label={label}
-      description={`${help} Here: one a line.`}
+      description={`${help} One per line.`}
       error={problem}
       autosize
       minRows={2}
@@ -81,7 +81,7 @@ function Dictionary(props: FieldProps) {
   return (
     <Textarea
       label={label}
-      description={`${help} Here: key = value, one a line.`}
+      description={`${help} One key = value per line.`}
       error={problem}
       autosize
       minRows={2}

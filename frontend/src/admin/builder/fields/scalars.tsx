@@ -24,7 +24,7 @@ export function useField({ path, schema, required = false }: FieldProps) {
     value: valueAt(builder.data, path),
     fallback: resolved(schema).default,
     label: labelOf(name),
-    help: `${help}${measured ? " A change begins a new data series." : ""}`.trim(),
+    help: `${help}${measured ? " Starts a new data series." : ""}`.trim(),
     problem: builder.problems.find((one) => one.path === pathName(path))?.message ?? null,
     set: (value: unknown) => builder.set(path, value),
     required,
@@ -105,7 +105,7 @@ export function Words(props: FieldProps) {
       error={problem}
       required={required}
       data={suggestionsFor(builder.data, props.path)}
-      placeholder={words.length === 0 ? "none; Enter adds one" : ""}
+      placeholder={words.length === 0 ? "none; press Enter to add one" : ""}
       value={words}
       onChange={(chosen) => set(chosen.length === 0 && !required ? undefined : chosen)}
     />
@@ -165,7 +165,7 @@ export function Lists(props: FieldProps) {
   return (
     <Textarea
       label={label}
-      description={`${help} Here: a list a line, its words parted by commas.`}
+      description={`${help} One list per line, words separated by commas.`}
       error={problem}
       className="editor"
       autosize
@@ -194,12 +194,12 @@ export function Raw(props: FieldProps) {
   return (
     <JsonInput
       label={label}
-      description={`${help} Here: as JSON.`}
+      description={`${help} Enter as JSON.`}
       error={problem}
       autosize
       minRows={2}
       maxRows={12}
-      validationError="This is no JSON."
+      validationError="This is not valid JSON."
       value={text}
       onChange={(entered) => {
         setText(entered);

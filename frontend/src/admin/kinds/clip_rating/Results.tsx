@@ -45,9 +45,9 @@ function CellCard({ data, factors }: { data: Schemas["Results"]; factors: Factor
   return (
     <Card withBorder>
       <Title order={2} size="h5">
-        Answers in each cell
+        Responses per cell
       </Title>
-      <PlotFigure options={cells} label="Distribution of answers in each cell" rows={cellRows(data, labels)} />
+      <PlotFigure options={cells} label="Distribution of responses in each cell" rows={cellRows(data, labels)} />
     </Card>
   );
 }
@@ -121,7 +121,7 @@ function ClipResults({ study, data, factors }: { study: string; data: Schemas["R
         </ScrollArea>
         <Stack flex="1 1 300px" maw={460}>
           {shown === undefined ? (
-            <Text c="dimmed">This clip is of an earlier version of the study.</Text>
+            <Text c="dimmed">This clip belongs to an earlier version of the study.</Text>
           ) : (
             <ClipCard key={shown.url} study={study} clip={shown} label={labels.get(shown.cell)} />
           )}

@@ -27,8 +27,7 @@ function TraceResults({ data, factors }: { data: Data; factors: Factors }) {
           Mean ratings over the clip
         </Title>
         <Text size="sm">
-          Each person&apos;s clips of a cell are averaged first, then people. People answer what they see about a second later; how much
-          later is in the report.
+          Clips are averaged within people, then over people. Responses lag about one second behind the clip; the report states the lag.
         </Text>
         <PlotFigure options={together} label="Mean rating over time in every cell" rows={traceRows(data.cells, labels)} />
       </Card>
@@ -50,8 +49,8 @@ function TraceResults({ data, factors }: { data: Data; factors: Factors }) {
 
 function CellCard({ cell, data, label }: { cell: Cell; data: Data; label: string }) {
   const options = useMemo(() => cellTracePlot(cell, data), [cell, data]);
-  const blinks = cell.blinks_s.length > 0 ? " Ticks below: when its clips blink, a row a clip." : " Its clips have no marked blinks.";
-  const interval = cell.low === null ? "One person, so no interval." : "Shaded: 95% interval over people.";
+  const blinks = cell.blinks_s.length > 0 ? " Ticks: blinks in the clips, one row per clip." : " No blinks are marked in its clips.";
+  const interval = cell.low === null ? "One person: no interval." : "Shaded: 95% interval over people.";
   return (
     <Card withBorder>
       <Title order={2} size="h5">
@@ -60,7 +59,7 @@ function CellCard({ cell, data, label }: { cell: Cell; data: Data; label: string
       <Text size="sm">
         {interval}
         {blinks}
-        {cell.left_out > 0 && ` ${cell.left_out} traces of another sampling rate are left out.`}
+        {cell.left_out > 0 && ` ${cell.left_out} traces with another sampling rate are excluded.`}
       </Text>
       <PlotFigure
         options={options}

@@ -28,8 +28,8 @@ function PairResults({ data, factors }: { data: Data; factors: Factors }) {
             Chosen over
           </Title>
           <Text size="sm">
-            Share of comparisons in which the cell of the row was chosen over that of the column, which has the number of its row; a tie is
-            half for each.
+            Share of comparisons in which the row was chosen over the column (columns are numbered like rows). A tie counts one half for
+            each.
           </Text>
           <PlotFigure options={choices} label="Share of choices in each pair of cells" rows={choiceRows(data, labels)} />
         </Card>

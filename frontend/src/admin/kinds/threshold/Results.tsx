@@ -39,7 +39,7 @@ function ThresholdResults({ data, factors }: { data: Data; factors: Factors }) {
           Thresholds
         </Title>
         <Text size="sm">
-          Of each person the latest estimate of the series; how sure it is, is the standard deviation of its posterior.{" "}
+          Latest estimate of each person's series. The posterior SD shows its uncertainty.{" "}
           {along.second && `It is the threshold at ${along.second.middle} along ${along.second.title}. `}
           The report fits the psychometric functions anew.
         </Text>
