@@ -85,10 +85,10 @@ _NOTHING_HERE = """<!doctype html>
   <head>
     <meta charset="utf-8">
     <meta name="viewport" content="width=device-width, initial-scale=1">
-    <title>Nothing is here</title>
+    <title>Page not found</title>
   </head>
   <body>
-    <h1>Nothing is here</h1>
+    <h1>Page not found</h1>
     <p>The address may be mistyped. A study is reached by the link you were given.</p>
     <p><a href="/admin/">For experimenters</a></p>
   </body>

@@ -63,7 +63,7 @@ def test_a_browser_gets_a_page_where_nothing_is_and_a_program_json(client: TestC
     browser = {"accept": "text/html,application/xhtml+xml,application/xml;q=0.9,*/*;q=0.8"}
     answer = client.get("/nothing", headers=browser)
     assert (answer.status_code, answer.headers["content-type"]) == (404, "text/html; charset=utf-8")
-    assert "Nothing is here" in answer.text
+    assert "Page not found" in answer.text
     assert "default-src 'none'" in answer.headers["content-security-policy"]
     for path, headers in (("/api/nothing", browser), ("/nothing", {}), ("/nothing", {"accept": "*/*"})):
         assert client.get(path, headers=headers).json()["error"]["code"] == "not_found"

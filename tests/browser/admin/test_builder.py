@@ -138,7 +138,7 @@ def test_a_form_of_the_bank_is_saved_as_a_new_version(dashboard: Dashboard) -> N
     expect(save).to_be_enabled()
     save.click()
     expect(page.get_by_text("short, version 2")).to_be_visible()
-    expect(page.get_by_text("Discard changes, version 2.")).to_be_visible()
+    expect(page.get_by_text("Saved as version 2.")).to_be_visible()
     page.get_by_role("switch", name="Show TOML").click()
     said = tomllib.loads(str(page.get_by_label("Definition", exact=True).input_value()))
     assert said["forms"][-1]["name"] == "comments"

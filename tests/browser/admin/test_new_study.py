@@ -74,7 +74,7 @@ def test_own_clips_to_a_live_link(dashboard: Dashboard, clips: list[Path]) -> No
     expect(name).to_have_accessible_description(re.compile("There is already a study called 'short'"))
     expect(name).to_be_focused()
     name.fill("robots")
-    expect(name).to_have_accessible_description(re.compile(r"addresses and files\.$"))
+    expect(name).to_have_accessible_description(re.compile(r"URLs and file names\.$"))
     hand.press("Create")
     page.get_by_text("robots, version 1").wait_for()
 

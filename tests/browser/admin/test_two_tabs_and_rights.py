@@ -49,7 +49,7 @@ def test_saving_in_one_tab_keeps_the_unsaved_work_of_the_other(dashboard: Dashbo
     typed(second, "Words of the second tab.")
     expect(second.get_by_role("button", name=SAVE)).to_be_enabled()
     second.get_by_role("button", name=SAVE).click()
-    expect(second.get_by_text(re.compile(r"Discard changes, version \d+"))).to_be_visible()
+    expect(second.get_by_text(re.compile(r"Saved as version \d+"))).to_be_visible()
     first.reload()
     expect(first.get_by_text("was restored")).to_be_visible()
     expect(first.get_by_label(DEBRIEF)).to_have_value("Words of the first tab.")
@@ -64,7 +64,7 @@ def test_discarding_in_one_tab_keeps_the_unsaved_work_of_the_other(
     builder(second, dashboard)
     typed(second, "To be given up.")
     second.get_by_role("button", name="Discard changes").click()
-    expect(second.get_by_text(re.compile(r"Discard changes, version \d+"))).to_be_visible()
+    expect(second.get_by_text(re.compile(r"Saved as version \d+"))).to_be_visible()
     first.reload()
     expect(first.get_by_label(DEBRIEF)).to_have_value("To be kept.")
 
