@@ -1,4 +1,4 @@
-"""Motion checks: short clips whose answer shows in motion alone, and what is asked about each kind."""
+"""Motion checks: short clips whose answer is visible through motion only, and their questions."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -14,7 +14,7 @@ CHECK_CELL = ""
 
 @dataclass(frozen=True)
 class CheckKind:
-    """What is asked about the clips of one kind of check.
+    """The question about the clips of one kind of check.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""How the commands of a command line are gathered, listed and loaded, with examples a shell takes."""
+"""How command lines are grouped, listed and loaded, with examples that can be pasted into a shell."""
 
 import inspect
 import re
@@ -10,7 +10,7 @@ from typing import Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-# Examples in the help of a command, as lines that a shell takes as they are printed.
+# Examples in the help of a command, as lines that can be pasted into a shell.
 
 CONTINUED = " \\"
 INDENT = "    "
@@ -19,21 +19,21 @@ _BESIDE_ITS_WORD = re.compile(r"\n?^Example: (.+)(?=\n\n|\Z)", re.MULTILINE)
 
 
 def whole_examples(text: str, width: int) -> str:
-    """Break the examples of a help text at options, so that no line is wider than `width` where it can be.
+    """Break the examples of a help text before options, so that no line exceeds `width` if possible.
 
     Parameters
     ----------
     text : str
-        A help text; an example is an indented paragraph of one line, or what stands behind `Example: `.
+        A help text; an example is an indented paragraph of one line, or the text after `Example: `.
     width : int
         Characters in a line.
 
     Returns
     -------
     str
-        The text; before each example stands click's mark of a paragraph that is not wrapped.
+        The text; each example is preceded by click's mark for a paragraph that is not wrapped.
     """
-    # Behind its word, within a paragraph, click would wrap it as prose.
+    # Within a paragraph, click would wrap it as prose.
     paragraphs = _BESIDE_ITS_WORD.sub(r"\n\nExample:\n\n  \1", text.strip()).split("\n\n")
     return "\n\n".join(
         _whole(one, width) if one.startswith("  ") and "\n" not in one.strip() else one for one in paragraphs
@@ -52,13 +52,13 @@ def _whole(example: str, width: int) -> str:
 
 
 def broken(command: str, width: int) -> list[str]:
-    """A command as lines that end in a backslash but for the last, broken before options.
+    """A command as lines that end in a backslash except for the last, broken before options.
 
     Parameters
     ----------
     command : str
     width : int
-        Characters in a line, the backslash included.
+        Characters in a line, including the backslash.
 
     Returns
     -------
@@ -86,7 +86,7 @@ def broken(command: str, width: int) -> list[str]:
 # How the commands of every command line are gathered and listed in its help.
 
 NEAR = 0.7
-"""Likeness from which a command is suggested: below it `list` is answered with `blinks`."""
+"""Minimum similarity for suggesting a command: with less, `blinks` would be suggested for `list`."""
 
 
 class WholeExamplesCommand(TyperCommand):
@@ -111,18 +111,18 @@ class CommandApp(typer.Typer):
 
 
 class WholeLineGroup(TyperGroup):
-    """A group whose help lists each command with its whole first paragraph; Typer would cut it short."""
+    """A group whose help lists each command with its whole first paragraph; Typer would shorten it."""
 
     def __init__(self, **settings: Any):
         super().__init__(**{**settings, "suggest_commands": False})
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """Find the command; one that is not there is answered with those whose names are like it."""
+        """Find the command; for an unknown one, suggest commands with similar names."""
         lacks = args and not args[0].startswith("-") and self.get_command(ctx, args[0]) is None
         if lacks and not ctx.resilient_parsing:
             near = get_close_matches(args[0], self.list_commands(ctx), cutoff=NEAR)
             hint = f" Did you mean {', '.join(map(repr, near))}?" if near else ""
-            ctx.fail(f"No such command {args[0]!r}.{hint}")
+            ctx.fail(f"There is no command {args[0]!r}.{hint}")
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
@@ -144,7 +144,7 @@ def command_group(
     Parameters
     ----------
     help_text : str
-        What the commands are for: the first paragraph of the group's own help.
+        Purpose of the commands: the first paragraph of the group's help.
     group_class : type
         Class of the group: `WholeLineGroup` or one made of it.
     **settings : Any
@@ -161,10 +161,10 @@ def command_group(
     )
 
 
-# A command line that lists its commands without importing any: each is loaded when it is called.
+# A command line that lists its commands without importing them: each is loaded when it is called.
 
 Commands = Mapping[str, tuple[str, str]]
-"""Command -> the module whose `register` adds it, and the line of help that lists it."""
+"""Command -> the module whose `register` adds it, and its line of help in the list."""
 
 
 def lazy_group(commands: Commands) -> type[WholeLineGroup]:

@@ -8,13 +8,13 @@ from typing import Any, NoReturn, Protocol, cast
 from experiments.errors import InputError, expectation, wrong_value
 
 NO_ROOM = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS}
-"""What a disk says that is full or may not be written to."""
+"""Errors of a disk that is full or not writable."""
 STOPPED = 130
 """Exit code after Ctrl-C, which Typer may have turned into it."""
 
 
 class UsageError(Protocol):
-    """What Typer raises for a command or an option that is not there, or a value that is none."""
+    """What Typer raises for an unknown command or option, or an invalid value."""
 
     exit_code: int
     ctx: Any
@@ -39,8 +39,8 @@ def run_command_line(app: Callable[..., object]) -> None:
     except BrokenPipeError:
         sys.exit(0)
     except Exception as error:
-        if type(error).__name__ == "Abort":  # Typer's, of a question without a yes or without anybody to ask
-            sys.stderr.write("stopped: the question was not answered by yes\n")
+        if type(error).__name__ == "Abort":  # from Typer: a question was declined or could not be asked
+            sys.stderr.write("stopped: the question was not answered with yes\n")
             sys.exit(1)
         if not hasattr(error, "format_message"):
             _say_disk(error)
@@ -60,7 +60,7 @@ def _wrong_call(error: UsageError) -> str:
 
 
 def _refused_option(error: UsageError) -> str:
-    """A value refused for its type or limit, in the words of refused declarations; else empty."""
+    """A value refused for its type or limit, worded like refused declarations; otherwise empty."""
     errors = getattr(error.__cause__, "errors", None)  # pydantic's, where Typer loaded it: it is slow to load
     param = getattr(error, "param", None)
     if errors is None or param is None:
@@ -75,5 +75,5 @@ def _say_disk(error: Exception) -> NoReturn:
     if not isinstance(error, OSError) or error.errno not in NO_ROOM:
         raise error
     where = f"{error.filename}: " if error.filename else ""
-    sys.stderr.write(f"error: {where}{error.strerror}; make room and run the same command again\n")
+    sys.stderr.write(f"error: {where}{error.strerror}; free disk space and run the same command again\n")
     sys.exit(2)

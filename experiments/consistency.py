@@ -1,6 +1,6 @@
-"""Whether the parts of a declared experiment fit one another: asked of every declaration once it is read.
+"""Checks whether the parts of a declared experiment fit together. Every declaration is checked after reading.
 
-The two places that read declarations ask: `experiments.load` and `experiments.schema.stored`.
+`experiments.load` and `experiments.schema.stored` call it.
 """
 
 from pydantic import ValidationError
@@ -17,14 +17,14 @@ from experiments.wording import language_fault, silent_on_flicker, suggested_sen
 
 
 def check_consistency(experiment: Experiment, *, has_data: bool = False) -> None:
-    """Refuse an experiment whose parts do not fit one another.
+    """Refuse an experiment whose parts do not fit together.
 
     Parameters
     ----------
     experiment : Experiment
-        As it was read: every key is right for itself.
+        The parsed experiment: every key is valid by itself.
     has_data : bool, optional
-        Whether answers were collected by it: what is newly refused stays allowed then.
+        Whether answers were collected with it: newer rules are then not applied.
 
     Raises
     ------
@@ -63,12 +63,12 @@ def _consistent(experiment: Experiment, has_data: bool) -> None:
 
 def _assignment_fits(experiment: Experiment) -> None:
     kind = KINDS[experiment.trial.kind]
-    dealt = f"trials of the kind {kind.name} are dealt by their own design"
+    dealt = f"trials of the kind {kind.name} are assigned by their own design"
     between = next((factor.name for factor in experiment.factors if factor.between), None)
     if between and not kind.groups:
-        raise ValueError(f"factors: '{between}' is between participants; {dealt}")
+        raise ValueError(f"factors: '{between}' is between participants, but {dealt}; remove `between`")
     if experiment.assignment != Assignment() and not kind.shares_clips:
-        raise ValueError(f"assignment: {dealt}")
+        raise ValueError(f"assignment: {dealt}; remove [assignment]")
     if fault := shares.fault_of_assignment(experiment) or groups.fault_of_grouping(experiment):
         raise ValueError(fault)
 
@@ -79,15 +79,16 @@ def _random_factors_fit(experiment: Experiment) -> None:
         return
     if not KINDS[experiment.trial.kind].random_factors:
         raise ValueError(
-            f"factors: '{drawn[0]}' is random; trials of the kind {experiment.trial.kind} know none"
+            f"factors: '{drawn[0]}' is random, but trials of the kind {experiment.trial.kind} do not "
+            f"support random factors"
         )
     for key, mentioned in (("factors", experiment.analysis.factors), ("pairs", experiment.analysis.pairs)):
         if named := next((name for name in mentioned if name in drawn), None):
             raise ValueError(
-                f"analysis.{key}: '{named}' is a random factor, over which means are taken; leave it out"
+                f"analysis.{key}: '{named}' is a random factor, over which ratings are averaged; remove it"
             )
     if len(drawn) == len(experiment.factors):
-        raise ValueError(f"factors: every factor is random; expected one to compare, got '{drawn[0]}' alone")
+        raise ValueError(f"factors: expected at least one factor that is not random, got only '{drawn[0]}'")
 
 
 def _enough_check_clips(experiment: Experiment) -> None:
@@ -95,19 +96,19 @@ def _enough_check_clips(experiment: Experiment) -> None:
     asked = sum(motion_checks_by_block(experiment))
     if asked > checks.clips:
         raise ValueError(
-            f"evidence.motion_checks.clips: expected at least the {asked} checks that a participant is "
-            f"asked, got {checks.clips}"
+            f"evidence.motion_checks.clips: expected at least {asked}, one per check of a participant; got "
+            f"{checks.clips}"
         )
 
 
 def _consent_mentions_flicker(experiment: Experiment, has_data: bool) -> None:
-    """Where the switch adds motion checks; studies that declare them by hand get a warning instead."""
+    """For checks added by `online_recruitment`; studies that declare them manually get a warning instead."""
     if not experiment.evidence.online_recruitment or has_data:
         return
     if silent := silent_on_flicker(experiment):
         raise ValueError(
-            f"texts.{silent[0]}.consent: expected it to mention that clips flicker, since "
-            "evidence.online_recruitment shows clips of flickering dots; add a sentence such as "
+            f"texts.{silent[0]}.consent: expected a warning about flicker, because "
+            f"evidence.online_recruitment shows flickering dots; add a sentence such as "
             f'"{suggested_sentence(silent[0])}"'
         )
 

@@ -20,18 +20,18 @@ def clips(experiment: Experiment) -> list[ClipSpec]:
 
 
 def rated_clips(experiment: Experiment) -> list[ClipSpec]:
-    """The clips that trials ask about; a reference is only shown beside them."""
+    """The clips that trials ask about; references are only shown with them."""
     return [clip for clip in clips(experiment) if experiment.trial.rates(experiment, clip)]
 
 
 def rated_levels(experiment: Experiment, factor: str) -> list[str]:
-    """The declared levels of a factor, in order, without one whose clips are only shown as references."""
+    """The declared levels of a factor, in order, except those only shown as references."""
     rated = {clip.level(factor) for clip in rated_clips(experiment)}
     return [level.name for level in experiment.factor(factor).levels if level.name in rated]
 
 
 def blocks(experiment: Experiment) -> list[BlockSpec]:
-    """Blocks in declared order, repeats included; a participant's order is drawn by the server."""
+    """Blocks in declared order, including repeats; the server determines each participant's order."""
     every = clips(experiment)
     split = experiment.blocks.split_by
     if split is None:
@@ -52,6 +52,6 @@ def render_settings(experiment: Experiment, spec: ClipSpec) -> RenderSettings:
 
 
 def exemplar_key(experiment: Experiment, spec: ClipSpec) -> str:
-    """Key of the blink a clip shows: clips with the same key show the same blink (see `Exemplars`)."""
+    """Key of the blink that a clip shows: clips with the same key show the same blink (see `Exemplars`)."""
     own = [level for factor, level in spec.levels if factor in experiment.exemplars.own_per]
     return "/".join([*own, f"{spec.exemplar:03d}"])

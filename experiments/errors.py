@@ -1,4 +1,4 @@
-"""One way to refuse bad input: what was expected, what came, and what to do."""
+"""One format for rejecting bad input: what was expected, what was received, and what to do."""
 
 import json
 from collections.abc import Callable, Mapping
@@ -11,16 +11,17 @@ from table_files.errors import nearest as nearest
 
 
 def and_others(number: int) -> str:
-    """Return ` (and 2 more problems)`, to end a line that tells the first; nothing where it is alone."""
+    """Return ` (and 2 more problems)` for the end of a line that reports the first; empty if it is the only
+    one."""
     return f" (and {number} more problem{'s' if number > 1 else ''})" if number else ""
 
 
-# What was expected and what came, in words, for every value that a model refuses.
+# What was expected and what was received, in words, for every value that a model refuses.
 
 MAX_SHOWN = 60
 
 Context = Mapping[str, Any]
-"""What the model says of its limit: `ge`, `pattern`, `min_length`..."""
+"""The model's description of its limit: `ge`, `pattern`, `min_length`..."""
 
 TYPES = {
     "string_type": "a text in quotes",
@@ -66,7 +67,7 @@ def wrong_value(detail: Mapping[str, Any]) -> str:
     """
     kind, given, context = detail["type"], detail.get("input"), detail.get("ctx") or {}
     if kind == "missing":
-        return "this key is required and missing"
+        return "this key is required but missing"
     expected = expectation(detail)
     if expected is None:
         message = str(detail["msg"]).removeprefix("Value error, ")
@@ -79,7 +80,7 @@ def wrong_value(detail: Mapping[str, Any]) -> str:
 
 
 def expectation(detail: Mapping[str, Any]) -> str | None:
-    """What was expected where pydantic names a type or a limit; None where a validator has words of its own.
+    """What was expected, if pydantic reports a type or a limit; None if a validator has its own message.
 
     Examples
     --------
@@ -91,7 +92,8 @@ def expectation(detail: Mapping[str, Any]) -> str | None:
 
 
 def is_follower(detail: Mapping[str, Any]) -> bool:
-    """Whether the error follows from others: a list found too short once its wrong items were taken out."""
+    """Whether the error follows from others: a list is too short only because its wrong items were
+    removed."""
     return detail["type"] == "too_short" and bool(len(detail["input"]) >= detail["ctx"]["min_length"])
 
 
@@ -101,7 +103,7 @@ def _nearest(word: str, allowed: list[str]) -> str:
 
 
 def _way_out(kind: str, detail: Mapping[str, Any]) -> str:
-    """How the two kinds of table are told apart in TOML, where one was written for the other."""
+    """How to write the right kind of table in TOML, if the other kind was written."""
     table = ".".join(part for part in detail["loc"] if isinstance(part, str))
     ends_in_key = isinstance(detail["loc"][-1], str) if detail["loc"] else False
     if kind == "tuple_type" and isinstance(detail["input"], dict):
@@ -116,7 +118,7 @@ def _is_tables(given: Any) -> bool:
 
 
 def as_toml(given: Any) -> str:
-    """A value as it stands in TOML, long ones cut off and tables by their keys."""
+    """A value as written in TOML; long values are cut off, and tables are shown by their keys."""
     if isinstance(given, str):
         return repr(given) if len(given) <= MAX_SHOWN else f"{given[:MAX_SHOWN]!r}..."
     if isinstance(given, dict):

@@ -1,4 +1,4 @@
-"""Output that is whole or absent: written under a temporary name beside the target, then renamed."""
+"""Output that is complete or absent: written under a temporary name next to the target, then renamed."""
 
 import errno
 import json
@@ -14,39 +14,39 @@ from experiments.errors import InputError
 
 
 def temporary_beside(path: Path, suffix: str = "") -> Path:
-    """Return a name beside `path` for unfinished output; the folder must exist and be writable."""
+    """Return a name next to `path` for unfinished output; the folder must exist and be writable."""
     folder = path.parent
     if not folder.is_dir():
-        raise InputError(f"{path}: the folder {folder} does not exist; make it first")
+        raise InputError(f"{path}: the folder {folder} does not exist; create it first")
     if path.is_dir():
-        raise InputError(f"{path}: expected a file name, this is a folder")
+        raise InputError(f"{path}: expected a file name, got a folder")
     if not os.access(folder, os.W_OK):
-        raise InputError(f"{path}: the folder {folder} cannot be written to")
+        raise InputError(f"{path}: the folder {folder} is not writable")
     return folder / f".{path.name}.{os.getpid()}.part{suffix}"
 
 
 def check_targets(outputs: Iterable[Path | None], inputs: Iterable[Path | None] = ()) -> None:
-    """Refuse outputs that cannot be written, or would take the place of an input or of one another."""
+    """Refuse outputs that cannot be written, or that would overwrite an input or another output."""
     taken = [path.resolve() for path in inputs if path is not None]
     for path in outputs:
         if path is not None:
             temporary_beside(path)
             if path.resolve() in taken:
-                raise InputError(f"{path}: already in use in this call; give every output a name of its own")
+                raise InputError(f"{path}: already used in this call; give every output a unique name")
             taken.append(path.resolve())
 
 
 def check_ending(path: Path | None, endings: tuple[str, ...], what: str) -> None:
-    """Refuse a name for output whose ending is not one of its kind; a name without an ending is refused too.
+    """Refuse an output name with a wrong ending or without an ending.
 
     Parameters
     ----------
     path : Path or None
-        None is no output.
+        None if there is no output.
     endings : tuple of str
         Expected, with their dots, in small letters.
     what : str
-        The output in words, as `a track`, or its option.
+        The output in words, such as `a track`, or its option.
     """
     if path is not None and path.suffix.lower() not in endings:
         raise InputError(f"{what}: expected a name that ends in {' or '.join(endings)}, got '{path.name}'")
@@ -60,12 +60,12 @@ def remove_quietly(path: Path) -> None:
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """Give a temporary path; rename it to `path` if the block ends well, remove it if not.
+    """Give a temporary path; rename it to `path` if the block succeeds, remove it otherwise.
 
     Raises
     ------
     InputError
-        The file cannot stand there, or the disk is full.
+        The file cannot be written there, or the disk is full.
     """
     temporary = temporary_beside(path, suffix=path.suffix)
     try:
@@ -74,33 +74,35 @@ def whole_file(path: Path) -> Iterator[Path]:
     except OSError as error:
         if error.errno in NO_ROOM:
             raise InputError(
-                f"{path} cannot be written ({error.strerror}); make room and try again"
+                f"{path} cannot be written ({error.strerror}); free disk space and try again"
             ) from error
         if error.filename == str(temporary):
-            raise InputError(f"{path} cannot be written ({error.strerror}); write it elsewhere") from error
+            raise InputError(
+                f"{path} cannot be written ({error.strerror}); choose a different location"
+            ) from error
         raise
     finally:
         remove_quietly(temporary)
 
 
 def says_full(error: Exception) -> bool:
-    """Whether an error, or that which `whole_file` made it of, says that the disk is full."""
+    """Whether an error, or the one that caused it in `whole_file`, reports a full disk."""
     cause = error if isinstance(error, OSError) else error.__cause__
     return isinstance(cause, OSError) and cause.errno == errno.ENOSPC
 
 
 @contextmanager
 def whole_text(path: Path) -> Iterator[TextIO]:
-    """Open `path` for text (UTF-8, newlines as written) so that it appears whole or not at all."""
+    """Open `path` for text (UTF-8, newlines as written) so that it appears completely or not at all."""
     with whole_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as stream:
         yield stream
 
 
 @contextmanager
 def whole_private_file(path: Path) -> Iterator[IO[bytes]]:
-    """As `whole_file`, open for bytes: for its owner alone, and on the disk before it stands there."""
+    """As `whole_file`, open for bytes: readable by its owner only, and on the disk before it is renamed."""
     with whole_file(path) as temporary:
-        remove_quietly(temporary)  # of a process that was killed and had this one's number
+        remove_quietly(temporary)  # left by a killed process with the same process ID
         descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
         with os.fdopen(descriptor, "wb") as stream:
             yield stream
@@ -108,16 +110,16 @@ def whole_private_file(path: Path) -> Iterator[IO[bytes]]:
             os.fsync(stream.fileno())
 
 
-# JSON of numbers: what is undefined or infinite becomes null.
+# JSON of numbers: undefined and infinite numbers become null.
 
 
 def json_text(value: Any) -> str:
-    """Indented JSON; JSON has no NaN, so what is undefined or infinite becomes null.
+    """Indented JSON; undefined and infinite numbers become null, because JSON has no NaN.
 
     Parameters
     ----------
     value : Any
-        Dictionaries, lists, tuples, text, numbers and None, in any depth.
+        Dictionaries, lists, tuples, text, numbers and None, at any depth.
 
     Returns
     -------
@@ -135,13 +137,13 @@ def _finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-# The address of a database as its owner writes it, and as SQLAlchemy needs it.
+# The URL of a database as its owner writes it, and as SQLAlchemy needs it.
 
 DRIVER = "postgresql+psycopg://"
 
 
 def with_driver(url: str) -> str:
-    """The address with the driver that this project uses, where it names PostgreSQL and no driver.
+    """The URL with this project's driver, if it names PostgreSQL without a driver.
 
     Examples
     --------

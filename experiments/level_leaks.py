@@ -1,10 +1,10 @@
-"""What tells the levels of a factor apart besides the factor: the confounds that a manifest shows.
+"""Features that reveal the levels of a factor: confounds that a manifest shows.
 
-For each factor and each feature of a clip that raters could notice (where the lids rest at its start and end,
-how far the end lies from the start, its length, rate, size and brightness) the clips are counted by level and
-by value. A level is recognized better than chance where Pearson's chi-square of that table is too large
-(p < 0.001), or where each level has a value that no other level has. Then a difference between levels may be
-due to the feature instead of the factor.
+For each factor, the clips are tabulated by level and by each feature that raters could notice: where the lids
+rest at the start and end, how far the two differ, length, frame rate, size and brightness. A level can be
+recognized better than chance if Pearson's chi-square of that table is large (p < 0.001), or if each level has
+a value that no other level has. A difference between levels may then be due to the feature instead of the
+factor.
 """
 
 from collections import Counter, defaultdict
@@ -15,11 +15,11 @@ from math import erfc, exp, lgamma, log, sqrt
 from experiments.manifest import Clip
 
 ALPHA = 0.001
-"""A table of levels by values that chance gives this rarely is reported."""
+"""Tables of levels by values with a smaller chance probability are reported."""
 MASS = 0.1
-"""A value that at least this share of the clips has makes a separate group."""
+"""A value shared by at least this proportion of the clips forms a separate group."""
 GROUPS = 4
-"""Groups of equal size for all other values."""
+"""Number of groups of equal size for all other values."""
 DECIMALS = 3
 Value = float | str
 Table = dict[str, Counter[object]]
@@ -29,25 +29,25 @@ ONSET = "frame at which the blink begins"
 BYTES = "size of the file"
 BRIGHTNESS = ("brightness of the first frame", "brightness of the last frame")
 TABULATED_ONLY = frozenset({BYTES})
-"""A rater does not see these, so they are shown in tables and never reported."""
+"""Raters cannot see these features, so they are tabulated but never reported."""
 
 
 @dataclass(frozen=True)
 class LevelLeak:
-    """How well a feature of the clips tells the levels of a factor apart.
+    """How well a feature of the clips reveals the levels of a factor.
 
     Attributes
     ----------
     factor, feature : str
     level : str
-        The level that the feature tells apart best.
+        The level that the feature reveals best.
     right, others : float
         Share of the clips of this level, and of all other clips, that a guess from the feature gets right.
-        Without any relation both add up to 1.
+        Without any relation, they add up to 1.
     clips : int
         Clips that were compared; the same blink shown in several cells counts once.
     p_value : float
-        Of Pearson's chi-square of levels by groups of values; 0 where every level has a value for itself.
+        Of Pearson's chi-square of levels by groups of values; 0 if every level has a unique value.
     """
 
     factor: str
@@ -60,7 +60,7 @@ class LevelLeak:
 
     @property
     def reported(self) -> bool:
-        """Whether the feature tells the levels apart, and raters can notice it."""
+        """Whether the feature reveals the levels, and raters can notice it."""
         return self.p_value < ALPHA and self.feature not in TABULATED_ONLY
 
     def __str__(self) -> str:
@@ -68,14 +68,14 @@ class LevelLeak:
             f"the level '{self.level}' of '{self.factor}' can be recognized by the {self.feature} alone: "
             f"a guess from it is right for {self.right:.0%} of the level's clips and for "
             f"{self.others:.0%} of the others ({self.clips} clips). An effect of '{self.factor}' may be due "
-            f"to this: make the clips alike in it, unless it is what '{self.factor}' varies"
+            f"to this: equalize the clips in it, unless it is what '{self.factor}' varies"
         )
 
 
 def level_leaks(
     clips: Sequence[Clip], measured: Mapping[str, Mapping[str, Value]] | None = None
 ) -> tuple[LevelLeak, ...]:
-    """What every feature says of every factor's levels, in the order of factors and features.
+    """How well each feature reveals each factor's levels, in the order of factors and features.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def level_leaks(
 def reported_leaks(
     clips: Sequence[Clip], measured: Mapping[str, Mapping[str, Value]] | None = None
 ) -> list[str]:
-    """The features that tell levels apart, a sentence each."""
+    """The features that reveal levels, one sentence each."""
     return [str(leak) for leak in level_leaks(clips, measured) if leak.reported]
 
 
@@ -145,7 +145,8 @@ _FEATURES: dict[str, Callable[[Clip], Value | None]] = {
 
 
 def _features_of(clips: Sequence[Clip], factor: str) -> set[str]:
-    """The features that a factor of rendered clips varies on purpose: it sets the character or the length."""
+    """The features that a factor of rendered clips varies on purpose, because it sets the character or
+    length."""
     if not all("character" in clip.inputs for clip in clips):
         return set()
     set_on_purpose: set[str] = set()
@@ -173,10 +174,10 @@ def _judged(
     value_of: Callable[[Clip], Value | None],
     set_by: Sequence[str],
 ) -> LevelLeak | None:
-    """What one feature says of one factor's levels; None where the clips of one level alone have it.
+    """How well one feature reveals one factor's levels; None if only one level has it.
 
     Clips are compared within the levels of the factors that set the feature on purpose. A blink that several
-    cells show alike is one observation: else it would be guessed from its own copies.
+    cells share is one observation; otherwise it would be guessed from its own copies.
     """
     seen: dict[tuple[object, ...], tuple[tuple[str, ...], str, Value]] = {}
     for clip in clips:
@@ -250,16 +251,17 @@ def chi_square_tail(statistic: float, df: int) -> float:
 
 
 def _separates(table: Table) -> bool:
-    """Whether each of several levels has two clips or more, all in one group that no other level has."""
+    """Whether there are several levels with at least two clips each, all in one group that no other level
+    has."""
     groups = [set(row) for row in table.values()]
     alone = all(len(group) == 1 for group in groups) and len(set().union(*groups)) == len(groups)
     return len(table) > 1 and alone and min(row.total() for row in table.values()) > 1
 
 
 def _gives_a_level_away(table: Table) -> bool:
-    """Whether one level's clips, two or more, all have one value that no other level has.
+    """Whether all clips of a level (at least two) share one value that no other level has.
 
-    For features that do not vary by themselves: rates and sizes are the same unless they were made to differ.
+    For features that do not vary by chance: rates and sizes are the same unless they were changed.
     """
     for level, row in table.items():
         others = set().union(*(set(other) for name, other in table.items() if name != level))
@@ -271,8 +273,8 @@ def _gives_a_level_away(table: Table) -> bool:
 def _guessed(tables: Sequence[Table], level: str) -> tuple[float, float]:
     """Share of the clips of a level, and of the others, that a guess from the groups gets right.
 
-    A clip is guessed to be of the level where its group holds a greater share of the level's clips than of
-    the others'; equal shares count half.
+    A clip is guessed to belong to the level if its group holds a larger share of that level's clips than of
+    the others; equal shares count half.
     """
     right, others, of_level, of_others = 0.0, 0.0, 0, 0
     for table in tables:
@@ -291,7 +293,7 @@ def _guessed(tables: Sequence[Table], level: str) -> tuple[float, float]:
 
 
 def grouped_values(values: Sequence[Value]) -> Callable[[Value], object]:
-    """Put values into groups: a common value is a group, all others are cut into groups of equal size."""
+    """Group values: a frequent value is a group, and all others are divided into groups of equal size."""
     counts = Counter(values)
     if len(counts) <= GROUPS or any(isinstance(value, str) for value in values):
         return lambda value: value

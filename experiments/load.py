@@ -1,4 +1,4 @@
-"""Read an experiment from TOML: shipped by name, or a file. Problems carry their line and a way out."""
+"""Read an experiment from TOML: shipped by name, or a file. Problems include their line and a solution."""
 
 import re
 import tomllib
@@ -16,15 +16,15 @@ from experiments.errors import InputError, and_others, did_you_mean, is_follower
 from experiments.schema.effects import Key, is_tag
 from experiments.schema.stored import upgrade_data
 
-# Tell dotted keys that take seconds to read in TOML text, in one pass and before any reader gets it.
+# Detect dotted keys that take seconds to parse, in one pass and before any parser reads the TOML text.
 
 MAX_DEPTH = 32
-"""Tables and lists in one another; dotted keys make tables of any depth in a few letters each."""
+"""Maximum nesting of tables and lists; dotted keys can make deep tables with a few letters per level."""
 PART = r"""(?:[\w-]++|"(?>(?:[^"\\\n]++|\\[^\n])*)"|'[^'\n]*+')"""
 """One part of a dotted key, bare or quoted."""
 _PARTS = re.compile(PART)
 _DOT = r"[ \t]*+\.[ \t]*+"
-# Without a way back, and the rest of an unclosed string is swallowed: each letter is looked at a few times at
+# Without backtracking, and with the rest of an unclosed string consumed: each letter is read a few times at
 # most. Groups repeat in atomic ones: Debian 12's Python 3.11.2 matches their possessive repeats wrongly.
 _TOKEN = re.compile(
     r'"""(?>(?:[^"\\]++|\\.|"{1,2}+(?!"))*)(?:"{3,5}+|.*+)'
@@ -37,21 +37,22 @@ _TOKEN = re.compile(
 
 
 def has_endless_key(text: str) -> bool:
-    """Whether a dotted key has more parts than tables may stand in one another.
+    """Whether a dotted key has more parts than the maximum nesting depth of tables.
 
-    The time to read one grows with the square of its parts. Dots in texts and comments do not count; behind
-    the first mistake of a text, where every reader stops, the answer says nothing.
+    The time to parse a key grows with the square of its parts. Dots in texts and comments do not count. After
+    the first mistake in a text, where every parser stops, the answer is meaningless.
     """
     return any(token["beyond"] is not None for token in _TOKEN.finditer(text))
 
 
 def sum_of_cubes(text: str) -> int:
-    """Of the parts of every dotted key, which is how the time grows that an editor of TOML takes."""
+    """Sum of the cubes of the parts of every dotted key: the time that an editor of TOML takes grows like
+    this."""
     keys = (token["key"] for token in _TOKEN.finditer(text))
     return sum(len(_PARTS.findall(key)) ** 3 for key in keys if key is not None and "." in key)
 
 
-# Find the line of a key in TOML text, because the standard parser keeps no positions.
+# Find the line of a key in TOML text, because the standard parser does not store positions.
 
 _HEADER = re.compile(r"^\s*+(\[\[?+)([^\]]++)\]\]?+\s*+(#.*)?$")
 _STRING_OR_COMMENT = re.compile(
@@ -62,7 +63,7 @@ _KEY = re.compile(r"^\s*([A-Za-z0-9_\-\"'.]+)\s*=")
 
 
 def line_of(text: str, location: Sequence[object]) -> int | None:
-    """Return the line (from 1) of the deepest part of `location` that stands in `text`, or None.
+    """Return the line (from 1) of the deepest part of `location` that is in `text`, or None.
 
     `location` is a path of keys and list indices, as pydantic reports it. Arrays of tables (`[[a]]`) count
     their headers; keys inside inline tables are found on the line of the table's own key.
@@ -70,7 +71,7 @@ def line_of(text: str, location: Sequence[object]) -> int | None:
     places = _places(text)
     prefix = list(location)
     while prefix:
-        # `[[a]]` has no line of its own where one says `a`: its first element's is meant.
+        # The key `a` of `[[a]]` has no separate line: the line of its first element is used.
         for key in (tuple(prefix), (*prefix, 0)):
             if key in places:
                 return places[key]
@@ -101,20 +102,20 @@ def _places(text: str) -> dict[tuple[object, ...], int]:
 
 
 def _without_strings(text: str) -> str:
-    """The text with its values' strings and its comments emptied, every line where it was."""
+    """The text with its strings and comments emptied; every line keeps its number."""
 
     def emptied(match: re.Match[str]) -> str:
         token = match[0]
         if token.startswith(('"""', "'''")):
             return '""' + "\n" * token.count("\n")
-        # A quoted key says what it is called; quoted values do not matter.
+        # A quoted key contains a name; quoted values do not matter.
         return "" if token.startswith("#") else re.sub(r"[\[\]{}#=]", "_", token)
 
     return _STRING_OR_COMMENT.sub(emptied, text)
 
 
 def _enter(keys: list[str], is_array: bool, counts: dict[tuple[object, ...], int]) -> tuple[object, ...]:
-    """The path of a table header, with the index of the latest element wherever a key is an array."""
+    """The path of a table header, with the index of the latest element for every array."""
     here: tuple[object, ...] = ()
     for position, key in enumerate(keys):
         here = (*here, key)
@@ -137,12 +138,12 @@ DEMOS = (
     *("pairs-demo", "sliders-demo", "dcr-demo", "threshold-demo", "plane-demo", "checks-demo", "faces-demo"),
     *("timing", "timing-pairs", "timing-continuous"),
 )
-"""Demonstrations of the other kinds of trial and of sliders; each is found by its file's name or its own."""
+"""Demonstrations of the other kinds of trial and of sliders; each is found by its file name or its name."""
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing wrong in a definition: where (line from 1, dotted path) and what to do."""
+    """One problem in a definition: where (line from 1, dotted path) and what to do."""
 
     line: int | None
     path: str
@@ -154,12 +155,12 @@ class Problem:
 
 
 class DefinitionError(InputError):
-    """A definition cannot be used; `problems` lists the reasons, the message is the first.
+    """A definition cannot be used; `problems` lists the reasons, and the message is the first.
 
     Parameters
     ----------
     number : int, optional
-        How many reasons there are, where not all are listed.
+        How many reasons there are, if not all are listed.
     """
 
     def __init__(self, source: str, problems: Sequence[Problem], number: int | None = None) -> None:
@@ -169,11 +170,11 @@ class DefinitionError(InputError):
 
 
 class UnknownExperimentError(InputError):
-    """A name that is neither a shipped experiment's nor the path of a file."""
+    """A name that is neither a shipped experiment nor the path of a file."""
 
 
 def load_experiment(name_or_path: str, *, has_data: bool = False) -> Experiment:
-    """Load a shipped experiment by name, or the TOML file at a path; `has_data` as for `parse_experiment`."""
+    """Load a shipped experiment by name, or the TOML file at a path; `has_data` as in `parse_experiment`."""
     path = locate(name_or_path)
     try:
         text = path.read_text(encoding="utf-8")
@@ -183,7 +184,7 @@ def load_experiment(name_or_path: str, *, has_data: bool = False) -> Experiment:
 
 
 def locate(name_or_path: str) -> Path:
-    """Return the TOML file of a shipped experiment's name or of a path; InputError where neither exists."""
+    """Return the path of the TOML file for a shipped experiment or a path; InputError if neither exists."""
     stem = name_or_path.replace("_", "-")
     if stem in (*SHIPPED, *DEMOS):
         return FOLDER / f"{stem}.toml"
@@ -192,7 +193,7 @@ def locate(name_or_path: str) -> Path:
         return path
     if path.suffix == ".toml":
         raise InputError(
-            f"no file {name_or_path}; expected a TOML file or one of {', '.join((*SHIPPED, *DEMOS))}"
+            f"there is no file {name_or_path}; expected a TOML file or one of {', '.join((*SHIPPED, *DEMOS))}"
         )
     names = (*SHIPPED, *DEMOS)
     near = nearest(stem, names)
@@ -203,7 +204,7 @@ def locate(name_or_path: str) -> Path:
 
 
 MAX_PROBLEMS = 100
-"""Reasons that are listed; a text can hold a hundred thousand unknown keys."""
+"""Maximum number of listed reasons; a text can contain a hundred thousand unknown keys."""
 TOO_DEEP = "not valid TOML: lists or tables are nested too deeply"
 
 
@@ -213,7 +214,8 @@ def parse_experiment(text: str, source: str = "definition", *, has_data: bool = 
     Parameters
     ----------
     has_data : bool
-        Of data that were collected by it: what an earlier version took, such as a number in quotes, still is.
+        Whether data were collected with it: values that an earlier version accepted, such as numbers in
+        quotes, are still accepted.
     """
     data = toml_data(text, source)
     number = data.pop("format", 1)
@@ -223,10 +225,10 @@ def parse_experiment(text: str, source: str = "definition", *, has_data: bool = 
         path, _, message = str(error).partition(": ")
         raise DefinitionError(source, [Problem(line_of(text, (path,)), path, message)]) from error
     try:
-        # TOML tells texts, numbers and truth values apart: none is taken for another.
+        # TOML distinguishes texts, numbers and booleans: none is accepted for another.
         experiment = Experiment.model_validate(_with_tuples(data), strict=not has_data)
     except ValidationError as error:
-        # A misspelt key is also a missing one: name the misspelling first.
+        # A misspelled key is also a missing one: report the misspelling first.
         causes = (detail for detail in error.errors() if not is_follower(detail))
         details = sorted(causes, key=lambda detail: detail["type"] == "missing")
         problems = [_problem(detail, text) for detail in details[:MAX_PROBLEMS]]
@@ -239,13 +241,13 @@ def parse_experiment(text: str, source: str = "definition", *, has_data: bool = 
 
 
 def _unfit_part(message: str, text: str) -> Problem:
-    """A fault of parts that do not fit; its path stands before the message, items of lists from 1."""
+    """A fault of parts that do not fit; its path precedes the message, and list items count from 1."""
     location, message = _located(message)
     return Problem(line_of(text, location), _dotted(location), message)
 
 
 def _located(message: str) -> tuple[tuple[object, ...], str]:
-    """The place that stands before a message, and the message; no place where it names none."""
+    """The place that precedes a message, and the message; no place if the message names none."""
     named = _LOCATION.match(message)
     if not named:
         return (), message
@@ -257,12 +259,12 @@ def _dotted(location: Sequence[object]) -> str:
 
 
 def toml_data(text: str, source: str = "definition") -> dict[str, Any]:
-    """What a TOML text says, whoever wrote it: what would keep a reader busy is refused before it is read.
+    """Parse TOML text from any source; text that would take too long to parse is refused before parsing.
 
     Raises
     ------
     DefinitionError
-        Where it is not TOML, or tables stand in one another without end.
+        The text is not valid TOML, or its tables are nested too deeply.
     """
     if has_endless_key(text):
         raise DefinitionError(source, [Problem(None, "", TOO_DEEP)])
@@ -271,7 +273,7 @@ def toml_data(text: str, source: str = "definition") -> dict[str, Any]:
     except tomllib.TOMLDecodeError as error:
         line = getattr(error, "lineno", None) or _line_in(str(error))
         raise DefinitionError(source, [Problem(line, "", f"not valid TOML: {error}")]) from error
-    except ValueError as error:  # of a number longer than Python reads
+    except ValueError as error:  # for a number longer than Python can parse
         problem = Problem(None, "", "not valid TOML: a number has too many digits")
         raise DefinitionError(source, [problem]) from error
     except RecursionError as error:
@@ -282,7 +284,7 @@ def toml_data(text: str, source: str = "definition") -> dict[str, Any]:
 
 
 def is_deeper(data: Any, depth: int) -> bool:
-    """Whether tables and lists stand in one another more than `depth` times."""
+    """Whether tables and lists are nested deeper than `depth`."""
     level = [data]
     for _ in range(depth + 1):
         level = [
@@ -295,7 +297,7 @@ def is_deeper(data: Any, depth: int) -> bool:
 
 
 def _with_tuples(data: Any) -> Any:
-    """The data with lists as tuples, which is what a strict reading takes for a list."""
+    """The data with lists as tuples, which strict validation expects for a list."""
     if isinstance(data, dict):
         return {key: _with_tuples(value) for key, value in data.items()}
     return tuple(map(_with_tuples, data)) if isinstance(data, list) else data
@@ -309,7 +311,7 @@ def _line_in(message: str) -> int | None:
 def _problem(detail: Any, text: str) -> Problem:
     location = tuple(_without_tags(detail["loc"]))
     kind, message = detail["type"], wrong_value(detail | {"loc": location})
-    if location and location[-1] == "[key]":  # The name of a table's key, which stands before it.
+    if location and location[-1] == "[key]":  # The name of a table's key, which precedes it.
         location, message = location[:-1], f"the key {message}"
     if kind == "union_tag_invalid":
         location = (*location, detail["ctx"]["discriminator"].strip("'"))
@@ -327,7 +329,7 @@ def _problem(detail: Any, text: str) -> Problem:
 
 
 def _walk(location: Sequence[object]) -> Iterator[tuple[object, type[BaseModel], bool]]:
-    """Each part of a place, the model after it, and whether the part only tells members of a union apart."""
+    """Each part of a path, the model after it, and whether the part only identifies a union member."""
     model: type[BaseModel] = Experiment
     tables: list[type[BaseModel]] = []
     for part in location:
@@ -346,7 +348,7 @@ def _without_tags(location: Sequence[object]) -> Iterator[object]:
 
 
 def _keys_at(location: Sequence[object]) -> list[str]:
-    """The keys allowed at a place of the declaration, by walking the models."""
+    """The keys allowed at a place in the declaration, by walking the models."""
     models: list[type[BaseModel]] = [Experiment, *(model for _, model, _ in _walk(location))]
     return list(models[-1].model_fields)
 

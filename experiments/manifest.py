@@ -1,4 +1,4 @@
-"""`manifest.json` beside a folder of clips: what each clip shows, and the hash of its bytes."""
+"""The `manifest.json` in a folder of clips: what each clip shows, and the hash of its bytes."""
 
 import hashlib
 import json
@@ -11,10 +11,10 @@ from experiments.checks import CheckName
 from experiments.declaration.base import Declaration
 from experiments.errors import InputError, wrong_value
 
-# What a clip was made from, where it is not shown as it came: the original, and what was changed.
+# What a converted clip was made from: the original, and the changes.
 
 ColourRange = Literal["limited", "full", "not said"]
-"""Limited: luminance 16 to 235 of 255, as video has it; full: 0 to 255; not said: taken as limited."""
+"""Limited: luminance 16 to 235 of 255, as in video. Full: 0 to 255. Not said: treated as limited."""
 FrameRate = Annotated[float, Field(ge=1, le=240)]
 
 
@@ -26,7 +26,7 @@ class SourceVideo(Declaration):
     file : str
         The name it came with.
     sha256 : str
-        Of its bytes, which are kept.
+        Of its bytes. The original is kept.
     bytes : int
         Length of the file.
     container, codec, pixel_format : str
@@ -34,25 +34,25 @@ class SourceVideo(Declaration):
     colour_range : str
         Of the original; clips are always of limited range.
     width_px, height_px : int
-        Of its stored pictures, before they were turned.
+        Of its stored frames, before rotation.
     fps : float
-        Frames per second; of a variable rate, the inverse of the median time between frames.
+        Frames per second; with a variable rate, the inverse of the median time between frames.
     variable_rate : bool
-        True where its frames do not follow one another at equal times.
+        True if its frames are not equally spaced in time.
     frames : int
         Frames of the original.
     changes : tuple of str
-        What was done, in words, in the order in which it was done.
+        The changes, in words, in the order in which they were made.
     encoded_again : bool
-        False where its pictures were copied as they were.
+        False if its frames were copied unchanged.
     frame_map : tuple of int
-        For each frame of the clip the frame of the original that it shows, both from 0; empty where each
-        shows its own.
+        For each frame of the clip, the frame of the original that it shows, both from 0; empty if they are
+        identical.
     lowest_psnr_db : float or None
-        Of the clip's worst frame: peak signal-to-noise ratio of the luminance, between what went into the
-        encoder and what comes out of it; None where no pixel differs or nothing was encoded again.
+        Peak signal-to-noise ratio of the luminance of the clip's worst frame, between the encoder's input and
+        output; None if no pixel differs or nothing was re-encoded.
     encoder : str
-        What encoded it; empty where nothing was encoded again.
+        Name of the encoder; empty if nothing was re-encoded.
     """
 
     file: Annotated[str, StringConstraints(min_length=1, max_length=200)]
@@ -75,19 +75,19 @@ class SourceVideo(Declaration):
 
     @property
     def kept_as(self) -> str:
-        """The original's name in the folder of a manifest: the clip made from it may have its name."""
+        """Name of the original in the folder of a manifest; the converted clip may have its name."""
         pure = PurePosixPath(self.file)
         return f"{pure.stem}.original{pure.suffix}"
 
 
 MANIFEST_NAME = "manifest.json"
 MADE_ELSEWHERE = "clips made elsewhere"
-"""The note of a manifest that `stimuli manifest` wrote of somebody's own clips."""
+"""The note in a manifest that `stimuli manifest` wrote for your own clips."""
 UPLOADED = "uploaded"
-"""In place of a program's version: of clips that came through the admin site."""
+"""Used instead of a program version for clips that were uploaded on the admin site."""
 Sha256 = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]
 FileName = Annotated[str, StringConstraints(pattern=r"^\w[^/\\\x00-\x1f\x7f]{0,150}$")]
-"""A file's own name, in any script: a letter or digit first, no slash, at most 151 characters."""
+"""A file name in any script: it starts with a letter or digit, has no slash, and at most 151 characters."""
 
 
 class Clip(Declaration):
@@ -100,21 +100,21 @@ class Clip(Declaration):
     profile : str
         Identifier of the blink shown.
     profile_repeated : bool
-        True where the same recorded eye already stands for another exemplar of this cell.
+        True if the same recorded eye is already used for another exemplar of this cell.
     closure : tuple of float
         Closure at 300 fps over the whole clip (0 open, 1 closed); empty for clips not made here.
     closure_other : tuple of float
-        The right eye's, where the eyes move apart.
+        Closure of the right eye, if the eyes move separately.
     lower_vertical_mm, lower_horizontal_mm : tuple of float
-        The lower lid's lift and its slide towards the nose, at 300 fps; empty where it rests.
+        Lift of the lower lid and its slide toward the nose, at 300 fps; empty if it rests.
     blinks_s : tuple of float
-        Onsets of the blinks of a performance, in s from the clip's start; left out of other clips.
+        Onsets of the blinks of a performance, in s from the start of the clip; omitted for other clips.
     onset_frame : int or None
         Output frame at which the blink begins.
     width_mm : float or None
         Shown width at actual size.
     source : SourceVideo or None
-        What a converted clip was made from; left out where the file is shown as it came.
+        What a converted clip was made from; omitted if the file is shown unchanged.
     """
 
     levels: dict[str, str]
@@ -143,7 +143,8 @@ class Clip(Declaration):
 
 
 class CheckClip(Declaration):
-    """One clip of a motion check. The file's name says nothing of its answer, and no participant is sent it.
+    """One clip of a motion check. Its file name reveals nothing about the answer, and participants never see
+    it.
 
     Attributes
     ----------
@@ -172,14 +173,14 @@ class CheckClip(Declaration):
 
 
 class Manifest(Declaration):
-    """All clips of one experiment, and what made them.
+    """All clips of one experiment, and how they were made.
 
     Attributes
     ----------
     checks : tuple of CheckClip
         Clips of motion checks.
     checks_seed : int or None
-        What they were made from; who knows it knows their answers.
+        Their random seed; it reveals their answers, so keep it secret.
     """
 
     experiment: str
@@ -194,12 +195,12 @@ class Manifest(Declaration):
 
     @property
     def files(self) -> tuple[Clip | CheckClip, ...]:
-        """Every clip that has a file: those of the design and those of checks."""
+        """Every clip that has a file: clips of the design and of checks."""
         return (*self.clips, *self.checks)
 
     @property
     def made_elsewhere(self) -> bool:
-        """Whether `stimuli manifest` wrote it of somebody's own clips."""
+        """Whether `stimuli manifest` wrote it for your own clips."""
         return MADE_ELSEWHERE in self.notes
 
     @property
@@ -209,12 +210,12 @@ class Manifest(Declaration):
 
 
 def read_manifest(folder: Path) -> Manifest:
-    """Read and validate `folder/manifest.json`; InputError in one line where it cannot be used."""
+    """Read and validate `folder/manifest.json`; one-line InputError if it cannot be used."""
     path = folder / MANIFEST_NAME
     if not path.is_file():
         raise InputError(
             f"expected a {MANIFEST_NAME} in {folder}, found none; build the clips with `stimuli build`, or "
-            "write one for clips of your own with `stimuli manifest`"
+            f"write a manifest for your own clips with `stimuli manifest`"
         )
     try:
         return Manifest.model_validate(json.loads(path.read_text(encoding="utf-8")))
@@ -227,7 +228,7 @@ def read_manifest(folder: Path) -> Manifest:
 
 
 def check_files(manifest: Manifest, folder: Path) -> None:
-    """Raise InputError for the first clip that is missing or whose bytes have another hash."""
+    """Raise InputError for the first clip that is missing or whose hash differs."""
     for clip in manifest.files:
         path = folder / clip.file
         if not path.is_file():
@@ -243,9 +244,9 @@ def check_files(manifest: Manifest, folder: Path) -> None:
 
 
 def _remedy(manifest: Manifest) -> str:
-    """What brings back a clip, by where the clips came from."""
+    """How to restore a clip, depending on its origin."""
     if manifest.made_elsewhere:
-        return "put the file back, or write the manifest again with `stimuli manifest`"
+        return "restore the file, or write the manifest again with `stimuli manifest`"
     return "build the clips again with `stimuli build`"
 
 
@@ -256,13 +257,13 @@ def check_originals(manifest: Manifest, folder: Path) -> None:
         if not path.is_file() or file_sha256(path) != source.sha256:
             state = "was changed" if path.is_file() else "is missing"
             raise InputError(
-                f"original {source.kept_as}, from which a clip was converted, {state} in {folder}; write the "
-                "manifest again with `stimuli manifest`, which puts it there"
+                f"original {source.kept_as}, from which a clip was converted, {state} in {folder}; write "
+                f"the manifest again with `stimuli manifest`, which restores it"
             )
 
 
 def place_of(clip: Clip | CheckClip) -> str:
-    """Where in the study a clip belongs, in words."""
+    """The place of a clip in the study, in words."""
     return f"check {clip.number}" if isinstance(clip, CheckClip) else f"{clip.cell}, exemplar {clip.exemplar}"
 
 

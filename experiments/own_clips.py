@@ -1,4 +1,4 @@
-"""Which cell each of somebody's own clips belongs to: by a table of levels, or by a pattern of file names."""
+"""Which cell each of your own clips belongs to: by a table of levels, or by a pattern of file names."""
 
 import math
 import re
@@ -14,18 +14,19 @@ from experiments.errors import InputError, did_you_mean
 from experiments.kinds import reserved_names
 from table_files.delimited import NamedRows, table_of_text
 
-# Patterns of file names such as `{character}_{speed}.mp4`: what stands in the place of each field.
+# Patterns of file names such as `{character}_{speed}.mp4`: the text in the place of each field.
 #
-# As a regular expression such a pattern takes time that grows with each further field as a power of the
-# name's length: a few fields and one long name that does not fit kept a server busy for minutes. Here each
-# place of a name is looked at once a field.
+# As a regular expression, such a pattern takes time that grows as a power of the length of the name, with one
+# power per field. A few fields and one long name that does not match kept a server busy for minutes. Here,
+# each position of a name is examined once per field.
 
 FIELD = re.compile(r"\{([A-Za-z][A-Za-z0-9_]*)\}")
 
 
 @dataclass(frozen=True)
 class NamePattern:
-    """Texts and, between them, fields of one letter or more without a slash, each as short as it can be.
+    """Texts and, between them, fields of at least one character without a slash, each as short as
+    possible.
 
     Attributes
     ----------
@@ -39,12 +40,12 @@ class NamePattern:
 
     @classmethod
     def read(cls, pattern: str) -> "NamePattern":
-        """The pattern that stands in a text."""
+        """The pattern in a text."""
         parts = FIELD.split(pattern)
         return cls(tuple(parts[::2]), tuple(parts[1::2]))
 
     def fit(self, name: str) -> Mapping[str, str] | None:
-        """What stands for each field in a whole name; None where the name does not follow the pattern.
+        """The text for each field in a whole name; None if the name does not match the pattern.
 
         >>> NamePattern.read("{face}_{speed}.mp4").fit("ada_slow.mp4")
         {'face': 'ada', 'speed': 'slow'}
@@ -52,7 +53,7 @@ class NamePattern:
         """
         if not name.startswith(self.texts[0]):
             return None
-        # For each field, the places where it may begin, and from which it led nowhere.
+        # For each field, possible start positions that led nowhere.
         dead: list[set[int]] = [set() for _ in self.fields]
         begins, ends = [len(self.texts[0])], list[int]()
         while len(ends) < len(self.fields):
@@ -71,7 +72,7 @@ class NamePattern:
     def _next_end(
         self, name: str, number: int, begin: int, ends_after: int, dead: list[set[int]]
     ) -> int | None:
-        """The next place where a field may end so that the rest is not known to fail."""
+        """The next possible end of a field for which the rest is not known to fail."""
         text, is_last = self.texts[number + 1], number + 1 == len(self.fields)
         slash = name.find("/", begin)
         limit = len(name) if slash < 0 else slash
@@ -86,7 +87,7 @@ class NamePattern:
         return None
 
 
-# What a factor may be called, by the parts that file names have in its place.
+# Suggested names of factors, based on the parts of file names.
 
 WORDS = {
     "speed": "slow slower slowest medium middle normal fast faster fastest quick",
@@ -114,7 +115,7 @@ _WITH_UNIT = re.compile(r"(.*\d)(ms|s|fps|hz|px|mm|cm|deg|db|percent)", re.IGNOR
 
 
 def name_and_frame(parts: Sequence[str]) -> tuple[str | None, str, str]:
-    """What a factor may be called by its levels, and what stands before and after each of them.
+    """A name for a factor based on its levels, and the constant text before and after each of them.
 
     Parameters
     ----------
@@ -124,11 +125,11 @@ def name_and_frame(parts: Sequence[str]) -> tuple[str | None, str, str]:
     Returns
     -------
     str or None
-        The name; None where the parts do not give one away.
+        The name; None if the parts do not suggest one.
     str
-        What begins each part without belonging to the level, such as `speed-`.
+        The start of each part that does not belong to the level, such as `speed-`.
     str
-        What ends each part likewise, such as the unit of `dur60ms`.
+        The end of each part that does not belong to the level, such as the unit of `dur60ms`.
     """
     name, head = _name_and_head(parts)
     tails = {fit[2] if (fit := _WITH_UNIT.fullmatch(part)) else "" for part in parts}
@@ -156,7 +157,7 @@ def _free(name: str) -> bool:
     return name not in reserved_names()
 
 
-# The order of levels that were read from file names: numbers by size, words of known scales by place.
+# The order of levels from file names: numbers by size, words of known scales by position.
 
 SCALES = tuple(
     {word: rank for rank, word in enumerate(words.split())}
@@ -192,9 +193,9 @@ SCALES = tuple(
         "absent present",
     )
 )
-"""Words of usual scales in their order."""
+"""Words of common scales in their order."""
 LEAST = {"none", "zero", "nothing", "baseline"}
-"""Words that begin every scale."""
+"""Words that begin a scale."""
 _NUMBERED_LEVEL = re.compile(r"((?:[^\d+-]\D*)?)([+-]?\d+(?:\.\d+)?)(\D*)")
 
 
@@ -209,8 +210,8 @@ def in_order(levels: Sequence[str]) -> list[str]:
     Returns
     -------
     list of str
-        By size where all are numbers, or one number between the same words (`2ms`, `10ms`); by their place
-        where all are words of one scale (`slow`, `medium`, `fast`); else as they came.
+        By size if all are numbers, or a number between the same words (`2ms`, `10ms`). By position if all are
+        words of one scale (`slow`, `medium`, `fast`). Otherwise in their original order.
     """
     different = list(dict.fromkeys(levels))
     for places in (_numbers(different), _places(different)):
@@ -222,7 +223,7 @@ def in_order(levels: Sequence[str]) -> list[str]:
 
 
 def _numbers(levels: Sequence[str]) -> list[float] | None:
-    """The number of each level; None unless every one has one and the same words around it."""
+    """The number of each level; None unless all have the same words around it."""
     try:
         numbers = [float(level) for level in levels]
     except ValueError:
@@ -233,7 +234,7 @@ def _numbers(levels: Sequence[str]) -> list[float] | None:
 
 
 def _places(levels: Sequence[str]) -> list[int] | None:
-    """The place of each level in the first scale that has them all; None without one."""
+    """The position of each level in the first scale that contains them all; None if there is none."""
     words = [re.sub(r"[\W_]", "", level.casefold()) for level in levels]
     for scale in SCALES:
         if all(word in scale or word in LEAST for word in words) and any(word in scale for word in words):
@@ -248,12 +249,12 @@ MAX_CELLS_NAMED = 3
 
 
 def one_form(name: str) -> str:
-    """A name in the one form of Unicode that equal-looking names share (NFC)."""
+    """A name in the Unicode form that equal-looking names share (NFC)."""
     return unicodedata.normalize("NFC", name)
 
 
 def levels_from_table(text: str, files: Iterable[str]) -> Placed:
-    """Read levels from CSV text; each clip needs one row, each row a clip, every level a value."""
+    """Read levels from CSV text: one row per clip, and a value for every level."""
     return levels_from_rows(table_of_text(text, "the table").named_rows(), files)
 
 
@@ -262,7 +263,8 @@ def levels_from_rows(table: NamedRows, files: Iterable[str]) -> Placed:
     columns = [name for name in table.header if name]
     if "file" not in columns or len(columns) < 2:
         raise InputError(
-            f"expected a CSV with a column 'file' and one a factor, got {', '.join(columns) or 'none'}"
+            f"expected a CSV with a column 'file' and one column per factor, got "
+            f"{', '.join(columns) or 'none'}"
         )
     factors = [name for name in columns if name not in ("file", FIRST_FIELD)]
     refuse_reserved_factors(factors)
@@ -274,13 +276,15 @@ def levels_from_rows(table: NamedRows, files: Iterable[str]) -> Placed:
                 f"line {number} of the table: no clip is called '{name}'{did_you_mean(name, known)}"
             )
         if name in rows:
-            raise InputError(f"line {number} of the table: '{name}' stands there twice")
+            raise InputError(f"line {number} of the table: expected each clip once, got '{name}' twice")
         levels = {factor: (row[factor] or "").strip() for factor in factors}
         if empty := [factor for factor, level in levels.items() if not level]:
-            raise InputError(f"line {number} of the table: '{name}' has no level of '{empty[0]}'")
+            raise InputError(f"line {number} of the table: '{name}' has no level for '{empty[0]}'")
         rows[name] = (levels, (row.get(FIRST_FIELD) or "").strip())
     if missing := sorted(known - set(rows)):
-        raise InputError(f"{len(missing)} clips have no row in the table, the first is '{missing[0]}'")
+        raise InputError(
+            f"{len(missing)} clips have no row in the table, such as '{missing[0]}'; add one row per clip"
+        )
     return _numbered(rows)
 
 
@@ -290,16 +294,16 @@ def levels_from_names(pattern: str, files: Iterable[str]) -> Placed:
     refuse_reserved_factors(fields)
     if not [name for name in fields if name != FIRST_FIELD] or len(set(fields)) != len(fields):
         raise InputError(
-            "expected a pattern with factors in braces, each once, such as {character}_{exemplar}.mp4"
+            "expected a pattern with each factor once in braces, such as {character}_{exemplar}.mp4"
         )
     whole, by_stem = (NamePattern.read(one_form(text)) for text in (pattern, _stem(pattern)))
     rows = {}
     for name in files:
-        fit = by_stem.fit(_stem(name))  # files of several formats follow one pattern
+        fit = by_stem.fit(_stem(name))  # files in several formats share one pattern
         if fit is None:
             fit = whole.fit(name)
         if fit is None:
-            raise InputError(f"the file name '{name}' does not follow the pattern {pattern}")
+            raise InputError(f"the file name '{name}' does not match the pattern {pattern}")
         levels = {field: fit[field] for field in fields if field != FIRST_FIELD}
         rows[name] = (levels, fit[FIRST_FIELD] if FIRST_FIELD in fields else "")
     return _numbered(rows)
@@ -310,7 +314,7 @@ def _stem(name: str) -> str:
 
 
 def _numbered(rows: dict[str, tuple[dict[str, str], str]]) -> Placed:
-    """Number exemplars from 1 within each cell: in the order of their marks, or of file names without any."""
+    """Number exemplars from 1 within each cell: by their marks, or by file name if there are none."""
     cells: dict[tuple[str, ...], list[tuple[tuple[int, str], str]]] = defaultdict(list)
     for name, (levels, mark) in rows.items():
         order = (int(mark) if mark.isdecimal() else 0, mark or name)
@@ -323,7 +327,7 @@ def _numbered(rows: dict[str, tuple[dict[str, str], str]]) -> Placed:
 
 
 def check_factorial(placed: Placed) -> None:
-    """InputError unless every combination of levels has the same number of clips."""
+    """Raise InputError unless every combination of levels has the same number of clips."""
     if not placed:
         raise InputError("expected at least one clip, got none")
     counts = Counter(tuple(levels.values()) for levels, _ in placed.values())
@@ -337,23 +341,23 @@ def check_factorial(placed: Placed) -> None:
     largest, smallest = counts.most_common()[0], counts.most_common()[-1]
     if largest[1] != smallest[1]:
         raise InputError(
-            f"every cell needs the same number of clips: {'/'.join(largest[0])} has {largest[1]}, "
+            f"expected the same number of clips in every cell: {'/'.join(largest[0])} has {largest[1]}, "
             f"{'/'.join(smallest[0])} has {smallest[1]}"
         )
     refuse_reserved_factors(known)
 
 
 def refuse_reserved_factors(names: Iterable[str]) -> None:
-    """InputError where a factor has the name of another column of the answers."""
+    """Raise InputError if a factor has the name of another column of the answers."""
     if reserved := sorted(set(names) & (reserved_names() - {FIRST_FIELD})):
         raise InputError(
-            f"a factor cannot be called '{reserved[0]}', the name of a column of the answers; call it, say, "
-            f"'{reserved[0]}_shown'"
+            f"a factor cannot have the name '{reserved[0]}', because a column of the answers has it; use "
+            f"another name, such as '{reserved[0]}_shown'"
         )
 
 
 def _without_clips(known: dict[str, list[str]], present: Collection[tuple[str, ...]]) -> str:
-    # Taken one by one: levels by mistake, one a file, multiply to more cells than memory holds.
+    # One by one: accidental levels, one per file, multiply to more cells than fit in memory.
     missing = (cell for cell in product(*known.values()) if cell not in present)
     named = ["/".join(cell) for cell in islice(missing, MAX_CELLS_NAMED)]
     others = prod(map(len, known.values())) - len(present) - len(named)
@@ -361,28 +365,29 @@ def _without_clips(known: dict[str, list[str]], present: Collection[tuple[str, .
 
 
 def levels_of(placed: Placed) -> dict[str, list[str]]:
-    """Levels of each factor: those of numbers and known scales in their order, others as clips have them."""
+    """Levels of each factor: numbers and known scales in their order, others in the order of the clips."""
     names = next(iter(placed.values()))[0]
     return {name: in_order([levels[name] for levels, _ in placed.values()]) for name in names}
 
 
 def check_names(names: Iterable[str]) -> None:
-    """InputError where two names are one on some systems: equal but for case or the form of an accent."""
+    """Raise InputError if two names are identical on some systems: equal except for case or accent
+    encoding."""
     seen: dict[str, str] = {}
     for name in names:
         folded = one_form(name).casefold()
         if folded in seen:
             raise InputError(
-                f"'{seen[folded]}' and '{name}' are one name on some systems; rename one of them"
+                f"'{seen[folded]}' and '{name}' are the same name on some systems; rename one of them"
             )
         seen[folded] = name
 
 
 def suggest_pattern(names: Iterable[str]) -> str | None:
-    """A pattern where every name has as many parts between underscores, hyphens or blanks, or is one part.
+    """A pattern if every name has the same number of parts, separated by underscores, hyphens or spaces.
 
-    Factors are called by what their levels give away (`factor_names`), else `factor1`, `factor2` and so on.
-    None where the names follow no pattern, and where all that varies is a number of the clip.
+    Factors are named after their levels (`factor_names`), or `factor1`, `factor2` and so on. None if the
+    names match no pattern, or if they differ only in the number of the clip.
     """
     paths = [PurePosixPath(name) for name in names]
     endings = {path.suffix for path in paths}
@@ -391,7 +396,7 @@ def suggest_pattern(names: Iterable[str]) -> str | None:
     for between in ("_", "-", " "):
         if (stem := _suggested(stems, between)) is not None:
             return stem + ending
-    whole = "\0"  # in no name: the names are one part each
+    whole = "\0"  # in no name: each name is one part
     if any(sign in stem for stem in stems for sign in "_- "):
         return None
     stem = _suggested(stems, whole, least_parts=1)
@@ -406,7 +411,7 @@ def _suggested(stems: Sequence[str], between: str, least_parts: int = 2) -> str 
     varying = [position for position, column in enumerate(columns) if len(set(column)) > 1]
     if not varying:
         return None
-    words = [column[0] for column in columns]  # a part that every name has stands as it is
+    words = [column[0] for column in columns]  # a part that all names share is kept
     taken: set[str] = set()
     for number, position in enumerate(varying, start=1):
         guessed, head, tail = name_and_frame(columns[position])
@@ -422,5 +427,5 @@ def _suggested(stems: Sequence[str], between: str, least_parts: int = 2) -> str 
 
 
 def _free_number(number: int, taken: set[str]) -> str:
-    """`factor1` and so on, after those that the names themselves have taken."""
+    """`factor1` and so on, after those used in the names."""
     return next(name for k in count(number) if (name := f"factor{k}") not in taken)

@@ -1,7 +1,6 @@
-"""A sealed plan: design, exclusions, analysis and power as they were fixed before the first participant.
+"""A sealed plan: design, exclusions, analysis and power as fixed before the first participant.
 
-Whoever holds the file can show by its hash that nothing in it was changed, and a report held against it lists
-what was done otherwise.
+The hash of the file proves that nothing in it was changed. A report compared with it lists all deviations.
 """
 
 import hashlib
@@ -20,30 +19,30 @@ from experiments.schema.difference import difference
 from experiments.schema.stored import load_stored
 
 OF_PAGES = ("texts", "title", "participant_title", "languages", "source", "dataset", "version")
-"""Keys whose change is no deviation from a plan: what pages say, and what the data say of themselves."""
+"""Keys whose change is not a deviation from a plan: page texts and metadata of the data."""
 
 
 class Seal(Declaration):
     """The sealed file."""
 
     format: Literal[1] = 1
-    """Of this file."""
+    """Format of this file."""
     study: str
     """Name of the study."""
     version: int
-    """Version of the study that was sealed."""
+    """Version of the sealed study."""
     sealed_at: str
-    """When (UTC, ISO 8601), by the server's clock."""
+    """Time of sealing (UTC, ISO 8601), by the server's clock."""
     definition: dict[str, Any]
     """The whole declaration: design, scales, exclusions, analysis plan, number of participants."""
     definition_format: int
     """Format of that declaration."""
     definition_sha256: Sha256
-    """Hash of that declaration, as stands with every answer."""
+    """Hash of that declaration, as stored with every answer."""
     clips_sha256: Sha256
     """Hash over the clips' own hashes, in order of cells and exemplars."""
     power: dict[str, Any] | None = None
-    """What `analysis power --json` found before; none where no power was reckoned."""
+    """Earlier result of `analysis power --json`; null if power was not computed."""
 
     @property
     def sha256(self) -> str:
@@ -53,11 +52,11 @@ class Seal(Declaration):
 
     @property
     def experiment(self) -> Experiment:
-        """What was declared."""
+        """The declared experiment."""
         return load_stored(self.definition, self.definition_format)
 
     def text(self) -> str:
-        """The file, its own hash in it."""
+        """The file, including its own hash."""
         return (
             json.dumps(self.model_dump(mode="json") | {"sha256": self.sha256}, indent=1, ensure_ascii=False)
             + "\n"
@@ -65,7 +64,7 @@ class Seal(Declaration):
 
 
 def read_seal(path: Path) -> Seal:
-    """Read a sealed plan; InputError where there is none, or something in it was changed."""
+    """Read a sealed plan; InputError if there is none, or if it was changed."""
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
         own = data.pop("sha256", None)
@@ -78,7 +77,9 @@ def read_seal(path: Path) -> Seal:
             f"{path.name}: expected a sealed plan as `server seal` writes it ({reason})"
         ) from error
     if own != seal.sha256:
-        raise InputError(f"{path.name}: the seal is broken: its content has another hash than it says")
+        raise InputError(
+            f"{path.name}: the seal is broken: the content does not match its own hash; use the original file"
+        )
     return seal
 
 
@@ -92,9 +93,9 @@ def clips_sha256(clips: Iterable[SealedClip]) -> str:
 
 
 def read_clips_sha256(path: Path) -> str:
-    """`clips_sha256` of the clips that a manifest lists; InputError where the file is none.
+    """`clips_sha256` of the clips in a manifest; InputError if the file is not a manifest.
 
-    No more of it is read than that: the manifest in a capsule lacks the answers to motion checks.
+    Only this part is read, because the manifest in a capsule lacks the answers to motion checks.
     """
     try:
         clips = json.loads(path.read_text(encoding="utf-8"))["clips"]
@@ -106,23 +107,24 @@ def read_clips_sha256(path: Path) -> str:
 
 
 def deviations(seal: Seal, experiment: Experiment, participants: int, clips: str | None = None) -> list[str]:
-    """What was declared or done otherwise than sealed, a line each.
+    """What was declared or done differently than sealed, one line each.
 
     Parameters
     ----------
     participants : int
-        Those analysed.
+        Number of analyzed participants.
     clips : str, optional
-        Hash of the clips that were shown (`clips_sha256`); None where it is not known.
+        Hash of the clips that were shown (`clips_sha256`); None if it is unknown.
     """
     changes = difference(seal.experiment, experiment)
     lines = [str(change) for change in changes if change.path.split(".")[0] not in OF_PAGES]
     planned = seal.experiment.participants
     if participants != planned:
-        lines.append(f"{planned} participants were planned, {participants} are analysed")
+        lines.append(f"{planned} participants were planned, {participants} are analyzed")
     if clips is not None and clips != seal.clips_sha256:
         lines.append(
-            f"other clips were shown than sealed (sha256 {clips[:12]}..., sealed {seal.clips_sha256[:12]}...)"
+            f"the clips shown differ from the sealed clips (sha256 {clips[:12]}..., sealed "
+            f"{seal.clips_sha256[:12]}...)"
         )
     return lines
 
@@ -130,7 +132,7 @@ def deviations(seal: Seal, experiment: Experiment, participants: int, clips: str
 def deviations_said(
     seal: Seal, experiment: Experiment, participants: int, clips: str | None = None
 ) -> tuple[str, ...]:
-    """The lines of a report on the plan it is held against."""
+    """The lines of a report about the plan it is compared with."""
     plan = f"the plan sealed {seal.sealed_at} (sha256 {seal.sha256[:12]}...)"
     departures = deviations(seal, experiment, participants, clips)
     return tuple(f"deviation from {plan}: {line}" for line in departures) or (

@@ -1,4 +1,4 @@
-"""The texts of a study: their languages, whether consent mentions flicker, placeholders left unfilled."""
+"""The texts of a study: their languages, whether consent mentions flicker, unfilled placeholders."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -10,10 +10,10 @@ from experiments.assignment.order import motion_checks_by_block
 from experiments.declaration.base import Translated
 from experiments.declaration.experiment import Experiment
 
-# The languages of declared texts: each has at least the study's first, which participants fall back on.
+# The languages of declared texts: each has at least the study's first language, which is the fallback.
 
 Text = tuple[str, dict[str, str]]
-"""Dotted path of a declared text, items of lists from 1, and the text by language."""
+"""Dotted path of a declared text (list items count from 1), and the text by language."""
 
 
 def language_fault(declared: BaseModel, languages: Sequence[str]) -> str | None:
@@ -23,7 +23,7 @@ def language_fault(declared: BaseModel, languages: Sequence[str]) -> str | None:
         return None
     path, text = missing[0]
     undeclared = [language for language in text if language not in languages]
-    has = f"one in {', '.join(text)} alone" if text else "an empty table"
+    has = f"only {', '.join(text)}" if text else "an empty table"
     unlisted = f", and languages does not list {', '.join(undeclared)}" if undeclared else ""
     others = f" ({len(missing) - 1} more lack it)" if len(missing) > 1 else ""
     return (
@@ -33,22 +33,23 @@ def language_fault(declared: BaseModel, languages: Sequence[str]) -> str | None:
 
 
 def unlisted(declared: BaseModel, languages: Sequence[str]) -> str:
-    """A sentence on texts that nobody is offered, since their language is not listed; empty where none is."""
+    """A sentence about texts that nobody sees because their language is not listed; empty if there are
+    none."""
     texts = list(_texts(declared))
     codes = {code: None for _, text in texts for code in text if code not in languages}
     if not codes:
         return ""
     path = next(path for path, text in texts if not codes.keys().isdisjoint(text))
     return (
-        f"Texts in {', '.join(codes)} are offered to nobody, such as that of {path}: languages lists "
-        f"{', '.join(languages)} alone."
+        f"Texts in {', '.join(codes)} are never shown, such as that of {path}: languages lists only "
+        f"{', '.join(languages)}."
     )
 
 
 def _texts(declared: BaseModel, prefix: str = "") -> Iterator[Text]:
-    """Every text that was written; those by default have the languages of the page and no others.
+    """Every text that was written; default texts have only the languages of the page.
 
-    A stored declaration holds its defaults too: what is as by default counts as not written.
+    A stored declaration includes its defaults: a text equal to its default counts as not written.
     """
     for key, field in type(declared).model_fields.items():
         value = getattr(declared, key)
@@ -67,11 +68,11 @@ def _texts_within(value: Any, path: str, is_text: bool) -> Iterator[Text]:
 
 
 def is_translated(annotation: Any) -> bool:
-    """True where a key of this type holds a text in several languages."""
+    """True if a key of this type holds a text in several languages."""
     return annotation == Translated or any(map(is_translated, get_args(annotation)))
 
 
-# Whether consent mentions flicker, which some people are sensitive to and must know before they agree.
+# Whether consent mentions flicker. Some people are sensitive to it and must know before they consent.
 
 WORDS = {
     "ar": r"وميض|وماض|تومض|يومض|تخفق|صرع",
@@ -86,8 +87,7 @@ WORDS = {
     "pt": r"cintil|tremel|bruxule|tremul|lampej|piscantes|fotossens|epilep|epilép",
     "zh": r"闪烁|闪光|闪动|频闪|光敏|癫痫|閃爍|閃光|癲癇",
 }
-"""Parts of words by which a consent mentions flicker, in each language of the page; none of them is about
-blinking."""
+"""Parts of words with which a consent text mentions flicker, per page language; none is about blinking."""
 SENTENCES = {
     "ar": "تعرض بعض المقاطع القصيرة نقاطًا تومض بسرعة.",
     "de": "Einige kurze Clips zeigen flimmernde Punkte.",
@@ -101,11 +101,11 @@ SENTENCES = {
     "pt": "Alguns clipes curtos mostram pontos que cintilam.",
     "zh": "部分短片会显示闪烁的圆点。",
 }
-"""A sentence for a consent; English and German are read by the authors, the others await a reader."""
+"""A sentence for a consent text; English and German are reviewed by the authors, the others await review."""
 
 
 def mentions_flicker(text: str, language: str) -> bool:
-    """Whether a text mentions flicker; True in languages whose words are not known: nothing can be said."""
+    """Whether a text mentions flicker; True in languages whose words are unknown."""
     known = WORDS.get(language.partition("-")[0].lower())
     return known is None or re.search(known, text, re.IGNORECASE) is not None
 
@@ -124,11 +124,11 @@ def silent_on_flicker(experiment: Experiment) -> list[str]:
 
 
 def suggested_sentence(language: str) -> str:
-    """A sentence that a consent in this language can use."""
+    """A sentence that a consent text in this language can use."""
     return SENTENCES.get(language.partition("-")[0].lower(), SENTENCES["en"])
 
 
-# Placeholders that nobody has filled in, in the texts that participants read.
+# Unfilled placeholders in the texts that participants read.
 #
 # Templates of consent forms have marks such as `[Title]` and `[name, institution, e-mail]`. A text that still
 # has one must not reach participants.
@@ -146,7 +146,7 @@ _KEYS = re.compile(
     r"links|rechts|oben|unten|sic|…|\.\.\.|[^\W_]|\d[\d\s,.:%–-]*)",
     re.IGNORECASE,
 )
-"""What stands in brackets without being a placeholder: a key to press, one character, a number, `[sic]`."""
+"""Bracketed text that is not a placeholder: a key to press, one character, a number, `[sic]`."""
 _ASIDES = re.compile(
     r"optional|required|mandatory|(?:please )?(?:specify|explain|describe)|freiwillig|"
     r"pflicht(?:feld|angabe)?|"
@@ -156,19 +156,19 @@ _ASIDES = re.compile(
     r"[^\W\d_].*\b(?:19|20)\d\d[a-z]?",
     re.IGNORECASE,
 )
-"""What brackets say to people: that an answer is optional, to specify it, examples, sources by year."""
+"""Bracketed text for people: that an answer is optional, to specify it, examples, sources by year."""
 MAX_MARKS_NAMED = 5
 
 
 class UnfilledText(NamedTuple):
-    """One text in one language with marks that nobody has filled in.
+    """One text in one language with unfilled marks.
 
     Attributes
     ----------
     path : str
         As the TOML has it, with the language: `texts.en.consent`.
     certain : bool
-        False where the marks may be meant as they are.
+        False if the marks may be intended.
     """
 
     path: str
@@ -186,8 +186,8 @@ class UnfilledText(NamedTuple):
             return f"{of} has {named}{rest}. Should this be filled in before participants read it?"
         return (
             f"{self.path} (language {self.language}) still has {'a placeholder' if one else 'placeholders'} "
-            f"that nobody filled in: {named}{rest}. Replace {'it' if one else 'each'}, or put `backticks` "
-            f"around {'it' if one else 'one'} that participants are to read as it is."
+            f"to fill in: {named}{rest}. Replace {'it' if one else 'each'}, or put `backticks` "
+            f"around {'it' if one else 'one'} that participants should read unchanged."
         )
 
 
@@ -225,7 +225,7 @@ class ParticipantText(NamedTuple):
 
 
 def participant_texts(declared: Experiment) -> Iterator[ParticipantText]:
-    """Every page and every translated text, and the title where participants read it."""
+    """Every page and every translated text, and the title if participants read it."""
     if not declared.participant_title:
         yield from (ParticipantText("title", language, declared.title) for language in declared.languages[:1])
     for language, pages in declared.texts.items():
@@ -236,7 +236,7 @@ def participant_texts(declared: Experiment) -> Iterator[ParticipantText]:
 
 
 def translated_texts(declared: BaseModel, prefix: str = "") -> Iterator[tuple[str, dict[str, str]]]:
-    """Dotted path of each text that has translations (items of lists from 1), and the text by language."""
+    """Dotted path of each translated text (list items count from 1), and the text by language."""
     for key, field in type(declared).model_fields.items():
         yield from _placeholders_within(
             getattr(declared, key), f"{prefix}{key}", is_translated(field.annotation)
@@ -254,7 +254,7 @@ def _placeholders_within(value: Any, path: str, is_text: bool) -> Iterator[tuple
 
 
 def untranslated(declared: Experiment) -> dict[str, list[str]]:
-    """Language -> paths of texts that participants who read it get in the study's first language."""
+    """Language -> paths of texts that its participants see in the study's first language."""
     first, *others = declared.languages
     missing: dict[str, list[str]] = {}
     written = [(path, text) for path, text in translated_texts(declared) if text.get(first)]

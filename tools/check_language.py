@@ -32,7 +32,7 @@ BANNED = {
     r"\bstands?\b(?! (?:for|still|up|out|alone|apart|guard))": "is, are",
     r"\bwhoever\b": "anyone who, people who",
     r"\ba row an? |\bone an? (?:row|play|person|visit|cell)\b": "one row per ...",
-    r"\b(?:is|are) no (?!longer|one\b|doubt|more|such)": "is not a ...",
+    r"\b(?<!there )(?:is|are) no (?!longer|one\b|doubt|more|such)": "is not a ...",
     r"\bby its name\b": "by name",
     r"\bof (?:its|their|his|her|one's) own\b": "separate, its own ...",
     r"\bwhat is asked\b": "required",

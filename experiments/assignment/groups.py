@@ -1,4 +1,4 @@
-"""Groups of participants, and which of them a participant comes into."""
+"""Groups of participants, and how participants are assigned to them."""
 
 from collections.abc import Iterable
 from itertools import product
@@ -11,24 +11,24 @@ from experiments.declaration.trial import ClipSpec
 from experiments.errors import did_you_mean
 from experiments.rules import ScreenFormAnswer
 
-# Groups of participants: one for each combination of the levels of the factors between participants.
+# Groups of participants: one for each combination of levels of the between-participant factors.
 
 
 class Seat(NamedTuple):
-    """Where a participant stands: the levels of their group, and their place in it, from 0."""
+    """Position of a participant: the levels of their group, and their place in it, from 0."""
 
     levels: tuple[tuple[str, str], ...]
     number: int
 
 
 def groups(experiment: Experiment) -> list[tuple[tuple[str, str], ...]]:
-    """The levels of each group, last factor fastest; one group without levels where no factor is between."""
+    """The levels of each group, last factor fastest; one group without levels if no factor is between."""
     between = [factor for factor in experiment.factors if factor.between]
     return list(product(*([(factor.name, level.name) for level in factor.levels] for factor in between)))
 
 
 def name_of(levels: Iterable[tuple[str, str]]) -> str:
-    """A group as quotas, links and exports name it; empty where there is one group only."""
+    """Name of a group in quotas, links and exports; empty if there is only one group."""
     return "/".join(level for _, level in levels)
 
 
@@ -38,14 +38,14 @@ def names(experiment: Experiment) -> list[str]:
 
 
 def seat_of(experiment: Experiment, slot: int) -> Seat:
-    """The place of a slot of the study: groups take turns, so that their sizes differ by at most one."""
+    """The seat of a slot of the study: groups take turns, so that their sizes differ by at most one."""
     every = groups(experiment)
     return Seat(every[slot % len(every)], slot // len(every))
 
 
 # Decision 0515: Groups have quotas and are chosen before the slot.
 def of_group(experiment: Experiment, levels: Iterable[tuple[str, str]]) -> Experiment:
-    """The experiment as one group sees it: factors between participants have the group's level alone."""
+    """The experiment as one group sees it: between-participant factors have only the group's level."""
     mine = dict(levels)
     if not mine:
         return experiment
@@ -66,7 +66,7 @@ def clips_of(experiment: Experiment, seat: Seat) -> list[ClipSpec]:
     return [clip for clip in design.clips(experiment) if set(seat.levels) <= set(clip.levels)]
 
 
-# Which group a participant comes into: by turn, by the link they came by, or by what they answer.
+# Which group a participant is assigned to: by turn, by their link, or by their answer.
 
 
 class DecidingQuestion(NamedTuple):
@@ -77,34 +77,38 @@ class DecidingQuestion(NamedTuple):
 
 
 def deciding_question(experiment: Experiment) -> DecidingQuestion | None:
-    """The question whose answer decides the group; None where no answer does."""
+    """The question whose answer decides the group; None if no answer does."""
     name = experiment.groups.question
     return next((where for where, field in _questions(experiment) if field.name == name), None)
 
 
 def group_of_answer(experiment: Experiment, answer: str) -> str:
-    """Name of the group of who gives this (checked) answer to the deciding question."""
+    """Name of the group of a participant with this (checked) answer to the deciding question."""
     return experiment.groups.answers.get(answer, answer)
 
 
 def fault_of_grouping(experiment: Experiment) -> str | None:
-    """What in [groups] does not fit the experiment, as `path: what to do`; None where all is well."""
+    """What in [groups] does not fit the experiment, as `path: what to do`; None if everything fits."""
     declared, known = experiment.groups, names(experiment)
     if declared == type(declared)():
         return None
     if len(known) < 2:
-        return "groups: no factor is between participants; set `between = true` on one, or leave it out"
+        return "groups: no factor is between participants; set `between = true` for one, or remove [groups]"
     for path, named in (("quotas", declared.quotas), ("answers", declared.answers.values())):
         unknown = next((name for name in named if name not in known), None)
         if unknown is not None:
             return f"groups.{path}: no group is called '{unknown}'{did_you_mean(unknown, known)}"
     if declared.question is None:
-        return "groups.answers: give it with by = 'form:question' only" if declared.answers else None
+        return (
+            ("groups.answers: allowed only with by = 'form:question'; remove it")
+            if declared.answers
+            else None
+        )
     return _fault_of_question(experiment, declared.question)
 
 
 def _questions(experiment: Experiment) -> list[tuple[DecidingQuestion, Question]]:
-    """The questions before the trials, with their places."""
+    """The questions before the trials, with their forms."""
     before = (form for form in experiment.forms if form.when == "before")
     return [(DecidingQuestion(form.name, field.name), field) for form in before for field in form.fields]
 
@@ -114,14 +118,16 @@ def _fault_of_question(experiment: Experiment, name: str) -> str | None:
     asked = [(where, field) for where, field in every if field.name == name]
     if not asked:
         near = did_you_mean(name, [where.field for where, _ in every])
-        return f"groups.by: no form before the trials asks '{name}'{near}"
+        return f"groups.by: no form before the trials has the question '{name}'{near}"
     if len(asked) > 1:
-        return f"groups.by: '{name}' is asked in two forms; give the one that decides another name"
+        return f"groups.by: '{name}' occurs in two forms; rename the question that decides"
     [(where, field)] = asked
     if not isinstance(field, ChoiceField):
-        return f"groups.by: '{name}' is no choice of one answer; only such a question decides a group"
+        return (
+            f"groups.by: '{name}' is not a single-choice question; only such a question can decide the group"
+        )
     if not field.required:
-        return f"groups.by: '{name}' may be left open; set `required = true`"
+        return f"groups.by: '{name}' is optional; set `required = true`"
     return _fault_of_answers(experiment, where, field.values)
 
 
@@ -139,7 +145,7 @@ def _fault_of_answers(experiment: Experiment, where: DecidingQuestion, values: t
     for value in values:
         if value not in refused and group_of_answer(experiment, value) not in known:
             return (
-                f"groups.answers: '{value}' leads to none of the groups {', '.join(known)}; give its group, "
-                "or refuse the answer by a [[screening]] rule"
+                f"groups.answers: '{value}' leads to none of the groups {', '.join(known)}; set its group, "
+                f"or refuse the answer with a [[screening]] rule"
             )
     return None

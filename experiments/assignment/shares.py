@@ -22,7 +22,7 @@ def every_clip(clips: Sequence[ClipSpec]) -> frozenset[ClipSpec]:
     return frozenset(clips)
 
 
-# Declared lists of clips, dealt to participants in turn.
+# Declared lists of clips, assigned to participants in turn.
 
 
 def list_label(clip: ClipSpec) -> str:
@@ -117,16 +117,22 @@ def fault_of_levels(experiment: Experiment) -> str | None:
     """What does not fit of the dealt factors, as `path: what to do`; None where all is well."""
     dealt = [factor for factor in experiment.factors if factor.dealt]
     if dealt and experiment.assignment.lists:
-        return f"assignment.lists: '{dealt[0].name}' is dealt by per_participant; leave out one of the two"
+        return (
+            f"assignment.lists: '{dealt[0].name}' is already assigned by per_participant; remove one of "
+            f"the two"
+        )
     for factor in dealt:
         if experiment.blocks.split_by == factor.name:
-            return f"blocks.split_by: participants see some levels of '{factor.name}' only; split by another"
+            return (
+                f"blocks.split_by: participants see only some levels of '{factor.name}'; split by "
+                f"another factor"
+            )
         number, size = len(factor.levels), factor.per_participant or 1
         if size > 1 and balanced_blocks(number, size) is None:
             near = " or ".join(map(str, near_sizes(number, size))) or "1"
             return (
-                f"factors: '{factor.name}': no balanced way to show {size} of {number} levels is known; "
-                f"set per_participant = {near}"
+                f"factors: '{factor.name}': there is no known balanced design for {size} of {number} "
+                f"levels; set per_participant = {near}"
             )
     return None
 
@@ -201,9 +207,9 @@ def lines(experiment: Experiment) -> tuple[str, ...]:
         counts = expected_counts(experiment, slots)
         low, high = min(counts.values()), max(counts.values())
         each = f"{low}" if low == high else f"{low} to {high}"
-        said.append(f"with {len(slots)} participants each clip is seen {each} times")
+        said.append(f"with {len(slots)} participants, each clip is seen {each} times")
         if unseen := [list_label(clip) for clip, count in counts.items() if not count]:
-            said.append(f"{len(unseen)} clips are seen by nobody, {unseen[0]} first")
+            said.append(f"{len(unseen)} clips are never shown, such as {unseen[0]}")
     return tuple(said)
 
 
@@ -226,16 +232,16 @@ def fault_of_assignment(experiment: Experiment) -> str | None:
     between = [factor.name for factor in experiment.factors if factor.between]
     if (declared.clips_per_cell or 0) > experiment.exemplars.per_cell:
         return (
-            f"assignment.clips_per_cell: expected at most the {experiment.exemplars.per_cell} clips a cell "
-            f"has, got {declared.clips_per_cell}"
+            f"assignment.clips_per_cell: expected at most {experiment.exemplars.per_cell}, the number of "
+            f"clips per cell; got {declared.clips_per_cell}"
         )
     if experiment.blocks.split_by in between:
         return (
-            f"blocks.split_by: '{experiment.blocks.split_by}' differs between participants; "
-            "split by a factor within them"
+            f"blocks.split_by: '{experiment.blocks.split_by}' differs between participants; split by a "
+            f"within-participant factor"
         )
     if declared.lists and between:
-        return f"assignment.lists: '{between[0]}' already makes groups; leave out one of the two"
+        return f"assignment.lists: '{between[0]}' already makes groups; remove one of the two"
     if wrong := fault_of_levels(experiment):
         return wrong
     wrong = fault_of_lists(design.rated_clips(experiment), declared.lists)

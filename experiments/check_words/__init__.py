@@ -1,7 +1,7 @@
-"""What is asked about motion checks, a module a language of the page, named by its tag.
+"""Wording of motion checks, one module per page language, named by its tag.
 
-A language is found by its module's name; who adds one to the page adds its module here. English and German
-are read by the authors; each other module says at its top that it awaits a reader whose language it is.
+A language is found by its module name. To add a language to the page, add a module here. English and German
+are reviewed by the authors; every other module says at its top that it awaits review.
 """
 
 from importlib import import_module

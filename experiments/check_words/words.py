@@ -8,7 +8,7 @@ DIGITS = tuple(str(digit) for digit in range(1, 10))
 
 @dataclass(frozen=True)
 class Asked:
-    """What is asked about one kind of check: the question, and the choices in the order of their answers."""
+    """The wording of one kind of check: the question, and the choices in the order of their answers."""
 
     question: str
     choices: tuple[str, ...]

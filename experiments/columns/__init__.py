@@ -1,7 +1,7 @@
 """Every exported column, declared once: SQL views, CSV, codebook, data dictionary, Psych-DS and analysis.
 
 `base` has what every kind of trial exports, `runs` what the table of runs has; the columns of a kind's
-answers stand in its own folder (`experiments.kinds.<kind>.columns`), with the view that joins them.
+answers are in its folder (`experiments.kinds.<kind>.columns`), with the view that joins them.
 """
 
 from experiments.columns.column import Column, ColumnType, names_of

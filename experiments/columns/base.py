@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from experiments.columns.column import Column
 
 ORIGINS = ("participant", "pilot", "simulated")
-"""Origins of runs that are exported; a preview's answers are not."""
+"""Origins of runs that are exported. Answers from previews are not exported."""
 VERDICTS = ("likely", "unclear", "unlikely", "not_judged")
 
 STUDY: tuple[Column, ...] = (
@@ -19,14 +19,14 @@ STUDY: tuple[Column, ...] = (
     Column(
         "study_version",
         "integer",
-        "Version of the study the run was made with.",
+        "Version of the study used in this run.",
         minimum=1,
         source="v.number",
     ),
     Column(
         "data_series",
         "integer",
-        "Data series of that version: versions that measure the same share one, and their answers may be "
+        "Data series of that version: versions that measure the same share one, and their answers can be "
         "pooled.",
         minimum=1,
         source="v.series",
@@ -34,7 +34,7 @@ STUDY: tuple[Column, ...] = (
     Column(
         "definition_sha256",
         "text",
-        "SHA-256 of the experiment's declaration this run was made with.",
+        "SHA-256 of the experiment's declaration used in this run.",
         source="v",
     ),
 )
@@ -44,27 +44,29 @@ RUN: tuple[Column, ...] = (
     Column(
         "participant",
         "text",
-        "The study's pseudonym of the participant; the same person has another one in another study.",
+        "Pseudonym of the participant in this study. The same person has different pseudonyms in different "
+        "studies.",
         source="r",
     ),
     Column(
         "phase",
         "text",
-        "Whether the run was made while the study was a pilot or live.",
+        "Whether the study was a pilot or live during this run.",
         values=("pilot", "live"),
         source="r",
     ),
     Column(
         "run_origin",
         "text",
-        "Where the answers come from, fixed at the run's start: the live study, its pilot, or no person.",
+        "Where the answers come from: the live study, its pilot, or a simulation. It is fixed when the run "
+        "starts.",
         values=ORIGINS,
         source="r.origin",
     ),
     Column(
         "synthetic",
         "boolean",
-        "True where no person gave this rating: simulated or synthesised data.",
+        "True if no person gave this rating: simulated or synthesized data.",
         source="r.origin = 'simulated'",
     ),
     Column(
@@ -74,40 +76,40 @@ RUN: tuple[Column, ...] = (
         values=("active", "complete", "screened_out", "withdrawn"),
         source="r.status",
     ),
-    Column("excluded", "boolean", "True where an experimenter excluded the run by hand.", source="r"),
+    Column("excluded", "boolean", "True if an experimenter excluded the run manually.", source="r"),
     Column("exclusion_reason", "text", "Why an experimenter excluded the run.", source="r", identifying=True),
     Column(
         "evidence_verdict",
         "text",
-        "Whether the run's answers are likely a person's; not_judged until the run is over, and where the "
-        "page brought no evidence.",
+        "Whether a person likely gave the answers of this run; not_judged until the run is over, or if the "
+        "page sent no evidence.",
         values=VERDICTS,
         source="coalesce(r.evidence_verdict, 'not_judged')",
     ),
-    Column("language", "text", "Language the participant read.", source="r"),
+    Column("language", "text", "Language shown to the participant.", source="r"),
 )
 
 TRIAL: tuple[Column, ...] = (
     Column(
         "trial_index",
         "integer",
-        "Position of the trial in the run, from 0, practice and checks included.",
+        "Position of the trial in the run, from 0, including practice and checks.",
         minimum=0,
         source="a",
     ),
     Column(
         "kind",
         "text",
-        "What the trial is; check is a motion check.",
+        "Kind of trial; check is a motion check.",
         values=("practice", "main", "attention", "check"),
         source="a",
     ),
-    Column("block", "integer", "Block number from 1; 0 for practice.", minimum=0, source="a"),
+    Column("block", "integer", "Block number, from 1; 0 for practice.", minimum=0, source="a"),
     Column("block_label", "text", "Level of the factor that splits the blocks, or all.", source="a"),
     Column(
         "play",
         "integer",
-        "Which play of this trial: 1, or more where a failed clip was shown again.",
+        "Presentation number in this trial: 1, or more if a failed clip was shown again.",
         minimum=1,
         source="t",
     ),
@@ -116,16 +118,16 @@ TRIAL: tuple[Column, ...] = (
 LEVELS = Column(
     "levels",
     "text",
-    "JSON object of factor names and level names; the CSV has a column a factor instead.",
+    "JSON object of factor names and level names; the CSV has one column per factor instead.",
     source="c",
     json=True,
 )
 
 CLIP: tuple[Column, ...] = (
     LEVELS,
-    Column("cell", "text", "Level names in factor order, joined by slashes.", source="c"),
+    Column("cell", "text", "Level names in factor order, separated by slashes.", source="c"),
     Column("exemplar", "integer", "Which exemplar of the cell, from 1.", minimum=1, source="c"),
-    Column("profile_id", "text", "Identifier of the blink profile shown, as in the manifest.", source="c"),
+    Column("profile_id", "text", "Identifier of the blink profile, as in the manifest.", source="c"),
     Column("stimulus", "text", "File name of the clip.", source="c.file"),
     Column("clip_sha256", "text", "SHA-256 of the clip's bytes.", source="c"),
 )
@@ -165,7 +167,7 @@ TIMES: tuple[Column, ...] = (
     Column(
         "comment",
         "text",
-        "What the participant wrote beside the rating, where asked.",
+        "Comment of the participant on this rating, if the study asks for one.",
         source="t",
         identifying=True,
     ),
@@ -180,16 +182,16 @@ CHECK: tuple[Column, ...] = (
     Column(
         "check_response",
         "integer",
-        "The choice in a motion check, whose right one is expected_response; empty in other trials.",
+        "Answer to a motion check (expected_response is the correct one); empty in other trials.",
         minimum=1,
         source="t.payload",
         member="check",
     ),
 )
-"""Of motion checks, in studies of every kind of trial."""
+"""For motion checks, in studies with any kind of trial."""
 
 
-# The tables behind a view: those of every answer, and a clip for each role in which a trial shows one.
+# The tables behind a view: those of every answer, and one clip per role in a trial.
 
 RUN_ALIASES = frozenset("rvs")
 RUN_JOINS = "JOIN study_versions v ON v.id = r.version_id\nJOIN studies s ON s.id = r.study_id\n"

@@ -1,4 +1,4 @@
-"""A column of what is exported: its name, type, unit, meaning and range, and where the database has it."""
+"""A column of the exports: its name, type, unit, meaning, range, and source in the database."""
 
 import re
 import unicodedata
@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 JOINED = "{joined}"
-"""Stands in a source for the function that joins texts, whose name is another one in each database."""
+"""Placeholder in a source for the function that joins texts; its name depends on the database."""
 ColumnType = Literal["text", "integer", "number", "boolean", "time"]
-"""A `number` read from JSON keeps its writing: what was stored as 4 is exported as 4 and not as 4.0."""
+"""A `number` read from JSON keeps its notation: 4 is exported as 4 and not as 4.0."""
 
 
 @dataclass(frozen=True)
@@ -19,25 +19,25 @@ class Column:
     Attributes
     ----------
     unit : str or None
-        As SI writes it, or the thing counted; None for what has none.
+        The SI symbol, or the thing counted; None without a unit.
     values : tuple of str
-        Every value there is, for columns of names.
+        All possible values, for columns of names.
     labels : tuple of (str, str)
-        What values mean, as pairs of value (as the CSV writes it) and label; not every value needs one.
+        Meanings of values, as pairs of value (as in the CSV) and label; not every value needs one.
     identifying : bool
-        Whether it may tell who a person is: written in their own words, or of their device alone.
+        Whether it might identify a person: their own words, or data specific to their device.
     minimum, maximum : float or None
         The range of numbers, ends included; None where open.
     source : str
-        The SQL behind it. A bare alias of the view's tables stands for `alias.name`; empty where the column
-        is of no view. `JOINED` in it is put into the database's own words.
+        The SQL behind it. An alias of the view's tables stands for `alias.name`; empty for columns without a
+        view. `JOINED` in it is replaced by the function of the database.
     json : bool
         True where the source is a JSON column, exported as text.
     member : str
-        Path of the value in the JSON object that the source is (`choice`, `left.frames_drawn`); empty where
-        the source is the value.
+        Path of the value in the JSON object of the source (`choice`, `left.frames_drawn`); empty if the
+        source is the value.
     otherwise : str
-        SQL of what stands where nothing is there; empty for NULL.
+        SQL of the value used if there is none; empty for NULL.
     """
 
     name: str
@@ -56,12 +56,12 @@ class Column:
 
     @property
     def expression(self) -> str:
-        """The SQL behind the column, its table's alias included."""
+        """The SQL behind the column, including the alias of its table."""
         return f"{self.source}.{self.name}" if self.source.isidentifier() else self.source
 
     @property
     def allowed(self) -> str:
-        """The column's values or range in words, with their labels; empty where anything may stand."""
+        """The values or range of the column in words, with labels; empty if any value is allowed."""
         labels = dict(self.labels)
         if self.values:
             return ", ".join(f"{one} = {labels[one]}" if one in labels else one for one in self.values)
@@ -75,7 +75,7 @@ class Column:
         return f"{self.minimum:g} or more" if self.minimum is not None else ""
 
     def admits(self, value: object) -> bool:
-        """True where `value` lies in the column's range or among its values; None always does."""
+        """True if `value` lies in the column's range or is one of its values; always true for None."""
         if value is None or (self.values and value == ""):
             return True
         if self.values:
@@ -87,15 +87,15 @@ class Column:
 
 
 def names_of(columns: Iterable[Column], *types: ColumnType) -> tuple[str, ...]:
-    """Names of the columns of these types, in order; of all columns where no type is given."""
+    """Names of the columns of these types, in order; of all columns if no type is given."""
     return tuple(column.name for column in columns if not types or column.type in types)
 
 
-# Names of columns made from names of levels, options and questions, which may be written in any script.
+# Names of columns made from names of levels, options and questions, which may be in any script.
 
 
 def plain_name(text: str) -> str:
-    """Letters, digits and underscores of `text`, accents off; `x` and the letters' code points where none.
+    """Letters, digits and underscores of `text`, without accents; `x` and code points if there are none.
 
     >>> plain_name("fast & near"), plain_name("Größe"), plain_name("-1.5"), plain_name("速")
     ('fast_near', 'Grosse', 'minus1_5', 'x901f')
@@ -107,7 +107,7 @@ def plain_name(text: str) -> str:
 
 
 def unlike(name: str, taken: set[str]) -> str:
-    """`name`, with a number after it where it is taken already (whatever the case); it is taken then."""
+    """`name`, with a number appended if it is already taken (case-insensitive); it is then taken."""
     free, number = name, 2
     while free.casefold() in taken:
         free, number = f"{name}_{number}", number + 1

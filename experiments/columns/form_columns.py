@@ -1,4 +1,4 @@
-"""The answers of questionnaires as columns: one a question, and one an option where several may be chosen."""
+"""Questionnaire answers as columns: one per question, or one per option if several may be chosen."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -11,12 +11,12 @@ from experiments.declaration.experiment import Experiment
 from experiments.declaration.forms import Form, FormField, is_empty
 
 PREFIX = "form_"
-"""No column of runs or answers begins so, nor can a factor's name be taken for one."""
+"""No other column begins like this, and no factor name can be mistaken for one."""
 
 
 @dataclass(frozen=True)
 class FormColumn:
-    """A column and the answer it holds: of a form's field, or of one option where several may be chosen."""
+    """A column and its answer: that of a form field, or of one option if several may be chosen."""
 
     column: Column
     form: str
@@ -24,7 +24,7 @@ class FormColumn:
     option: str | None = None
 
     def value(self, answers: Mapping[str, Mapping[str, Any]]) -> Any:
-        """The cell, of a run's answers by form and field; empty where nothing was answered."""
+        """The cell value from a run's answers by form and field; empty if there is no answer."""
         answer = answers.get(self.form, {}).get(self.field)
         if is_empty(answer):
             return ""
@@ -34,7 +34,7 @@ class FormColumn:
 
 
 def form_columns(definitions: Iterable[Experiment]) -> list[FormColumn]:
-    """The columns of all versions' forms, in order; what later versions say of a question counts."""
+    """The columns of all versions' forms, in order; later versions of a question override earlier ones."""
     known: dict[tuple[str, str, str | None], FormColumn] = {}
     for experiment in definitions:
         language = experiment.languages[0]
@@ -47,7 +47,7 @@ def form_columns(definitions: Iterable[Experiment]) -> list[FormColumn]:
 
 
 def run_columns(forms: Iterable[FormColumn], old_order: bool = False) -> list[Column]:
-    """The columns of the runs CSV of a study with these questions, which stand in the place of `FORMS`."""
+    """The columns of the runs CSV of a study with these questions, which replace `FORMS`."""
     columns: list[Column] = []
     for column in in_old_order("runs", RUN_COLUMNS) if old_order else RUN_COLUMNS:
         columns.extend([one.column for one in forms] if column is FORMS else [column])
@@ -61,7 +61,7 @@ def _of_field(form: Form, field: FormField, language: str) -> Iterator[FormColum
 
 
 def _united(before: FormColumn | None, after: FormColumn) -> FormColumn:
-    """The later column, with the options that only earlier versions had."""
+    """The later column, plus options that only earlier versions had."""
     if before is None or not before.column.values:
         return after
     values = tuple(dict.fromkeys((*before.column.values, *after.column.values)))
@@ -70,7 +70,7 @@ def _united(before: FormColumn | None, after: FormColumn) -> FormColumn:
 
 
 def _named(columns: Iterable[FormColumn]) -> Iterator[FormColumn]:
-    """The columns under names of which none stands twice (`a_b` with `c` is spelled as `a` with `b_c`)."""
+    """The columns with unique names (`a_b` with `c` is spelled like `a` with `b_c`)."""
     taken: set[str] = set()
     for one in columns:
         yield replace(one, column=replace(one.column, name=unlike(one.column.name, taken)))

@@ -1,6 +1,6 @@
-"""The order of columns until 0.2, which exports have on request: columns were added at the end of it.
+"""The order of columns until 0.2, which exports use on request (new columns were then added at the end).
 
-It is complete: a column that is not in it is younger, and stands behind those that are.
+It is complete: columns that are not listed are newer and follow those that are.
 """
 
 from collections.abc import Iterable

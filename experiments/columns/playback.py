@@ -1,25 +1,25 @@
-"""Columns of how a trial's clips were shown: the playback, its clock, the views, the screen.
+"""Columns that describe how the clips of a trial were shown: playback, clock, views and screen.
 
-Aliases of the tables as in the base columns, and w views.
+Table aliases are those of the base columns, plus w for views.
 """
 
 from experiments.columns import base
 from experiments.columns.column import JOINED, Column
 
 PLAYBACK: tuple[Column, ...] = (
-    Column("method", "text", "How the clip was played.", values=("webcodecs", "video", "none"), source="t"),
+    Column("method", "text", "Method of playback.", values=("webcodecs", "video", "none"), source="t"),
     Column(
         "verdict",
         "text",
-        "Playback verdict by the declared rules.",
+        "Verdict on the presentation by the declared rules.",
         values=("good", "uncertain", "flagged", "failed"),
         source="t",
     ),
-    Column("verdict_rule", "text", "The rule that gave the verdict, empty where good.", source="t"),
+    Column("verdict_rule", "text", "The rule that determined the verdict; empty if good.", source="t"),
     Column(
         "key_to_first_frame_ms",
         "number",
-        "From the start key to the first frame drawn.",
+        "Time from the start key to the first drawn frame.",
         unit="ms",
         minimum=0,
         source="t",
@@ -27,7 +27,7 @@ PLAYBACK: tuple[Column, ...] = (
     Column(
         "frames_drawn",
         "integer",
-        "Frames of the clip that were drawn.",
+        "Number of frames of the clip that were drawn.",
         unit="frames",
         minimum=0,
         source="t",
@@ -35,7 +35,7 @@ PLAYBACK: tuple[Column, ...] = (
     Column(
         "frames_late",
         "integer",
-        "Frames drawn more than one refresh from their time.",
+        "Number of frames drawn more than one refresh early or late.",
         unit="frames",
         minimum=0,
         source="t",
@@ -43,7 +43,7 @@ PLAYBACK: tuple[Column, ...] = (
     Column(
         "frames_missing",
         "integer",
-        "Frames of the clip that were never drawn.",
+        "Number of frames of the clip that were never drawn.",
         unit="frames",
         minimum=0,
         source="t",
@@ -60,7 +60,7 @@ PLAYBACK: tuple[Column, ...] = (
     Column(
         "focus_lost",
         "boolean",
-        "True where the page lost focus or visibility during the clip.",
+        "True if the page lost focus or visibility during the clip.",
         source="t",
     ),
 )
@@ -69,7 +69,7 @@ SCREEN: tuple[Column, ...] = (
     Column(
         "refresh_rate_hz",
         "number",
-        "Measured refresh rate of the screen; where the play itself saw a faster one, that one.",
+        "Measured refresh rate of the screen, or the rate seen during the presentation if that was higher.",
         unit="Hz",
         minimum=0,
         source="t",
@@ -78,7 +78,7 @@ SCREEN: tuple[Column, ...] = (
     Column(
         "px_per_mm",
         "number",
-        "CSS pixels per millimetre from the size calibration.",
+        "CSS pixels per millimeter, from the size calibration.",
         unit="px/mm",
         minimum=0,
         source="t",
@@ -86,7 +86,7 @@ SCREEN: tuple[Column, ...] = (
     Column(
         "viewing_distance_mm",
         "number",
-        "Viewing distance from the blind-spot test, where asked.",
+        "Viewing distance from the blind-spot test, if the study has one.",
         unit="mm",
         minimum=0,
         source="t",
@@ -105,7 +105,7 @@ CLOCK: tuple[Column, ...] = (
     Column(
         "clock_late_ms",
         "number",
-        "Longest time by which a callback of the animation clock ran after the refresh it was for.",
+        "Longest delay of a callback of the animation clock after its refresh.",
         unit="ms",
         source="t",
     ),
@@ -121,8 +121,8 @@ VIEWS: tuple[Column, ...] = (
     Column(
         "views",
         "integer",
-        "How often the trial's clips were begun to be shown up to this answer, views broken off included; "
-        "empty where the page kept no views.",
+        "Number of times the clips of this trial were started before this answer, including interrupted "
+        "views; empty if the page kept no views.",
         minimum=1,
         source=f"nullif((SELECT count(*) FROM views w WHERE {_OF_TRIAL} "  # noqa: S608 - constants
         "AND w.play <= t.play), 0)",
@@ -130,27 +130,27 @@ VIEWS: tuple[Column, ...] = (
     Column(
         "view_outcomes",
         "text",
-        "How each view of this play ended, in order: shown, interrupted (a reload or a crash), or begun "
-        "where its end is not known.",
+        "How each view of this presentation ended, in order: shown, interrupted (a reload or a crash), or "
+        "begun if its end is unknown.",
         source=f"(SELECT {JOINED}(o.outcome, ' ') FROM ({_OUTCOMES}) o)",  # noqa: S608 - constants
     ),
     Column(
         "disturbances",
         "text",
-        "JSON object of what disturbed the views of this play and how often; empty where the page did not "
-        "watch.",
+        "JSON object of disturbances in this presentation and their counts; empty if the page did not "
+        "record them.",
         source="t",
         json=True,
     ),
 )
-"""Each view of the trial, as it was begun and as it ended."""
+"""Each view of the trial, with its start and its end."""
 
 ASSUMED_REFRESH_HZ = 60
 ONSET_DELAY_REFRESHES = {"Firefox/": 1, "Chrome/": 0}
-"""Refreshes from drawing a picture to the frame buffer, by user agent; `make scope` measures them."""
+"""Refreshes from drawing an image to the frame buffer, by user agent; `make scope` measures them."""
 
 _REFRESH_MS = f"1000.0 / coalesce(t.refresh_rate_hz, {ASSUMED_REFRESH_HZ})"
-# PostgreSQL rounds `numeric` alone; the column is a plain number in both databases.
+# PostgreSQL rounds only `numeric`; the column is a plain number in both databases.
 _ROUNDED = "CAST(round(CAST({} AS numeric), 2) AS double precision)"
 _DELAYS = " ".join(
     f"WHEN CAST(r.device AS text) LIKE '%{browser}%' THEN {refreshes}"
@@ -161,9 +161,9 @@ PRESENTATION: tuple[Column, ...] = (
     Column(
         "onset_delay_ms",
         "number",
-        "Add this to recorded times of pictures, and take it off rt_from_first_frame: the time from drawing "
-        "a picture to the frame buffer as measured for the browser (none in Chromium, 1 refresh in Firefox), "
-        "without the monitor's own delay. Empty for other browsers and where no frame was logged.",
+        "Delay from drawing an image to the frame buffer, as measured for this browser (none in Chromium, "
+        "1 refresh in Firefox). Add it to recorded frame times, and subtract it from rt_from_first_frame. "
+        "It excludes the delay of the monitor. Empty for other browsers, or if no frame was logged.",
         unit="ms",
         minimum=0,
         source="CASE WHEN t.method = 'webcodecs' THEN "
@@ -172,19 +172,19 @@ PRESENTATION: tuple[Column, ...] = (
     Column(
         "onset_uncertainty_ms",
         "number",
-        "How far a picture's time, onset_delay_ms added, may be from the frame buffer's: one refresh in good "
-        "plays. Empty for others, about which nothing is promised.",
+        "Maximum error of a frame time after adding onset_delay_ms, relative to the frame buffer: one "
+        "refresh in good presentations. Empty for all others, which have no such guarantee.",
         unit="ms",
         minimum=0,
         source="CASE WHEN t.method = 'webcodecs' AND t.verdict = 'good' THEN "
         f"{_ROUNDED.format(_REFRESH_MS)} END",
     ),
 )
-"""What `make scope` knows of the way from the drawing to the screen (docs/explanation/participant.md)."""
+"""What `make scope` measured about the path from drawing to the screen (docs/explanation/participant.md)."""
 
 
 def answer_columns(shown: tuple[Column, ...], answer: tuple[Column, ...]) -> tuple[Column, ...]:
-    """The columns of a view of answers in logical order, said here once for every kind of trial.
+    """The columns of a view of answers in logical order, the same for every kind of trial.
 
     Parameters
     ----------

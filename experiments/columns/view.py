@@ -13,8 +13,8 @@ from experiments.columns.column import JOINED, Column, ColumnType, names_of
 from experiments.columns.old_order import in_old_order
 
 Dialect = Literal["sqlite", "postgresql"]
-MADE_FROM = "made from the columns in experiments, anew at each upgrade"
-"""Stands in every view's own text, so that an upgrade knows a view of a kind that is gone."""
+MADE_FROM = "made from the columns in experiments"
+"""Part of the text of every view, so that an upgrade recognizes views of removed kinds."""
 
 _TIME: dict[Dialect, str] = {
     "sqlite": "replace({}, ' ', 'T') || 'Z'",
@@ -34,9 +34,9 @@ class View:
     name : str
         Of the view in the database.
     title : str
-        What one row is, as a heading of the codebook says it.
+        What one row is, as in the heading of the codebook.
     columns : tuple of Column
-        In order. One of them may be `LEVELS`: the CSV has a column a factor in its place.
+        In order. One of them may be `LEVELS`, which the CSV replaces with one column per factor.
     rows : str or callable
         The SQL after SELECT: tables, joins, and which rows count; by database where they differ.
     """
@@ -52,7 +52,7 @@ class View:
         return names_of(self.columns)
 
     def pick(self, *names: str) -> tuple[Column, ...]:
-        """The columns called so; KeyError for a name that is no column."""
+        """The columns with these names; KeyError if a name is not a column."""
         by_name = {column.name: column for column in self.columns}
         return tuple(by_name[name] for name in names)
 
@@ -64,15 +64,15 @@ class View:
         return f"CREATE VIEW {self.name} AS\n-- {MADE_FROM}\nSELECT {selected}\n{self.rows_in(dialect)}"
 
     def in_old_order(self) -> "View":
-        """The same view with its columns as they stood until 0.2."""
+        """The same view with its columns in the order used until 0.2."""
         return replace(self, columns=in_old_order(self.name, self.columns))
 
     def rows_in(self, dialect: Dialect) -> str:
-        """The SQL after SELECT, in the words of one database; it ends in the conditions."""
+        """The SQL after SELECT, in the dialect of one database; it ends in the conditions."""
         return self.rows if isinstance(self.rows, str) else self.rows(dialect)
 
     def csv_header(self, factors: Sequence[str]) -> list[str]:
-        """Column names of the CSV export: as the view, with a column a factor in the place of `levels`."""
+        """Column names of the CSV export: like the view, with one column per factor instead of `levels`."""
         header: list[str] = []
         for name in self.names:
             header.extend(factors if name == LEVELS.name else [name])
@@ -90,25 +90,25 @@ class View:
         return levels_at(self.columns)
 
     def factors_in_header(self, header: Iterable[str]) -> list[str]:
-        """The factor columns of a CSV export: every column the view does not name, in order."""
+        """The factor columns of a CSV export: every column that the view does not name, in order."""
         return [name for name in header if name not in self.names]
 
 
 def levels_at(columns: Iterable[Column]) -> int | None:
-    """Which of these columns `LEVELS` is; None where it is none of them."""
+    """Index of `LEVELS` in these columns; None if it is not one of them."""
     return next((index for index, column in enumerate(columns) if column.name == LEVELS.name), None)
 
 
 # Decision 0002: Factors are one JSON column in SQL and one column each in CSV.
 def with_levels(row: Sequence[Any], index: int | None, factors: tuple[str, ...]) -> tuple[Any, ...]:
-    """The cells with one a factor in the place of the levels, which stand at `index`."""
+    """The cells with one cell per factor instead of the levels at `index`."""
     if index is None:
         return tuple(row)
     return (*row[:index], *_level_cells(row[index], factors), *row[index + 1 :])
 
 
 def column_sql(column: Column, dialect: Dialect) -> str:
-    """The SQL behind a column in the words of one database, as the view selects it."""
+    """The SQL behind a column in the dialect of one database, as the view selects it."""
     if column.member:
         member = _member(column, dialect)
         return f"coalesce({member}, {column.otherwise})" if column.otherwise else member
@@ -120,7 +120,7 @@ def column_sql(column: Column, dialect: Dialect) -> str:
 
 
 def _member(column: Column, dialect: Dialect) -> str:
-    """The value at a path of a JSON object; SQLite types it by itself, PostgreSQL is told its type."""
+    """The value at a path of a JSON object; SQLite infers its type, PostgreSQL needs a cast."""
     if dialect == "sqlite":
         return f"json_extract({column.source}, '$.{column.member}')"
     *outer, last = column.member.split(".")
@@ -129,7 +129,7 @@ def _member(column: Column, dialect: Dialect) -> str:
     return f"CAST({value} AS {_CAST[column.type]})" if column.type in _CAST else value
 
 
-# A study has few cells but many rows: their JSON is parsed once each.
+# A study has few cells but many rows: the JSON of each cell is parsed once.
 @lru_cache(maxsize=4096)
 def _level_cells(levels: str | None, factors: tuple[str, ...]) -> tuple[str, ...]:
     level_of: Mapping[str, str] = json.loads(levels) if levels else {}
@@ -167,7 +167,7 @@ class Stretch:
 
     @property
     def of_answer(self) -> bool:
-        """Whether every row may have other values."""
+        """Whether the values can differ in every row."""
         return not self.of_run and not self.clips
 
 
@@ -211,13 +211,13 @@ class Stretches:
         )
 
     def answers(self) -> str:
-        """Rows of some runs: the run, what they are sorted by, the clips' ids, then the answer's cells."""
+        """Rows of some runs: the run, the sort keys, the IDs of the clips, then the cells of the answer."""
         cells = [cell for one in self.all if one.of_answer for cell in self._cells(one)]
         first = ("r.id", *self.order, *(f"{alias}.id" for alias in self.clips))
         return f"SELECT {', '.join((*first, *cells))}\n{self.view.rows_in(self.dialect)} AND r.id IN :runs"
 
     def slices(self) -> Iterator[slice]:
-        """Where the cells of each of the answer's stretches stand in a row of `answers`."""
+        """Positions of the cells of each answer stretch in a row of `answers`."""
         begin = 1 + len(self.order) + len(self.clips)
         for one in self.all:
             if one.of_answer:
@@ -225,16 +225,16 @@ class Stretches:
                 begin += len(one.columns)
 
     def clip_at(self, alias: str) -> int:
-        """Where a clip's id stands in a row of `answers`."""
+        """Position of a clip's ID in a row of `answers`."""
         return 1 + len(self.order) + self.clips.index(alias)
 
     def runs(self, stretch: Stretch) -> str:
-        """Ids of some runs, and the cells of a stretch that is of the run."""
+        """IDs of some runs, and the cells of a stretch that depends on the run."""
         cells = ", ".join(("r.id", *self._cells(stretch)))
         return f"SELECT {cells} FROM study_runs r\n{RUN_JOINS}WHERE r.id IN :runs"  # noqa: S608
 
     def shown(self, stretch: Stretch) -> str:
-        """The cells of a stretch that is of clips; each alias is a parameter, NULL where there is no clip."""
+        """The cells of a stretch that depends on clips; each alias is a parameter, NULL without a clip."""
         joins = " ".join(f"LEFT JOIN {CLIP_TABLE} {clip} ON {clip}.id = :{clip}" for clip in stretch.clips)
         return f"SELECT {', '.join(self._cells(stretch))} FROM (SELECT 1 AS one) o {joins}"  # noqa: S608
 

@@ -25,9 +25,10 @@ IMPLIED = "implied"
 
 
 class Declaration(BaseModel):
-    """A frozen piece of a declaration; unknown keys are refused by name.
+    """A frozen part of a declaration; unknown keys are refused by name.
 
-    The text under a key is its description: docs/reference/experiment.md and the API's schema are made of it.
+    The text under a key is its description. It appears in docs/reference/experiment.md and in the API's
+    schema.
     """
 
     model_config = ConfigDict(
@@ -38,18 +39,18 @@ class Declaration(BaseModel):
     )
 
 
-# Names within one declaration: each stands once, and none is a column of the export.
+# Names within one declaration: each is used once, and none is a column of the export.
 
 
 def refuse_repeats(names: Sequence[str], what: str) -> None:
-    """ValueError where a name stands twice; `what` says whose names they are."""
+    """Raise ValueError if a name occurs twice; `what` says what the names belong to."""
     repeated = sorted({name for name in names if names.count(name) > 1})
     if repeated:
-        raise ValueError(f"each {what} needs a name of its own; '{repeated[0]}' stands twice")
+        raise ValueError(f"each {what} needs a unique name; '{repeated[0]}' is used twice")
 
 
 def refuse_reserved(names: Iterable[str], reserved: frozenset[str]) -> None:
-    """ValueError where a factor has the name of a column that stands beside it in the export."""
+    """Raise ValueError if a factor has the name of another column of the export."""
     for name in names:
         if name in reserved:
             raise ValueError(f"factor '{name}' has the name of a ratings column; choose another")

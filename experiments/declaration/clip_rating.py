@@ -10,10 +10,10 @@ from experiments.declaration.base import IMPLIED, Declaration, LevelName, Name, 
 from experiments.declaration.trial import Answer, ClipSpec, HasFactors, HasTrial, RatedScale, TrialDeclaration
 from experiments.errors import InputError
 
-# What every type of scale declares, and what the rest of the program may ask of one.
+# What every type of scale declares and offers to the rest of the program.
 
 SCALE_NAME = "rating"
-"""Name of the scale of a [trial.scale], which has none of its own."""
+"""Name of the scale of a [trial.scale], which has no `name` key."""
 
 
 class Scale(Declaration):
@@ -22,13 +22,13 @@ class Scale(Declaration):
     type: str
     """Type of scale."""
     name: Name = SCALE_NAME
-    """Names the scale in the data (column `scale`); each of several needs its own."""
+    """Name of the scale in the data (column `scale`). With several scales, each needs a unique name."""
     question: Translated
-    """What is asked, in every language."""
+    """The question, in every language."""
     reverse: bool = False
-    """Whether a high answer means little of what is measured; the data keep the answer as it was given."""
+    """Whether a high answer means a low value of what is measured. The data keep the answer as given."""
     not_applicable: Translated | None = None
-    """Label of an answer beside the scale, such as `cannot say`; it is stored without a number."""
+    """Label of an additional answer such as `cannot say`. It is stored without a number."""
 
     @property
     @abstractmethod
@@ -42,7 +42,7 @@ class Scale(Declaration):
 
     @property
     def interval(self) -> float:
-        """The least difference of two answers."""
+        """The smallest difference between two answers."""
         return 1
 
     @property
@@ -51,12 +51,12 @@ class Scale(Declaration):
         """Labels of the lowest and of the highest answer."""
 
     def texts(self) -> Iterator[tuple[str, Translated]]:
-        """Key and text of everything that participants read, the question left out."""
+        """Key and text of everything that participants read, except the question."""
         if self.not_applicable:
             yield "not_applicable", self.not_applicable
 
     def missing_text(self) -> str | None:
-        """The first text that lacks a language of the question; None where all have it."""
+        """The first text that lacks a language of the question; None if all have it."""
         for key, text in self.texts():
             missing = sorted(set(self.question) - set(text))
             if missing:
@@ -84,34 +84,34 @@ class Scale(Declaration):
         """The scale in one line of the codebook."""
         low, high = (label.get(language, "") for label in self.ends)
         beside = self.not_applicable and f" Or: {self.not_applicable.get(language, '')} (not_applicable)."
-        turned = " Reverse-keyed: a high answer means little; answers are stored as they were chosen."
+        turned = " Reverse-keyed: a high answer means a low value; answers are stored as chosen."
         return (
             f"Scale: {self.lowest:g} ({low}) to {self.highest:g} ({high}). "
             f"Question: {self.question.get(language, '')}{beside or ''}{turned if self.reverse else ''}"
         )
 
 
-# Whole numbers side by side, the ends labelled or each of them.
+# Whole numbers next to one another, with labels at the ends or at each number.
 
 
 class Points(Scale):
     """The points of a rating scale: whole numbers from `minimum` to `maximum`, 2 to 11 of them.
 
-    Either the two ends are labelled (`low`, `high`) or every point (`labels`).
+    Label either the two ends (`low`, `high`) or every point (`labels`).
     """
 
     type: Annotated[Literal["points"], IMPLIED] = "points"
-    """Names this type of scale; it is meant where none is named."""
+    """The type of this scale. It is the default type."""
     minimum: int = 1
     """Lowest point of the scale, a whole number."""
     maximum: int = 7
-    """Highest point; with the lowest it makes 2 to 11 points."""
+    """Highest point. The scale must have 2 to 11 points."""
     low: Translated | None = None
     """Label of the lowest point."""
     high: Translated | None = None
     """Label of the highest point."""
     labels: tuple[Translated, ...] = ()
-    """Labels of all points from the lowest, instead of `low` and `high`."""
+    """Labels of all points, starting with the lowest. Use this instead of `low` and `high`."""
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
@@ -121,7 +121,7 @@ class Points(Scale):
         if self.labels and (self.low or self.high):
             raise ValueError("expected low and high, or labels of all points; got both")
         if self.labels and len(self.labels) != count:
-            raise ValueError(f"expected {count} labels, one a point, got {len(self.labels)}")
+            raise ValueError(f"expected {count} labels, one per point, got {len(self.labels)}")
         if not self.labels and not (self.low and self.high):
             raise ValueError("expected low and high, or labels of all points; got neither")
         return self
@@ -142,12 +142,12 @@ class Points(Scale):
         return (self.low or self.labels[0], self.high or self.labels[-1])
 
     def texts(self) -> Iterator[tuple[str, Translated]]:
-        """The labels too."""
+        """Include the labels."""
         yield from super().texts()
         yield from (("labels", label) for label in self.labels)
 
     def said(self, language: str) -> str:
-        """Every label where there are more than two."""
+        """Include every label if there are more than two."""
         points = (
             f"{self.minimum + step} {label.get(language, '')}" for step, label in enumerate(self.labels)
         )
@@ -162,22 +162,23 @@ Finite = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
 
 
 class Slider(Scale):
-    """A slider from `minimum` to `maximum`. It has no handle, hence no answer, before it is first touched."""
+    """A slider from `minimum` to `maximum`. The handle appears on the first touch, so untouched sliders have
+    no answer."""
 
     type: Literal["slider"] = "slider"
-    """Names this type of scale."""
+    """The type of this scale."""
     minimum: Finite = 0.0
-    """The number at its left end (right, where a language is read so)."""
+    """The number at the left end (at the right end in right-to-left languages)."""
     maximum: Finite = 100.0
-    """The number at its other end."""
+    """The number at the other end."""
     step: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1.0
-    """Difference of neighbouring answers; the range is a whole number of steps."""
+    """Difference between neighboring answers. The range must be a whole number of steps."""
     low: Translated
     """Label of the low end."""
     high: Translated
     """Label of the high end."""
     show_value: bool = False
-    """Whether the number is shown while the slider is moved."""
+    """Whether the number is shown while the slider moves."""
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
@@ -210,7 +211,7 @@ class Slider(Scale):
         return (self.low, self.high)
 
     def texts(self) -> Iterator[tuple[str, Translated]]:
-        """The labels too."""
+        """Include the labels."""
         yield from super().texts()
         yield from (("low", self.low), ("high", self.high))
 
@@ -232,27 +233,27 @@ AnyScale = Annotated[Points | Slider, Field(discriminator="type"), BeforeValidat
 
 
 class RatingReference(Declaration):
-    """The clip shown before each rated one, as in degradation category rating (ITU-T P.910).
+    """The clip shown before each rated clip, as in degradation category rating (ITU-T P.910).
 
-    Either the rated clip with another `level` of one `factor`, or the clip of one `cell` with the exemplar of
-    the rated clip.
+    It is either the rated clip with another `level` of one `factor`, or the clip of one `cell` with the same
+    exemplar number as the rated clip.
     """
 
     factor: Name | None = None
-    """The factor in whose level the reference differs from the rated clip; all other levels and the exemplar
-    are those of the rated clip."""
+    """The factor in which the reference differs from the rated clip. All other levels and the exemplar are
+    those of the rated clip."""
     level: LevelName | None = None
-    """The reference's level of that factor."""
+    """The level of that factor in the reference."""
     cell: str | None = None
-    """Label of the reference's cell, instead of `factor` and `level`: its level names in factor order, joined
-    by slashes. Levels between participants are the participant's own."""
+    """Label of the reference cell, instead of `factor` and `level`: its level names in factor order,
+    separated by slashes. Between-participant levels are the participant's own."""
     label: Translated
-    """What the page says below the reference while it runs, in every language."""
+    """Text below the reference while it plays, in every language."""
     gap_ms: Annotated[int, Field(ge=0, le=10_000)] = 2000
-    """Plain background between the reference and the rated clip, in ms."""
+    """Blank background between the reference and the rated clip, in ms."""
     rate_itself: bool = False
-    """Whether the reference is also rated against itself (P.910's hidden reference); else its cells are not
-    rated."""
+    """Whether the reference is also rated against itself (the hidden reference of P.910). If off, its cells
+    are not rated."""
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
@@ -265,7 +266,7 @@ class RatingReference(Declaration):
         return self
 
     def of(self, experiment: HasFactors, clip: ClipSpec) -> ClipSpec:
-        """The reference of this clip; a clip of the reference's cell is its own."""
+        """The reference of this clip; a clip in the reference's cell is its own reference."""
         if self.factor is not None and self.level is not None:
             levels = tuple(
                 (name, self.level if name == self.factor else level) for name, level in clip.levels
@@ -298,33 +299,33 @@ MAX_FRAMES_LOGGED = 20_000
 
 
 class ClipRating(TrialDeclaration):
-    """The single-clip rating: start by key, one view (or `views`), answer after the clip's end.
+    """Rating of single clips: start by key, one view (or `views`), answer after the end of the clip.
 
-    A mouse that has not moved since its last press chooses nothing until `pointer_delay_ms` have passed.
+    If the mouse has not moved since its last click, clicks are ignored until `pointer_delay_ms` have passed.
     """
 
     kind: Literal["clip_rating"] = "clip_rating"
-    """Names this kind of trial."""
+    """The kind of this trial."""
     scale: AnyScale | None = None
-    """The question and its scale, where there is one: [trial.scale]."""
+    """The question and its scale, if there is only one: [trial.scale]."""
     scales: Annotated[tuple[AnyScale, ...], Field(max_length=MAX_SCALES)] = ()
-    """One to eight scales, each with a name, instead of the one: [[trial.scales]]."""
+    """One to eight named scales, instead of a single scale: [[trial.scales]]."""
     arrangement: Literal["one_screen", "one_after_the_other"] = "one_screen"
-    """Several scales below one another on one screen, or a screen each in their order."""
+    """With several scales: all on one screen, or one screen per scale in their order."""
     views: Annotated[int, Field(ge=1, le=10)] = 1
     """How often the clip is shown before it is rated."""
     reference: RatingReference | None = None
-    """A clip shown before each rated one, in degradation category rating: [trial.reference]."""
+    """A clip shown before each rated clip, for degradation category rating: [trial.reference]."""
     start: Literal["key", "fixation"] = "key"
-    """A clip begins on a key press, or by itself after a fixation cross."""
+    """A clip starts on a key press, or automatically after a fixation cross."""
     fixation_ms: Annotated[int, Field(ge=0, le=10_000)] = 500
-    """How long the fixation cross stands before the clip, in ms; with `start = "fixation"`."""
+    """How long the fixation cross is shown before the clip, in ms; with `start = "fixation"`."""
     pointer_delay_ms: Annotated[int, Field(ge=0, le=10_000)] = 1500
-    """Time, in ms, for which a mouse that has not moved since its last press chooses nothing."""
+    """Time in ms for which clicks are ignored if the mouse has not moved since its last click."""
     confirm: bool = False
-    """Whether a rating counts only once it is confirmed, so that it can be changed before."""
+    """Whether participants confirm each rating. They can change it until then."""
     comment: bool = False
-    """Adds a line of free text beside the rating; it stands in the column `comment`."""
+    """Adds a text field to the rating screen. Its text is stored in the column `comment`."""
 
     @model_validator(mode="after")
     def _scales_fit(self) -> Self:
@@ -333,12 +334,13 @@ class ClipRating(TrialDeclaration):
             raise ValueError(f"expected [trial.scale], or [[trial.scales]] for several scales; got {got}")
         if self.scale is not None and self.scale.name != SCALE_NAME:
             raise ValueError(
-                f"scale.name: a [trial.scale] has no name, got '{self.scale.name}'; use [[trial.scales]]"
+                f"scale.name: expected no name in [trial.scale], got '{self.scale.name}'; use "
+                f"[[trial.scales]] for named scales"
             )
         names = [scale.name for scale in self.asked_scales]
         again = next((name for name in names if names.count(name) > 1), None)
         if again is not None:
-            raise ValueError(f"scales: expected a name of its own for each scale, got '{again}' twice")
+            raise ValueError(f"scales: expected a unique name for each scale, got '{again}' twice")
         missing = next(filter(None, (scale.missing_text() for scale in self.asked_scales)), None)
         if missing:
             raise ValueError(missing)
@@ -350,7 +352,7 @@ class ClipRating(TrialDeclaration):
             return self
         if self.views > 1:
             raise ValueError(
-                f"views: a trial with a reference shows both clips once; leave it out, got {self.views}"
+                f"views: expected 1, because a trial with a reference shows both clips once; got {self.views}"
             )
         missing = sorted(set(self.asked_scales[0].question) - set(self.reference.label))
         if missing:
@@ -358,17 +360,17 @@ class ClipRating(TrialDeclaration):
         return self
 
     def rates(self, experiment: HasFactors, clip: ClipSpec) -> bool:
-        """Every clip, but references that are not rated themselves."""
+        """Every clip, except references that are not rated themselves."""
         return self.reference is None or self.reference.rates(experiment, clip)
 
     def view_ms(self, lengths: Mapping[str, float]) -> float:
-        """The clip; where there is a reference, both in turn and what is between."""
+        """The clip; with a reference, both clips and the gap between them."""
         if "reference" in lengths and self.reference is not None:
             return sum(lengths.values()) + self.reference.gap_ms
         return super().view_ms(lengths)
 
     def shown_ms(self, lengths: Mapping[str, float]) -> float:
-        """The view as often as the clip is shown."""
+        """One view times the number of views."""
         return self.views * self.view_ms(lengths)
 
     @property
@@ -407,7 +409,7 @@ def clip_rating_of(experiment: HasTrial) -> ClipRating:
     return experiment.trial
 
 
-# What a participant answers to one clip: a number on each scale, or that the scale does not apply.
+# The answer to one clip: a number on each scale, or that the scale does not apply.
 
 
 class ScaleAnswer(Declaration):
@@ -416,12 +418,13 @@ class ScaleAnswer(Declaration):
     response: StrictInt | Annotated[StrictFloat, Field(allow_inf_nan=False)] | None
     not_applicable: bool = False
     rt: Annotated[float, Field(ge=0, le=1e10, allow_inf_nan=False)] | None = None
-    """From the clip's last frame to this answer, in ms; where there is one scale it is that of the trial."""
+    """From the last frame of the clip to this answer, in ms; with a single scale it equals that of the
+    trial."""
 
     @field_validator("response")
     @classmethod
     def _plain(cls, value: float | None) -> float | None:
-        """A whole number is stored as one, however it was sent."""
+        """Store a whole number as an integer, however it was sent."""
         return int(value) if isinstance(value, float) and value.is_integer() else value
 
     @model_validator(mode="after")
@@ -450,7 +453,7 @@ class RatingAnswer(Answer):
         return all(answer.given for answer in self.answers.values())
 
     def stored(self) -> dict[str, Any]:
-        """One number for the one scale of a [trial.scale]; else an object a scale."""
+        """One number for the single scale of a [trial.scale]; otherwise one object per scale."""
         gap = {} if self.reference_gap_ms is None else {"reference_gap_ms": self.reference_gap_ms}
         if self.answers.keys() == {SCALE_NAME}:
             return self.answers[SCALE_NAME].model_dump(exclude_defaults=True, exclude={"rt"}) | gap

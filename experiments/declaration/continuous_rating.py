@@ -20,12 +20,12 @@ Finite = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
 
 
 class ContinuousRating(TrialDeclaration):
-    """A slider that is moved while the clip is shown; its place is sampled at frames of the clip."""
+    """A slider that is moved while the clip plays. Its position is sampled at frames of the clip."""
 
     kind: Literal["continuous_rating"] = "continuous_rating"
-    """Names this kind of trial."""
+    """The kind of this trial."""
     question: Translated
-    """What is asked, in every language."""
+    """The question, in every language."""
     low: Translated
     """Label of the low end."""
     high: Translated
@@ -35,16 +35,16 @@ class ContinuousRating(TrialDeclaration):
     maximum: Finite = 100.0
     """The number at the high end."""
     input: Literal["slider", "keys"] = "slider"
-    """Moved by pointer or arrow keys a step a press (`slider`), or also by holding an arrow key, which
-    moves it evenly (`keys`)."""
+    """`slider`: moved by pointer, or by arrow keys one step per press. `keys`: holding an arrow key also
+    moves it, at constant speed."""
     seconds_across: Annotated[float, Field(ge=0.5, le=20)] = 3.0
-    """Time that a held key takes from end to end, in seconds; with `input = "keys"`."""
+    """Time in seconds that a held key takes from end to end; with `input = "keys"`."""
     sample_hz: Annotated[int, Field(ge=1, le=30)] = 10
-    """Samples a second of the clip: its place when every so manyth frame is drawn."""
+    """Samples per second of the clip. The position is sampled at regular frames."""
     max_lag_s: Annotated[float, Field(gt=0, le=10)] = 3.0
-    """Longest lag of ratings behind what they answer that the analysis looks for, in seconds."""
+    """Longest delay between clip and rating that the analysis considers, in seconds."""
     pointer_delay_ms: Annotated[int, Field(ge=0, le=10_000)] = 1500
-    """Time, in ms, for which a mouse that has not moved since its last press starts nothing."""
+    """Time in ms for which clicks are ignored if the mouse has not moved since its last click."""
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
@@ -61,7 +61,8 @@ class ContinuousRating(TrialDeclaration):
         """The question, the ends, and how often they are sampled."""
         low, high, question = (text.get(language, "") for text in (self.low, self.high, self.question))
         return (
-            f"Rated while the clip is shown, {self.sample_hz} samples a second: {self.minimum:g} ({low}) to "
+            f"Rated while the clip is shown, {self.sample_hz} samples per second: {self.minimum:g} ({low}) "
+            f"to "
             f"{self.maximum:g} ({high}). Question: {question}"
         )
 
@@ -87,7 +88,7 @@ def continuous_rating_of(experiment: HasTrial) -> ContinuousRating:
     return experiment.trial
 
 
-# What a participant answers to one clip: a number at each of its sampled frames.
+# The answer to one clip: a number at each of its sampled frames.
 
 Sample = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
 

@@ -1,6 +1,6 @@
 """An experiment as a declaration: factors, exemplars, blocks, scale, texts, rules and analysis plan.
 
-Whether its parts fit one another is asked once it is read, by `experiments.consistency`.
+`experiments.consistency` checks whether its parts fit together, after the file is read.
 """
 
 from collections.abc import Mapping
@@ -36,33 +36,34 @@ from experiments.rules import (
 
 
 class Experiment(Declaration):
-    """A factorial study of clips, complete: this is what an `expN.toml` declares."""
+    """The complete declaration of a factorial clip study (an `expN.toml` file)."""
 
     name: Name
     """Name of the experiment in manifests, exports and file names."""
     title: str
-    """Title that experimenters read, and participants where `participant_title` is not given."""
+    """Title that experimenters see. Participants see it too if `participant_title` is not set."""
     participant_title: Translated | None = None
-    """Title on the participant's first page and the browser's tab, in every language. A study's own title may
-    tell what is expected of the answers."""
+    """Title on the participant's first page and in the browser tab, in every language. Use it if the title of
+    the study reveals your hypothesis."""
     version: Annotated[int, Field(ge=1)] = 1
-    """The experimenter's own count of versions; nothing depends on it."""
+    """Your own version number. Nothing depends on it."""
     source: str = ""
-    """Where the design comes from, such as a reference to a paper. Stands in reports."""
+    """Where the design comes from, such as a reference to a paper. It is shown in reports."""
     participants: Annotated[int, Field(ge=1)] = 20
-    """Planned number of participants, for `stimuli plan`. The study's quota is set on the server."""
+    """Planned number of participants, for `stimuli plan`. The quota of the study is set on the server."""
     languages: Annotated[tuple[Language, ...], Field(min_length=1)] = ("en",)
-    """Languages offered to participants, the first where theirs is none of them; each needs its [texts]."""
+    """Languages offered to participants. The first is used if a participant's own language is not offered.
+    Each language needs its [texts]."""
     factors: Annotated[tuple[Factor, ...], Field(min_length=1)]
-    """The factors. Their levels, every one with every other, make the cells."""
+    """The factors. All combinations of their levels are the cells of the design."""
     render: RenderSettings = RenderSettings()
-    """How every clip is rendered, unless a level changes it."""
+    """How clips are rendered, unless a level changes it."""
     exemplars: Exemplars
     """How many clips a cell has."""
     assignment: Assignment = Assignment()
-    """Who sees which clips."""
+    """Which participant sees which clips."""
     groups: Groups = Groups()
-    """How participants come into the groups that factors between them make."""
+    """How participants are assigned to the groups of between-participant factors."""
     blocks: Blocks = Blocks()
     """Blocks and their order."""
     practice: Practice = Practice()
@@ -70,31 +71,31 @@ class Experiment(Declaration):
     trial: AnyTrial
     """What one trial shows and asks, by its kind."""
     display: Display = Display()
-    """Size and surround of the clip, and what the device must offer."""
+    """Size of the clip, background, and requirements for the device."""
     session: Session = Session()
-    """Coming back, and for how long a place is kept."""
+    """What happens when participants return, and how long a slot is kept."""
     playback: PlaybackRules = PlaybackRules()
-    """When a play is flagged or failed."""
+    """When a presentation is flagged or failed."""
     attention: AttentionChecks = AttentionChecks()
     """Attention checks between the trials."""
     evidence: Evidence = Evidence()
-    """What is asked for to tell people from programs."""
+    """Checks that distinguish people from programs."""
     screening: tuple[ScreeningRule, ...] = ()
-    """Rules that end a run while it goes on. The participant is told so, and the place is free again."""
+    """Rules that end a run early. The participant is informed, and the slot becomes free again."""
     warnings: Warnings = Warnings()
-    """Kind words to who answers without care, and when the run then ends."""
+    """Friendly warnings for careless responding, and when the run then ends."""
     exclusions: tuple[ExclusionRule, ...] = ()
-    """Rules, fixed before the data, that leave out runs or trials when the study is analysed."""
+    """Rules that exclude runs or trials from the analysis. They are fixed before data collection."""
     forms: tuple[Form, ...] = ()
     """Questionnaires before and after the trials."""
     texts: dict[Language, Texts]
-    """The pages, a table a language: [texts.en]."""
+    """The pages, one table per language: [texts.en]."""
     analysis: AnalysisPlan = AnalysisPlan()
-    """The analysis, fixed before the data."""
+    """The analysis plan. It is fixed before data collection."""
     retention: Retention = Retention()
-    """How long data of persons are kept."""
+    """How long personal data are kept."""
     dataset: Dataset = Dataset()
-    """Who made the data and who may use them, for datasets that are handed on."""
+    """Authors and license of the data, for shared datasets."""
 
     @property
     def factor_names(self) -> tuple[str, ...]:
@@ -102,7 +103,7 @@ class Experiment(Declaration):
         return tuple(factor.name for factor in self.factors)
 
     def title_for(self, language: str) -> str:
-        """The title that participants read in this language."""
+        """The title that participants see in this language."""
         titles = self.participant_title or {}
         return titles.get(language) or titles.get(self.languages[0]) or self.title
 
@@ -119,7 +120,7 @@ class Experiment(Declaration):
     @model_validator(mode="before")
     @classmethod
     def _factor_of_characters(cls, data: Any) -> Any:
-        """`[render] character = [...]` is short for a last factor, seen whole by everybody."""
+        """`[render] character = [...]` is short for a last factor that everyone sees completely."""
         render = data.get("render") if isinstance(data, Mapping) else None
         if not isinstance(render, Mapping) or not isinstance(render.get("character"), list | tuple):
             return data

@@ -18,15 +18,15 @@ class Level(Declaration):
     """One level of a factor: its name in the data, its label in tables, and what it changes in clips."""
 
     name: LevelName
-    """Value in the factor's column of every export and part of the cell's name. Participants never see it."""
+    """Value in the factor's column of every export, and part of the cell name. Participants never see it."""
     label: str
-    """What tables and figures call the level. Participants never see it."""
+    """Label of the level in tables and figures. Participants never see it."""
     render: RenderOverrides = RenderOverrides()
-    """What clips of this level change of [render]. Levels that change nothing give the same clips."""
+    """Settings of [render] that this level changes. Levels that change nothing share the same clips."""
 
 
 def names_listed(value: Any) -> tuple[str, ...]:
-    """The characters of a list; ValueError where it is none or one of them is no name."""
+    """The characters of a list; ValueError if it is not a list of names."""
     names = tuple(value) if isinstance(value, list | tuple) else ()
     if not names or not all(isinstance(name, str) and _names_a_folder(name) for name in names):
         raise ValueError(f'character: expected a list such as ["alder@8", "birch@6"], got {as_toml(value)}')
@@ -34,7 +34,7 @@ def names_listed(value: Any) -> tuple[str, ...]:
 
 
 def _names_a_folder(character: str) -> bool:
-    # of "." and ".." the last part is no name, and the folder is another one on every machine
+    # the last part of "." and ".." is not a name, and the folder differs between machines
     return PurePath(character).name not in ("", "..")
 
 
@@ -49,24 +49,26 @@ class Factor(Declaration):
     """A factor of the design. The clips are every combination of the factors' levels."""
 
     name: Name
-    """Name of the factor's column in the ratings CSV and in the analysis; no other column may have it."""
+    """Name of the factor's column in the ratings CSV and in the analysis. No other column may have this
+    name."""
     label: str
-    """What tables, figures and reports call the factor."""
+    """Label of the factor in tables, figures and reports."""
     between: bool = False
     """On: each participant sees one level, groups take turns, and the analysis compares participants. Off:
-    everybody sees every level."""
+    everyone sees every level."""
     random: bool = False
-    """On: the levels stand for more like them, such as faces or voices: the analysis of variance averages
-    over them, and the mixed models have them as random items, so that results hold for others. Off: the
-    levels are compared with one another."""
+    """On: the levels are a sample of many, such as faces or voices. The analysis of variance averages over
+    them, and mixed models treat them as random items, so that results generalize. Off: the levels are
+    compared with one another."""
     per_participant: Annotated[int, Field(ge=1, le=1000)] | None = None
-    """How many of a random factor's levels a participant sees, each level equally often over participants,
-    give or take one; left out, all of them."""
+    """How many levels of a random factor each participant sees. Levels are balanced over participants to
+    within one. Leave empty to show all."""
     character: tuple[str, ...] = ()
-    """Characters (names, or paths of folders) that each make a level, named after it without its version;
-    written instead of `levels`, and read as these: a declaration that was read has the levels and no list."""
+    """Characters (names or folder paths), one level each. Each level is named after its character, without
+    the version. Use this instead of `levels`; the parsed declaration contains the levels only."""
     levels: Annotated[tuple[Level, ...], Field(min_length=1)]
-    """In the order of tables and contrasts. In the list of cells the last factor's change fastest."""
+    """The levels, in the order of tables and contrasts. In the list of cells, the last factor varies
+    fastest."""
 
     @model_validator(mode="before")
     @classmethod
@@ -75,7 +77,7 @@ class Factor(Declaration):
         if listed is None or (not listed and data.get("levels")):
             return data
         if data.get("levels"):
-            raise ValueError("a level for each `character`, or `levels` of its own: leave one of them out")
+            raise ValueError("expected `character` or `levels`, got both; remove one of them")
         levels = tuple(level_of_character(name) for name in names_listed(listed))
         return {**data, "character": (), "levels": levels}
 
@@ -88,13 +90,15 @@ class Factor(Declaration):
     def _random_fits(self) -> Self:
         if self.random and self.between:
             raise ValueError(
-                "a factor is `random` or `between`, not both: give `per_participant = 1` to show each "
-                "participant one of its levels"
+                "expected `random` or `between`, got both; use `random` with `per_participant = 1` to show "
+                "each participant one level"
             )
         if self.per_participant is None:
             return self
         if not self.random:
-            raise ValueError("per_participant is for random factors: set `random = true`, or leave it out")
+            raise ValueError(
+                "per_participant applies to random factors only; set `random = true` or remove it"
+            )
         if self.per_participant > len(self.levels):
             raise ValueError(
                 f"per_participant: expected at most the {len(self.levels)} levels, got {self.per_participant}"
@@ -103,19 +107,21 @@ class Factor(Declaration):
 
     @property
     def dealt(self) -> bool:
-        """Whether participants see some of its levels only."""
+        """Whether each participant sees only some of its levels."""
         return self.per_participant is not None and self.per_participant < len(self.levels)
 
 
 class Exemplars(Declaration):
-    """How many clips a cell has, and which factors bring exemplars of their own.
+    """How many clips a cell has, and which factors have different blinks at each level.
 
-    Exemplar 3 of two cells shows the same blink unless the cells differ in a factor named in `own_per`.
+    Exemplar 3 of two cells shows the same blink unless the cells differ in a factor listed in `own_per`.
     """
 
     per_cell: Annotated[int, Field(ge=1, le=1000)]
-    """Clips (different blinks) in each cell. More of them make means less dependent on single blinks."""
+    """Clips (different blinks) in each cell. With more clips, means depend less on single blinks."""
     own_per: tuple[Name, ...] = ()
-    """Factors whose levels show different blinks; over all other factors exemplar n is the same blink."""
+    """Factors whose levels show different blinks. For all other factors, exemplar n is the same blink at
+    every level."""
     seed: int = 2011
-    """Seed of the draw of recorded blinks. Another seed gives other clips, and with them another study."""
+    """Random seed for the choice of recorded blinks. A different seed gives different clips and therefore a
+    different study."""

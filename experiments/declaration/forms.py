@@ -14,12 +14,12 @@ from experiments.declaration.base import Declaration, Name, Translated
 
 
 class Option(Declaration):
-    """One answer of a choice field; `value` is what is stored."""
+    """One answer of a choice field; `value` is stored."""
 
     value: str
-    """What is stored and exported, whatever language was read."""
+    """The value that is stored and exported, whatever the language."""
     label: Translated
-    """What the participant reads."""
+    """The text that participants read."""
 
 
 def among(values: list[Any], options: Sequence[Option]) -> str | None:
@@ -36,21 +36,21 @@ class Question(Declaration):
     """What every type of field has."""
 
     name: Name
-    """Key of the answer in the runs CSV's `forms`; [[screening]] names it as `field`."""
+    """Key of the answer in the `forms` column of the runs CSV. [[screening]] refers to it as `field`."""
     label: Translated
     """The question, in every language."""
     help: Translated | None = None
     """Smaller text under the question."""
     required: bool = False
-    """Whether the form can be sent only once this is answered."""
+    """Whether this question must be answered before the form can be sent."""
 
     screened_by: ClassVar[Literal["limits", "options"] | None] = None
-    """By what a [[screening]] rule may refuse an answer: `below` and `above`, `refused`, or not at all."""
+    """How a [[screening]] rule may refuse an answer: `below` and `above`, `refused`, or not at all."""
     example: ClassVar[str] = ""
-    """A field of this type as TOML, for the reference; empty where docs/reference/every-key.toml has one."""
+    """A field of this type as TOML, for the reference; empty if docs/reference/every-key.toml has one."""
 
     def problem(self, value: object) -> str | None:
-        """What is wrong with an answer, expected and got; None where nothing is."""
+        """What is wrong with an answer, expected and got; None if nothing is."""
         if is_empty(value):
             return "an answer is required" if self.required else None
         return self._problem(value)
@@ -102,7 +102,7 @@ class TextField(Question):
     """Free text."""
 
     type: Literal["text"] = "text"
-    """Names this type of field."""
+    """The type of this field."""
     max_length: Annotated[int, Field(ge=1, le=5000)] = 500
     """Longest answer, in characters."""
 
@@ -127,11 +127,11 @@ class NumberField(Question):
     """A whole number within limits, such as an age in years."""
 
     type: Literal["number"] = "number"
-    """Names this type of field."""
+    """The type of this field."""
     minimum: int = 0
-    """Smallest answer taken."""
+    """Smallest allowed answer."""
     maximum: int = 1_000_000
-    """Largest answer taken."""
+    """Largest allowed answer."""
 
     screened_by: ClassVar = "limits"
 
@@ -155,9 +155,9 @@ class ChoiceField(Question):
     """One of several answers."""
 
     type: Literal["choice"] = "choice"
-    """Names this type of field."""
+    """The type of this field."""
     options: Annotated[tuple[Option, ...], Field(min_length=2)]
-    """The answers, in the order in which they are listed."""
+    """The answers, in the order shown."""
 
     screened_by: ClassVar = "options"
 
@@ -186,9 +186,9 @@ class MultipleChoiceField(Question):
     """Any of several answers."""
 
     type: Literal["multiple_choice"] = "multiple_choice"
-    """Names this type of field."""
+    """The type of this field."""
     options: Annotated[tuple[Option, ...], Field(min_length=1)]
-    """The answers, in the order in which they are listed; any number of them may be chosen."""
+    """The answers, in the order shown. Participants may choose any number of them."""
 
     screened_by: ClassVar = "options"
     example: ClassVar = """\
@@ -230,16 +230,16 @@ options = [
         }
 
 
-# A rating with labelled ends.
+# A rating with labeled ends.
 
 
 class LikertField(Question):
-    """A rating from 1 to `points` with labelled ends."""
+    """A rating from 1 to `points` with labeled ends."""
 
     type: Literal["likert"] = "likert"
-    """Names this type of field."""
+    """The type of this field."""
     points: Annotated[int, Field(ge=2, le=11)] = 7
-    """Number of points; the answer is a whole number from 1."""
+    """Number of points. The answer is a whole number starting at 1."""
     low: Translated
     """Label of the lowest point."""
     high: Translated
@@ -282,12 +282,12 @@ FormField = Annotated[
 
 
 class Form(Declaration):
-    """One page of questions, shown before the first or after the last block."""
+    """A page of questions, shown before the first block or after the last one."""
 
     name: Name
-    """Key of the form's answers in the runs CSV; [[screening]] names it as `form`."""
+    """Key of the form's answers in the runs CSV. [[screening]] refers to it as `form`."""
     when: Literal["before", "after"] = "before"
-    """Shown after the consent, before the trials, or after the last trial."""
+    """`before`: after consent, before the trials. `after`: after the last trial."""
     title: Translated
     """Heading of the page."""
     fields: Annotated[tuple[FormField, ...], Field(min_length=1)]

@@ -13,73 +13,73 @@ from experiments.errors import InputError
 
 
 class SideBySide(Declaration):
-    """Two clips beside one another on one canvas, drawn by one clock.
+    """Two clips next to each other on one canvas, driven by one clock.
 
-    `if_too_narrow` says what happens on a screen where the two do not fit at actual size: they are stacked,
-    or the participant is asked for a larger window. Which of them was shown is stored with each answer.
+    `if_too_narrow` decides what happens if the clips do not fit on the screen at actual size. Each answer
+    stores which arrangement was shown.
     """
 
     arrangement: Literal["side_by_side"] = "side_by_side"
-    """Names this arrangement."""
+    """The name of this arrangement."""
     gap_mm: Annotated[float, Field(ge=0, le=100)] = 8.0
-    """Plain background between the two clips, in mm."""
+    """Blank background between the two clips, in mm."""
     if_too_narrow: Literal["stack", "refuse"]
-    """Where two clips do not fit beside one another: stack them, or ask for a larger window."""
+    """If two clips do not fit next to each other: stack them, or ask for a larger window."""
 
 
 class Stacked(Declaration):
-    """Two clips one above the other on one canvas, drawn by one clock."""
+    """Two clips one above the other on one canvas, driven by one clock."""
 
     arrangement: Literal["stacked"] = "stacked"
-    """Names this arrangement."""
+    """The name of this arrangement."""
     gap_mm: Annotated[float, Field(ge=0, le=100)] = 8.0
-    """Plain background between the two clips, in mm."""
+    """Blank background between the two clips, in mm."""
 
 
 class OneAfterTheOther(Declaration):
-    """Two clips in the same place, the second `gap_ms` of plain background after the first."""
+    """Two clips in the same place, separated by `gap_ms` of blank background."""
 
     arrangement: Literal["one_after_the_other"] = "one_after_the_other"
-    """Names this arrangement."""
+    """The name of this arrangement."""
     gap_ms: Annotated[int, Field(ge=0, le=10_000)]
-    """Plain background between the two clips, in ms."""
+    """Blank background between the two clips, in ms."""
 
 
 Presentation = Annotated[SideBySide | Stacked | OneAfterTheOther, Field(discriminator="arrangement")]
 
 
 class AllPairs(Declaration):
-    """Every clip with every other; `matched` compares clips of the same exemplar number only."""
+    """All pairs of clips; `matched` compares only clips with the same exemplar number."""
 
     among: Literal["all"] = "all"
-    """Names this choice of pairs."""
+    """The name of this choice of pairs."""
     exemplars: Literal["matched", "any"] = "matched"
-    """Only clips of the same exemplar number, or any two clips of the design."""
+    """Only clips with the same exemplar number, or any two clips of the design."""
 
 
 class WithinFactor(Declaration):
-    """Clips that differ in the level of one factor only: other factors and the exemplar are the same."""
+    """Clips that differ in one factor only: other factors and the exemplar are the same."""
 
     among: Literal["within"] = "within"
-    """Names this choice of pairs."""
+    """The name of this choice of pairs."""
     factor: Name
-    """The factor in whose level the two clips differ."""
+    """The factor in which the two clips differ."""
 
 
 class CellPair(Declaration):
-    """Two cells to compare, by their labels, each exemplar of the one with the same exemplar of the other."""
+    """Two cells to compare, by label. Each exemplar is compared with the same exemplar of the other cell."""
 
     cell: str
-    """Label of the one cell: its level names in factor order, joined by slashes."""
+    """Label of the first cell: its level names in factor order, separated by slashes."""
     other: str
     """Label of the other cell."""
 
 
 class DeclaredPairs(Declaration):
-    """The pairs of cells in this list and no others."""
+    """Only the pairs of cells in this list."""
 
     among: Literal["declared"] = "declared"
-    """Names this choice of pairs."""
+    """The name of this choice of pairs."""
     cells: Annotated[tuple[CellPair, ...], Field(min_length=1)]
     """The pairs of cells."""
 
@@ -88,87 +88,90 @@ Pairs = Annotated[AllPairs | WithinFactor | DeclaredPairs, Field(discriminator="
 
 
 class InTurn(Declaration):
-    """Every participant gets all pairs, or the next `pairs_per_person` of one order drawn for the study."""
+    """Every participant gets all pairs, or the next `pairs_per_person` of one random order for the study."""
 
     by: Literal["turn"] = "turn"
-    """Names this way of dealing."""
+    """The name of this method."""
 
 
 class IncompleteBlocks(Declaration):
-    """Each participant sees a few of the clips and compares each of them with each other.
+    """Each participant sees a few of the clips and compares all pairs of them.
 
-    The blocks are those of a balanced incomplete design: over a whole round of it every pair is compared
-    equally often, and every clip is in as many blocks as any other.
+    The blocks form a balanced incomplete design. In a complete round, every pair is compared equally often,
+    and every clip is in equally many blocks.
     """
 
     by: Literal["bibd"] = "bibd"
-    """Names this way of dealing."""
+    """The name of this method."""
     clips_per_block: Annotated[int, Field(ge=2, le=100)]
-    """Clips in a block; all pairs of them are compared. Where no design has them, near sizes are named."""
+    """Clips in a block; all pairs of them are compared. If no design has this size, the error names nearby
+    sizes."""
     blocks_per_person: Annotated[int, Field(ge=1, le=1000)] = 1
-    """Blocks of one participant."""
+    """Blocks per participant."""
 
 
 class Active(Declaration):
-    """The server chooses, when a participant begins, the pairs that tell most by what is answered so far."""
+    """When a participant starts, the server chooses the most informative pairs given all answers so far."""
 
     by: Literal["active"] = "active"
-    """Names this way of dealing."""
+    """The name of this method."""
     random_share: Annotated[float, Field(ge=0, le=1)] = 0.2
-    """Share of a participant's pairs that is drawn by lot from the others, whatever they tell."""
+    """Share of a participant's pairs that is drawn at random from the remaining pairs."""
 
 
 Dealing = Annotated[InTurn | IncompleteBlocks | Active, Field(discriminator="by")]
 
 
 class Ties(Declaration):
-    """The answer that neither clip is chosen, and its label."""
+    """The answer that the participant chooses neither clip, and its label."""
 
     label: Translated
     """Label of this answer, in every language."""
 
 
 class Reference(Declaration):
-    """A clip shown before each pair, as in degradation category rating: the cell, the pair's exemplar."""
+    """A clip shown before each pair, as in degradation category rating. It has the exemplar number of the
+    pair."""
 
     cell: str
-    """Label of its cell; the exemplar is that of the pair, and levels between participants are the
+    """Label of the reference cell. The exemplar is that of the pair, and between-participant levels are the
     participant's own."""
     label: Translated
-    """What the page says below it while it runs, in every language."""
+    """Text below the reference while it plays, in every language."""
     gap_ms: Annotated[int, Field(ge=0, le=10_000)] = 500
-    """Plain background after it, in ms."""
+    """Blank background after the reference, in ms."""
 
 
 class PairedComparison(TrialDeclaration):
-    """Which of two clips? Shown at once or in turn, with a tie where one is declared.
+    """A choice between two clips, shown at once or in turn, with a tie if one is declared.
 
-    A mouse that has not moved since its last press chooses nothing until `pointer_delay_ms` have passed.
+    If the mouse has not moved since its last click, clicks are ignored until `pointer_delay_ms` have passed.
     """
 
     kind: Literal["paired_comparison"] = "paired_comparison"
-    """Names this kind of trial."""
+    """The kind of this trial."""
     question: Translated
-    """What is asked of the two clips, in every language."""
+    """The question about the two clips, in every language."""
     presentation: Presentation
-    """How the two clips are shown; there is no default."""
+    """How the two clips are shown. There is no default."""
     pairs: Pairs
     """Which clips are compared."""
     dealing: Dealing = InTurn()
-    """Who compares which of the pairs: in turn, in balanced incomplete blocks, or the most telling next."""
+    """Which participant compares which pairs: in turn, balanced incomplete blocks, or the most informative
+    pairs."""
     ties: Ties | None = None
-    """Allows the answer that neither is chosen."""
+    """Allows participants to choose neither clip."""
     reference: Reference | None = None
     """A clip shown before each pair."""
     pointer_delay_ms: Annotated[int, Field(ge=0, le=10_000)] = 1500
-    """Time, in ms, for which a mouse that has not moved since its last press chooses nothing."""
+    """Time in ms for which clicks are ignored if the mouse has not moved since its last click."""
     pairs_per_person: Annotated[int, Field(ge=1, le=5000)] | None = None
-    """Comparisons of one participant in a block, dealt in turn from all pairs; where not given, all."""
+    """Comparisons per participant in a block, taken in turn from all pairs. Leave empty for all pairs."""
     expected_seconds: Annotated[float, Field(gt=0)] = 8.0
-    """Expected length of a trial in seconds, for the length of a visit."""
+    """Average duration of a trial, in seconds. The length of a visit is computed from it."""
 
     def asked(self, language: str) -> str:
-        """The question and what may be answered."""
+        """The question and the possible answers."""
         tie = f" or tie ({self.ties.label.get(language, '')})" if self.ties else ""
         return f"Question: {self.question.get(language, '')} Answers: left, right{tie}."
 
@@ -176,11 +179,15 @@ class PairedComparison(TrialDeclaration):
     def _dealing_fits(self) -> Self:
         each = self.pairs_per_person
         if self.dealing.by == "bibd" and each is not None:
-            raise ValueError("pairs_per_person: blocks say how many pairs there are; leave it out")
+            raise ValueError("pairs_per_person: the blocks determine the number of pairs; remove this key")
         if self.dealing.by == "bibd" and self.pairs.among == "declared":
-            raise ValueError("dealing: blocks need pairs among all or within a factor, not a list")
+            raise ValueError(
+                "dealing: `bibd` needs pairs among `all` or `within` a factor, got a list of pairs"
+            )
         if self.dealing.by == "active" and each is None:
-            raise ValueError("pairs_per_person: say how many pairs are chosen for each participant")
+            raise ValueError(
+                "pairs_per_person is required with `active`: the number of pairs per participant"
+            )
         return self
 
     @property
@@ -192,7 +199,7 @@ class PairedComparison(TrialDeclaration):
 
     @property
     def arrangements(self) -> tuple[str, ...]:
-        """Every arrangement that may be shown by this declaration."""
+        """Every arrangement that this declaration can show."""
         shown = self.presentation
         if isinstance(shown, SideBySide) and shown.if_too_narrow == "stack":
             return ("side_by_side", "stacked")
@@ -223,16 +230,16 @@ def paired_comparison_of(experiment: HasTrial) -> PairedComparison:
     """The experiment's trial as a paired comparison; InputError where it is of another kind."""
     if not isinstance(experiment.trial, PairedComparison):
         raise InputError(
-            f"this needs trials of the kind paired_comparison, '{experiment.name}' has "
-            f"{experiment.trial.kind}"
+            f"expected trials of the kind paired_comparison, got {experiment.trial.kind} in "
+            f"'{experiment.name}'"
         )
     return experiment.trial
 
 
-# What a participant answers to one pair.
+# The answer to one pair.
 
 CODES = {"left": 1, "right": 2, "tie": 3}
-"""The number of each answer, as its key has it and an attention check asks for it."""
+"""The number of each answer, as used by its key and by attention checks."""
 
 
 class ComparisonAnswer(Answer):
@@ -244,7 +251,7 @@ class ComparisonAnswer(Answer):
     kind: Literal["paired_comparison"]
     winner: Literal["left", "right", "tie"] | None
     arrangement: Literal["side_by_side", "stacked", "one_after_the_other"] | None = None
-    """How the two were in fact shown, not as declared where two clips beside one another did not fit."""
+    """The arrangement shown. It can differ from the declared one if two clips did not fit side by side."""
 
     @property
     def given(self) -> bool:

@@ -41,65 +41,69 @@ Moments = Annotated[tuple[Moment, ...], Field(max_length=100)]
 
 
 class RenderSettings(Declaration):
-    """Everything the clip builder needs for one cell."""
+    """All settings that the clip builder needs for one cell."""
 
     character: str = "photorealistic"
-    """A shipped character (`stimuli character list`: `alder@8`, `cartoon`), or the path of a folder of
-    your own; a list of them is short for a last factor `character` with a level each. Left out, it is the
-    retired `photorealistic`, so that old declarations keep their meaning."""
+    """A shipped character (see `stimuli character list`, for example `alder@8` or `cartoon`), or the path of
+    your own character folder. A list of characters is short for a last factor `character` with one level per
+    character. The default is the retired `photorealistic`, so that old declarations keep their
+    meaning."""
     profile: ProfileName = "real"
-    """Blink profile: recorded (`real`), made from recordings phase by phase (`phases`), of the paper's PCA
-    model, which closes too little (`model`), a textbook curve (`SL`, `AL`, `SL_ease`, `AL_ease`: symmetric or
-    asymmetric, linear or eased), or a CSV file of closure (0 open, 1 closed)."""
+    """Blink profile. `real`: recorded. `phases`: composed from recordings phase by phase. `model`: the
+    paper's PCA model, which does not close the eye fully. `SL`, `AL`, `SL_ease`, `AL_ease`: textbook curves
+    (symmetric or asymmetric, linear or eased). You can also name a CSV file of closure (0 open, 1
+    closed)."""
     duration_frames: DurationFrames | None = None
-    """Length of the blink, in frames at `duration_frames_fps`, whatever rate the clip has; left out (and
-    `duration_ms` too), blinks keep their recorded length."""
+    """Length of the blink in frames at `duration_frames_fps`. It does not depend on the frame rate of the
+    clip. If this and `duration_ms` are empty, blinks keep their recorded length."""
     duration_frames_fps: CountingRate = 30.0
-    """Rate at which `duration_frames` counts, in frames per second."""
+    """Frame rate of `duration_frames`, in frames per second."""
     duration_ms: DurationMs | None = None
     """Length of the blink in milliseconds, instead of `duration_frames`."""
     amplitude: Literal["full", "natural"] = "full"
-    """`full` (FC) closes the eye fully, to closure 1; `natural` (NC) keeps the closure that was measured."""
+    """`full` (FC) closes the eye fully, to closure 1. `natural` (NC) keeps the measured closure."""
     motion_blur: bool = True
-    """Mean of the 300 fps samples of an output frame in linear light (MB), or one sample of it (NB)."""
+    """On (MB): an output frame is the mean of its 300 fps samples in linear light. Off (NB): it is one of
+    these samples."""
     lower_lid: Literal["both", "vertical", "horizontal", "none"] = "none"
     """Which recorded signals move the lower lid."""
     lower_lid_gain: LowerLidGain = 1.0
-    """Size of the lower lid's motion relative to what was recorded; 0 holds it still. A clip that asks for
-    more than its character was baked for (1 mm up, 5 mm towards the nose) is refused."""
+    """Motion of the lower lid relative to the recording; 0 keeps it still. A clip that exceeds the limits of
+    its character (1 mm up, 5 mm toward the nose) is refused."""
     brow_mm: MovedMm | None = None
-    """How far the brows sink and draw together while the eye shuts, in mm at closure 1, in proportion to it;
-    0 holds them still. Left out, as the character was drawn or baked (`cartoon` 0.45, baked faces 0)."""
+    """How far the brows move down and together while the eye closes, in mm at closure 1. The motion is
+    proportional to closure; 0 keeps the brows still. If empty, the character's own value is used (`cartoon`
+    0.45, baked faces 0)."""
     cheek_mm: MovedMm | None = None
-    """How far the cheeks rise while the eye shuts, in mm at closure 1; as `brow_mm`."""
+    """How far the cheeks rise while the eye closes, in mm at closure 1; otherwise like `brow_mm`."""
     squint_mm: MovedMm | None = None
-    """How far the skin below the eye draws up and towards the nose while it shuts, in mm at closure 1; as
-    `brow_mm`. The margin of the lower lid is `lower_lid`'s."""
+    """How far the skin below the eye moves up and toward the nose while the eye closes, in mm at closure 1;
+    otherwise like `brow_mm`. It does not move the lid margin; see `lower_lid`."""
     gaze_mm: MovedMm | None = None
-    """How far the iris turns down, and half as far towards the nose, under the closing lid, in mm at closure
-    1 (0.2 is one degree); as `brow_mm`."""
+    """How far the iris turns down under the closing lid, in mm at closure 1 (0.2 is one degree); otherwise
+    like `brow_mm`. It turns half as far toward the nose."""
     eyes: Literal["alike", "separate"] = "alike"
-    """One signal drives both eyes, or the left and the right recording an eye each."""
+    """`alike`: one signal drives both eyes. `separate`: the left and right recordings each drive one eye."""
     performance: Timing | None = None
-    """Shows a performance of the blink engine for `seconds` instead of a single blink. What times its blinks:
-    a timer whose intervals lie evenly between half and one and a half times their mean (`uniform`), the
-    engine's fitted intervals (`intervals`), these and the events of `events_s` or `speech` (`events`), or
-    nothing, the eyes staying open (`none`). Blink n of an exemplar looks the same whatever times it. The keys
-    `profile` and of the blink's length are for single blinks."""
+    """Shows a performance of the blink engine for `seconds` instead of a single blink. `uniform`: a timer
+    with intervals from 0.5 to 1.5 times the mean. `intervals`: the engine's fitted intervals. `events`: these
+    plus the events of `events_s` or `speech`. `none`: the eyes stay open. Blink n of an exemplar looks the
+    same in all of them. `profile` and the blink length apply to single blinks only."""
     seconds: Seconds = 20.0
     """Length of a performance, in seconds."""
     state: State = "listening"
-    """What the person in a performance does; it sets the mean blink rate (page: blink engine)."""
+    """What the person in a performance is doing. It sets the mean blink rate (page: blink engine)."""
     blinks_per_minute: PerMinute | None = None
-    """Mean blink rate of a performance; left out, that published for its state."""
+    """Mean blink rate of a performance. If empty, the published rate for its state is used."""
     events_s: Moments = ()
-    """Moments that blinks answer where `performance` is `events`, in seconds from the clip's start."""
+    """Times at which an event triggers a blink, in seconds from the start of the clip. Used if `performance`
+    is `events`."""
     event: EventKind = "turn_end"
-    """What happens at the moments of `events_s`."""
+    """What happens at the times in `events_s`."""
     speech: str = ""
-    """A recording with sound or subtitles (.vtt, .srt) next to the TOML whose pauses and turns blinks answer,
-    where `performance` is `events`; the person speaks then, and is in `state` between turns. Of subtitles
-    with several voices name one: `dialogue.vtt#Anna`."""
+    """A recording with sound or subtitles (.vtt, .srt) next to the TOML file, used if `performance` is
+    `events`. Its pauses and turns trigger blinks. The person speaks during turns and is in `state` between
+    them. To choose one voice in the subtitles, add its name: `dialogue.vtt#Anna`."""
     fps: Fps = 30
     """Frame rate of the clip, in frames per second."""
     width_px: Annotated[int, Field(ge=320, le=1920, multiple_of=2)] = 960
@@ -110,7 +114,7 @@ class RenderSettings(Declaration):
     @model_validator(mode="after")
     def _one_length(self) -> Self:
         if self.duration_ms is not None and self.duration_frames is not None:
-            raise ValueError("expected duration_frames or duration_ms, got both; leave one out")
+            raise ValueError("expected duration_frames or duration_ms, got both; remove one of them")
         length_ms = self.blink_ms
         if length_ms is not None and not MIN_BLINK_MS - 1e-9 <= length_ms <= MAX_BLINK_MS + 1e-9:
             raise ValueError(
@@ -139,7 +143,7 @@ class RenderSettings(Declaration):
 
 
 class RenderOverrides(Declaration):
-    """What a level changes of [render]; a key left out stays as it is there."""
+    """Settings of [render] that a level changes. Omitted keys keep their value from [render]."""
 
     character: str | None = None
     """As [render] `character`, for clips of this level."""

@@ -16,34 +16,34 @@ class YesNo(Declaration):
     """One clip, and whether something was seen in it."""
 
     asks: Literal["yes_no"] = "yes_no"
-    """Names this task."""
+    """The name of this task."""
     yes: Translated
-    """Label of the answer that becomes likelier along the function."""
+    """Label of the answer that becomes more likely along the function."""
     no: Translated
     """Label of the other answer."""
     guess: Annotated[float, Field(ge=0.001, le=0.9)] = 0.02
-    """Assumed share of yes where there is nothing to be seen: the function's lower end."""
+    """Assumed share of "yes" answers if there is nothing to see: the lower end of the function."""
 
 
 class TwoInterval(Declaration):
-    """Two clips in turn, the stimulus and the standard in either order: in which of them was it?"""
+    """Two clips in turn, the stimulus and the standard in random order. The participant chooses one."""
 
     asks: Literal["two_interval"] = "two_interval"
-    """Names this task."""
+    """The name of this task."""
     standard: LevelName
-    """Level of the stimulus factor that every stimulus is shown against; it is not a stimulus itself."""
+    """Level of the stimulus factor that every stimulus is compared with. It is not a stimulus itself."""
     standard_second: LevelName | None = None
-    """Level of the second factor that the standard has; where not given, that of the stimulus beside it."""
+    """Level of the second factor in the standard. If empty, it is that of the stimulus."""
     first: Translated
-    """Label of the answer that names the first clip."""
+    """Label of the answer for the first clip."""
     second: Translated
-    """Label of the answer that names the second clip."""
+    """Label of the answer for the second clip."""
     gap_ms: Annotated[int, Field(ge=0, le=10_000)] = 500
-    """Plain background between the two clips, in ms."""
+    """Blank background between the two clips, in ms."""
 
     @property
     def guess(self) -> float:
-        """Who sees nothing names the right one of two as often as not."""
+        """Chance level of two-interval forced choice."""
         return 0.5
 
 
@@ -51,26 +51,26 @@ Task = Annotated[YesNo | TwoInterval, Field(discriminator="asks")]
 
 
 class SecondStimulus(Declaration):
-    """A second factor that changes from trial to trial: series then move over the grid of both.
+    """A second factor that changes from trial to trial: series then move on the grid of both factors.
 
-    The threshold along the first factor is taken to be a straight line over the numbers of the second.
+    The threshold of the first factor is assumed to be a straight line over the numbers of the second.
     """
 
     factor: Name
-    """The factor. Its levels with those of the first are the stimuli."""
+    """The second factor. The stimuli are the combinations of its levels with those of the first."""
     values: dict[LevelName, float] = Field(default_factory=dict)
-    """The number of each level; may be left out where the levels are named by their numbers."""
+    """The number of each level. Leave empty if the level names are numbers."""
 
 
 class Stimulus(Declaration):
-    """The factor along which each series looks for its threshold."""
+    """The factor along which each series searches for its threshold."""
 
     factor: Name
-    """The factor. Its levels are the stimuli that were rendered, and a series moves between them."""
+    """The factor. Its levels are the rendered stimuli, and a series moves between them."""
     values: dict[LevelName, float] = Field(default_factory=dict)
-    """The number of each level; may be left out where the levels are named by their numbers."""
+    """The number of each level. Leave empty if the level names are numbers."""
     second: SecondStimulus | None = None
-    """A second factor along which series move too."""
+    """A second factor along which series also move."""
 
     @property
     def factors(self) -> tuple[str, ...]:
@@ -79,7 +79,7 @@ class Stimulus(Declaration):
 
 
 class Series(Declaration):
-    """One adaptive series: a level of every factor but those of the stimulus."""
+    """One adaptive series: a level of every factor except the stimulus factors."""
 
     name: Name
     """Name of the series in the data."""
@@ -88,14 +88,14 @@ class Series(Declaration):
 
 
 class Range(Declaration):
-    """Numbers at even distances, ends included."""
+    """Evenly spaced numbers, including both ends."""
 
     lowest: float
     """Lowest number."""
     highest: float
     """Highest number."""
     steps: Annotated[int, Field(ge=2, le=101)] = 31
-    """How many numbers, both ends included."""
+    """How many numbers, including both ends."""
 
     @model_validator(mode="after")
     def _ascending(self) -> Self:
@@ -111,65 +111,68 @@ class Range(Declaration):
 
 
 class Stop(Declaration):
-    """When a series ends: after `trials`, earlier once its estimate is as certain as `sd` and `entropy` say.
+    """When a series ends: after `trials`, or earlier once its estimate is precise enough (`sd`, `entropy`).
 
-    Where both are given, both must be reached.
+    If both `sd` and `entropy` are set, both must be reached.
     """
 
     trials: Annotated[int, Field(ge=2, le=500)] | None = None
-    """Most trials of a series. Needed: an estimate need never become as certain as is asked."""
+    """Maximum number of trials in a series. It is required because an estimate might never become precise
+    enough."""
     at_least: Annotated[int, Field(ge=1)] = 10
-    """Answers that a series has before its certainty can end it."""
+    """Minimum number of answers before precision can end a series."""
     sd: Annotated[float, Field(gt=0)] | None = None
-    """Standard deviation of the threshold's posterior at which a series ends, in the stimulus's unit. With a
-    second factor the threshold is that at the middle of its numbers, and `entropy` regards the tilt too."""
+    """Standard deviation of the threshold's posterior at which a series ends, in the unit of the stimulus.
+    With a second factor, it is evaluated at the middle of its numbers; `entropy` also covers the tilt."""
     entropy: Annotated[float, Field(gt=0)] | None = None
     """Entropy of the posterior over all parameters at which a series ends, in bits."""
 
 
 class Threshold(TrialDeclaration):
-    """Adaptive series by QUEST+: each answer decides which of the rendered stimuli is shown next.
+    """Adaptive series by QUEST+: each answer determines which rendered stimulus is shown next.
 
-    A mouse that has not moved since its last press chooses nothing until `pointer_delay_ms` have passed.
+    If the mouse has not moved since its last click, clicks are ignored until `pointer_delay_ms` have passed.
     """
 
     kind: Literal["threshold"] = "threshold"
-    """Names this kind of trial."""
+    """The kind of this trial."""
     question: Translated
-    """What is asked after the clip or clips, in every language."""
+    """The question after the clip or clips, in every language."""
     task: Task
-    """One clip and yes or no, or two clips and which of them."""
+    """One clip with yes or no, or a choice between two clips."""
     stimulus: Stimulus
     """What changes from trial to trial."""
     series: tuple[Series, ...] = ()
-    """The series, run interleaved; where none is given, one a combination of the other factors' levels."""
+    """The series, which run interleaved. If empty, there is one per combination of the other factors'
+    levels."""
     function: Literal["normal", "weibull"] = "normal"
-    """Shape assumed for the psychometric function. The Weibull needs stimuli above 0."""
+    """Assumed shape of the psychometric function. The Weibull function needs stimuli above 0."""
     direction: Literal["rising", "falling"] = "rising"
-    """Whether yes (or right) becomes likelier with the stimulus's number, or less likely."""
+    """Whether "yes" (or a correct answer) becomes more or less likely as the stimulus number increases."""
     lapse: Annotated[float, Field(ge=0.001, le=0.2)] = 0.02
-    """Assumed share of wrong answers to what is plain to see: 1 minus the function's upper end."""
+    """Assumed share of wrong answers to obvious stimuli: 1 minus the upper end of the function."""
     thresholds: Range | None = None
-    """Thresholds considered; where not given, from the lowest stimulus to the highest. With a second factor
-    they are those at the middle of its numbers."""
+    """Thresholds considered. If empty, they range from the lowest to the highest stimulus. With a second
+    factor, they apply to the middle of its numbers."""
     tilts: Range | None = None
-    """With a second factor, the considered changes of the threshold per unit of its numbers; where not given,
-    as steep as a threshold that crosses all stimuli of the first, either way."""
+    """With a second factor: the changes of the threshold considered, per unit of its numbers. If empty, they
+    range up to the slope at which the threshold crosses all stimuli of the first factor, in both
+    directions."""
     spreads: Range | None = None
-    """Considered SDs of the normal function (in the stimulus's unit), or slopes of the Weibull; where not
-    given, a twentieth to a half of the stimuli's range, or 1 to 10."""
+    """SDs of the normal function (in the unit of the stimulus) or slopes of the Weibull function to consider.
+    If empty, 1/20 to 1/2 of the range of the stimuli, or slopes from 1 to 10."""
     stop: Stop
     """When a series ends."""
     ahead: Annotated[int, Field(ge=0, le=20)] = 3
-    """Trials of a series that a page without connection may show before the server has the answers to
-    earlier ones. Such trials are marked in the data."""
+    """Trials of a series that an offline page may show before the server has received earlier answers. These
+    trials are marked in the data."""
     pointer_delay_ms: Annotated[int, Field(ge=0, le=10_000)] = 1500
-    """Time, in ms, for which a mouse that has not moved since its last press chooses nothing."""
+    """Time in ms for which clicks are ignored if the mouse has not moved since its last click."""
     expected_seconds: Annotated[float, Field(gt=0)] = 5.0
-    """Expected length of a trial in seconds, for the length of a visit."""
+    """Average duration of a trial, in seconds. The length of a visit is computed from it."""
 
     def asked(self, language: str) -> str:
-        """The question and what may be answered."""
+        """The question and the possible answers."""
         task = self.task
         one, other = (task.yes, task.no) if isinstance(task, YesNo) else (task.first, task.second)
         names = ("yes", "no") if isinstance(task, YesNo) else ("first", "second")
@@ -204,15 +207,15 @@ def threshold_of(experiment: HasTrial) -> Threshold:
     """The experiment's trial as a threshold; InputError where it is of another kind."""
     if not isinstance(experiment.trial, Threshold):
         raise InputError(
-            f"this needs trials of the kind threshold, '{experiment.name}' has {experiment.trial.kind}"
+            f"expected trials of the kind threshold, got {experiment.trial.kind} in '{experiment.name}'"
         )
     return experiment.trial
 
 
-# What a participant answers to one trial of a series.
+# The answer to one trial of a series.
 
 CODES = {"yes": 1, "no": 2, "first": 1, "second": 2}
-"""The number of each answer, as its key has it and an attention check asks for it."""
+"""The number of each answer, as used by its key and by attention checks."""
 
 
 class ThresholdAnswer(Answer):
@@ -221,7 +224,7 @@ class ThresholdAnswer(Answer):
     kind: Literal["threshold"]
     chosen: Literal["yes", "no", "first", "second"] | None
     known: Annotated[StrictInt, Field(ge=0, le=100_000)] = 0
-    """How many answers of the series the server's choice of this stimulus rested on, as it said."""
+    """How many answers of the series the server had used when it chose this stimulus, as it reported."""
 
     @property
     def given(self) -> bool:

@@ -51,11 +51,11 @@ class RatedScale:
     step : float
         Between the answers that there are.
     reverse : bool
-        Whether a high answer means little of what is measured; stored answers are as they were chosen.
+        Whether a high answer means a low value of what is measured; answers are stored as chosen.
     not_applicable : bool
         Whether "cannot say" is an answer too; it is stored without a number.
     question, low, high : Translated
-        What is asked, and the labels of the ends, by language.
+        The question and the labels of the ends, by language.
     member : str
         Path of the number in the stored answer (`trial_ratings.payload`), parts joined by dots.
     """
@@ -102,19 +102,19 @@ class TrialDeclaration(Declaration):
     kind: str
     """Kind of trial."""
     expected_seconds: Annotated[float, Field(gt=0)] = 6.0
-    """Seconds a trial takes on average, from which the length of a visit is reckoned."""
+    """Average duration of a trial, in seconds. The length of a visit is computed from it."""
 
     def asked(self, language: str) -> str:
-        """What participants are asked and may answer, in one line of the codebook."""
+        """The question and its possible answers, in one line of the codebook."""
         del language
         return ""
 
     def rated_scales(self) -> tuple[RatedScale, ...]:
-        """The scales on which each trial is rated; none where its answers are no ratings."""
+        """The scales on which each trial is rated; empty for kinds whose answers are not ratings."""
         return ()
 
     def rates(self, experiment: HasFactors, clip: ClipSpec) -> bool:
-        """Whether trials ask about this clip; others of the design are only shown beside it."""
+        """Whether trials ask about this clip; other clips of the design are only shown with it."""
         del experiment, clip
         return True
 
@@ -160,7 +160,7 @@ class HasTrial(Protocol):
 
 @dataclass(frozen=True)
 class ByKind:
-    """Annotation: a union of models that are told apart by `kind`, also where there is one kind only.
+    """Annotation: a union of models that is identified by `kind`, even if there is only one kind.
 
     Attributes
     ----------

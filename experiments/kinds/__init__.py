@@ -1,7 +1,7 @@
 """The kinds of trial, and the registry that finds them by name.
 
-A new kind is a file of its name in `experiments.declaration`, for its [trial], and one here, with its `Kind`:
-both are found by the name.
+A new kind needs a file with its name in `experiments.declaration`, for its [trial], and one here, with its
+`Kind`. Both are found by name.
 """
 
 from importlib import import_module
@@ -24,20 +24,20 @@ def _kind_in(name: str) -> Kind:
 
 
 KINDS: dict[str, Kind] = {name: _kind_in(name) for name in TRIALS}
-"""Every kind by the name that a TOML gives it; the first is meant where none is given."""
+"""Every kind by its name in the TOML; the first is the default."""
 
 
 def views() -> tuple[View, ...]:
-    """The SQL views of all kinds, which every upgrade makes (`server.core.database_views`)."""
+    """The SQL views of all kinds, which every upgrade recreates (`server.core.database_views`)."""
     return tuple(kind.view for kind in KINDS.values())
 
 
 def reserved_names() -> frozenset[str]:
-    """Names that no factor may have: they are columns beside it."""
+    """Names that no factor may have, because other columns of the export have them."""
     return frozenset(name for view in views() for name in view.names)
 
 
-# Types that are of whichever kind their key `kind` names: what a page gets, an answer.
+# Types whose kind is named by their key `kind`: what a page gets, an answer.
 
 AnyPage = Annotated[Declaration, ByKind(lambda: {name: kind.page for name, kind in KINDS.items()})]
 AnyAnswer = Annotated[

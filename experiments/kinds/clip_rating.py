@@ -1,4 +1,4 @@
-"""Single clips rated on scales: what does not fit, who rates which, page, columns."""
+"""Ratings of single clips: checks of the declaration, assignment, page model, columns."""
 
 import random
 from dataclasses import replace
@@ -33,29 +33,29 @@ from experiments.errors import did_you_mean
 from experiments.kinds.kind import Kind
 from experiments.schema.effects import Effect
 
-# What in declared ratings of single clips does not fit the rest of the experiment.
+# Checks of declared single-clip ratings against the rest of the experiment.
 
 
 def fault(experiment: Experiment) -> str | None:
-    """More views of a long performance than a trial may log; a reference that does not fit."""
+    """More views of a long performance than a trial may log, or a reference that does not fit."""
     trial = clip_rating_of(experiment)
     levels = [level.render for factor in experiment.factors for level in factor.levels]
     settings = [experiment.render, *(level.applied_to(experiment.render) for level in levels)]
     if trial.reference and any(one.performance for one in settings):
-        return "trial.reference: performances have no reference; leave it out, or show single blinks"
+        return "trial.reference: performances cannot have a reference; remove it, or show single blinks"
     if trial.reference and (wrong := fault_of_reference(trial.reference, experiment)):
         return wrong
     longest = max((round(one.seconds * one.fps) for one in settings if one.performance), default=0)
     if longest * trial.views <= MAX_FRAMES_LOGGED:
         return None
     return (
-        f"trial.views: {trial.views} views of {longest} frames are more than the {MAX_FRAMES_LOGGED} that "
-        "a trial may log; show shorter clips, fewer frames a second or fewer views"
+        f"trial.views: {trial.views} views of {longest} frames exceed the {MAX_FRAMES_LOGGED} frames that "
+        f"a trial may log; use shorter clips, fewer frames per second or fewer views"
     )
 
 
 def fault_of_reference(reference: RatingReference, experiment: Experiment) -> str | None:
-    """What here does not fit the design, as `path: what to do`; None where all is well."""
+    """What does not fit the design, as `path: what to do`; None if everything fits."""
     return (
         _fault_of_clip(reference, experiment)
         or _fault_of_difference(reference, experiment)
@@ -88,14 +88,14 @@ def _fault_of_clip(reference: RatingReference, experiment: Experiment) -> str | 
 def _fault_of_factor(factor: Factor) -> str | None:
     if factor.between or factor.dealt:
         return (
-            f"trial.reference.factor: participants see some levels of '{factor.name}' only; name a "
-            "factor of which everybody sees all"
+            f"trial.reference.factor: participants see only some levels of '{factor.name}'; use a factor "
+            f"whose levels everyone sees"
         )
     return None
 
 
 def _differing(reference: RatingReference, experiment: Experiment) -> list[str]:
-    """The factors in whose levels a reference can differ from its clip, in declared order."""
+    """The factors in which a reference can differ from its clip, in declared order."""
     return [
         factor.name
         for factor in experiment.factors
@@ -105,67 +105,67 @@ def _differing(reference: RatingReference, experiment: Experiment) -> list[str]:
 
 
 def _fault_of_difference(reference: RatingReference, experiment: Experiment) -> str | None:
-    """A reference is another clip than some, and shows the blink of each."""
+    """A reference must differ from some clips, and show the same blink as each clip."""
     differing = _differing(reference, experiment)
     if not differing:
         return (
-            "trial.reference: every clip would be its own reference; name a factor of which each "
-            "participant sees two levels or more"
+            "trial.reference: every clip would be its own reference; use a factor of which each "
+            "participant sees at least two levels"
         )
     own = next((name for name in differing if name in experiment.exemplars.own_per), None)
     if own is not None:
         return (
-            f"exemplars.own_per: a reference shows the blink of its clip, but the levels of '{own}', in "
-            f"which the two differ, have blinks of their own; leave '{own}' out of own_per"
+            f"exemplars.own_per: a reference must show the same blink as its clip, but '{own}', in which "
+            f"they differ, has different blinks at each level; remove '{own}' from own_per"
         )
     return None
 
 
 def _fault_of_rest(reference: RatingReference, experiment: Experiment) -> str | None:
-    """Without the reference's own trials the rated cells must still be a crossed design."""
+    """Without the reference's own trials, the rated cells must still form a crossed design."""
     hidden = "or set rate_itself = true"
     split = experiment.blocks.split_by
     if reference.factor is None and len(experiment.factors) > 1:
         return (
-            f"trial.reference.cell: without ratings of '{reference.cell}' the rated cells are not crossed; "
-            f"name factor and level, {hidden}"
+            f"trial.reference.cell: without ratings of '{reference.cell}', the rated cells are not fully "
+            f"crossed; use factor and level, {hidden}"
         )
     name = reference.factor or experiment.factor_names[0]
     if split == name:
         return (
-            f"blocks.split_by: the reference's level of '{name}' would be an empty block; "
-            f"split by another factor, {hidden}"
+            f"blocks.split_by: the block of the reference's level of '{name}' would be empty; split by "
+            f"another factor, {hidden}"
         )
     if len(experiment.factor(name).levels) < 3:
         return (
-            f"trial.reference: '{name}' needs two levels beside the reference's to compare; "
-            f"add a level, {hidden}"
+            f"trial.reference: '{name}' needs at least two levels in addition to the reference's; add a "
+            f"level, {hidden}"
         )
     return None
 
 
-# What a single-clip rating exports: the base columns and the rating itself, one row a scale and play.
-#
-# A payload with one number is that of a [trial.scale]; one with `answers` has an object a scale.
+# Exports of a single-clip rating: the base columns and the rating, one row per scale and presentation.
+# A payload with one number is from a [trial.scale]; one with `answers` has one object per scale.
 
 ANSWER: tuple[Column, ...] = (
     Column(
         "scale",
         "text",
-        "Name of the scale: rating where the study has one; empty in checks.",
+        "Name of the scale: rating if the study has a single scale; empty in checks.",
         source="CASE WHEN a.kind IN ('attention', 'check') THEN NULL ELSE e.key END",
     ),
     Column(
         "response",
         "number",
-        "The rating as it was chosen on the scale, reverse-keyed or not; empty where not_applicable was.",
+        "The rating as chosen on the scale, even if the scale is reverse-keyed; empty if not_applicable "
+        "was chosen.",
         source="e.value",
         member="response",
     ),
     Column(
         "not_applicable",
         "boolean",
-        "True where the answer beside the scale (cannot say) was chosen.",
+        "True if the additional answer (cannot say) was chosen.",
         source="e.value",
         member="not_applicable",
         otherwise="false",
@@ -173,13 +173,13 @@ ANSWER: tuple[Column, ...] = (
     Column(
         "expected_response",
         "integer",
-        "The answer asked for in an attention check, or right in a motion check.",
+        "The required answer in an attention check, or the correct answer in a motion check.",
         source="a",
     ),
     Column(
         "scale_rt",
         "number",
-        "Response time from the clip's last frame to the answer on this scale, where there are several.",
+        "Response time from the clip's last frame to the answer on this scale, if there are several scales.",
         unit="ms",
         minimum=0,
         source="e.value",
@@ -199,13 +199,13 @@ REFERENCE: tuple[Column, ...] = (
     Column(
         "reference",
         "text",
-        "Cell of the reference clip shown before; empty where the study has none.",
+        "Cell of the reference clip shown before the rated clip; empty if the study has none.",
         source="xc.cell",
     ),
     Column(
         "reference_gap_ms",
         "number",
-        "From the last frame of the reference to the first of the rated clip, as they were drawn.",
+        "Time from the last drawn frame of the reference to the first drawn frame of the rated clip.",
         unit="ms",
         minimum=0,
         source="t.payload",
@@ -220,27 +220,26 @@ def _rows(dialect: Dialect) -> str:
 
 RATINGS = View(
     name="ratings",
-    title="Ratings: one row a play, or one a scale and play",
+    title="Ratings: one row per presentation, or one per scale and presentation",
     columns=answer_columns((*base.CLIP, *REFERENCE), ANSWER),
     rows=_rows,
 )
 
 
-# What of a single-clip rating the participant's page is told.
-#
-# A model of its own, so that a key added to the declaration reaches participants only when it is put here
+# What the participant's page receives about a single-clip rating.
+# A separate model, so that a key added to the declaration reaches participants only when it is added here
 # too.
 
 
 class ShownRatingReference(Declaration):
-    """The label of the reference, and how long the canvas stays plain after it; not which clip it is."""
+    """The label of the reference and the length of the blank gap after it, but not which clip it is."""
 
     label: Translated
     gap_ms: int
 
 
 class ShownClipRating(Declaration):
-    """The declared single-clip rating as the page gets it."""
+    """The declared single-clip rating as the page receives it."""
 
     kind: Literal["clip_rating"]
     scales: tuple[AnyScale, ...]
@@ -276,11 +275,12 @@ def shown(experiment: Experiment) -> ShownClipRating:
     )
 
 
-# Who rates which clips in what order: everyone every clip, in blocks as declared.
+# Who rates which clips in what order: everyone rates every clip, in blocks as declared.
 
 
 def assign(experiment: Experiment, seed: int, slot: int) -> list[Trial]:
-    """The trials of one participant in order, see `single_clips`; a check asks for any point of the scale."""
+    """The trials of one participant in order, see `single_clips`; checks can require any point of the
+    scale."""
     scale = clip_rating_of(experiment).check_scale
 
     def asked(rng: random.Random) -> int:
@@ -294,7 +294,7 @@ def assign(experiment: Experiment, seed: int, slot: int) -> list[Trial]:
 
 
 def check_choices(experiment: Experiment) -> int:
-    """The points of the scale on which attention checks ask."""
+    """The points of the scale that attention checks can require."""
     scale = clip_rating_of(experiment).check_scale
     return scale.maximum - scale.minimum + 1
 
@@ -313,7 +313,7 @@ def plan(experiment: Experiment) -> tuple[str, ...]:
 
 
 def block_size(experiment: Experiment, block: BlockSpec) -> int:
-    """One trial a clip of the participant's share, the largest where they differ."""
+    """One trial per clip of the participant's share; the largest if blocks differ."""
     laps = len(experiment.assignment.lists) or 1
     seats = (seat_of(experiment, slot) for slot in range(laps))
     return max(len(share(experiment, seat).intersection(block.clips)) for seat in seats)

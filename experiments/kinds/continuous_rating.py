@@ -1,4 +1,4 @@
-"""Clips rated while they are shown: who rates which, page, columns."""
+"""Clips rated while they play: assignment, page model, columns."""
 
 import random
 from typing import Literal
@@ -25,9 +25,8 @@ from experiments.kinds.clip_rating import block_size
 from experiments.kinds.kind import Kind
 from experiments.schema.effects import Effect
 
-# What a continuous rating exports: the base columns and the trace, one row a play.
-#
-# Alias beside those of the base columns: k clips.
+# Exports of a continuous rating: the base columns and the trace, one row per presentation.
+# Alias in addition to those of the base columns: k clips.
 
 ANSWER: tuple[Column, ...] = (
     Column(
@@ -40,20 +39,20 @@ ANSWER: tuple[Column, ...] = (
     Column(
         "expected_response",
         "integer",
-        "The answer asked for in an attention check (1 to 7), or right in a motion check.",
+        "The required answer in an attention check (1 to 7), or the correct answer in a motion check.",
         source="a",
     ),
     Column(
         "trace",
         "text",
-        "The rating at each sampled frame, a JSON list; sample k stands at frame k step_frames.",
+        "JSON list of the rating at each sampled frame; sample k (from 0) is taken at frame k * step_frames.",
         source="t.payload",
         member="values",
     ),
     Column(
         "step_frames",
         "integer",
-        "Frames of the clip from one sample to the next.",
+        "Number of frames from one sample to the next.",
         unit="frame",
         minimum=1,
         source="t.payload",
@@ -71,7 +70,7 @@ ANSWER: tuple[Column, ...] = (
     Column(
         "blinks_s",
         "text",
-        "When the blinks of the clip's performance begin, a JSON list of seconds from its first frame; empty "
+        "JSON list of the onsets of the blinks in a performance, in seconds from the first frame; empty "
         "for other clips.",
         source="c",
         json=True,
@@ -80,17 +79,17 @@ ANSWER: tuple[Column, ...] = (
 
 TRACES = View(
     name="traces",
-    title="Traces: one row a play of a clip",
+    title="Traces: one row per presentation of a clip",
     columns=answer_columns(base.CLIP, ANSWER),
     rows=rows_of("continuous_rating", {"shown": "c"}, "LEFT JOIN clips k ON k.sha256 = c.clip_sha256\n"),
 )
 
 
-# What of a continuous rating the participant's page is told.
+# What the participant's page receives about a continuous rating.
 
 
 class ShownContinuousRating(Declaration):
-    """The declared continuous rating as the page gets it."""
+    """The declared continuous rating as the page receives it."""
 
     kind: Literal["continuous_rating"]
     question: Translated
@@ -126,7 +125,7 @@ def shown(experiment: Experiment) -> ShownContinuousRating:
     )
 
 
-# Who rates which clips in what order: as single clips are dealt.
+# Who rates which clips in what order: as for single clips.
 
 
 def assign(experiment: Experiment, seed: int, slot: int) -> list[Trial]:
@@ -138,7 +137,7 @@ def assign(experiment: Experiment, seed: int, slot: int) -> list[Trial]:
     return single_clips(experiment, seed, slot, asked)
 
 
-# Clips rated while they are shown: a slider's place, sampled at their frames.
+# Clips rated while they play: the position of a slider, sampled at their frames.
 
 EFFECTS: dict[str, Effect] = {
     "kind": "measured",

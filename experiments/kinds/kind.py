@@ -1,4 +1,4 @@
-"""What a kind of trial is made of. Everything else reads it from here."""
+"""The parts of a kind of trial. Everything else reads them from here."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,21 +14,21 @@ from experiments.schema.effects import Effect
 
 
 class PlanCommand(NamedTuple):
-    """Arguments behind `analysis`, and in words what they assume."""
+    """Arguments for `analysis`, and their assumptions in words."""
 
     arguments: list[str]
     assumed: str
 
 
 MEDIUM_F = 0.25
-"""Cohen's f that is called medium."""
+"""Cohen's f of a medium effect."""
 
 
 def power_of_means(experiment: Experiment) -> PlanCommand:
     """Power of tests of means: each factor by itself with a medium effect."""
     factors = [factor for factor in experiment.factors if len(factor.levels) > 1 and not factor.random]
     if not factors:
-        raise InputError("there is no factor whose levels are compared, so there is no power to reckon")
+        raise InputError("power cannot be computed: no factor is compared")
     arguments = ["plan", "anova"]
     for option, between in (("--within", False), ("--between", True)):
         named = [f"{one.name}:{len(one.levels)}" for one in factors if one.between is between]
@@ -43,25 +43,25 @@ def power_of_means(experiment: Experiment) -> PlanCommand:
 
 
 def nothing_wrong(experiment: Experiment) -> str | None:
-    """Kinds of which every declaration fits every experiment."""
+    """For kinds whose declarations fit every experiment."""
     del experiment
     return None
 
 
 def nothing_more(experiment: Experiment) -> tuple[str, ...]:
-    """What a plan says of a kind whose trials the cells and exemplars tell already."""
+    """For kinds whose cells and exemplars already describe the plan."""
     del experiment
     return ()
 
 
 def two_choices(experiment: Experiment) -> int:
-    """The answers that an attention check offers at least."""
+    """Two choices, the minimum for an attention check."""
     del experiment
     return 2
 
 
 def never(experiment: Experiment) -> bool:
-    """No kind's trials depend on what is stored unless it says so."""
+    """By default, the trials of a kind do not depend on stored answers."""
     del experiment
     return False
 
@@ -82,42 +82,41 @@ class Kind:
     roles : tuple of str
         The clips a trial shows, in the order of their places (`shown`; `left`, `right`).
     effects : mapping of str to {"wording", "measured"}
-        What an edit of each key of the declaration does to stored answers, by path below [trial].
+        The effect of an edit of each key on stored answers, by path below [trial].
     page : type
-        What of the declaration the participant's page is told.
+        What the participant's page receives of the declaration.
     shown : callable
         Makes the page's model (`page`) from the declaration.
     assign : callable
         The trials of one participant in order, by declaration, seed and slot.
     block_size : callable
-        Trials of one participant in a block, attention checks not counted.
+        Trials of one participant in a block, without attention checks.
     example : str
-        A [trial] as TOML, for the reference; it is what a newcomer copies.
+        A [trial] as TOML, for the reference; newcomers copy it.
     further_examples : tuple of str
-        Of keys that exclude one another, so that the reference shows each.
+        Examples of keys that exclude one another, so that the reference shows each.
     shares_clips : bool
-        Whether it follows [assignment]; else that is refused.
+        Whether it supports [assignment]; otherwise [assignment] is refused.
     groups : bool
-        Whether it follows factors between participants; else they are refused.
+        Whether it supports between-participant factors; otherwise they are refused.
     random_factors : bool
-        Whether it follows random factors: deals their levels, and analyses them as random.
+        Whether it supports random factors: assigns their levels, and analyzes them as random.
     plan : callable
-        Lines that `stimuli plan` adds: expected counts; InputError where the design cannot be analysed.
+        Lines that `stimuli plan` adds: expected counts; InputError if the design cannot be analyzed.
     adapts : bool
         Whether answers decide what is shown next: the server then follows its series.
     fault : callable
-        What in the declared [trial] does not fit the rest of the experiment: `path: what to do`, or None.
+        What in the declared [trial] does not fit the rest of the experiment, as `path: what to do`, or None.
     power : callable
-        The `analysis plan` that gives the power of the declared design; InputError where it cannot be
-        computed.
+        The `analysis plan` that computes the power of the declared design; InputError if that is impossible.
     chooses : callable
         Whether a run's trials are chosen by the comparisons stored before it.
     assign_by : callable or None
-        As `assign`, with the comparisons stored before, where `chooses` says so.
+        Like `assign`, but with the stored comparisons; used if `chooses` is true.
     check_response : callable
-        The number that an answer, as stored, is to an attention check, which asks for one.
+        The number of a stored answer, for comparison with the number that an attention check requires.
     check_choices : callable
-        How many numbers an attention check may ask for.
+        How many numbers an attention check can require.
     """
 
     declaration: type[TrialDeclaration]
@@ -145,5 +144,5 @@ class Kind:
 
     @property
     def name(self) -> str:
-        """As the TOML, the database and the API name it."""
+        """Its name in the TOML, the database and the API."""
         return str(self.declaration.model_fields["kind"].default)

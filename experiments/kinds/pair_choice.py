@@ -1,4 +1,4 @@
-"""Pairs chosen by the comparisons that are stored: the most telling ones, and a random share."""
+"""Pairs chosen by the stored comparisons: the most informative ones, and a random share."""
 
 import random
 from collections import Counter
@@ -14,13 +14,13 @@ from experiments.declaration.paired_comparison import Active, paired_comparison_
 from experiments.declaration.trial import ClipSpec
 from experiments.kinds.pairs import Pair, every_pair, item_of
 
-# Active sampling: the pairs of items that tell most next, given the comparisons that are stored.
+# Active sampling: the pairs of items that are most informative next, given the stored comparisons.
 #
 # As ASAP (Mikhailiuk et al. 2020, Active Sampling for Pairwise Comparisons via Approximate Message Passing
 # and Information Gain Maximization, ICPR), in its batch form: the score of an item has a normal posterior,
 # a pair is worth the information that one more answer is expected to give, and a batch is a spanning tree
 # of the items with the greatest sum, so that it hangs together. The posterior is the mode of a Bradley-
-# Terry model with a normal prior and the curvature of its own direction there (a diagonal Laplace
+# Terry model with a normal prior and the curvature along each score there (a diagonal Laplace
 # approximation), which pure Python has in some milliseconds.
 #
 # Letters: s_i score of item i in logits, p_ij = 1 / (1 + exp(s_j - s_i)), n_ij comparisons of i with j, w_ij
@@ -54,7 +54,7 @@ class StoredComparisons:
     won : float
         How many of them the first item won, a tie counting half.
     open : int
-        Comparisons that were dealt to people who are still under way.
+        Comparisons assigned to participants who have not finished.
     """
 
     answered: float = 0.0
@@ -71,7 +71,7 @@ class Posterior:
     known: dict[Edge, float] = field(default_factory=dict)
 
     def expect(self, edge: Edge, times: int = 1) -> None:
-        """Count comparisons that were dealt but not answered: they will tell as much as answers do."""
+        """Count comparisons that were assigned but not answered; they will be as informative as answers."""
         one, other = edge
         p = _share(self.scores[one] - self.scores[other])
         for item in edge:
@@ -126,7 +126,7 @@ def batch(
     number: int,
     rng: random.Random,
 ) -> list[Edge]:
-    """The pairs of items to compare next, the most telling first; none twice where there are others.
+    """The pairs of items to compare next, the most informative first; no pair twice if others remain.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def _spanning(items: int, ranked: Sequence[Edge]) -> list[Edge]:
     return tree
 
 
-# A participant's pairs chosen by what is stored: the most telling ones, and a random share of the others.
+# A participant's pairs: the most informative ones given what is stored, and a random share of the others.
 
 SCORES = {"left": 1.0, "tie": 0.5, "right": 0.0}
 
@@ -202,7 +202,7 @@ def chosen_pairs(experiment: Experiment, seed: int, compared: Iterable[Compared]
 
 
 class _Choice:
-    """The pairs of a design with what is stored of each, and those taken so far."""
+    """The pairs of a design with the stored data of each, and those taken so far."""
 
     def __init__(self, experiment: Experiment, compared: Iterable[Compared], rng: random.Random) -> None:
         self.pairs, self.taken = every_pair(experiment), list[Pair]()
@@ -238,13 +238,13 @@ class _Choice:
             stored.won += row.times * (score if one < other else 1 - score)
 
     def take_telling(self, number: int) -> None:
-        """Take the pairs of items that tell most; of the clips that stand for them those shown least."""
+        """Take the most informative pairs of items; among their clips, those shown least."""
         edges = [edge for edge in self._edges if edge[0] != edge[1]]
         for edge in batch(len(self._number), edges, self._stored, min(number, len(edges)), self._rng):
             self._take_least_shown(self._edges[edge])
 
     def take_random(self, number: int) -> None:
-        """Take so many of the others by lot, whatever they tell."""
+        """Take this many of the others at random, however informative they are."""
         taken = set(self.taken)
         self.taken += self._rng.sample([pair for pair in self.pairs if pair not in taken], number)
 
@@ -259,7 +259,7 @@ class _Choice:
         return self._shown[_key(pair.left), _key(pair.right)]
 
     def sided(self, pair: Pair) -> Pair:
-        """The pair on the side on which it has been shown less often; by lot where that is equal."""
+        """The pair with the sides it has been shown with less often; at random if equal."""
         lead = self._on_this_side(pair) - self._on_this_side(pair.swapped)
         return pair.swapped if lead > 0 or (lead == 0 and self._rng.random() < 0.5) else pair
 

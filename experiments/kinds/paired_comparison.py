@@ -1,4 +1,4 @@
-"""Two clips compared: who compares which pairs, in which order and with which sides; page, columns."""
+"""Comparisons of two clips: assignment of pairs, order and sides; page model, columns."""
 
 import random
 from collections import Counter
@@ -32,9 +32,8 @@ from experiments.kinds.pair_choice import chosen_pairs
 from experiments.kinds.pairs import BlockDeal, Deal, Pair, check_connected, every_pair, fault, item_of
 from experiments.schema.effects import Effect
 
-# What a comparison exports: the base columns, both clips and the one chosen, one row a showing of a pair.
-#
-# Where two clips come one after the other, the first is the left one.
+# Exports of a comparison: the base columns, both clips and the chosen one, one row per presentation of a
+# pair. If two clips are shown one after the other, the first is the left one.
 
 _ROLES = {"left": "lc", "right": "rc", "first": "fc", "second": "sc", "reference": "xc"}
 
@@ -47,13 +46,13 @@ def _side(side: str, one: str, other: str) -> tuple[Column, ...]:
         Column(
             f"{side}_cell",
             "text",
-            f"Cell of the {side} clip: level names, joined by slashes.",
+            f"Cell of the {side} clip: level names, separated by slashes.",
             source=either("cell"),
         ),
         Column(
             f"{side}_exemplar",
             "integer",
-            f"Which exemplar of its cell the {side} clip is, from 1.",
+            f"Exemplar number of the {side} clip in its cell, from 1.",
             minimum=1,
             source=either("exemplar"),
         ),
@@ -71,7 +70,7 @@ ANSWER: tuple[Column, ...] = (
     Column(
         "winner",
         "text",
-        "The clip chosen, or tie.",
+        "The chosen clip, or tie.",
         values=("left", "right", "tie"),
         source="t.payload",
         member="winner",
@@ -79,7 +78,7 @@ ANSWER: tuple[Column, ...] = (
     Column(
         "arrangement",
         "text",
-        "How the two were shown: beside or above one another at once, or in turn (left is then the first).",
+        "How the two clips were shown: side by side or stacked at once, or in turn (left is then the first).",
         values=("side_by_side", "stacked", "one_after_the_other"),
         source="t.payload",
         member="arrangement",
@@ -87,8 +86,8 @@ ANSWER: tuple[Column, ...] = (
     Column(
         "expected_response",
         "integer",
-        "The answer asked for in an attention check (1 left or first, 2 right or second, 3 tie), or right in "
-        "a motion check.",
+        "The required answer in an attention check (1 left or first, 2 right or second, 3 tie), or the "
+        "correct answer in a motion check.",
         source="a",
     ),
 )
@@ -96,29 +95,29 @@ ANSWER: tuple[Column, ...] = (
 SHOWN: tuple[Column, ...] = (
     *_side("left", "lc", "fc"),
     *_side("right", "rc", "sc"),
-    Column("reference", "text", "Cell of the reference clip shown before.", source="xc.cell"),
+    Column("reference", "text", "Cell of the reference clip shown before the pair.", source="xc.cell"),
 )
 
 COMPARISONS = View(
     name="comparisons",
-    title="Comparisons: one row a showing of a pair",
+    title="Comparisons: one row per presentation of a pair",
     columns=answer_columns(SHOWN, ANSWER),
     rows=rows_of("paired_comparison", _ROLES),
 )
 
 
-# What of a paired comparison the participant's page is told.
+# What the participant's page receives about a paired comparison.
 
 
 class ShownReference(Declaration):
-    """The label of the reference clip, and how long the canvas stays plain after it; not which clip it is."""
+    """The label of the reference and the length of the blank gap after it, but not which clip it is."""
 
     label: Translated
     gap_ms: int
 
 
 class ShownPairedComparison(Declaration):
-    """The declared paired comparison as the page gets it: nothing of which pairs there are."""
+    """The declared paired comparison as the page receives it, without the pairs."""
 
     kind: Literal["paired_comparison"]
     question: Translated
@@ -144,7 +143,7 @@ def shown(experiment: Experiment) -> ShownPairedComparison:
     )
 
 
-# Who compares which pairs, in which order and with which sides; and what that adds up to.
+# Who compares which pairs, in which order and with which sides, and the resulting counts.
 
 
 def assign(experiment: Experiment, seed: int, slot: int, compared: Iterable[Compared] = ()) -> list[Trial]:
@@ -189,7 +188,7 @@ def _of_group(
 
 
 def check_choices(experiment: Experiment) -> int:
-    """The two sides, and the tie where it may be answered."""
+    """The two sides, and the tie if it is an answer."""
     return 3 if paired_comparison_of(experiment).ties else 2
 
 
@@ -214,12 +213,12 @@ def _trial(
 
 
 def chooses(experiment: Experiment) -> bool:
-    """True where a participant's pairs are chosen by the comparisons that are stored when they begin."""
+    """True if a participant's pairs depend on the comparisons stored when they start."""
     return isinstance(paired_comparison_of(experiment).dealing, Active)
 
 
 def deal(experiment: Experiment) -> Deal:
-    """Who gets which pairs, where that follows from the slot."""
+    """Who gets which pairs, if that follows from the slot."""
     dealing = paired_comparison_of(experiment).dealing
     return BlockDeal(experiment, dealing) if isinstance(dealing, IncompleteBlocks) else Deal(experiment)
 
@@ -239,7 +238,7 @@ def block_size(experiment: Experiment, block: BlockSpec) -> int:
 
 
 def plan(experiment: Experiment) -> tuple[str, ...]:
-    """Counts over the declared participants, in words; InputError where the pairs do not hang together."""
+    """Counts over the declared participants, in words; InputError if the pairs are not connected."""
     every = groups(experiment)
     if len(every) == 1:
         return _plan_of_group(experiment)
@@ -272,7 +271,7 @@ def _plan_of_choice(experiment: Experiment) -> tuple[str, ...]:
     if each * people < len(items) - 1:
         raise InputError(
             f"'{experiment.name}': expected at least {len(items) - 1} comparisons to connect {len(items)} "
-            f"items, got {each} by each of {people} participants; declare more of either"
+            f"items, got {each} by each of {people} participants; increase either number"
         )
     share = trial.dealing.random_share if isinstance(trial.dealing, Active) else 0.0
     again = f", {repeats} times each" if repeats > 1 else ""
@@ -280,9 +279,10 @@ def _plan_of_choice(experiment: Experiment) -> tuple[str, ...]:
     clips = {clip for pair in pairs for clip in pair}
     return (
         f"{len(pairs)} pairs; each participant makes {each} comparisons{again}, {round(share * each)} "
-        "of them drawn at random, the others chosen by what is answered so far",
-        f"over {people} participants each pair is compared {on_average:.1f} times on average, each clip "
-        f"is in {2 * repeats * each * people / len(clips):.1f} comparisons; close pairs more often",
+        "of them drawn at random, the others chosen from the answers so far",
+        f"over {people} participants, each pair is compared {on_average:.1f} times on average, and each "
+        f"clip is in {2 * repeats * each * people / len(clips):.1f} comparisons; similar clips are compared "
+        f"more often",
     )
 
 
@@ -368,7 +368,7 @@ dealing = { by = "turn" }
 )
 
 STEP = 0.3
-"""Log odds between neighbouring items in a planned study: the better one wins 57 of 100."""
+"""Log odds between neighboring items in a planned study: the better one wins 57 of 100."""
 MAX_ITEMS = 12
 """Items for which power is simulated."""
 
@@ -376,21 +376,26 @@ MAX_ITEMS = 12
 def power_of_pairs(experiment: Experiment) -> PlanCommand:
     """Power where a participant compares every two items."""
     if any(factor.between for factor in experiment.factors):
-        raise InputError("groups of participants compare different items, so no one power holds for all")
+        raise InputError("power cannot be computed: groups of participants compare different items")
     if chooses(experiment):
-        raise InputError("pairs are chosen by the answers so far, so no power is reckoned before the data")
+        raise InputError(
+            "power cannot be computed before data collection: pairs are chosen from the answers so far"
+        )
     pairs = every_pair(experiment)
     named = [(item_of(experiment, pair.left), item_of(experiment, pair.right)) for pair in pairs]
     items = len({item for both in named for item in both})
     if not 2 <= items <= MAX_ITEMS:
-        raise InputError(f"power of pairs is reckoned for 2 to {MAX_ITEMS} items, and there are {items}")
+        raise InputError(f"power of pairs can be computed for 2 to {MAX_ITEMS} items, got {items}")
     of_items = items * (items - 1) // 2
     if len({frozenset(both) for both in named}) < of_items:
-        raise InputError("power of pairs is reckoned where every two items are compared; here some are not")
+        raise InputError(
+            "power of pairs can be computed only if all pairs of items are compared; here some are not"
+        )
     shown = sum(trial.kind == "main" for trial in assign(experiment, seed=0, slot=0))
     if shown < of_items:
         raise InputError(
-            f"power of pairs is reckoned where a participant compares every two items; here it is {shown} of "
+            f"power of pairs can be computed only if each participant compares all pairs of items; here it "
+            f"is {shown} of "
             f"{of_items} pairs"
         )
     abilities = ",".join(f"{STEP * item:.1f}" for item in range(items))
@@ -400,8 +405,8 @@ def power_of_pairs(experiment: Experiment) -> PlanCommand:
     often = {1: "once", 2: "twice"}.get(repeats, f"{repeats} times")
     return PlanCommand(
         arguments,
-        f"neighbouring items differ by {STEP} in log odds, each participant compares every two items "
-        f"{often}, all by the same abilities",
+        f"neighboring items differ by {STEP} in log odds, each participant compares all pairs of items "
+        f"{often}, and all participants have the same abilities",
     )
 
 

@@ -176,9 +176,9 @@ def comparable_sets(experiment: Experiment) -> list[list[ClipSpec]]:
 class Deal:
     """Which pairs each slot gets, and with which sides.
 
-    The pairs stand in one order drawn for the whole study; slot after slot takes the next
-    `pairs_per_person` of them, round and round. So over any run of slots each pair is dealt as often as any
-    other, give or take one, and at every second deal its sides are exchanged.
+    The pairs have one random order for the whole study. Each slot takes the next `pairs_per_person` of them,
+    cyclically. Over any sequence of slots, each pair is therefore assigned equally often, to within one. Its
+    sides are exchanged every second time.
     """
 
     def __init__(self, experiment: Experiment) -> None:
@@ -262,9 +262,8 @@ def _short(names: list[str], joint: str, limit: int = 6) -> str:
 class BlockDeal(Deal):
     """Which pairs each slot gets where a participant compares all clips of a few blocks.
 
-    The blocks of every set of clips stand in one order, those of one set between those of the others; slot
-    after slot takes the next `blocks_per_person`, round and round. Each time a pair is dealt again its
-    sides are exchanged.
+    The blocks of every set of clips have one order, interleaved with those of the other sets. Each slot takes
+    the next `blocks_per_person`, cyclically. Each time a pair is assigned again, its sides are exchanged.
     """
 
     def __init__(self, experiment: Experiment, declared: IncompleteBlocks) -> None:

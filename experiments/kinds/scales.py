@@ -12,17 +12,17 @@ from experiments.kinds import KINDS
 
 
 def scales_of(experiment: Experiment) -> tuple[RatedScale, ...]:
-    """The scales of the experiment's trials in order; none for kinds that are not rated on scales."""
+    """The scales of the experiment's trials in order; empty for kinds without scales."""
     return experiment.trial.rated_scales()
 
 
 def scale_called(experiment: Experiment, name: str | None = None) -> RatedScale:
-    """The scale of this name, the first where none is given; InputError where there is none."""
+    """The scale with this name, or the first if no name is given; InputError if there is none."""
     scales = scales_of(experiment)
     if not scales:
         raise InputError(
-            f"this needs trials with a scale, '{experiment.name}' has trials of the kind "
-            f"{experiment.trial.kind}"
+            f"expected trials with a scale, got trials of the kind {experiment.trial.kind} in "
+            f"'{experiment.name}'"
         )
     names = [scale.name for scale in scales]
     if name is not None and name not in names:
@@ -30,7 +30,7 @@ def scale_called(experiment: Experiment, name: str | None = None) -> RatedScale:
     return scales[names.index(name) if name is not None else 0]
 
 
-# How many trials a participant has, and how long they take, whatever their kind.
+# How many trials a participant has, and how long they take, for any kind.
 
 
 class BlockSize(NamedTuple):
@@ -41,7 +41,7 @@ class BlockSize(NamedTuple):
 
 
 def trials_per_participant(experiment: Experiment) -> int:
-    """Rated trials of one participant, practice and attention checks not counted."""
+    """Rated trials of one participant, without practice and attention checks."""
     return sum(block.trials for block in block_sizes(experiment))
 
 
@@ -52,6 +52,6 @@ def block_sizes(experiment: Experiment) -> list[BlockSize]:
 
 
 def expected_minutes(experiment: Experiment) -> float:
-    """Expected length of a visit in minutes: trials times the declared seconds a trial."""
+    """Expected length of a visit in minutes: number of trials times the declared seconds per trial."""
     trials = trials_per_participant(experiment) + experiment.practice.trials
     return round(trials * experiment.trial.expected_seconds / 60, 1)

@@ -1,4 +1,4 @@
-"""Adaptive series: which has its turn when, page, columns."""
+"""Adaptive series: order of the series, page model, columns."""
 
 import random
 from collections.abc import Iterable
@@ -40,19 +40,18 @@ from experiments.kinds.threshold_grid import (
 )
 from experiments.schema.effects import Effect
 
-# What a threshold exports: the base columns, the stimulus, the answer and the estimate, one row a play.
-#
-# Aliases beside those of the base columns: q series_trials, w series_answers. The clip's columns are those of
-# the stimulus; a standard is told by `interval`.
+# Exports of a threshold: the base columns, the stimulus, the answer and the estimate, one row per
+# presentation. Aliases in addition to those of the base columns: q series_trials, w series_answers. The
+# columns of the clip describe the stimulus; `interval` shows where the standard was.
 
 SERIES: tuple[Column, ...] = (
     Column("series", "text", "Name of the adaptive series; empty in practice and checks.", source="q"),
-    Column("position", "integer", "Place of the trial in its series, from 1.", minimum=1, source="q"),
-    Column("value", "number", "The stimulus's number: that of its level.", source="w"),
+    Column("position", "integer", "Position of the trial in its series, from 1.", minimum=1, source="q"),
+    Column("value", "number", "Number of the stimulus: the number of its level.", source="w"),
     Column(
         "interval",
         "text",
-        "Where the stimulus was: the one clip shown, or the first or second of two.",
+        "Interval of the stimulus: the only clip, or the first or second of two.",
         values=("shown", "first", "second"),
         source="q.role",
     ),
@@ -70,14 +69,13 @@ ANSWER: tuple[Column, ...] = (
     Column(
         "correct",
         "boolean",
-        "The answer as analyses take it: 1 where it was yes, or named the stimulus; empty where it does not "
-        "count.",
+        "The answer as used in analyses: 1 if it was yes, or chose the stimulus; empty if it does not count.",
         source="w",
     ),
     Column(
         "expected_response",
         "integer",
-        "The answer asked for in an attention check (1 or 2), or right in a motion check.",
+        "The required answer in an attention check (1 or 2), or the correct answer in a motion check.",
         source="a",
     ),
 )
@@ -86,21 +84,21 @@ ESTIMATE: tuple[Column, ...] = (
     Column(
         "counts",
         "boolean",
-        "True where the answer moved the estimate: given in a main trial whose play did not fail.",
+        "True if the answer changed the estimate: given in a main trial whose presentation did not fail.",
         source="w",
     ),
     Column(
         "known",
         "integer",
-        "Answers of the series that the choice of this stimulus rested on.",
+        "Number of answers of the series used to choose this stimulus.",
         minimum=0,
         source="w",
     ),
     Column(
         "ahead",
         "integer",
-        "Earlier answers of the series that the choice did not know: above 0 where the page went on ahead of "
-        "the server, as it does without connection.",
+        "Number of earlier answers of the series not used for this choice. It is above 0 if the page went "
+        "ahead of the server, as it does offline.",
         minimum=0,
         source="w",
     ),
@@ -115,7 +113,7 @@ ESTIMATE: tuple[Column, ...] = (
     Column(
         "spread",
         "number",
-        "Mean of the posterior of the function's SD (normal) or slope (Weibull) after this answer.",
+        "Mean of the posterior of the SD (normal) or slope (Weibull) of the function after this answer.",
         minimum=0,
         source="w",
     ),
@@ -138,13 +136,13 @@ LEFT JOIN version_clips c ON c.id = w.version_clip_id
 
 THRESHOLDS = View(
     name="thresholds",
-    title="Thresholds: one row a play of a trial",
+    title="Thresholds: one row per presentation in a trial",
     columns=answer_columns((*SERIES, *base.CLIP), (*ANSWER, *ESTIMATE)),
     rows=rows_of("threshold", {}, _TABLES),
 )
 
 
-# What of a threshold the participant's page is told.
+# What the participant's page receives about a threshold.
 
 
 class ShownAnswer(Declaration):
@@ -155,7 +153,7 @@ class ShownAnswer(Declaration):
 
 
 class ShownThreshold(Declaration):
-    """The declared threshold as the page gets it: nothing of stimuli, series or function."""
+    """The declared threshold as the page receives it, without stimuli, series or function."""
 
     kind: Literal["threshold"]
     question: Translated
@@ -188,7 +186,7 @@ def shown(experiment: Experiment) -> ShownThreshold:
     )
 
 
-# Which series has its turn when, and what stands there until the server has chosen.
+# Order of the series, and the placeholder stimuli until the server has chosen.
 
 
 def assign(experiment: Experiment, seed: int, slot: int) -> list[Trial]:
@@ -268,7 +266,8 @@ def _trials_a_block(experiment: Experiment) -> int:
 
 
 def block_size(experiment: Experiment, block: BlockSpec) -> int:
-    """Most trials of a participant in a block: those of every series in it, of the group with most."""
+    """Maximum number of trials of a participant in a block: those of every series in it, in the largest
+    group."""
     each = (series_in_group(experiment, levels) for levels in groups(experiment))
     return max(len(_series_in(experiment, block, mine)) for mine in each) * _trials_a_block(experiment)
 
@@ -298,7 +297,7 @@ def plan(experiment: Experiment) -> tuple[str, ...]:
         f"each moves along {grid}, {task}",
         f"thresholds from {assumed.thresholds[0]:g} to {assumed.thresholds[-1]:g} are considered; guess "
         f"{assumed.guess:g}, lapse {assumed.lapse:g}",
-        f"{length}; up to {trial.ahead} trials of a series without connection",
+        f"{length}; up to {trial.ahead} trials of a series offline",
     )
 
 
@@ -307,15 +306,15 @@ def _length(stop: Stop, series: int) -> str:
     rules = [f"SD {stop.sd:g}"] if stop.sd is not None else []
     rules += [f"entropy {stop.entropy:g} bit"] if stop.entropy is not None else []
     if not rules:
-        return f"{longest} trials a series, {longest * series} a participant"
+        return f"{longest} trials per series, {longest * series} per participant"
     shortest = min(stop.at_least, longest)
     return (
-        f"{shortest} to {longest} trials a series, {shortest * series} to {longest * series} a participant: "
-        f"it ends at {' and '.join(rules)}"
+        f"{shortest} to {longest} trials per series, {shortest * series} to {longest * series} per "
+        f"participant: a series ends at {' and '.join(rules)}"
     )
 
 
-# Adaptive series over a rendered grid: where along a factor does an answer change?
+# Adaptive series over a rendered grid: where along a factor does the answer change?
 
 EFFECTS: dict[str, Effect] = {
     "kind": "measured",
@@ -404,17 +403,17 @@ def power_of_thresholds(experiment: Experiment) -> PlanCommand:
     ]
     if all(len(one.levels) < 2 for one in conditions):
         raise InputError(
-            "the stimulus is the only factor, so there are no conditions whose thresholds could differ"
+            "power cannot be computed: the stimulus is the only factor, so there are no conditions to compare"
         )
     if any(one.between and len(one.levels) > 1 for one in conditions):
-        raise InputError("power of thresholds is reckoned for conditions that each participant sees all of")
+        raise InputError("power of thresholds can be computed only if each participant sees all conditions")
     if len(series_of(experiment)) < 2:
         raise InputError(
-            "there is one series, so there are no two thresholds to compare and no power to reckon"
+            "power cannot be computed: there is only one series, so there are no two thresholds to compare"
         )
     numbers = sorted(stimuli(experiment))
     if len(numbers) < 3:
-        raise InputError(f"power of thresholds takes three stimuli or more, and there are {len(numbers)}")
+        raise InputError(f"power of thresholds needs at least three stimuli, got {len(numbers)}")
     step = (numbers[-1] - numbers[0]) / (len(numbers) - 1)
     middle = numbers[len(numbers) // 2]
     times = max(1, round((trial.stop.trials or 0) / len(numbers)))
@@ -426,7 +425,8 @@ def power_of_thresholds(experiment: Experiment) -> PlanCommand:
         arguments,
         f"thresholds near {middle:g} that differ by {step / 2:g} between two conditions, a function as wide "
         f"as the step of {step:g} between stimuli, a series of {trial.stop.trials} trials in each condition, "
-        f"as if each stimulus came {times} times: a series that looks for the threshold tells more",
+        f"as if each stimulus came {times} times: a series that searches for the threshold is more "
+        f"informative",
     )
 
 

@@ -1,4 +1,4 @@
-"""The rendered grid as adaptive series see it, and what in a declared threshold does not fit it."""
+"""The rendered grid as adaptive series see it, and checks of a declared threshold."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -11,16 +11,16 @@ from experiments.declaration.threshold import Range, Series, Threshold, TwoInter
 from experiments.declaration.trial import ClipSpec
 from experiments.errors import did_you_mean
 
-# What in a declared threshold does not fit the rest of the experiment, in one line with what to do.
+# Checks of a declared threshold against the rest of the experiment, in one line with what to do.
 
 MAX_TRIALS = 2000
 MAX_TABLE = 500_000
-"""Stimuli times considered parameters: one choice goes through all of them."""
+"""Number of stimuli times number of considered parameters: each choice evaluates all of them."""
 
 
 # Decision 0660: A threshold can be a line over a second factor.
 def fault(experiment: Experiment) -> str | None:
-    """The first fault; None where all is well."""
+    """The first fault; None if everything fits."""
     return next(_faults(experiment, threshold_of(experiment)), None)
 
 
@@ -32,8 +32,8 @@ def _faults(experiment: Experiment, trial: Threshold) -> Iterator[str]:
             return
         if experiment.factor(factor).between:
             yield (
-                f"trial.stimulus.{path}: '{factor}' is between participants, and a series moves within one; "
-                "leave `between` out there"
+                f"trial.stimulus.{path}: '{factor}' is between participants, but a series moves within one "
+                f"participant; remove `between` from it"
             )
     yield from _stimulus_faults(experiment, trial)
     yield from _second_faults(experiment, trial)
@@ -63,14 +63,14 @@ def _level_faults(path: str, factor: str, named: Iterable[str], levels: Sequence
 def _number_faults(
     path: str, factor: str, values: Mapping[str, float], levels: Sequence[str]
 ) -> Iterator[str]:
-    """What is wrong with the numbers of the levels of a factor."""
+    """What is wrong with the numbers of a factor's levels."""
     numbers: dict[float, str] = {}
     for name in levels:
         number = number_of(values, name)
         if number is None:
             yield (
                 f"{path}: expected a number for every level of '{factor}', got the level '{name}'; "
-                f"name levels by their numbers, or give each one in {path}.values"
+                f"use numbers as level names, or set the number of each level in {path}.values"
             )
             return
         if number in numbers:
@@ -87,24 +87,26 @@ def _second_faults(experiment: Experiment, trial: Threshold) -> Iterator[str]:
     if second is None:
         for path, given in (("tilts", trial.tilts), ("task.standard_second", beside)):
             if given is not None:
-                yield f"trial.{path}: give trial.stimulus.second too, or leave it out"
+                yield f"trial.{path}: add trial.stimulus.second, or remove this key"
         return
     levels = [level.name for level in experiment.factor(second.factor).levels]
     if second.factor == trial.stimulus.factor:
-        yield f"trial.stimulus.second.factor: '{second.factor}' is the first already; name another factor"
+        yield (
+            f"trial.stimulus.second.factor: '{second.factor}' is already the first factor; use another factor"
+        )
     yield from _level_faults("trial.stimulus.second.values", second.factor, second.values, levels)
     yield from _number_faults("trial.stimulus.second", second.factor, second.values, levels)
     if beside is not None:
         yield from _level_faults("trial.task.standard_second", second.factor, [beside], levels)
     if trial.function != "normal":
         yield (
-            "trial.function: expected normal with a second factor, whose thresholds may pass 0, "
-            f"got {trial.function}"
+            "trial.function: expected normal with a second factor, because its thresholds may cross 0; got "
+            "{trial.function}"
         )
 
 
 def _table_faults(experiment: Experiment) -> Iterator[str]:
-    """More stimuli and parameters than can be gone through for every trial."""
+    """More stimuli and parameters than can be evaluated for every trial."""
 
     assumed = model(experiment)
     parameters = len(assumed.thresholds) * len(assumed.spreads) * max(1, len(assumed.tilts))
@@ -112,26 +114,26 @@ def _table_faults(experiment: Experiment) -> Iterator[str]:
     if (size := stimuli * parameters) > MAX_TABLE:
         yield (
             f"trial.thresholds: {stimuli} stimuli times {parameters} sets of thresholds, "
-            f"spreads and tilts are {size}, more than {MAX_TABLE}; give them fewer steps"
+            f"spreads and tilts make {size} combinations, expected at most {MAX_TABLE}; reduce their steps"
         )
 
 
 def _group_faults(experiment: Experiment) -> Iterator[str]:
-    """A group of participants for which no series is declared."""
+    """A group of participants without a declared series."""
 
     for levels in groups(experiment):
         if not series_in_group(experiment, levels):
             yield (
-                f"trial.series: the group '{name_of(levels)}' has no series; declare one with its level, or "
-                "leave trial.series out"
+                f"trial.series: the group '{name_of(levels)}' has no series; declare one with its level, "
+                f"or remove trial.series"
             )
 
 
 def _function_faults(trial: Threshold, lowest: float) -> Iterator[str]:
     if trial.task.guess + trial.lapse >= 1:
         yield (
-            f"trial.lapse: guess {trial.task.guess:g} and lapse {trial.lapse:g} leave nothing between them; "
-            "together they must be below 1"
+            f"trial.lapse: guess {trial.task.guess:g} and lapse {trial.lapse:g} leave no range between "
+            f"them; their sum must be below 1"
         )
     if trial.function == "weibull" and (trial.direction == "falling" or lowest <= 0):
         what = "a falling function" if trial.direction == "falling" else f"the stimulus {lowest:g}"
@@ -146,8 +148,8 @@ def _stop_faults(experiment: Experiment, trial: Threshold) -> Iterator[str]:
     stop, repeats, split = trial.stop, experiment.blocks.repeats, experiment.blocks.split_by
     if stop.trials is None:
         yield (
-            "trial.stop.trials: expected the most trials of a series; by its certainty alone a series might "
-            "never end"
+            "trial.stop.trials is required: a maximum number of trials, because precision alone might "
+            "never end a series"
         )
         return
     early = stop.sd is not None or stop.entropy is not None
@@ -158,11 +160,14 @@ def _stop_faults(experiment: Experiment, trial: Threshold) -> Iterator[str]:
         )
     if stop.trials % repeats:
         yield (
-            f"trial.stop.trials: {stop.trials} trials of a series do not divide into {repeats} blocks; "
-            f"give a multiple of {repeats}"
+            f"trial.stop.trials: {stop.trials} trials of a series cannot be divided into {repeats} blocks; "
+            f"use a multiple of {repeats}"
         )
     if split in trial.stimulus.factors:
-        yield f"blocks.split_by: '{split}' is what each series moves along; split by another factor, or not"
+        yield (
+            f"blocks.split_by: '{split}' is the stimulus factor of each series; split by another factor, "
+            f"or remove split_by"
+        )
 
 
 def _series_faults(experiment: Experiment, trial: Threshold) -> Iterator[str]:
@@ -178,7 +183,7 @@ def _series_faults(experiment: Experiment, trial: Threshold) -> Iterator[str]:
             yield f"{here} is declared twice"
         for factor, level in one.levels.items():
             if factor in trial.stimulus.factors:
-                yield f"{here}: '{factor}' is what the series moves along and has no level of its own"
+                yield f"{here}: '{factor}' is the stimulus factor of the series; remove its level"
             elif factor not in others:
                 yield f"{here}: no factor is called '{factor}'{did_you_mean(factor, others)}"
             elif level not in others[factor]:
@@ -190,8 +195,8 @@ def _series_faults(experiment: Experiment, trial: Threshold) -> Iterator[str]:
     count = len(trial.series) or math.prod(len(levels) for levels in others.values())
     if count * (trial.stop.trials or 0) > MAX_TRIALS:
         yield (
-            f"trial.series: {count} series of {trial.stop.trials} trials are more than {MAX_TRIALS} for one "
-            "person; declare fewer series, or fewer trials"
+            f"trial.series: {count} series of {trial.stop.trials} trials exceed {MAX_TRIALS} trials per "
+            f"participant; use fewer series, or fewer trials"
         )
 
 
@@ -212,7 +217,7 @@ def number_of(values: Mapping[str, float], level: str) -> float | None:
     return number if math.isfinite(number) else None
 
 
-# The rendered grid as series see it: stimuli with their numbers, and what QUEST+ is told of a function.
+# The rendered grid as series see it: stimuli with their numbers, and the assumed function of QUEST+.
 
 Key = TypeVar("Key")
 
@@ -249,7 +254,7 @@ class Model(NamedTuple):
 
 
 def stimuli(experiment: Experiment) -> dict[float, str]:
-    """Level of the stimulus factor by its number, ascending."""
+    """Level of the stimulus factor by its number, in ascending order."""
     trial = threshold_of(experiment)
     levels = [level.name for level in experiment.factor(trial.stimulus.factor).levels]
     return _by_number(trial.stimulus.values, tested_levels(trial, levels))
@@ -317,7 +322,7 @@ def model(experiment: Experiment) -> Model:
 
 
 def series_of(experiment: Experiment) -> tuple[Series, ...]:
-    """The declared series; where none is, one a combination of the other factors' levels."""
+    """The declared series; if there are none, one per combination of the other factors' levels."""
     trial = threshold_of(experiment)
     if trial.series:
         return trial.series
@@ -329,7 +334,7 @@ def series_of(experiment: Experiment) -> tuple[Series, ...]:
 
 
 def series_in_group(experiment: Experiment, levels: Iterable[tuple[str, str]]) -> tuple[Series, ...]:
-    """The series that a group of participants runs: those whose levels are the group's."""
+    """The series of a group of participants: those whose levels match the group."""
     mine = set(levels)
     return tuple(one for one in series_of(experiment) if mine <= set(one.levels.items()))
 
@@ -343,17 +348,17 @@ def clip_of(
 
 
 def exemplar_at(experiment: Experiment, position: int) -> int:
-    """Exemplar of the clips at a place (from 1) of a series: they go round, whatever the stimulus is."""
+    """Exemplar of the clips at a position (from 1) of a series: exemplars rotate, whatever the stimulus."""
     return 1 + position % experiment.exemplars.per_cell
 
 
 def standard_of(trial: Threshold) -> str | None:
-    """The level shown for comparison; None where one clip is shown."""
+    """The level shown for comparison; None if one clip is shown."""
     return trial.task.standard if isinstance(trial.task, TwoInterval) else None
 
 
 def standard_beside(trial: Threshold, stimulus: Mapping[str, str]) -> dict[str, str] | None:
-    """Levels of the clip that this stimulus is shown against; None where one clip is shown."""
+    """Levels of the clip that this stimulus is compared with; None if one clip is shown."""
     task = trial.task
     if not isinstance(task, TwoInterval):
         return None

@@ -1,8 +1,7 @@
-"""Rules declared before the data, one file a rule: playback, attention checks, screening, warnings,
-exclusions.
+"""Rules declared before data collection: playback, attention checks, screening, warnings, exclusions.
 
-A new rule is its file and its place in a union below. Exclusion rules and warnings judge by a method of their
-own; every use of screening rules matches the union to its end (`assert_never`). Type-checking names a rule
+A new rule is a class and its place in a union below. Exclusion rules and warnings decide by a method. Every
+use of screening rules matches the union exhaustively (`assert_never`), so that type checking names a rule
 that nothing applies.
 """
 
@@ -25,10 +24,10 @@ from experiments.rules.screening import AttentionChecks, ScreenAttention, Screen
 from experiments.rules.warnings import WarnFast, WarnPattern, WarnSameAnswer
 
 ScreeningRule = Annotated[ScreenFormAnswer | ScreenAttention | ScreenDevice, Field(discriminator="rule")]
-"""Ends a run while it goes on."""
+"""Ends a run early."""
 
 WarningRule = Annotated[WarnSameAnswer | WarnPattern | WarnFast, Field(discriminator="rule")]
-"""Sees a lapse of care in the last answers of a run that goes on."""
+"""Detects careless responding in the last answers of a run."""
 
 ExclusionRule = Annotated[
     ExcludeIncomplete
@@ -41,7 +40,7 @@ ExclusionRule = Annotated[
     | DropSlowTrials,
     Field(discriminator="rule"),
 ]
-"""Leaves out a participant's run, or single trials, when the study is analysed."""
+"""Excludes a participant's run, or single trials, from the analysis."""
 
 __all__ = [
     "AttentionChecks",

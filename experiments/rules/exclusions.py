@@ -1,4 +1,4 @@
-"""Rules of [[exclusions]]: runs and single trials that are left out when a study is analysed."""
+"""Rules of [[exclusions]]: runs and single trials that are excluded from the analysis."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -11,9 +11,8 @@ from pydantic import Field
 
 from experiments.declaration.base import Declaration
 
-# What a rule of [[exclusions]] is: it leaves out whole runs, or single trials, by the data they gave.
-#
-# A rule is one file: its keys, and a method that judges. The analysis asks it, whatever the kind of trial.
+# A rule of [[exclusions]] excludes whole runs or single trials, based on their data.
+# A rule is a class: its keys, and a method that decides. The analysis calls it for every kind of trial.
 
 Source = Literal["rows", "plays", "attention"]
 
@@ -43,14 +42,14 @@ class RunTrials:
 
 # Decision 0510: An exclusion rule is one file.
 class LeavesOutRuns(Declaration):
-    """A rule about runs: its method `excludes(run: RunTrials) -> str | None` gives the reason in words.
+    """A rule about runs: its method `excludes(run: RunTrials) -> str | None` returns the reason.
 
     Attributes
     ----------
     needed : tuple of str
-        Columns it reads; where the data lack one the report says that the rule was not applied.
+        Columns it reads; if the data lack one, the report states that the rule was not applied.
     source : {"rows", "plays", "attention"}
-        All rows of the run, main trials of which nothing is left out, or attention checks.
+        All rows of the run, all main trials, or attention checks.
     """
 
     needed: ClassVar[tuple[str, ...]]
@@ -63,20 +62,20 @@ class LeavesOutTrials(Declaration):
     Attributes
     ----------
     needed : str
-        The column; where the data lack it the report says that the rule was not applied.
+        The column; if the data lack it, the report states that the rule was not applied.
     """
 
     needed: ClassVar[str]
 
 
-# Trials left out because their clip was not shown as declared.
+# Trials excluded because their clip was not shown as declared.
 
 
 class DropFailedPlays(LeavesOutTrials):
-    """Leave out trials whose clip was not shown as declared (verdict failed)."""
+    """Exclude trials whose clip was not shown as declared (verdict failed)."""
 
     rule: Literal["failed_plays"] = "failed_plays"
-    """Names this rule."""
+    """The name of this rule."""
     needed: ClassVar[str] = "verdict"
 
     def drops(self, value: str | float) -> bool:
@@ -84,16 +83,16 @@ class DropFailedPlays(LeavesOutTrials):
         return value == "failed"
 
 
-# Trials left out because the answer came late.
+# Trials excluded because the answer came late.
 
 
 class DropSlowTrials(LeavesOutTrials):
-    """Leave out trials answered later than `above_ms` after the clip's end."""
+    """Exclude trials answered later than `above_ms` after the end of the clip."""
 
     rule: Literal["slow_trials"] = "slow_trials"
-    """Names this rule."""
+    """The name of this rule."""
     above_ms: Annotated[float, Field(gt=0)] = 60_000.0
-    """Response time, in ms from the clip's end, over which a trial is left out."""
+    """Response time above which a trial is excluded, in ms from the end of the clip."""
     needed: ClassVar[str] = "rt"
 
     def drops(self, value: str | float) -> bool:
@@ -105,17 +104,17 @@ class DropSlowTrials(LeavesOutTrials):
 
 
 class ExcludeAttention(LeavesOutRuns):
-    """Leave out participants who failed more than `more_than` attention checks."""
+    """Exclude participants who failed more than `more_than` attention checks."""
 
     rule: Literal["attention_checks_failed"] = "attention_checks_failed"
-    """Names this rule."""
+    """The name of this rule."""
     more_than: Annotated[int, Field(ge=0)] = 0
-    """Failed checks that are still allowed; 0 excludes at the first."""
+    """Number of failed checks that is still allowed; 0 excludes at the first failure."""
     needed: ClassVar[tuple[str, ...]] = ("expected_response", "response")
     source: ClassVar[Source] = "attention"
 
     def excludes(self, run: RunTrials) -> str | None:
-        """How many checks were answered otherwise than asked, or not at all."""
+        """How many checks were answered incorrectly, or not at all."""
         asked = zip(run.numbers("expected_response"), run.numbers("response"), strict=True)
         failed = sum(not isnan(expected) and given != expected for expected, given in asked)
         return f"{failed} failed" if failed > self.more_than else None
@@ -127,13 +126,13 @@ EvidenceVerdict = Literal["unlikely", "unclear", "not_judged"]
 
 
 class ExcludeEvidence(LeavesOutRuns):
-    """Leave out runs by the verdict on whether a person answered (docs/explanation/evidence.md)."""
+    """Exclude runs by the verdict on whether a person answered (docs/explanation/evidence.md)."""
 
     rule: Literal["evidence_verdict"] = "evidence_verdict"
-    """Names this rule."""
+    """The name of this rule."""
     verdicts: Annotated[tuple[EvidenceVerdict, ...], Field(min_length=1)] = ("unlikely",)
-    """Verdicts that leave a run out. Assistive technology can be `unclear`; runs of pages that brought no
-    evidence are `not_judged`."""
+    """Verdicts that exclude a run. Runs with assistive technology can be `unclear`; runs without evidence are
+    `not_judged`."""
     needed: ClassVar[tuple[str, ...]] = ("evidence_verdict",)
     source: ClassVar[Source] = "rows"
 
@@ -147,12 +146,12 @@ class ExcludeEvidence(LeavesOutRuns):
 
 
 class ExcludeFast(LeavesOutRuns):
-    """Leave out participants whose median response time lies below `below_ms`."""
+    """Exclude participants whose median response time is below `below_ms`."""
 
     rule: Literal["median_response_time"] = "median_response_time"
-    """Names this rule."""
+    """The name of this rule."""
     below_ms: Annotated[float, Field(gt=0)] = 200.0
-    """Median response time, in ms from the clip's end, under which a run is left out."""
+    """Median response time below which a run is excluded, in ms from the end of the clip."""
     needed: ClassVar[tuple[str, ...]] = ("rt",)
 
     def excludes(self, run: RunTrials) -> str | None:
@@ -166,10 +165,10 @@ class ExcludeFast(LeavesOutRuns):
 
 
 class ExcludeIncomplete(LeavesOutRuns):
-    """Leave out participants who did not finish the run."""
+    """Exclude participants who did not finish the run."""
 
     rule: Literal["incomplete"] = "incomplete"
-    """Names this rule."""
+    """The name of this rule."""
     needed: ClassVar[tuple[str, ...]] = ("run_status",)
     source: ClassVar[Source] = "rows"
 
@@ -183,35 +182,35 @@ class ExcludeIncomplete(LeavesOutRuns):
 
 
 class ExcludePlayback(LeavesOutRuns):
-    """Leave out participants with more than this share of plays that were flagged or failed."""
+    """Exclude participants with more than this share of flagged or failed presentations."""
 
     rule: Literal["poor_playback_share"] = "poor_playback_share"
-    """Names this rule."""
+    """The name of this rule."""
     more_than: Annotated[float, Field(ge=0, le=1)] = 0.2
-    """Share of plays, flagged or failed, from 0 to 1, over which a run is left out."""
+    """Share of flagged or failed presentations above which a run is excluded, from 0 to 1."""
     needed: ClassVar[tuple[str, ...]] = ("verdict",)
 
     def excludes(self, run: RunTrials) -> str | None:
-        """The share of poor plays."""
+        """The share of poor presentations."""
         verdicts = run.texts("verdict")
         share = sum(verdict in {"flagged", "failed"} for verdict in verdicts) / len(verdicts)
         return f"{share:.0%} of plays were flagged or failed" if share > self.more_than else None
 
 
-# Exclusion by one and the same answer.
+# Exclusion by identical answers.
 
 
 class ExcludeStraightLining(LeavesOutRuns):
-    """Leave out participants who gave one and the same answer in more than this share of trials."""
+    """Exclude participants who gave the same answer in more than this share of trials."""
 
     rule: Literal["same_response_share"] = "same_response_share"
-    """Names this rule."""
+    """The name of this rule."""
     more_than: Annotated[float, Field(ge=0, le=1)] = 0.95
-    """Share of trials with the commonest answer, from 0 to 1, over which a run is left out."""
+    """Share of trials with the most frequent answer above which a run is excluded, from 0 to 1."""
     needed: ClassVar[tuple[str, ...]] = ("response",)
 
     def excludes(self, run: RunTrials) -> str | None:
-        """The share of the commonest answer."""
+        """The share of the most frequent answer."""
         given = run.given("response")
         share = max(Counter(given).values(), default=0) / max(1, len(given))
         return f"{share:.0%} of answers are the same" if share > self.more_than else None

@@ -1,4 +1,4 @@
-"""When a play of a clip is uncertain, flagged or failed."""
+"""When the presentation of a clip is uncertain, flagged or failed."""
 
 from typing import Annotated, Literal
 
@@ -6,68 +6,72 @@ from pydantic import Field
 
 from experiments.declaration.base import Declaration
 
-# What becomes of a play during which something disturbed the view.
+# What happens to a presentation that something disturbed.
 
 Consequence = Literal["ignore", "flag", "repeat"]
 
 
 class Disturbances(Declaration):
-    """What each disturbance of a view does to its play: `ignore`, `flag`, or `repeat` (it is failed).
+    """What each disturbance does to the presentation: `ignore`, `flag`, or `repeat` (it failed).
 
-    Every one is recorded with the view whatever it does. A view that was broken off, by a reload or a crash,
-    always fails its play.
+    Every disturbance is recorded, whatever its effect. A presentation that a reload or crash interrupted
+    always fails.
     """
 
     full_screen_left: Consequence = "flag"
-    """Full screen was left during the clip, or before its start key."""
+    """Participant left full screen during the clip, or before its start key."""
     window_too_small: Consequence = "flag"
     """The window became smaller than the clip."""
     clip_cut_off: Consequence = "flag"
-    """Less than the whole clip was inside the window."""
+    """Part of the clip was outside the window."""
     zoomed: Consequence = "flag"
-    """The page was zoomed or went to another screen, in the clip or before its start key: a wrong size."""
+    """The page was zoomed or moved to another screen, during the clip or before its start key: the size is
+    wrong."""
     refresh_dropped: Consequence = "flag"
-    """The screen refreshed much less often than it did before, as a power saver makes it."""
+    """The screen refreshed much less often than before, for example in power-saving mode."""
     scale_reloaded: Consequence = "flag"
-    """The page was left after the clip and the answer given on a later page, without a second view."""
+    """The page was reloaded after the clip, and the answer was given without a second view."""
     focus_lost: Consequence | None = None
-    """The page was hidden or lost focus during the clip; where not given, `fail_on_focus_lost` decides."""
+    """The page was hidden or lost focus during the clip. If empty, `fail_on_focus_lost` decides."""
 
 
 class PlaybackRules(Declaration):
-    """When a play is uncertain, flagged or failed. Counts are frames of the clip, times are milliseconds.
+    """When a presentation is uncertain, flagged or failed. Counts are frames of the clip; times are
+    milliseconds.
 
-    A play breaking a `failed_*` limit is failed (its clip is offered again at the end of the block), one
-    breaking a `flagged_*` limit is flagged. One whose animation clock ran more unevenly than
-    `uncertain_unevenness_ms` is uncertain: all frames were drawn, and one may not have reached the screen.
-    What a frame may be late and is still shown comes on top: 0.9 of the refreshes for which it stays beyond
-    one, or of what the only one leaves; it is never more than 0.9 of the time for which it stays. Any other
-    play is good.
+    A presentation that exceeds a `failed_*` limit fails, and its clip is shown again at the end of the block.
+    One that exceeds a `flagged_*` limit is flagged. If the animation clock is more uneven than
+    `uncertain_unevenness_ms`, it is uncertain: all frames were drawn, but one may not have reached the
+    screen. All others are good.
+
+    The limits allow for lateness that leaves a frame visible: 0.9 of the refreshes beyond the first for which
+    it stays. If it stays for one refresh only, 0.9 of the rest of that refresh counts. The allowance is never
+    more than 0.9 of the frame's duration.
     """
 
     flagged_missing_frames: Annotated[int, Field(ge=0)] = 0
-    """Frames of the clip never drawn, more than which flag a play."""
+    """Number of undrawn frames above which a presentation is flagged."""
     failed_missing_frames: Annotated[int, Field(ge=0)] = 3
-    """Frames of the clip never drawn, more than which fail a play."""
+    """Number of undrawn frames above which a presentation fails."""
     flagged_late_frames: Annotated[int, Field(ge=0)] = 2
-    """Frames drawn more than one refresh after their time, more than which flag a play."""
+    """Number of frames more than one refresh late, above which a presentation is flagged."""
     flagged_longest_gap_ms: Annotated[float, Field(gt=0)] = 70.0
-    """Longest time between two drawn frames, in ms, over which a play is flagged."""
+    """Longest time between two drawn frames above which a presentation is flagged, in ms."""
     failed_longest_gap_ms: Annotated[float, Field(gt=0)] = 250.0
-    """Longest time between two drawn frames, in ms, over which a play is failed."""
+    """Longest time between two drawn frames above which a presentation fails, in ms."""
     uncertain_unevenness_ms: Annotated[float, Field(gt=0)] = 3.0
-    """Unevenness of the page's animation clock, in ms, over which a play is uncertain."""
+    """Unevenness of the page's animation clock above which a presentation is uncertain, in ms."""
     fail_on_focus_lost: bool = True
-    """Whether a play fails where the page lost focus or visibility during it; else it is flagged."""
+    """Whether a presentation fails if the page loses focus or is hidden. Otherwise it is flagged."""
     flag_video_fallback: bool = True
-    """Whether a play by the video element, which reports frames less exactly, is flagged."""
+    """Whether to flag presentations by the video element, which reports frames less precisely."""
     disturbances: Disturbances = Disturbances()
-    """What disturbances of a view do to its play."""
+    """What each disturbance does to a presentation."""
     max_repeats: Annotated[int, Field(ge=0, le=5)] = 1
-    """How often a clip whose play failed is offered again, at the end of the block."""
+    """How often a clip is shown again at the end of the block after its presentation failed."""
 
     def consequence(self, disturbance: str) -> Consequence:
-        """What a disturbance of this name does; one that no key names is recorded only."""
+        """What a disturbance of this name does; one without a key is only recorded."""
         if disturbance == "focus_lost" and self.disturbances.focus_lost is None:
             return "repeat" if self.fail_on_focus_lost else "flag"
         if disturbance not in Disturbances.model_fields:

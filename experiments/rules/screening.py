@@ -1,4 +1,4 @@
-"""Rules of [[screening]], which end a run while it goes on: forms, attention checks, the device."""
+"""Rules of [[screening]], which end a run early: forms, attention checks, the device."""
 
 from collections.abc import Sequence
 from typing import Annotated, Literal
@@ -9,46 +9,46 @@ from experiments.declaration.base import Declaration, Name, Translated
 from experiments.declaration.forms import Form, Question
 from experiments.errors import did_you_mean
 
-# Attention checks: instructed ratings between the trials.
+# Attention checks: questions with a prescribed answer between the trials.
 
 
 class AttentionChecks(Declaration):
-    """Instructed ratings put between trials: 'please answer 2 this time'."""
+    """Questions with a prescribed answer between trials, such as "please answer 2 this time"."""
 
     per_block: Annotated[int, Field(ge=0, le=10)] = 0
-    """Checks in each block, at random places but never first. They are stored with kind `attention`."""
+    """Checks in each block, at random positions but never first. They are stored with kind `attention`."""
     text: Translated = Field(
         default_factory=lambda: {
             "en": "Attention check: please answer **{response}** on this screen.",
             "de": "Aufmerksamkeitsprüfung: Bitte antworten Sie hier mit **{response}**.",
         }
     )
-    """Markdown of the check, `{response}` standing for the answer asked for."""
+    """Text of the check in Markdown. `{response}` is replaced by the required answer."""
 
 
 # Screening by failed attention checks.
 
 
 class ScreenAttention(Declaration):
-    """Screen out as soon as more than `more_than` attention checks were answered otherwise than asked."""
+    """Screen out participants who failed more than `more_than` attention checks."""
 
     rule: Literal["attention_checks_failed"] = "attention_checks_failed"
-    """Names this rule."""
+    """The name of this rule."""
     more_than: Annotated[int, Field(ge=0)] = 0
-    """Failed checks that are still allowed; 0 ends the run at the first."""
+    """Number of failed checks that is still allowed; 0 ends the run at the first failure."""
 
 
 # Screening by the device.
 
 
 class ScreenDevice(Declaration):
-    """Screen out where browser, screen or window cannot show the clips as [display] asks.
+    """Screen out participants whose browser, screen or window cannot show the clips as [display] requires.
 
-    Without this rule the page explains what is missing, and the link stays open for another device.
+    Without this rule, the page explains what is missing, and the link stays valid for another device.
     """
 
     rule: Literal["device"] = "device"
-    """Names this rule."""
+    """The name of this rule."""
 
 
 # Screening by an answer of a form.
@@ -58,24 +58,25 @@ class ScreenDevice(Declaration):
 class ScreenFormAnswer(Declaration):
     """Screen out by an answer: one of `refused`, or a number under `below` or over `above`.
 
-    The run ends as soon as the form is sent. A question left open screens nobody out: make it required.
+    The run ends as soon as the form is sent. Unanswered questions screen nobody out, so set `required =
+    true`.
     """
 
     rule: Literal["form_answer"] = "form_answer"
-    """Names this rule."""
+    """The name of this rule."""
     form: Name
     """Name of the form."""
     field: Name
-    """Name of the question in it."""
+    """Name of the question in the form."""
     refused: tuple[str, ...] = ()
-    """Values of options that end the run; for questions with options."""
+    """Option values that end the run; for questions with options."""
     below: int | None = None
-    """A number smaller than this ends the run; for numbers and ratings."""
+    """Numbers smaller than this end the run; for numbers and ratings."""
     above: int | None = None
-    """A number larger than this ends the run; for numbers and ratings."""
+    """Numbers larger than this end the run; for numbers and ratings."""
 
     def screens_out(self, answer: object) -> bool:
-        """True where this answer (text, number, or list of texts) ends the run."""
+        """True if this answer (text, number, or list of texts) ends the run."""
         if isinstance(answer, int):
             low = self.below is not None and answer < self.below
             return low or (self.above is not None and answer > self.above)
@@ -83,7 +84,7 @@ class ScreenFormAnswer(Declaration):
         return any(value in self.refused for value in given)
 
     def fault(self, forms: Sequence[Form]) -> str | None:
-        """What is wrong with this rule, given the declared forms; None where nothing is."""
+        """What is wrong with this rule, given the declared forms; None if nothing is."""
         form = next((form for form in forms if form.name == self.form), None)
         if form is None:
             return f"no form is called '{self.form}'{did_you_mean(self.form, [form.name for form in forms])}"
@@ -97,10 +98,10 @@ class ScreenFormAnswer(Declaration):
         limits = self.below is not None or self.above is not None
         if field.screened_by == "limits":
             fits = limits and not self.refused
-            return None if fits else f"'{field.name}' is a number: give `below` or `above`, not `refused`"
+            return None if fits else f"'{field.name}' is a number: use `below` or `above`, not `refused`"
         if field.screened_by is None:
             return f"'{field.name}' is free text; only choices and numbers can be screened"
         if limits or not self.refused:
-            return f"'{field.name}' is a choice: give `refused`, not `below` or `above`"
+            return f"'{field.name}' is a choice: use `refused`, not `below` or `above`"
         wrong = next((value for value in self.refused if value not in field.values), None)
         return f"'{field.name}' has no option '{wrong}'{did_you_mean(wrong, field.values)}" if wrong else None

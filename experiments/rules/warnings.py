@@ -1,4 +1,4 @@
-"""Rules of [[warnings.rules]]: a lapse of care in the last answers of a run, and what it is told."""
+"""Rules of [[warnings.rules]]: careless responding in the last answers of a run, and the warning shown."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,10 +10,9 @@ from pydantic import Field
 
 from experiments.declaration.base import Declaration, Translated
 
-# What a rule of [[warnings.rules]] is: it sees a lapse of care in the last answers of a run that goes on.
-#
-# A rule is one file: its keys, and a method that judges. The server asks it with each answer to a main trial,
-# whatever the kind of trial.
+# A rule of [[warnings.rules]] detects careless responding in the last answers of a run.
+# A rule is a class: its keys, and a method that decides. The server calls it with each answer to a main
+# trial, whatever the kind of trial.
 
 
 @dataclass(frozen=True)
@@ -30,9 +29,9 @@ class Warns(Declaration):
     Attributes
     ----------
     answers : int
-        How many answers, the latest last, it is given; with fewer it is not asked.
+        How many answers it receives, the latest last; with fewer it is not called.
     text : Translated
-        What the participant then reads.
+        The text that the participant then reads.
     """
 
     answers: int
@@ -45,9 +44,8 @@ def follow_a_cycle(given: Sequence[GivenAnswer], length: int) -> bool:
     return len(values) > length and values[length:] == values[:-length]
 
 
-# Words of the warnings in the languages of the page, as declared where a rule gives no `text` of its own.
-#
-# English and German are reviewed; the others await a reader whose language they are.
+# Texts of the warnings in the languages of the page. They apply if a rule has no `text`.
+# English and German are reviewed; the others await review by a native speaker.
 
 HEADINGS = {
     "en": "A word in between",
@@ -152,18 +150,18 @@ def in_every_language(words: dict[str, str]) -> dict[str, str]:
     return {tag: f"# {HEADINGS[tag]}\n\n{text}" for tag, text in words.items()}
 
 
-# Warning of answers too fast to be given by looking.
+# Warning about answers that are too fast.
 
 
 class WarnFast(Warns):
-    """Warn whose median response time in the last `answers` main trials lies below `below_ms`."""
+    """Warn if the median response time of the last `answers` main trials is below `below_ms`."""
 
     rule: Literal["fast_answers"] = "fast_answers"
-    """Names this rule."""
+    """The name of this rule."""
     answers: Annotated[int, Field(ge=5, le=100)] = 10
-    """Answers of which the median is taken."""
+    """Number of answers from which the median is computed."""
     below_ms: Annotated[float, Field(gt=0)] = 250.0
-    """Median response time, in ms from the clip's end, under which the warning comes."""
+    """Median response time below which the warning is shown, in ms from the end of the clip."""
     text: Translated = Field(default_factory=partial(in_every_language, FAST_ANSWERS))
     """Markdown of the warning, in every language."""
 
@@ -177,14 +175,14 @@ class WarnFast(Warns):
 
 
 class WarnPattern(Warns):
-    """Warn whose last `answers` main trials repeat two to `longest` answers over and over."""
+    """Warn if the last `answers` main trials repeat a pattern of two to `longest` answers."""
 
     rule: Literal["repeated_pattern"] = "repeated_pattern"
-    """Names this rule."""
+    """The name of this rule."""
     answers: Annotated[int, Field(ge=8, le=100)] = 20
-    """Answers in a row that follow the pattern."""
+    """Number of consecutive answers that follow the pattern."""
     longest: Annotated[int, Field(ge=2, le=10)] = 4
-    """Length of the longest pattern looked for; 1, 2, 3, 1, 2, 3 has length 3."""
+    """Length of the longest pattern to detect; 1, 2, 3, 1, 2, 3 has length 3."""
     text: Translated = Field(default_factory=partial(in_every_language, REPEATED_PATTERN))
     """Markdown of the warning, in every language."""
 
@@ -195,17 +193,17 @@ class WarnPattern(Warns):
         return any(follow_a_cycle(given, length) for length in range(2, self.longest + 1))
 
 
-# Warning of one and the same answer.
+# Warning about identical answers.
 
 
 class WarnSameAnswer(Warns):
-    """Warn who gives one and the same answer in `answers` main trials in a row."""
+    """Warn if all of the last `answers` main trials have the same answer."""
 
     rule: Literal["same_answer"] = "same_answer"
-    """Names this rule."""
+    """The name of this rule."""
     answers: Annotated[int, Field(ge=5, le=100)] = 20
-    """Equal answers in a row. With two answers to choose from, twenty come by chance in 1 of 5,000 visits of
-    100 trials."""
+    """Identical answers in a row. With two possible answers, 20 identical answers occur by chance in 1 of
+    5,000 visits of 100 trials."""
     text: Translated = Field(default_factory=partial(in_every_language, SAME_ANSWER))
     """Markdown of the warning, in every language."""
 

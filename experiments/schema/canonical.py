@@ -166,14 +166,14 @@ def as_json(form: object) -> str:
 def canonical(
     declaration: BaseModel, always: frozenset[str], earlier: Mapping[str, str], prefix: str = ""
 ) -> dict[str, Any]:
-    """The declaration as JSON data, without what it leaves at its default.
+    """The declaration as JSON data, without keys that have their default value.
 
     Parameters
     ----------
     always : frozenset of str
         Paths of keys that are kept whatever they are set to.
     earlier : mapping of str to str
-        Path of each renamed key to the name that stands in the form for it.
+        Path of each renamed key to its name in the form.
     """
     form: dict[str, Any] = {}
     for name, field in type(declaration).model_fields.items():

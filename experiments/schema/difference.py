@@ -82,7 +82,7 @@ class _Edit:
                 # nobody has read both.
                 yield Change(_join(shown, key), "wording", old.get(key), new.get(key))
                 continue
-            # Languages are no part of a path.
+            # Languages are not part of a path.
             below = path if path == "texts" else _join(path, key)
             yield from self.changes(old[key], new[key], _join(shown, key), below)
 
@@ -136,7 +136,7 @@ def _join(path: str, key: str) -> str:
 
 
 _TITLES = ("title", "label", "question", "text", "name")
-"""Keys by whose value a person knows a table, the most telling first."""
+"""Keys whose value identifies a table for a reader, the most informative first."""
 
 
 def _in_words(value: Any) -> str:

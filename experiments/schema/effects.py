@@ -1,4 +1,4 @@
-"""What an edit of each key does to the answers that are there, and the keys of a declaration as paths."""
+"""The effect of an edit of each key on existing answers, and the keys of a declaration as paths."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any, Literal, NamedTuple, get_args, get_origin
@@ -9,12 +9,10 @@ from pydantic.fields import FieldInfo
 from experiments.declaration.experiment import Experiment
 from experiments.declaration.trial import ByKind
 
-# What an edit of each key does to the answers that are there already.
-#
-# `measured`: answers before and after are answers to something else, so a new data series begins.
-# `wording`: they may be pooled. A key stands here by its path; one entry covers the keys below it that have
-# none of their own. Keys under `trial` are declared by the kind of trial. A key that no entry covers fails
-# a test.
+# The effect of an edit of each key on existing answers.
+# `measured`: answers before and after measure different things, so a new data series begins. `wording`: they
+# may be pooled. Keys are listed by path; one entry also covers the keys below it that have no entry. Keys
+# under `trial` are declared by the kind of trial. A key that no entry covers fails a test.
 
 Effect = Literal["wording", "measured"]
 
@@ -26,7 +24,7 @@ EFFECTS: Mapping[str, Effect] = {
     "source": "wording",
     "participants": "wording",
     "languages": "wording",
-    # Names of levels make the cells; labels stand in tables and figures only.
+    # Names of levels make the cells; labels appear only in tables and figures.
     "factors.name": "measured",
     "factors.label": "wording",
     "factors.between": "measured",
@@ -92,13 +90,14 @@ EFFECTS: Mapping[str, Effect] = {
 
 
 def effects_with(below_trial: Mapping[str, Effect]) -> dict[str, Effect]:
-    """The table with the keys of one kind of trial, which stand under `trial`."""
+    """The table with the keys of one kind of trial, which are under `trial`."""
     return {**EFFECTS, "trial.kind": "measured", **{f"trial.{key}": of for key, of in below_trial.items()}}
 
 
 # Decision 0321: Which edits begin a new data series.
 def effect_of(path: str, effects: Mapping[str, Effect] = EFFECTS) -> Effect | None:
-    """The effect of the key at `path`: its own entry, or that of the nearest table above; None where none."""
+    """The effect of the key at `path`: its own entry, or that of the nearest table above; None if there is
+    none."""
     while path:
         if path in effects:
             return effects[path]
@@ -126,7 +125,7 @@ class Key(NamedTuple):
 
     @property
     def tables(self) -> list[type[BaseModel]]:
-        """The models that the key may hold, with keys of their own."""
+        """The models that the key may hold and that have keys themselves."""
         for mark in self.field.metadata:
             if isinstance(mark, ByKind):
                 return list(mark.models().values())
@@ -134,7 +133,7 @@ class Key(NamedTuple):
 
 
 def keys(model: type[BaseModel] = Experiment, prefix: str = "") -> Iterator[Key]:
-    """Every key of `model` and of the models inside, depth first; a table comes before its keys."""
+    """Every key of `model` and of its nested models, depth first; a table comes before its keys."""
     for name, field in model.model_fields.items():
         path = f"{prefix}{name}"
         key = Key(path, model, field)
@@ -158,5 +157,5 @@ def models_inside(annotation: Any) -> list[type[BaseModel]]:
 
 
 def is_tag(field: FieldInfo) -> bool:
-    """True for the key that tells the members of a union apart: one constant is all it may be."""
+    """True for the key that identifies a member of a union: its only value is a constant."""
     return get_origin(field.annotation) is Literal and len(get_args(field.annotation)) == 1

@@ -543,7 +543,7 @@ class Receipt(BaseModel):
     rating_id: str
     saved_at: datetime
     verdict: Literal["good", "uncertain", "flagged", "failed"]
-    rule: str = Field(description="The rule that gave the verdict, empty where good.")
+    rule: str = Field(description="The rule that determined the verdict; empty if good.")
     again: bool = Field(description="Show the clip again at the end of its block, as the next play.")
     remaining: int = Field(description="Trials of the run that still need an answer.")
     status: RunStatus = Field(description="Of the run: screened_out where this answer ended it.")

@@ -118,7 +118,7 @@ class Signals:
     cycle : float or None
         Share of answers equal to the one some trials before, at the best distance from two to four.
     checks : float or None
-        Share of attention checks answered as asked.
+        Share of attention checks answered correctly.
     motion_checks : float or None
         Share of motion checks answered rightly, of the `motion_checks_asked` that tell something.
     motion_checks_guessed : float or None

@@ -142,7 +142,7 @@ def readable_failures(folder: Path, state: BuildState) -> Iterator[None]:
     except OSError as error:
         raise InputError(
             f"{folder} cannot be written ({error.strerror or error}); {state.count} clips are finished, "
-            "make room and run the same command again"
+            "free disk space and run the same command again"
         ) from error
 
 

@@ -82,9 +82,9 @@ def test_folders_give_levels_their_own_name_and_versions_are_dropped() -> None:
         ('["..", "birch"]', "expected a list such as"),
         ('["alder/..", "birch"]', "expected a list such as"),
         ('[".", "birch"]', "expected a list such as"),
-        ('["alder", "alder"]', "'alder' stands twice"),
-        ('["a/b", "c/b"]', "'b' stands twice"),
-        ('["alder@4", "alder@8"]', "'alder' stands twice"),
+        ('["alder", "alder"]', "'alder' is used twice"),
+        ('["a/b", "c/b"]', "'b' is used twice"),
+        ('["alder@4", "alder@8"]', "'alder' is used twice"),
     ],
 )
 @pytest.mark.parametrize("make", [lambda listed: as_factor(f"character = {listed}"), in_render])
@@ -107,7 +107,7 @@ def test_a_factor_wants_a_list_and_render_a_name_or_a_list() -> None:
 
 
 def test_levels_and_a_list_are_refused_together() -> None:
-    with pytest.raises(DefinitionError, match="a level for each `character`, or `levels` of its own"):
+    with pytest.raises(DefinitionError, match="expected `character` or `levels`, got both"):
         faces(3, 2, keys=f"random = true\n{LIST}")
 
 

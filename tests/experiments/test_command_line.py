@@ -19,7 +19,7 @@ def test_a_question_that_nobody_answers_is_no_traceback(capsys: pytest.CaptureFi
     with pytest.raises(SystemExit) as ended:
         run_command_line(asks)
     assert ended.value.code == 1
-    assert capsys.readouterr().err == "stopped: the question was not answered by yes\n"
+    assert capsys.readouterr().err == "stopped: the question was not answered with yes\n"
 
 
 @pytest.mark.parametrize(

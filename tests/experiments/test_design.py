@@ -58,7 +58,7 @@ def test_a_level_may_give_its_length_in_other_units() -> None:
 @pytest.mark.parametrize(
     ("values", "reason"),
     [
-        ({"duration_frames": 9, "duration_ms": 300}, "got both; leave one out"),
+        ({"duration_frames": 9, "duration_ms": 300}, "got both; remove one of them"),
         ({"duration_frames": 9, "duration_frames_fps": 240}, "100 to 2000 ms, got duration_frames 9 at 240"),
         ({"duration_frames": 61}, "at 30 fps, 2033 ms"),
     ],

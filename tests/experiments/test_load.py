@@ -39,7 +39,7 @@ EXP1 = locate("exp1").read_text(encoding="utf-8")
             "no factor is called 'profil'; did you mean 'profile'?",
         ),
         ("title =", "title ", 3, "not valid TOML"),
-        ('name = "cartoon"', 'name = "photorealistic"', None, "'photorealistic' stands twice"),
+        ('name = "cartoon"', 'name = "photorealistic"', None, "'photorealistic' is used twice"),
         ('name = "blur"', 'name = "response"', None, "has the name of a ratings column"),
         ('profile = "phases"', 'profile = "phasse"', None, "expected one of real, phases"),
     ],
@@ -128,9 +128,9 @@ def test_screening_rules_are_part_of_the_declaration() -> None:
     [
         (screened(form="demografics"), "no form is called 'demografics'; did you mean 'demographics'?"),
         (screened(field="agee"), "has no field 'agee'; did you mean 'age'?"),
-        (screened(condition='refused = ["90"]'), "'age' is a number: give `below` or `above`"),
-        (screened(condition=""), "'age' is a number: give `below` or `above`"),
-        (screened(field="vision"), "'vision' is a choice: give `refused`"),
+        (screened(condition='refused = ["90"]'), "'age' is a number: use `below` or `above`"),
+        (screened(condition=""), "'age' is a number: use `below` or `above`"),
+        (screened(field="vision"), "'vision' is a choice: use `refused`"),
         (screened(field="vision", condition='refused = ["blnd"]'), "'vision' has no option 'blnd'"),
         (screened(condition="abov = 80"), "unknown key 'abov'; did you mean 'above'?"),
     ],
@@ -167,7 +167,7 @@ def test_texts_that_nobody_is_offered_are_named() -> None:
     """`unlisted` is what the builder's notes and those of the check say."""
     assert unlisted(parse_experiment(EXP1), ("en", "de")) == ""
     alone = parse_experiment(EXP1.replace('languages = ["en", "de"]', 'languages = ["en"]'))
-    assert unlisted(alone, alone.languages).startswith("Texts in de are offered to nobody, such as that of ")
+    assert unlisted(alone, alone.languages).startswith("Texts in de are never shown, such as that of ")
     # Kept in a database it holds its defaults too, which nobody wrote.
     in_english = re.sub(
         r', de = "[^"]*"', "", SHORT.replace('languages = ["en", "de"]', 'languages = ["en"]')
@@ -184,8 +184,8 @@ def test_a_text_without_the_first_language_is_refused() -> None:
     with pytest.raises(DefinitionError) as caught:
         parse_experiment(text, "mine.toml")
     assert str(caught.value) == (
-        "mine.toml: line 85: trial.scale.question: expected a text in en, the first of languages, got one "
-        "in de alone, and languages does not list de; add en to the text, or correct languages"
+        "mine.toml: line 85: trial.scale.question: expected a text in en, the first of languages, got only "
+        "de, and languages does not list de; add en to the text, or correct languages"
     )
     # What was collected by it is analysed, and what a database holds is read.
     experiment = parse_experiment(text, has_data=True)
@@ -194,5 +194,5 @@ def test_a_text_without_the_first_language_is_refused() -> None:
 
 def test_texts_without_the_first_language_are_counted() -> None:
     text = EXP1.replace('languages = ["en", "de"]', 'languages = ["fr"]').replace("[texts.de]", "[texts.fr]")
-    with pytest.raises(DefinitionError, match=r"got one in en, de alone, .* \(\d+ more lack it\)"):
+    with pytest.raises(DefinitionError, match=r"got only en, de, .* \(\d+ more lack it\)"):
         parse_experiment(text)

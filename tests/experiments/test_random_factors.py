@@ -97,22 +97,27 @@ def test_trials_and_practice_show_the_faces_of_the_share(seed: int, slot: int) -
 def test_a_plan_says_how_many_faces_each_sees() -> None:
     first, second = CLIP_RATING.plan(faces(4, 2))
     assert first == "each participant sees 2 of 4 levels of 'face'"
-    assert second.startswith("with 12 participants each clip is seen 6 times")
+    assert second.startswith("with 12 participants, each clip is seen 6 times")
 
 
 @pytest.mark.parametrize(
     ("keys", "seen", "more", "message"),
     [
-        ("", 2, "", "per_participant is for random factors"),
+        ("", 2, "", "per_participant applies to random factors"),
         ("random = true", 5, "", "expected at most the 4 levels, got 5"),
-        ("random = true\nbetween = true", None, "", "`random` or `between`, not both"),
+        ("random = true\nbetween = true", None, "", "`random` or `between`, got both"),
         (
             "random = true",
             2,
             '\n[blocks]\nsplit_by = "face"\n',
-            "participants see some levels of 'face' only",
+            "participants see only some levels of 'face'",
         ),
-        ("random = true", 2, "\n[assignment]\nlists = [['f0/SL/1']]\n", "'face' is dealt by per_participant"),
+        (
+            "random = true",
+            2,
+            "\n[assignment]\nlists = [['f0/SL/1']]\n",
+            "'face' is already assigned by per_participant",
+        ),
     ],
 )
 def test_what_does_not_fit_is_said_in_one_line(keys: str, seen: int, more: str, message: str) -> None:
@@ -123,7 +128,7 @@ def test_what_does_not_fit_is_said_in_one_line(keys: str, seen: int, more: str, 
 
 def test_a_random_factor_is_not_compared() -> None:
     text = DEMO.replace('factors = ["profile"]', 'factors = ["face", "profile"]')
-    with pytest.raises(DefinitionError, match="'face' is a random factor, over which means are taken"):
+    with pytest.raises(DefinitionError, match="'face' is a random factor, over which ratings are averaged"):
         parse_experiment(text)
 
 

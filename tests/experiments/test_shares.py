@@ -78,7 +78,7 @@ def test_lists_are_dealt_in_turn() -> None:
     experiment = exp1(f"lists = {lists}")
     shown = [len(share(experiment, seat_of(experiment, slot))) for slot in range(4)]
     assert shown == [2, 1, 2, 1]
-    assert "317 clips are seen by nobody" in CLIP_RATING.plan(experiment)[-1]
+    assert "317 clips are never shown" in CLIP_RATING.plan(experiment)[-1]
 
 
 def test_declared_blocks_hold_their_part_of_the_share() -> None:
@@ -91,19 +91,29 @@ def test_declared_blocks_hold_their_part_of_the_share() -> None:
 def test_the_plan_says_groups_and_counts() -> None:
     first, second = CLIP_RATING.plan(exp1("clips_per_cell = 5", ("character",)))
     assert first == "2 groups of participants in turn: photorealistic (16), cartoon (16)"
-    assert second == "with 32 participants each clip is seen 4 times"
+    assert second == "with 32 participants, each clip is seen 4 times"
     assert CLIP_RATING.plan(load_experiment("exp1")) == ()
 
 
 @pytest.mark.parametrize(
     ("assignment", "between", "split", "message"),
     [
-        ("clips_per_cell = 21", (), False, "expected at most the 20 clips a cell has, got 21"),
-        ("clips_per_cell = 2\nlists = [['a/1']]", (), False, "give `clips_per_cell` or `lists`, not both"),
-        ("lists = [['a', 'a']]", (), False, "list 1: 'a' stands twice"),
+        ("clips_per_cell = 21", (), False, "expected at most 20, the number of clips per cell; got 21"),
+        (
+            "clips_per_cell = 2\nlists = [['a/1']]",
+            (),
+            False,
+            "expected `clips_per_cell` or `lists`, got both; remove one of them",
+        ),
+        ("lists = [['a', 'a']]", (), False, "list 1: expected each clip once, got 'a' twice"),
         ("lists = [['cartoon/real/MB/FC/21']]", (), False, "list 1: the design has no clip"),
         ("lists = [['cartoon/real/MB/FC/1']]", ("blur",), False, "'blur' already makes groups"),
-        ("", ("character",), True, "'character' differs between participants; split by a factor within them"),
+        (
+            "",
+            ("character",),
+            True,
+            "'character' differs between participants; split by a within-participant factor",
+        ),
     ],
 )
 def test_what_does_not_fit_is_said_in_one_line(

@@ -104,7 +104,7 @@ def test_another_table_than_declared_is_refused(files: Path) -> None:
     (files / "c.json").write_text(json.dumps([{"name": "x"}]))
     assert "expected the columns of a table as JSON" in str(convert(files, "t.sav").exception)
     said = str(convert(files, "t.sav").exception)
-    assert said.endswith("(column 1: type: this key is required and missing)"), said
+    assert said.endswith("(column 1: type: this key is required but missing)"), said
     (files / "c.json").write_text("{}")
     assert str(convert(files, "t.sav").exception).endswith("(expected a list, got an empty table)")
     (files / "c.json").write_text("run,speed")

@@ -112,7 +112,7 @@ def test_a_study_of_several_scales_has_the_power_of_the_expected_f():
     [
         ("sliders-demo", {"effects": ["character=9"], "scale": "eerines"}, "did you mean 'eeriness'"),
         ("sliders-demo", {}, "name the effects that you expect, for example --effect character=6.5"),
-        ("pairs-demo", {"effects": ["character=9"]}, "this needs trials with a scale"),
+        ("pairs-demo", {"effects": ["character=9"]}, "expected trials with a scale"),
     ],
 )
 def test_what_a_study_without_published_figures_needs_is_said(study, options, said):

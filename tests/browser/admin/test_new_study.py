@@ -92,7 +92,9 @@ def test_own_clips_to_a_live_link(dashboard: Dashboard, clips: list[Path]) -> No
     hand.press("Set live")
     asked = page.get_by_role("dialog")
     expect(asked.get_by_text("The plan is not sealed. You can seal it only before")).to_be_visible()
-    expect(asked.get_by_text("Phones are turned away: a window of at least 800 x 500 px")).to_be_visible()
+    expect(
+        asked.get_by_text("Phones are turned away: the study requires a window of at least 800 x 500 px")
+    ).to_be_visible()
     confirm = asked.get_by_role("button", name="Set live")
     # Blue, as what begins something; red is for what is lost.
     red, blue = confirm.evaluate("(b) => getComputedStyle(b).backgroundColor.match(/\\d+/g)")[::2]

@@ -75,13 +75,13 @@ def test_a_pair_that_is_dealt_again_has_its_sides_exchanged() -> None:
     ("rest", "pairs", "told"),
     [
         (BLOCKS.format(size=5, each=1), '{ among = "all" }', "expected at most the 4 clips"),
-        (BLOCKS.format(size=3, each=1) + "\npairs_per_person = 3", ANY, "blocks say how many"),
+        (BLOCKS.format(size=3, each=1) + "\npairs_per_person = 3", ANY, "the blocks determine"),
         (
             BLOCKS.format(size=2, each=1),
             '{ among = "declared", cells = [{ cell = "both", other = "none" }] }',
-            "not a list",
+            "got a list of pairs",
         ),
-        ('dealing = { by = "active" }', ANY, "say how many pairs"),
+        ('dealing = { by = "active" }', ANY, "pairs_per_person is required"),
         ('dealing = { by = "actve" }', ANY, "no such by 'actve'"),
     ],
 )

@@ -69,7 +69,7 @@ OWN_BLINKS = DEMO.replace(EXEMPLARS, EXEMPLARS + 'own_per = ["lower_lid"]\n')
 def test_blinks_of_a_factor_in_which_the_two_do_not_differ_may_be_its_own() -> None:
     own = with_factor(SECOND).replace(EXEMPLARS, EXEMPLARS + 'own_per = ["speed"]\n')
     assert changed(REFERENCE, own).exemplars.own_per == ("speed",)
-    with pytest.raises(DefinitionError, match="leave 'speed' out of own_per"):
+    with pytest.raises(DefinitionError, match="remove 'speed' from own_per"):
         changed('cell = "both/a"\n', own)
 
 
@@ -93,9 +93,13 @@ NOT_RATED = DEMO.replace("rate_itself = true\n", "")
         (
             with_factor(BETWEEN),
             'factor = "speed"\nlevel = "a"\n',
-            "participants see some levels of 'speed' only",
+            "participants see only some levels of 'speed'",
         ),
-        (with_factor(SECOND).replace("rate_itself = true\n", ""), 'cell = "both/a"\n', "are not crossed"),
+        (
+            with_factor(SECOND).replace("rate_itself = true\n", ""),
+            'cell = "both/a"\n',
+            "are not fully crossed",
+        ),
         (
             with_factor(SECOND).replace("rate_itself = true\n", ""),
             'factor = "speed"\nlevel = "a"\n',
@@ -107,9 +111,9 @@ NOT_RATED = DEMO.replace("rate_itself = true\n", "")
             'cell = "both"\n',
             "every clip would be its own reference",
         ),
-        (OWN_BLINKS, REFERENCE, "leave 'lower_lid' out of own_per"),
-        (OWN_BLINKS, 'cell = "both"\n', "leave 'lower_lid' out of own_per"),
-        (NOT_RATED + '\n[blocks]\nsplit_by = "lower_lid"\n', REFERENCE, "an empty block"),
+        (OWN_BLINKS, REFERENCE, "remove 'lower_lid' from own_per"),
+        (OWN_BLINKS, 'cell = "both"\n', "remove 'lower_lid' from own_per"),
+        (NOT_RATED + '\n[blocks]\nsplit_by = "lower_lid"\n', REFERENCE, "would be empty"),
         (DEMO.replace("expected_seconds = 9.0", "views = 2"), REFERENCE, "shows both clips once"),
         (DEMO.replace(', de = "Referenz"', ""), REFERENCE, "no text in 'de'"),
     ],

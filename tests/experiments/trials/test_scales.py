@@ -24,6 +24,6 @@ def test_a_scale_that_is_not_there_is_named_with_those_that_are() -> None:
     with pytest.raises(InputError, match="'exp1' has no scale 'ratin'; did you mean 'rating'"):
         scale_called(load_experiment("exp1"), "ratin")
     pairs = load_experiment(str(REPOSITORY / "experiments" / "pairs-demo.toml"))
-    with pytest.raises(InputError, match="this needs trials with a scale"):
+    with pytest.raises(InputError, match="expected trials with a scale"):
         scale_called(pairs)
     assert scales_of(pairs) == ()

@@ -87,13 +87,13 @@ def test_series_are_the_other_factors_levels_where_none_are_declared() -> None:
             'factor = "duration", values = { "99" = 1 } }',
             "'duration' has no level '99'",
         ),
-        ("trials = 12, ", "", "trial.stop.trials: expected the most trials of a series"),
+        ("trials = 12, ", "", "trial.stop.trials is required"),
         ("at_least = 8", "at_least = 12", "sd and entropy never end one"),
-        ("trials = 12", "trials = 13", "13 trials of a series do not divide into 2 blocks"),
+        ("trials = 12", "trials = 13", "13 trials of a series cannot be divided into 2 blocks"),
         ("sd = 20.0", "sd = 0.0", "expected more than 0, got 0.0"),
         ("[trial]", "[trial]\nlapse = 0.4", "expected at most 0.2, got 0.4"),
         ('asks = "yes_no"', 'asks = "yes_no", guess = 0.95', "expected at most 0.9, got 0.95"),
-        ('asks = "yes_no"', 'asks = "yes_no", guess = 0.9', "guess 0.9 and lapse 0.15 leave nothing"),
+        ('asks = "yes_no"', 'asks = "yes_no", guess = 0.9', "guess 0.9 and lapse 0.15 leave no range"),
         ("[trial]", '[trial]\nfunction = "weibull"\ndirection = "falling"', "got a falling function"),
         (
             "[trial]",
@@ -111,7 +111,7 @@ def test_series_are_the_other_factors_levels_where_none_are_declared() -> None:
         (
             "[trial]",
             '[trial]\nseries = [{ name = "a", levels = { asymmetry = "SL", duration = "100" } }]',
-            "is what the series moves along",
+            "is the stimulus factor of the series",
         ),
         (
             "[trial]",
@@ -119,7 +119,7 @@ def test_series_are_the_other_factors_levels_where_none_are_declared() -> None:
             ' { name = "a", levels = { asymmetry = "AL" } }]',
             "'a' is declared twice",
         ),
-        ("repeats = 2", 'repeats = 2\nsplit_by = "duration"', "is what each series moves along"),
+        ("repeats = 2", 'repeats = 2\nsplit_by = "duration"', "is the stimulus factor of each series"),
         ('yes = { en = "Yes", de = "Ja" }', 'yes = { en = "Yes" }', "task.yes has no text in 'de'"),
     ],
 )
@@ -178,7 +178,7 @@ def test_the_plan_tells_series_stimuli_and_length() -> None:
     told = "\n".join(THRESHOLD.plan(declared()))
     assert "2 adaptive series, interleaved: s1 (SL), s2 (AL)" in told
     assert "4 stimuli from 100 to 400" in told
-    assert "8 to 12 trials a series, 16 to 24 a participant: it ends at SD 20" in told
+    assert "8 to 12 trials per series, 16 to 24 per participant: a series ends at SD 20" in told
     assert "against the standard 100" in "\n".join(THRESHOLD.plan(declared(TWO)))
 
 
@@ -245,7 +245,7 @@ def test_the_standard_has_the_stimulus_second_level_or_the_declared_one() -> Non
         (
             'second = { factor = "asymmetry"',
             'second = { factor = "duration"',
-            "'duration' is the first already",
+            "'duration' is already the first factor",
         ),
         (
             ", values = { SL = 0, AL = 1 }",
@@ -259,12 +259,12 @@ def test_the_standard_has_the_stimulus_second_level_or_the_declared_one() -> Non
             "[trial]",
             "[trial]\nthresholds = { lowest = 1, highest = 2, steps = 101 }\n"
             "spreads = { lowest = 1, highest = 2, steps = 101 }",
-            "more than 500000",
+            "expected at most 500000",
         ),
         (
             "[trial]",
             '[trial]\nseries = [{ name = "a", levels = { asymmetry = "SL" } }]',
-            "'asymmetry' is what the series moves along",
+            "'asymmetry' is the stimulus factor of the series",
         ),
     ],
 )
@@ -278,9 +278,9 @@ def test_faults_of_a_second_factor_are_named(old: str, new: str, said: str) -> N
     [
         (
             YES_NO + "[trial.tilts]\nlowest = 0.0\nhighest = 1.0\n",
-            "trial.tilts: give trial.stimulus.second too",
+            "trial.tilts: add trial.stimulus.second",
         ),
-        (TWO + 'standard_second = "SL"\n', "trial.task.standard_second: give trial.stimulus.second too"),
+        (TWO + 'standard_second = "SL"\n', "trial.task.standard_second: add trial.stimulus.second"),
     ],
 )
 def test_what_needs_a_second_factor_is_refused_without(trial: str, said: str) -> None:
@@ -303,7 +303,7 @@ def test_with_a_factor_between_participants_each_runs_the_series_of_their_group(
     assert sum(size.trials for size in block_sizes(experiment)) == 12
     plan = " ".join(THRESHOLD.plan(experiment))
     assert "group SL: s1 group AL: s2" in plan
-    assert "8 to 12 a participant" in plan
+    assert "8 to 12 per participant" in plan
 
 
 def test_a_group_without_a_series_and_a_stimulus_between_people_are_refused() -> None:
@@ -312,6 +312,6 @@ def test_a_group_without_a_series_and_a_stimulus_between_people_are_refused() ->
         between(only)
     text = text_of().replace('label = "Duration"', 'label = "Duration"\nbetween = true')
     with pytest.raises(
-        DefinitionError, match="'duration' is between participants, and a series moves within one"
+        DefinitionError, match="'duration' is between participants, but a series moves within one participant"
     ):
         parse_experiment(text)

@@ -137,7 +137,7 @@ def test_a_changed_byte_is_refused_with_the_files_name(unpacked: Path, path: str
     (unpacked / path).write_bytes(content)
     code, said = verify(unpacked)
     assert code == 2
-    assert said.startswith(f"{path}: its bytes were changed: expected sha256")
+    assert said.startswith(f"{path}: the file was changed: expected sha256")
     assert "\n" not in said
 
 
@@ -218,7 +218,7 @@ def test_a_report_made_of_files_outside_is_refused(unpacked: Path, path: str) ->
     (unpacked / CAPSULE_FILE).write_text(Capsule.model_validate(data).text(), encoding="utf-8")
     code, said = verify(unpacked)
     assert code == 2
-    assert f"the report was made of '{path}', no file of the list" in " ".join(said.split())
+    assert f"the report was made from '{path}', which the list does not contain" in " ".join(said.split())
 
 
 def test_a_list_that_is_no_object_gets_one_line(unpacked: Path) -> None:

@@ -101,7 +101,7 @@ def test_damaged_level_is_named(tiny_character: Path, damage: bytes | None) -> N
         ("closure = 0.25", "closure = 0.75", "ascending"),
         ("closure = 1.0", "closure = 0.9", "from closure 0"),
         ("crop = [4, 4, 40, 16]", "crop = [10, 4, 40, 16]", "inside the"),
-        ('name = "tiny"', 'nmae = "tiny"', "name: this key is required and missing"),
+        ('name = "tiny"', 'nmae = "tiny"', "name: this key is required but missing"),
         ('file = "level_0.50.webp"', 'file = "../level.webp"', "inside the character's folder"),
         ("px_per_mm = 1.5", "px_per_mm = ", "is not TOML"),
         ("horizontal_mm = 1.0", "horizontal_mm = 2.0", "every pair"),
@@ -123,14 +123,14 @@ def test_wrong_declaration_is_one_clear_line(tiny_character: Path, old: str, new
         # As an older format, a later one, and no format at all.
         (
             b'name = "old"\nlevels = ["open.png", "shut.png"]\n',
-            "label: this key is required and missing; .* another version",
+            "label: this key is required but missing; .* another version",
         ),
         (
             b'format = 9\nname = "new"\nlabel = "New"\n',
-            "this key is required and missing; .* bake it again",
+            "this key is required but missing; .* bake it again",
         ),
         (b"\xff\xfe", "no text in UTF-8; put a whole file in its place"),
-        (b"", "this key is required and missing"),
+        (b"", "this key is required but missing"),
     ],
 )
 def test_an_atlas_of_another_format_is_one_clear_line(tmp_path: Path, content: bytes, message: str) -> None:
