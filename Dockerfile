@@ -12,7 +12,11 @@ WORKDIR /app
 COPY requirements.lock deploy/s3.lock ./
 RUN python -m venv venv
 RUN venv/bin/python -m pip install --no-cache-dir --disable-pip-version-check --require-hashes -r requirements.lock -r s3.lock
-COPY pyproject.toml LICENSE docs/explanation/server.md ./
+COPY pyproject.toml LICENSE README.md ./
+COPY tools/wheel_hook.py tools/wheel_hook.py
+COPY --from=pages /app/frontend/dist frontend/dist
+COPY palpebra palpebra
+COPY blink_engine blink_engine
 COPY experiments experiments
 COPY server server
 COPY stimuli_builder stimuli_builder
@@ -20,15 +24,14 @@ COPY table_files table_files
 COPY video_conversion video_conversion
 COPY analysis analysis
 COPY migrations migrations
-RUN cp server.md README.md && venv/bin/python -m pip install --no-cache-dir --disable-pip-version-check --no-deps .
+RUN PALPEBRA_WHEEL_WITHOUT=docs,demo venv/bin/python -m pip install --no-cache-dir --disable-pip-version-check --no-deps .
 RUN mkdir data backups
 
 FROM python:3.11.14-slim
 WORKDIR /app
 ENV PYTHONDONTWRITEBYTECODE=1 PYTHONUNBUFFERED=1 PATH=/app/venv/bin:$PATH
-ENV PALPEBRA_DATA_FOLDER=/app/data PALPEBRA_FRONTEND_FOLDER=/app/frontend/dist PALPEBRA_LOG_FORMAT=json
+ENV PALPEBRA_DATA_FOLDER=/app/data PALPEBRA_LOG_FORMAT=json
 COPY --from=packages /app/venv venv
-COPY --from=pages /app/frontend/dist frontend/dist
 COPY deploy/backup.sh ./
 # Named volumes take over the owner of the folder they are mounted on.
 COPY --from=packages --chown=10001:10001 /app/data data

@@ -7,7 +7,7 @@ export PATH := $(CURDIR)/$(BIN):$(PATH)
 # Where this is set, every start compiles every module anew: seconds for each process that a test starts.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: addon playground help run test test-all check check-style check-types check-imports check-pages check-supply setup setup-test lock format types bench sbom scope load evidence audit house equal screenshots docs api clean
+.PHONY: wheel release addon playground help run test test-all check check-style check-types check-imports check-pages check-supply setup setup-test lock format types bench sbom scope load evidence audit house equal screenshots docs api clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-12s %s\n", $$1, $$2}' Makefile
@@ -66,8 +66,8 @@ RESOLVE = $(BIN)/uv pip compile -q --upgrade --universal --generate-hashes --no-
 lock: ## resolve the Python dependencies again, with hashes: what runs, what tests and servers add
 	@mkdir -p build
 	@$(RESOLVE) --all-extras --group dev -o build/all.lock
-	@$(RESOLVE) -c build/all.lock -o requirements.lock
-	@$(RESOLVE) -c build/all.lock --extra s3 -o build/server.lock
+	@$(RESOLVE) -c build/all.lock --extra track --extra render -o requirements.lock
+	@$(RESOLVE) -c build/all.lock --extra track --extra render --extra s3 -o build/server.lock
 	@$(BIN)/python tools/split_locks.py build/all.lock requirements.lock requirements-dev.lock
 	@$(BIN)/python tools/split_locks.py build/server.lock requirements.lock deploy/s3.lock
 	@$(BIN)/python tools/check_lock_files.py
@@ -105,6 +105,12 @@ playground: setup ## build the blink engine's pages that open from a folder: dis
 docs: setup-test ## write the reference pages from the code and build the documentation site, served at /docs
 	@$(BIN)/python tools/reference.py
 	@$(BIN)/python -m sphinx -q -W --keep-going -b html -d build/doctrees docs frontend/dist/docs
+
+wheel: setup-test ## build the wheel and the sdist with pages, docs and the demo: dist/palpebra-VERSION-py3-none-any.whl
+	@$(BIN)/python tools/build_wheel.py
+
+release: setup-test ## wheel, sdist, bill of materials, checksums and release notes in dist/, after the upgrade test
+	@$(BIN)/python tools/release.py
 
 audit: setup-test ## ask the advisory databases about every locked package; says where none answered
 	@$(BIN)/python tools/audit.py

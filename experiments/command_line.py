@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any, NoReturn, Protocol, cast
 
 from experiments.errors import InputError, expectation, wrong_value
+from experiments.extras import missing_extra
 
 NO_ROOM = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS}
 """Errors of a disk that is full or not writable."""
@@ -33,6 +34,12 @@ def run_command_line(app: Callable[..., object]) -> None:
         code = app(standalone_mode=False)
     except InputError as error:
         sys.stderr.write(f"error: {error}\n")
+        sys.exit(2)
+    except ModuleNotFoundError as error:
+        line = missing_extra(error.name or "")
+        if line is None:
+            raise
+        sys.stderr.write(f"error: {line}\n")
         sys.exit(2)
     except KeyboardInterrupt:
         code = STOPPED

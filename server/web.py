@@ -211,7 +211,9 @@ def _file_within(folder: Path, asked: Path) -> Path | None:
 def _page(settings: Settings, clips: ClipStore, site: str) -> Response:
     index = settings.frontend_folder / site / "index.html"
     if not index.is_file():
-        raise PagesNotBuilt(f"The page {site} is not built; run `make run`, or `npm run build` in frontend.")
+        raise PagesNotBuilt(
+            f"The page {site} is not built; run `make run` in the checkout, or install Palpebra again."
+        )
     text = _read(index, index.stat().st_mtime_ns).decode("utf-8")
     headers = {"cache-control": "no-cache"}
     if NONCE_PLACEHOLDER in text:

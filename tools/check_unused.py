@@ -17,6 +17,7 @@ OWN = (
     "bench",
     "blink_engine",
     "experiments",
+    "palpebra",
     "server",
     "packages/blender_addon/addon_build",
     "packages/blender_addon/blender_addon",
@@ -58,6 +59,8 @@ CALLED_FROM_OUTSIDE = {
     "bake_face": "an entry point of packages/face_baking",
     "bake_samples": "an entry point of packages/face_baking",
     "editor_schema": "frontend/scripts/api_types.mjs",
+    "CustomBuildHook": "hatchling",
+    "initialize": "hatchling",
 }
 
 

@@ -30,6 +30,12 @@ from server.core.values import Role
 # The file that keeps the secret key in the data folder: for its owner alone, made once for all workers.
 
 
+def built_pages() -> Path:
+    """The folder of the built pages: inside the installed package, or in a checkout."""
+    packaged = REPOSITORY / "palpebra" / "pages"
+    return packaged if packaged.is_dir() else REPOSITORY / "frontend" / "dist"
+
+
 def secret_key_path(data_folder: Path) -> Path:
     """Where the key of this data folder is kept."""
     return data_folder / "secret_key"
@@ -241,7 +247,7 @@ class Settings(BaseSettings):
         "data_folder/secret_key, made at first start.",
     )
     frontend_folder: Path = Field(
-        default=REPOSITORY / "frontend" / "dist",
+        default=built_pages(),
         description="Folder of the built pages (participant, admin).",
     )
     library_folder: Path = Field(

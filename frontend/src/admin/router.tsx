@@ -15,6 +15,11 @@ const invitation = createRoute({
   path: "/invitation",
   component: lazyRouteComponent(() => import("./account/InvitationPage"), "InvitationPage"),
 });
+const start = createRoute({
+  getParentRoute: () => root,
+  path: "/start",
+  component: lazyRouteComponent(() => import("./account/StartPage"), "StartPage"),
+});
 const letter = createRoute({
   getParentRoute: () => root,
   path: "/letter/$about",
@@ -99,6 +104,7 @@ const tabs = [
 const tree = root.addChildren([
   signIn,
   invitation,
+  start,
   letter,
   inside.addChildren([
     studies,

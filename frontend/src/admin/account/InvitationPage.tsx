@@ -5,7 +5,7 @@ import { Link } from "@tanstack/react-router";
 import { useState } from "react";
 import { api, Refused, type Schemas, unwrap } from "../api";
 import { Answer } from "../ui/Answer";
-import { EntryForm, EntryPage, NameField, PasswordField, ProviderButtons, useEntered } from "./entry";
+import { EntryForm, EntryPage, NameField, PasswordField, ProviderButtons, useEntered, usePageAskedFor } from "./entry";
 
 const CLOSED: Record<string, string> = {
   used: "This link has already been used.",
@@ -55,9 +55,10 @@ const MAY: Record<Schemas["InvitationState"]["role"], string> = {
 function MakeAccount({ token, role }: { token: string; role: Schemas["InvitationState"]["role"] }) {
   const [name, setName] = useState("");
   const [password, setPassword] = useState("");
+  const next = usePageAskedFor();
   const accept = useMutation({
     mutationFn: () => unwrap(api.POST("/api/admin/invitations/{token}/account", { params: { path: { token } }, body: { name, password } })),
-    onSuccess: useEntered(),
+    onSuccess: useEntered(next),
   });
   return (
     <>

@@ -3,7 +3,7 @@ import { useMutation, useQueryClient, useQuery } from "@tanstack/react-query";
 import { useNavigate, Link, useSearch } from "@tanstack/react-router";
 import { useState } from "react";
 import { api, unwrap, sessionQuery, Refused, type Schemas } from "../api";
-import { EntryForm, EntryPage, NameField, PasswordField, ProviderButtons, Refusal, waysQuery, useEntered } from "./entry";
+import { EntryForm, EntryPage, NameField, PasswordField, ProviderButtons, Refusal, waysQuery, useEntered, usePageAskedFor } from "./entry";
 
 // The account's own second factor, after another service has signed one in.
 
@@ -97,10 +97,4 @@ function ByPassword({ known = "", then }: ByPasswordProps) {
       )}
     </>
   );
-}
-
-/** Where somebody wanted to go before they had to sign in; only within this site. */
-function usePageAskedFor(): string {
-  const { next }: { next?: unknown } = useSearch({ strict: false });
-  return typeof next === "string" && /^\/(?!\/)/.test(next) ? next : "/";
 }

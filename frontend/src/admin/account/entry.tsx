@@ -87,6 +87,12 @@ export function useEntered(next = "/") {
   };
 }
 
+/** Where somebody wanted to go before they had to sign in; only within this site. */
+export function usePageAskedFor(): string {
+  const { next }: { next?: unknown } = useSearch({ strict: false });
+  return typeof next === "string" && /^\/(?!\/)/.test(next) ? next : "/";
+}
+
 // Signing in with a university's or ORCID's own service: a button each, and what came of it.
 
 export const waysQuery = { queryKey: ["ways"], queryFn: () => unwrap(api.GET("/api/admin/session/ways")), staleTime: 60_000 };

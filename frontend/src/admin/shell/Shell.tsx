@@ -28,6 +28,9 @@ function AccountMenu({ account }: { account: Schemas["AccountOut"] }) {
         <Menu.Item component={Link} to="/account">
           My account
         </Menu.Item>
+        <Menu.Item component="a" href="/docs/" target="_blank" rel="noreferrer">
+          Documentation
+        </Menu.Item>
         {(["auto", "light", "dark"] as const).map((scheme) => (
           <Menu.Item key={scheme} onClick={() => setColorScheme(scheme)} disabled={scheme === colorScheme}>
             {scheme === "auto" ? "System" : scheme === "light" ? "Light" : "Dark"}

@@ -1,0 +1,99 @@
+/** The first page that `palpebra` opens: three ways to begin. What it knows stands behind '#', so no log ever sees it. */
+import { Anchor, Button, Card, Container, Group, SimpleGrid, Stack, Text, Title } from "@mantine/core";
+import { useDocumentTitle } from "@mantine/hooks";
+import { useState } from "react";
+
+interface Known {
+  demo: string | null;
+  invitation: string | null;
+  folder: string | null;
+}
+
+const FROM_CLIPS = "/studies/new";
+
+function whatIsKnown(): Known {
+  const parts = new URLSearchParams(window.location.hash.slice(1));
+  const demo = parts.get("demo");
+  // Only a path of this server: the page must not send anyone elsewhere.
+  return { demo: demo?.startsWith("/run/") === true ? demo : null, invitation: parts.get("invitation"), folder: parts.get("folder") };
+}
+
+export function StartPage() {
+  useDocumentTitle("Welcome – Palpebra");
+  const [{ demo, invitation, folder }] = useState(whatIsKnown);
+  const entrance = invitation === null ? "/admin" + FROM_CLIPS : `/admin/invitation?next=${encodeURIComponent(FROM_CLIPS)}#${invitation}`;
+  return (
+    <Container size="lg" py={48} component="main">
+      <Title order={1} ta="center">
+        Welcome to Palpebra
+      </Title>
+      <Text ta="center" c="dimmed" mb="xl">
+        Rating studies with short clips. Where do you want to start?
+      </Text>
+      <SimpleGrid cols={{ base: 1, sm: 3 }}>
+        {demo !== null && (
+          <Choice
+            title="Try the demo study"
+            text="Take part yourself: watch a few blinks and rate how natural they look. It takes two minutes."
+            button="Take part"
+            href={demo}
+            newTab
+          />
+        )}
+        <Choice
+          title="Make a study from my clips"
+          text={
+            invitation === null
+              ? "Upload clips, say what varies, and get a link for participants."
+              : "Create your account first. Then upload clips, say what varies, and get a link for participants."
+          }
+          button={invitation === null ? "New study" : "Create account"}
+          href={entrance}
+        />
+        <Choice
+          title="Analyze data"
+          text="Run an ANOVA, mixed models, pairs or opinion scores on a table that you already have."
+          button="Show me how"
+          href="/docs/tutorials/analyze-csv.html"
+          newTab
+        />
+      </SimpleGrid>
+      <Group justify="center" mt="xl" gap="lg">
+        <Anchor href="/docs/" size="sm">
+          Documentation
+        </Anchor>
+        {folder !== null && (
+          <Text size="sm" c="dimmed">
+            Your data are in {folder}
+          </Text>
+        )}
+      </Group>
+    </Container>
+  );
+}
+
+interface ChoiceProps {
+  title: string;
+  text: string;
+  button: string;
+  href: string;
+  newTab?: boolean;
+}
+
+function Choice({ title, text, button, href, newTab = false }: ChoiceProps) {
+  return (
+    <Card withBorder padding="lg">
+      <Stack h="100%" justify="space-between">
+        <div>
+          <Title order={2} size="h4" mb="xs">
+            {title}
+          </Title>
+          <Text size="sm">{text}</Text>
+        </div>
+        <Button component="a" href={href} {...(newTab ? { target: "_blank", rel: "noreferrer" } : {})}>
+          {button}
+        </Button>
+      </Stack>
+    </Card>
+  );
+}

@@ -1,0 +1,1 @@
+"""The command `palpebra`: one way into everything, for people who installed the wheel."""

@@ -1,0 +1,5 @@
+"""`python -m palpebra`."""
+
+from palpebra.cli import main
+
+main()

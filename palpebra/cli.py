@@ -1,0 +1,74 @@
+"""The command `palpebra`: start the server, try the demo, care for the data; the three programs by name."""
+
+import sys
+from importlib import import_module, metadata
+
+from experiments.command_groups import lazy_app
+from experiments.command_line import run_command_line
+from palpebra.conflicts import refuse_foreign_packages
+
+COMMANDS = {
+    "start": (
+        "palpebra.start",
+        "Start the server and open the first page. This is what `palpebra` alone does.",
+    ),
+    "demo": ("palpebra.start", "Add the demo study, start the server and open the study as a participant."),
+    "doctor": ("palpebra.care", "Check the installation and the data, and say what to fix."),
+    "backup": ("palpebra.care", "Write database, clips and secret key into one file."),
+    "upgrade": ("palpebra.care", "Back up the data and bring the database to this version."),
+    "service": ("palpebra.service", "Write a systemd unit that runs the server."),
+    "stimuli": ("palpebra.programs", "Track eyelids, measure blinks and build clips: `stimuli`."),
+    "server": ("palpebra.programs", "Studies, links, exports and everything else of a server: `server`."),
+    "analysis": ("palpebra.programs", "From ratings to tables, figures and reports: `analysis`."),
+}
+PROGRAMS = {"stimuli": "stimuli_builder.cli", "server": "server.cli", "analysis": "analysis.cli"}
+
+app = lazy_app(
+    "palpebra",
+    "Rating studies with short clips. Without a command, `palpebra` starts the server and opens the browser.",
+    COMMANDS,
+)
+
+
+def with_start(arguments: list[str]) -> list[str]:
+    """The arguments with the command that `palpebra` alone, or with options alone, means.
+
+    Parameters
+    ----------
+    arguments : list of str
+        What follows `palpebra`.
+
+    Returns
+    -------
+    list of str
+
+    Examples
+    --------
+    >>> with_start(["--port", "8010"])
+    ['start', '--port', '8010']
+    >>> with_start(["doctor"])
+    ['doctor']
+    """
+    first = arguments[0] if arguments else ""
+    is_help = first in ("--help", "--install-completion", "--show-completion")
+    return arguments if first and (is_help or not first.startswith("-")) else ["start", *arguments]
+
+
+def main() -> None:
+    """Run one command."""
+    arguments = sys.argv[1:]
+    if arguments[:1] == ["--version"]:
+        print(f"palpebra {metadata.version('palpebra')}")
+        return
+    if arguments and arguments[0] in PROGRAMS:
+        # The program's own command line, so that its help and errors are the same under both names.
+        sys.argv = [arguments[0], *arguments[1:]]
+        import_module(PROGRAMS[arguments[0]]).main()
+        return
+    sys.argv = [sys.argv[0], *with_start(arguments)]
+    run_command_line(_checked_app)
+
+
+def _checked_app(**settings: object) -> object:
+    refuse_foreign_packages()
+    return app(**settings)

@@ -1,0 +1,73 @@
+"""Where data are kept, and which port is free: decided once, before the server reads its settings."""
+
+import os
+import socket
+from pathlib import Path
+
+from platformdirs import user_data_path
+
+from experiments.errors import InputError
+
+DATA_VARIABLE = "PALPEBRA_DATA_FOLDER"
+PORT = 8000
+PORTS_TRIED = 20
+
+
+def data_folder(given: Path | None) -> Path:
+    """The folder of the data, made if it is missing.
+
+    Parameters
+    ----------
+    given : Path or None
+        `--folder`; else the environment variable PALPEBRA_DATA_FOLDER, else the user's data folder of this
+        system (`~/.local/share/palpebra` on Linux).
+
+    Raises
+    ------
+    InputError
+        The folder cannot be written to.
+    """
+    folder = given or Path(os.environ.get(DATA_VARIABLE) or user_data_path("palpebra", appauthor=False))
+    try:
+        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        probe = folder / ".can_be_written"
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InputError(
+            f"folder {folder}: expected a writable folder, got '{reason}'; choose another by --folder"
+        ) from error
+    return folder.resolve()
+
+
+def free_port(wanted: int | None) -> int:
+    """The port to listen on: the wanted one, or the first free one from 8000 on.
+
+    Raises
+    ------
+    InputError
+        The wanted port is in use, or none of the next ones is free.
+    """
+    ports = [wanted] if wanted else range(PORT, PORT + PORTS_TRIED)
+    for port in ports:
+        if _is_free(port):
+            return port
+    tried = f"port {wanted} is" if wanted else f"ports {PORT} to {PORT + PORTS_TRIED - 1} are"
+    raise InputError(f"{tried} in use; choose a free one by --port")
+
+
+def _is_free(port: int) -> bool:
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(("127.0.0.1", port))
+        except OSError:
+            return False
+    return True
+
+
+def use_folder(folder: Path, port: int = PORT) -> None:
+    """Set the environment that the server reads its settings from."""
+    os.environ[DATA_VARIABLE] = str(folder)
+    os.environ.setdefault("PALPEBRA_PUBLIC_URL", f"http://localhost:{port}")

@@ -1,0 +1,169 @@
+"""`palpebra` and `palpebra demo`: the server with the embedded default, and the browser on the first page."""
+
+import os
+import threading
+import time
+import urllib.error
+import urllib.request
+import webbrowser
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+from urllib.parse import quote, urlencode
+
+import typer
+
+from experiments.errors import InputError
+from palpebra.folders import data_folder, free_port, use_folder
+
+DEMO = Path(__file__).resolve().parent / "demo"
+"""The demo's declaration and clips; `make wheel` builds them."""
+DEMO_NAME = "demo"
+LOCK = "palpebra.lock"
+SECONDS_TO_START = 60
+
+Folder = Annotated[Path | None, typer.Option(help="Folder for the data; your user data folder by default.")]
+Port = Annotated[
+    int | None, typer.Option(min=1, max=65535, help="Port; by default the first free one from 8000 on.")
+]
+NoBrowser = Annotated[bool, typer.Option("--no-browser", help="Print the address and open no browser.")]
+
+
+def register(parent: typer.Typer) -> None:
+    """Add the commands that start the server."""
+    parent.command("start")(start)
+    parent.command("demo")(demo)
+
+
+def start(folder: Folder = None, port: Port = None, no_browser: NoBrowser = False) -> None:
+    """Start the server and open the first page. This is what `palpebra` alone does.
+
+    The first start creates the database and adds the demo study. On the page you try the demo, make a study
+    from your clips, or analyze data. Stop with Ctrl-C.
+
+    Examples:
+
+        palpebra
+
+        palpebra --folder ~/studies --port 8010 --no-browser
+    """
+    _serve(folder, port, first_page, with_browser=not no_browser)
+
+
+def demo(folder: Folder = None, port: Port = None, no_browser: NoBrowser = False) -> None:
+    """Add the demo study, start the server and open the study as a participant.
+
+    Example: palpebra demo
+    """
+    _serve(folder, port, demo_page, with_browser=not no_browser)
+
+
+def first_page(folder: Path) -> str:
+    """Path of the first page, with what it needs to know after the `#`, which no server sees."""
+    known = {"folder": str(folder)}
+    if link := demo_link():
+        known["demo"] = link
+    if invitation := first_invitation():
+        known["invitation"] = invitation
+    return f"/admin/start#{urlencode(known, quote_via=quote)}"
+
+
+def demo_page(folder: Path) -> str:
+    """Path of the demo study's participant page."""
+    link = demo_link()
+    if link is None:
+        raise InputError(f"the demo study was removed from {folder}; choose another folder by --folder")
+    return link
+
+
+def demo_link() -> str | None:
+    """Path of the demo's link for participants; None if this server has no demo."""
+    from server.cli_common import stored_services
+    from server.studies.links import general_links, link_url
+    from server.studies.repository import open_studies
+
+    with stored_services() as services, services.database.write() as session:
+        for study in open_studies(session):
+            if study.name == DEMO_NAME:
+                for link in general_links(session, services.settings.key, study):
+                    return link_url("", services.settings.key, link.public_id)
+    return None
+
+
+def first_invitation() -> str | None:
+    """The token by which the first account is created; None once there is one."""
+    from server.accounts import invitations
+    from server.accounts import service as accounts
+    from server.cli_common import stored_services
+
+    with stored_services() as services:
+        with services.database.read() as session:
+            if accounts.accounts_exist(session):
+                return None
+        return invitations.invite(services.database, "owner", "first owner", None)[1]
+
+
+def _serve(folder: Path | None, port: int | None, page: Callable[[Path], str], *, with_browser: bool) -> None:
+    place = data_folder(folder)
+    chosen = free_port(port)
+    if port is None and chosen != 8000:
+        typer.echo(f"Port 8000 is in use; using {chosen}.")
+    use_folder(place, chosen)
+    from server.cli_run import run
+
+    with only_server_of(place):
+        _prepare(place)
+        address = f"http://localhost:{chosen}{page(place)}"
+        typer.echo(f"Data folder: {place}")
+        typer.echo(f"Open {address}")
+        typer.echo("Stop with Ctrl-C.")
+        if with_browser:
+            threading.Thread(target=_open_when_ready, args=(address, chosen), daemon=True).start()
+        run(port=chosen)
+
+
+def _prepare(place: Path) -> None:
+    """Create or upgrade the database, and add the demo study to a new one."""
+    from server.cli_common import migrated_services
+
+    is_new = not (place / "palpebra.sqlite").exists()
+    with migrated_services():
+        pass
+    if is_new and (DEMO / "manifest.json").is_file():
+        from server.studies.cli import add
+
+        add(str(DEMO / "demo.toml"), DEMO, name=DEMO_NAME, open_=True)
+
+
+@contextmanager
+def only_server_of(place: Path) -> Iterator[None]:
+    """Hold the folder while its server runs.
+
+    Raises
+    ------
+    InputError
+        Another `palpebra` serves this folder.
+    """
+    from server.core.locks import file_lock
+
+    try:
+        with file_lock(place / LOCK, wait=False):
+            yield
+    except BlockingIOError as error:
+        raise InputError(
+            f"another palpebra is serving {place}; stop it, or choose another folder by --folder"
+        ) from error
+
+
+def _open_when_ready(address: str, port: int) -> None:
+    until = time.monotonic() + SECONDS_TO_START
+    while time.monotonic() < until:
+        try:
+            urllib.request.urlopen(f"http://127.0.0.1:{port}/healthz", timeout=2).close()
+        except (urllib.error.URLError, OSError):
+            time.sleep(0.2)
+            continue
+        if not (os.environ.get("BROWSER") == "none" or webbrowser.open(address)):
+            typer.echo(f"No browser was found. Open {address} yourself.")
+        return

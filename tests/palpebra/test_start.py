@@ -1,0 +1,138 @@
+"""`palpebra` with what can go wrong at a start: one clear line each, and nothing changes."""
+
+import os
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from experiments.errors import InputError
+from palpebra.cli import with_start
+from palpebra.conflicts import refuse_foreign_packages
+from palpebra.folders import data_folder, free_port
+from palpebra.start import only_server_of
+
+
+def palpebra(*arguments: str, folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "palpebra", *arguments],
+        env={**os.environ, "HOME": str(folder), **environment},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ([], ["start"]),
+        (["--no-browser"], ["start", "--no-browser"]),
+        (["--help"], ["--help"]),
+        (["backup", "x.tar"], ["backup", "x.tar"]),
+    ],
+)
+def test_no_command_means_start(given: list[str], expected: list[str]) -> None:
+    assert with_start(given) == expected
+
+
+def test_port_in_use_is_refused_if_wanted_and_passed_over_if_not() -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with pytest.raises(InputError, match=f"port {port} is in use; choose a free one by --port"):
+            free_port(port)
+    assert free_port(port) == port
+    assert free_port(None) >= 8000
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_folder_that_cannot_be_written_to(tmp_path: Path) -> None:
+    tmp_path.chmod(0o500)
+    with pytest.raises(InputError, match="expected a writable folder"):
+        data_folder(tmp_path / "data")
+
+
+def test_file_in_place_of_the_folder(tmp_path: Path) -> None:
+    (tmp_path / "data").write_text("", encoding="utf-8")
+    with pytest.raises(InputError, match="choose another by --folder"):
+        data_folder(tmp_path / "data")
+
+
+def test_default_folder_is_the_users(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("PALPEBRA_DATA_FOLDER", raising=False)
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    assert data_folder(None) == tmp_path / "palpebra"
+
+
+def test_second_server_of_a_folder_is_refused(tmp_path: Path) -> None:
+    with only_server_of(tmp_path):
+        done = palpebra("--folder", str(tmp_path), "--no-browser", folder=tmp_path)
+    assert done.returncode == 2
+    assert "another palpebra is serving" in done.stderr
+    assert not (tmp_path / "palpebra.sqlite").exists()
+
+
+def test_package_of_another_project_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "migrations").mkdir()
+    (tmp_path / "migrations" / "__init__.py").write_text("", encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.delitem(sys.modules, "migrations", raising=False)
+    with pytest.raises(InputError, match="package 'migrations': expected Palpebra's, got the one in"):
+        refuse_foreign_packages()
+
+
+def test_upgrade_backs_up_first_and_names_both(tmp_path: Path) -> None:
+    data = tmp_path / "data"
+    assert "nothing to upgrade" in palpebra("upgrade", "--folder", str(data), folder=tmp_path).stderr
+    environment = {**os.environ, "PALPEBRA_DATA_FOLDER": str(data)}
+    server = [sys.executable, "-m", "server"]
+    subprocess.run([*server, "database", "upgrade"], env=environment, check=True, capture_output=True)
+    done = palpebra("upgrade", "--folder", str(data), folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    (kept,) = (data / "backups").glob("palpebra-*.tar")
+    assert str(kept) in done.stdout
+    assert "uv tool upgrade palpebra" in done.stdout
+
+
+def test_database_of_a_newer_version_is_refused(tmp_path: Path) -> None:
+    import sqlite3
+
+    data = tmp_path / "data"
+    environment = {**os.environ, "PALPEBRA_DATA_FOLDER": str(data)}
+    server = [sys.executable, "-m", "server"]
+    subprocess.run([*server, "database", "upgrade"], env=environment, check=True, capture_output=True)
+    with sqlite3.connect(data / "palpebra.sqlite") as database:
+        database.execute("UPDATE alembic_version SET version_num = '9999'")
+    done = palpebra("--folder", str(data), "--no-browser", folder=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "newer version" in done.stderr
+
+
+def test_programs_keep_their_own_command_lines(tmp_path: Path) -> None:
+    done = palpebra("analysis", "anova", "--help", folder=tmp_path)
+    assert done.returncode == 0
+    assert "analysis anova [OPTIONS]" in done.stdout
+
+
+def test_service_writes_a_unit(tmp_path: Path) -> None:
+    out = tmp_path / "palpebra.service"
+    done = palpebra(
+        "service",
+        "--folder",
+        str(tmp_path / "data"),
+        "--domain",
+        "lab.example.org",
+        "--out",
+        str(out),
+        folder=tmp_path,
+    )
+    assert done.returncode == 0, done.stderr
+    text = out.read_text(encoding="utf-8")
+    assert f"Environment=PALPEBRA_DATA_FOLDER={tmp_path / 'data'}" in text
+    assert "PALPEBRA_PUBLIC_URL=https://lab.example.org" in text
