@@ -44,4 +44,6 @@ def test_the_changelog_begins_with_it_and_the_day_it_is_cited_by() -> None:
 
 
 def test_the_supported_version_is_the_latest() -> None:
-    assert f"Only the latest version, {VERSION.rpartition('.')[0]}, gets" in read("docs/explanation/security.md")
+    assert f"Only the latest version, {VERSION.rpartition('.')[0]}, gets" in read(
+        "docs/explanation/security.md"
+    )
