@@ -103,7 +103,7 @@ def database_file(settings: Settings) -> Path:
     if url.get_backend_name() != "sqlite" or not url.database or url.database == ":memory:":
         raise InputError(
             "snapshots are of a database that is a SQLite file; PostgreSQL goes back to a moment by "
-            "deploy/point-in-time.sh (docs/how-to/deploy.md)"
+            "deploy/point-in-time.sh (docs/how-to/go-back-in-time.md)"
         )
     return Path(url.database)
 
