@@ -7,7 +7,7 @@ export PATH := $(CURDIR)/$(BIN):$(PATH)
 # Where this is set, every start compiles every module anew: seconds for each process that a test starts.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: wheel release addon playground help run test test-all check check-style check-types check-imports check-pages check-supply setup setup-test lock format types bench sbom scope load evidence audit house equal screenshots docs api clean
+.PHONY: wheel release addon playground help run test test-all check check-style check-types check-imports check-pages check-docs check-supply setup setup-test lock format types bench sbom scope load evidence audit house equal screenshots docs api clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## /{printf "  make %-12s %s\n", $$1, $$2}' Makefile
@@ -25,7 +25,7 @@ test-all: setup-test ## run every test, long ones too: Firefox, kill -9, attacks
 	@$(PYTEST) $(TESTS)
 
 check: setup-test ## lint and type-check everything, import rules, lock files, known weaknesses
-	@$(MAKE) --no-print-directory --jobs=5 --keep-going check-style check-types check-imports check-pages check-supply
+	@$(MAKE) --no-print-directory --jobs=6 --keep-going check-style check-types check-imports check-pages check-docs check-supply
 
 # The parts of `check`, side by side once `make setup-test` is through; one that fails fails the whole, and make
 # names it after the others have ended.
@@ -46,6 +46,9 @@ check-imports:
 
 check-pages:
 	@cd frontend && npm run --silent typecheck && npm run --silent lint && npm run --silent api -- --check && npm run --silent size
+
+check-docs: ## words, spelling, reading grades and links of the documentation (`make docs` fails on warnings)
+	@$(BIN)/python -W ignore -m tools.check_language --pages
 
 check-supply:
 	@$(BIN)/python tools/check_lock_files.py

@@ -1,6 +1,9 @@
 """Plain English: banned words with the better one, and how hard pages are to read.
 
-    python -m tools.check_language              every finding in docs, texts and code; fails if there is one
+    python -m tools.check_language              every finding in docs, texts and code; fails if any
+    python -m tools.check_language --pages      the site's pages, README, CONTRIBUTING and CHANGELOG:
+                                                words, American spelling, reading grades and links
+                                                (`make check-docs`)
     python -m tools.check_language --grades     reading grade (Flesch-Kincaid) of each page, hardest first
 
 Code (backticks, code blocks) and quotations are left alone.
@@ -29,10 +32,10 @@ BANNED = {
     r"\bmend(?:s|ed|ing)?\b": "fix, correct",
     r"\bparted by\b": "separated by",
     r"\bbeside(?!s)\b": "next to, in addition to, with",
-    r"\bstands?\b(?! (?:for|still|up|out|alone|apart|guard))": "is, are",
+    r"\bstands?\b(?! (?:for|still|up|out|alone|apart|guard)|-ins?\b)": "is, are",
     r"\bwhoever\b": "anyone who, people who",
     r"\ba row an? |\bone an? (?:row|play|person|visit|cell)\b": "one row per ...",
-    r"\b(?<!there )(?:is|are) no (?!longer|one\b|doubt|more|such)": "is not a ...",
+    r"(?<!there )\b(?:is|are) no (?!longer|one\b|doubt|more|such)": "is not a ...",
     r"\bby its name\b": "by name",
     r"\bof (?:its|their|his|her|one's) own\b": "separate, its own ...",
     r"\bwhat is asked\b": "required",
@@ -40,9 +43,26 @@ BANNED = {
     r"\bthereof\b": "of it",
     r"\bhindmost\b|\bthe likes? of\b": "plain words",
 }
+BRITISH = {
+    r"\b\w*colour\w*": "color",
+    r"\b\w*(?:behavi|neighb|fav|hon|lab|hum|rum|vap)our\w*": "or instead of our",
+    r"\b\w*label(?:l(?:ed|ing|er))\w*": "labeled, labeling",
+    r"\b(?:model|travel|cancel|signal|channel)l(?:ed|ing|er)\w*": "one l",
+    r"\banaly(?:se|sed|sing)\b": "analyze",
+    r"\b(?:milli|kilo|centi)?metres?\b|\bcentre\w*|\bfibres?\b": "er instead of re",
+    r"\bgrey\w*": "gray",
+    r"\blicences?\b|\bdefences?\b": "license, defense",
+    r"\bjudgements?\b": "judgment",
+    r"\bcatalogues?\b|\bprogrammes?\b": "catalog, program",
+    r"\b(?:re|de|un|pseud)?(?:random|normal|recogn|organ|summar|item|synthes|local|optim|minim|maxim|general|standard|visual|"
+    r"character|initial|util|real|serial|anonym|onym|quant|vector|regular|penal|categor|emphas|apolog|author|custom|"
+    r"synchron|symbol)is(?:e|ed|es|ing|ation|ations)\b": "ize, ization",
+}
+"""British spellings and the American ones."""
 BANNED_WORDS = tuple((re.compile(pattern, re.IGNORECASE), better) for pattern, better in BANNED.items())
+BRITISH_WORDS = tuple((re.compile(pattern, re.IGNORECASE), better) for pattern, better in BRITISH.items())
 CODE_BLOCK = re.compile(r"^(\s*)(```|~~~|:::).*?^\1\2", re.MULTILINE | re.DOTALL)
-CODE = re.compile(r"`[^`\n]*`|\"[^\"\n]*\"|“[^”\n]*”|\]\([^)]*\)")
+CODE = re.compile(r"`[^`\n]*`|\"[^\"\n]*\"|“[^”\n]*”|\]\([^)]*\)|^\[[^\]]+\]: .*")
 
 
 @dataclass(frozen=True)
@@ -58,13 +78,15 @@ class Finding:
         return f"{self.file}:{self.line}: '{self.word}': better {self.better}"
 
 
-def banned_words_in(text: str) -> Iterator[tuple[int, str, str]]:
+def banned_words_in(
+    text: str, words: tuple[tuple[re.Pattern[str], str], ...] = BANNED_WORDS
+) -> Iterator[tuple[int, str, str]]:
     """Line, word and better word of each banned word outside code and quotations."""
     for number, line in enumerate(text.splitlines(), start=1):
         plain = CODE.sub(" ", line)
-        for pattern, better in BANNED_WORDS:
-            for found in pattern.finditer(plain):
-                yield number, found.group(0).strip(), better
+        for pattern, better in words:
+            for match in pattern.finditer(plain):
+                yield number, match.group(0).strip(), better
 
 
 def prose_of(page: str) -> str:
@@ -80,13 +102,13 @@ def prose_of(page: str) -> str:
 
 def pages() -> list[Path]:
     """The pages of the site that people write."""
-    found = [
+    written = [
         *(ROOT / "docs").rglob("*.md"),
         ROOT / "README.md",
         ROOT / "CONTRIBUTING.md",
         ROOT / "CHANGELOG.md",
     ]
-    return sorted(page for page in found if "generated" not in page.parts)
+    return sorted(page for page in written if "generated" not in page.parts)
 
 
 def without_code_blocks(text: str) -> str:
@@ -118,12 +140,39 @@ def source_texts(file: Path) -> Iterator[tuple[int, str]]:
             yield number, line
 
 
-def findings() -> Iterator[Finding]:
-    """Every banned word in pages, Python and TypeScript of the programs."""
+def anchors_of(page: Path) -> set[str]:
+    """The names by which links reach the headings of a page."""
+    headings = re.findall(r"^#+ (.+)$", without_code_blocks(page.read_text(encoding="utf-8")), re.MULTILINE)
+    plain = (re.sub(r"[^\w\- ]", "", heading.replace("`", "").lower()) for heading in headings)
+    return {heading.strip().replace(" ", "-") for heading in plain}
+
+
+def broken_links(page: Path) -> list[str]:
+    """Links of a page to files or headings that do not exist, but for pages of the build; a line each."""
+    faults = []
+    text = without_code_blocks(page.read_text(encoding="utf-8"))
+    for target in re.findall(r"\]\(([^)\s]+)\)", re.sub(r"`[^`\n]*`", "", text)):
+        name, _, anchor = target.partition("#")
+        if re.match(r"[a-z]+:", target) or "generated/" in target:
+            continue
+        file = (page.parent / name).resolve() if name else page
+        if not file.exists() or (anchor and file.suffix == ".md" and anchor not in anchors_of(file)):
+            faults.append(f"{page.name}: the link {target} leads nowhere: correct it")
+    return faults
+
+
+def findings_in_pages() -> Iterator[Finding]:
+    """Every banned word in the pages, and every British spelling in those that people write."""
     for page in pages():
         name = str(page.relative_to(ROOT))
-        for line, word, better in banned_words_in(without_code_blocks(page.read_text(encoding="utf-8"))):
+        words = BANNED_WORDS if name in REFERENCE else BANNED_WORDS + BRITISH_WORDS
+        text = without_code_blocks(page.read_text(encoding="utf-8"))
+        for line, word, better in banned_words_in(text, words):
             yield Finding(name, line, word, better)
+
+
+def findings_in_code() -> Iterator[Finding]:
+    """Every banned word in Python and TypeScript of the programs."""
     listed = subprocess.run(
         ["git", "ls-files", "*.py", "*.ts", "*.tsx"], cwd=ROOT, capture_output=True, text=True, check=True
     )
@@ -137,17 +186,42 @@ def findings() -> Iterator[Finding]:
                 yield Finding(name, first + line - 1, word, better)
 
 
+def grades() -> list[tuple[float, str]]:
+    """Grade and name of each page with enough text, hardest first."""
+    graded = ((grade_of(page), str(page.relative_to(ROOT))) for page in pages())
+    return sorted(((grade, name) for grade, name in graded if grade is not None), reverse=True)
+
+
+def faults_of_grades(graded: list[tuple[float, str]]) -> list[str]:
+    """Pages above the highest grade, and a median above the highest median; a line each."""
+    faults = [
+        f"{name}: reading grade {grade:.1f}, at most {HIGHEST_GRADE:g}: write shorter sentences"
+        for grade, name in graded
+        if grade > HIGHEST_GRADE and name not in REFERENCE
+    ]
+    median = statistics.median(grade for grade, _ in graded)
+    if median > MEDIAN_GRADE:
+        faults.append(f"reading grade of the pages: median {median:.1f}, at most {MEDIAN_GRADE:g}")
+    return faults
+
+
 def main() -> int:
     """Print the findings or the grades."""
     if "--grades" in sys.argv:
-        graded = [(grade, page) for page in pages() if (grade := grade_of(page)) is not None]
-        for grade, page in sorted(graded, reverse=True, key=lambda pair: pair[0]):
-            print(f"{grade:5.1f}  {page.relative_to(ROOT)}")
+        graded = grades()
+        for grade, name in graded:
+            print(f"{grade:5.1f}  {name}")
         print(f"{statistics.median(grade for grade, _ in graded):5.1f}  median of {len(graded)} pages")
         return 0
-    found = [str(finding) for finding in findings()]
-    print("\n".join(found) or "language: no banned words")
-    return 1 if found else 0
+    if "--pages" in sys.argv:
+        # Generated tables repeat texts of the code, where `findings_in_code` finds them.
+        lines = [str(finding) for finding in findings_in_pages() if finding.file not in REFERENCE]
+        lines += faults_of_grades(grades())
+        lines += [fault for page in pages() for fault in broken_links(page)]
+    else:
+        lines = [str(finding) for finding in (*findings_in_pages(), *findings_in_code())]
+    print("\n".join(lines) or "language: no banned words")
+    return 1 if lines else 0
 
 
 if __name__ == "__main__":

@@ -29,7 +29,7 @@ PACKAGES = ("server", "analysis", "experiments", "stimuli_builder", "blink_engin
 RESULTS = ROOT / "out" / "mutation.jsonl"
 SECONDS = 300
 """Longest run of the tests of one expression; a change that makes them hang counts as noticed."""
-MOST_FILES = 8
+MAX_FILES = 8
 SLOW = re.compile(r"tests/(browser|experiments_e2e|docs|bench|scope|equal|house|server/attacks)")
 SWAPS: dict[type[ast.AST], type[ast.AST]] = {
     ast.Lt: ast.LtE,
@@ -69,12 +69,12 @@ class Site:
 
 def sites_in(tree: Path) -> dict[str, Site]:
     """Every operator whose function and line are unique in a version."""
-    found: dict[str, list[Site]] = {}
+    by_key: dict[str, list[Site]] = {}
     for package in PACKAGES:
         for file in sorted((tree / package).rglob("*.py")):
             for site in _sites(file):
-                found.setdefault(site.key, []).append(site)
-    return {key: sites[0] for key, sites in found.items() if len(sites) == 1}
+                by_key.setdefault(site.key, []).append(site)
+    return {key: sites[0] for key, sites in by_key.items() if len(sites) == 1}
 
 
 def _sites(file: Path) -> Iterator[Site]:
@@ -119,7 +119,7 @@ def tests_of(file: Path, tree: Path) -> list[str]:
     tests = [path for path in sorted((tree / "tests").rglob("test_*.py")) if not SLOW.search(str(path))]
     direct = [path for path in tests if imports.search(path.read_text(encoding="utf-8"))]
     near = [path for path in tests if path.parent.name == file.parent.name]
-    return [str(path.relative_to(tree)) for path in (direct or near)[:MOST_FILES]]
+    return [str(path.relative_to(tree)) for path in (direct or near)[:MAX_FILES]]
 
 
 def outcome(site: Site, tree: Path) -> str:

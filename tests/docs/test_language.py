@@ -1,0 +1,69 @@
+"""`make check-docs` finds words to avoid, British spellings, hard pages and broken links."""
+
+from pathlib import Path
+
+import pytest
+
+from tools.check_language import (
+    BANNED_WORDS,
+    BRITISH_WORDS,
+    banned_words_in,
+    broken_links,
+    faults_of_grades,
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ("It is read anew.", "anew"),
+        ("The file stands beside it.", "beside"),
+        ("The value is no number.", "is no"),
+        ("The colour of the iris.", "colour"),
+        ("Labelled frames are analysed.", "Labelled"),
+        ("Runs are randomised.", "randomised"),
+        ("Two grey fields.", "grey"),
+    ],
+)
+def test_a_word_to_avoid_is_found(text: str, word: str) -> None:
+    assert word in [seen for _, seen, _ in banned_words_in(text, BANNED_WORDS + BRITISH_WORDS)]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "There is no default, and there are no exceptions.",
+        "It stands for a level; stand-ins are used.",
+        'The key `colour` and the text "labelled" are code and a quotation.',
+        "Exercise, otherwise, precise, analyses and irises are American too.",
+        "[g-lang]: https://example.org/localisation",
+    ],
+)
+def test_plain_american_english_passes(text: str) -> None:
+    assert list(banned_words_in(text, BANNED_WORDS + BRITISH_WORDS)) == []
+
+
+def test_a_page_that_is_hard_to_read_is_named() -> None:
+    assert faults_of_grades([(15.2, "docs/hard.md"), (6.0, "docs/easy.md"), (5.0, "docs/easier.md")]) == [
+        "docs/hard.md: reading grade 15.2, at most 14: write shorter sentences"
+    ]
+    assert faults_of_grades([(12.0, "docs/a.md"), (11.0, "docs/b.md")]) == [
+        "reading grade of the pages: median 11.5, at most 10"
+    ]
+
+
+def test_a_link_to_a_missing_file_or_heading_is_found(tmp_path: Path) -> None:
+    (tmp_path / "other.md").write_text(
+        "# Other\n\n## What you get\n\n## `analysis pairs`\n", encoding="utf-8"
+    )
+    page = tmp_path / "page.md"
+    page.write_text(
+        "[a](other.md) [b](other.md#what-you-get) [c](other.md#analysis-pairs) [d](https://example.org)\n"
+        "[e](missing.md) [f](other.md#what-you-pay) [g](#nowhere)\n",
+        encoding="utf-8",
+    )
+    assert [fault.split()[3] for fault in broken_links(page)] == [
+        "missing.md",
+        "other.md#what-you-pay",
+        "#nowhere",
+    ]
