@@ -117,6 +117,8 @@ def test_own_clips_to_a_live_link(dashboard: Dashboard, clips: list[Path]) -> No
 def test_demonstrations_that_are_not_built_are_named_with_their_commands(dashboard: Dashboard) -> None:
     page = dashboard.open("/")
     page.get_by_role("link", name="New study").click()
-    expect(page.get_by_role("listitem").filter(has_text="stimuli build pairs-demo --out ")).to_have_count(1)
+    page.get_by_role("tab", name="From a shipped experiment").click()
+    page.get_by_text("Demonstrations without clips on this server").click()
+    expect(page.get_by_role("listitem").filter(has_text="stimuli build pairs-demo --out ")).to_be_visible()
     page.goto(f"{dashboard.server.address}/nothing")
     expect(page.get_by_role("heading", name="Page not found")).to_be_visible()

@@ -465,8 +465,8 @@ function isUnbuiltDemo({ demonstration, clips_ready }: Shipped): boolean {
 function Unbuilt({ demos }: { demos: Shipped[] }) {
   if (demos.length === 0) return null;
   return (
-    <Text size="sm" component="div">
-      Demonstrations without clips on this server, each with the command that builds them:
+    <Text size="sm" component="details">
+      <summary>Demonstrations without clips on this server ({demos.length})</summary>
       <ul>
         {demos.map(({ name, title, build }) => (
           <li key={name}>
@@ -518,10 +518,10 @@ function NewStudy() {
         }}
         maw={400}
       />
-      <Tabs defaultValue="shipped">
+      <Tabs defaultValue="clips">
         <Tabs.List>
-          <Tabs.Tab value="shipped">From a shipped experiment</Tabs.Tab>
           <Tabs.Tab value="clips">From your own clips</Tabs.Tab>
+          <Tabs.Tab value="shipped">From a shipped experiment</Tabs.Tab>
           <Tabs.Tab value="definition">From a definition (TOML)</Tabs.Tab>
         </Tabs.List>
         <Tabs.Panel value="shipped" pt="md">
