@@ -35,7 +35,7 @@ def command_lines(text: str) -> list[str]:
 
 def fault_of(line: str) -> str | None:
     """What does not exist in a command line, or None."""
-    words = shlex.split(line.replace("...", ""), comments=True)
+    words = shlex.split(line.replace("...", "").partition(" > ")[0], comments=True)
     command: Any = PROGRAMS[words[0]]
     context = command.context_class(command, info_name=words[0])
     rest = words[1:]
@@ -57,7 +57,19 @@ def fault_of(line: str) -> str | None:
         option = word.partition("=")[0]
         if re.fullmatch(r"--?[a-z][\w-]*", option) and option not in known:
             return f"{command.name}: no option {option}"
-    return None
+    if any("[" in word or word in ("...", "|") for word in rest):
+        return None  # a synopsis, not a command
+    *_, extra = _parsed(command, context, rest)
+    return f"{command.name}: too many arguments: {' '.join(extra)}" if extra else None
+
+
+def _parsed(command: Any, context: Any, words: list[str]) -> tuple[Any, list[str]]:
+    """Options as given, and the words that no argument of the command takes."""
+    if hasattr(command, "get_command"):
+        return {}, []
+    context.resilient_parsing = True
+    options, left, _ = command.make_parser(context).parse_args(list(words))
+    return options, left
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(REPOSITORY)))
@@ -76,4 +88,5 @@ def test_commands_of_page_exist(page: Path) -> None:
 def test_a_wrong_option_is_found() -> None:
     assert fault_of("analysis anova x.csv --witihn a") == "anova: no option --witihn"
     assert fault_of("stimuli blink x.csv") == "no command 'blink'"
+    assert fault_of("server workspace member vision anna editor") == "member: too many arguments: editor"
     assert len([line for page in PAGES for line in command_lines(page.read_text(encoding="utf-8"))]) > 150
