@@ -10,11 +10,11 @@ PRIVATE = 0o077
 COMMANDS = {
     "run": (
         "server.cli_run",
-        "Serve participants and experimenters until stopped (Ctrl-C); what is under way is finished first.",
+        "Serve participants and experimenters until stopped (Ctrl-C); running requests are finished first.",
     ),
     "export": (
         "server.exports.cli",
-        "Write a study's data: as csv, the columns of experiments/columns and one column a factor.",
+        "Export a study's data, for example as CSV with one column per factor.",
     ),
     "capsule": (
         "server.exports.cli",
@@ -22,47 +22,47 @@ COMMANDS = {
     ),
     "seal": (
         "server.exports.cli",
-        "Seal design, exclusions, analysis plan and power before the first participant; or write the seal "
+        "Seal design, exclusions, analysis plan and power before the first participant, or write the seal "
         "again.",
     ),
     "methods": (
         "server.exports.cli",
-        "Write a study's Methods paragraph; each number is followed by the query that gives it.",
+        "Write a study's Methods paragraph with the query behind each number.",
     ),
     "simulate": (
         "server.rehearsals.cli",
-        "Let simulated participants take part through the HTTP API; their runs have the origin `simulated`.",
+        "Run simulated participants through the HTTP API; their runs have the origin `simulated`.",
     ),
     "retention": (
         "server.privacy.cli",
-        "Erase what is due by the retention that studies declare; the server does so each hour.",
+        "Erase data that are due by the retention rules of studies; the server does so every hour.",
     ),
     "doctor": (
         "server.operations.cli",
-        "Check the installation and say what to fix; exit code 1 where something failed.",
+        "Check the installation and report what to fix; exit code 1 if a check failed.",
     ),
     "backup": (
         "server.operations.cli_backups",
-        "Write database, clips and secret key of this moment into one file, while the server goes on.",
+        "Back up database, clips and secret key in one file while the server runs.",
     ),
     "backup-key": (
         "server.operations.cli_backups",
-        "Make a pair of keys for encrypted backups, and print the public one.",
+        "Create a key pair for encrypted backups, and print the public key.",
     ),
     "restore": (
         "server.operations.cli_backups",
-        "Bring a backup back into an empty database (SQLite or PostgreSQL) and clip store.",
+        "Restore a backup into an empty database (SQLite or PostgreSQL) and clip store.",
     ),
     "drill": (
         "server.operations.cli_backups",
-        "Bring the newest backup back beside the data, examine it and remove it; exit code 1 where it "
-        "failed.",
+        "Test the newest backup: restore it to a temporary place, check it and remove it; exit code 1 on "
+        "failure.",
     ),
     "database": ("server.operations.cli", "The database's tables."),
     "study": ("server.studies.cli", "Studies on this server."),
     "link": ("server.studies.cli", "Links for participants."),
     "admin": ("server.accounts.cli", "Accounts of experimenters."),
-    "account": ("server.accounts.cli", "Let somebody in again who lost a password or a phone."),
+    "account": ("server.accounts.cli", "Restore access for someone who lost a password or a phone."),
     "audit": ("server.accounts.audit_cli", "The audit log: verify its chain of hashes, export it."),
     "workspace": ("server.accounts.workspace_cli", "Workspaces: laboratories that share this server."),
     "person": ("server.privacy.cli", "One participant: subject access and erasure."),
@@ -71,7 +71,7 @@ COMMANDS = {
 
 app = lazy_app(
     "server",
-    "Run rating studies: serve participants and experimenters, manage studies, take out the data.",
+    "Run rating studies: serve participants and experimenters, manage studies, export data.",
     COMMANDS,
 )
 

@@ -35,17 +35,17 @@ def migrated_services(settings: Settings | None = None, *, stored: bool = False)
         revision = _stored_revision(services.database)
         if revision is None and stored:
             address = services.database.url.render_as_string(hide_password=True)
-            raise _no_database(address, "nothing in the database")
+            raise _no_database(address, "an empty database at")
         if revision is not None and not known_revision(revision):
             raise InputError(
-                f"the database has revision {revision}, which this program does not know; "
-                "it was written by a newer version, install that one"
+                f"the database has revision {revision}, which a newer version of this program wrote; "
+                f"install that version"
             )
         if revision is None and services.settings.has_short_key and not services.settings.is_local:
             raise InputError(
                 f"PALPEBRA_SECRET_KEY: expected at least {KEY_LENGTH_MIN} random characters for a new "
-                f"database, got {len(services.settings.secret_key)}; leave it out to have one made in the "
-                "data folder"
+                f"database, got {len(services.settings.secret_key)}; leave it empty to generate one in the "
+                f"data folder"
             )
         upgrade(services.database)
         yield services
@@ -74,8 +74,8 @@ def stored_services(settings: Settings | None = None) -> Iterator[Services]:
 
 def _no_database(address: str, what: str) -> InputError:
     return InputError(
-        f"there is {what} {address}; run this in the folder where the server runs, or name its data by "
-        "PALPEBRA_DATA_FOLDER or DATABASE_URL"
+        f"there is {what} {address}; run this in the folder of the server, or set PALPEBRA_DATA_FOLDER or "
+        f"DATABASE_URL"
     )
 
 
@@ -106,12 +106,12 @@ def refusal(error: Exception) -> str | None:
     if isinstance(error, ValidationError) and error.title == Settings.__name__:
         return "; ".join(map(_setting, error.errors()))
     if isinstance(error, PoolTimeout):
-        return "no connection to the database came free: try again, or raise PALPEBRA_DATABASE_POOL"
+        return "no database connection became available: try again, or increase PALPEBRA_DATABASE_POOL"
     if is_busy(error):
-        return "another program keeps the database locked: end it, or try again when it is done"
+        return "another program has locked the database: stop it, or try again later"
     if isinstance(error, DBAPIError) and is_away(error):
-        said = str(error.orig).strip().splitlines() or ["it does not answer"]
-        return f"the database is away ({said[0]}); see DATABASE_URL, then run: server doctor"
+        said = str(error.orig).strip().splitlines() or ["it does not respond"]
+        return f"the database is not reachable ({said[0]}); check DATABASE_URL, then run: server doctor"
     return None
 
 

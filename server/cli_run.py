@@ -43,13 +43,13 @@ def run(
     host: Annotated[str, typer.Option(help="Address to listen on; 0.0.0.0 for all.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=1, max=65535, help="Port to listen on.")] = 8000,
     workers: Annotated[
-        int, typer.Option(min=1, max=64, help="Processes; more than one wants PostgreSQL.")
+        int, typer.Option(min=1, max=64, help="Number of processes; more than one requires PostgreSQL.")
     ] = 1,
     welcome: Annotated[
         bool, typer.Option(help="Print the links of open studies and of the admin site.")
     ] = False,
 ) -> None:
-    """Serve participants and experimenters until stopped (Ctrl-C); what is under way is finished first.
+    """Serve participants and experimenters until stopped (Ctrl-C); running requests are finished first.
 
     Settings come from the environment, see docs/reference/settings.md. Behind https set PALPEBRA_PUBLIC_URL.
     Example: server run --host 0.0.0.0 --port 8000 --workers 2
@@ -106,10 +106,12 @@ def _check_free(host: str, port: int) -> None:
         except OSError as error:
             reason = error.strerror or str(error)
             if isinstance(error, socket.gaierror):
-                raise InputError(f"cannot listen on '{host}' ({reason}); choose another by --host") from error
+                raise InputError(
+                    f"cannot listen on '{host}' ({reason}); choose another address with --host"
+                ) from error
             raise InputError(
                 f"cannot listen on {host}:{port} ({reason}); "
-                "choose another by --port (with make: PORT=8001 make run)"
+                "choose another port with --port (with make: PORT=8001 make run)"
             ) from error
 
 
@@ -125,4 +127,4 @@ def _welcome(database: Database, settings: Settings) -> None:
     out.print(f"admin site: {settings.public_url}/admin/")
     if first:
         _, token = invitations.invite(database, "owner", "first owner", None)
-        out.print(f"make the first account (once): {invitation_url(settings.public_url, token)}")
+        out.print(f"create the first account (link works once): {invitation_url(settings.public_url, token)}")

@@ -30,7 +30,7 @@ from server.models import ROLES, Account, AdminSession, Role
 
 COOKIE = "palpebra_session"
 _SEEN_EVERY = timedelta(minutes=1)
-_NO_SUCH = "This API token is unknown, revoked or expired; make a new one."
+_NO_SUCH = "This API token is unknown, revoked or expired. Create a new one."
 
 
 def check_origin(request: Request, settings: Settings) -> None:
@@ -50,13 +50,13 @@ def check_origin(request: Request, settings: Settings) -> None:
             return
         if site is None:
             raise NotAllowed(
-                "This change is refused: neither Origin nor Sec-Fetch-Site says where it comes from. A "
-                "program needs an API token instead of the cookie."
+                "This change was refused: the request has neither an Origin nor a Sec-Fetch-Site header. "
+                "Programs must use an API token instead of the cookie."
             )
-        raise NotAllowed("This change was asked for by another site and is refused.")
+        raise NotAllowed("This change was requested by another site and was refused.")
     own = {settings.public_url, f"{request.url.scheme}://{request.headers.get('host', '')}"}
     if _address_of(origin) not in own:
-        raise NotAllowed(f"This change was asked for by another site ({origin[:100]}) and is refused.")
+        raise NotAllowed(f"This change was requested by another site ({origin[:100]}) and was refused.")
 
 
 def _address_of(origin: str) -> str:
@@ -183,17 +183,17 @@ class _Access:
         identity = identify(request, database, settings)
         if identity.held_back and self.role == "owner":
             raise SecondFactorNeeded(
-                "On this server owners need a second factor: set one up under My account, or sign in again "
+                "Owners need a second factor on this server. Set one up under My account, or sign in again "
                 "with it."
             )
         if ROLES.index(identity.role) < ROLES.index(self.role):
-            raise NotAllowed(f"This needs the role {self.role} on this server; yours is {identity.role}.")
+            raise NotAllowed(f"This requires the role {self.role} on this server; yours is {identity.role}.")
         if identity.scopes is not None:
             if not self.scopes:
-                raise NotAllowed("This cannot be done with an API token; sign in in a browser.")
+                raise NotAllowed("This cannot be done with an API token. Sign in with a browser.")
             if identity.scopes.isdisjoint(self.scopes):
                 scopes = " or ".join(f"'{scope}'" for scope in self.scopes)
-                raise NotAllowed(f"This needs a token with the scope {scopes}.")
+                raise NotAllowed(f"This requires a token with the scope {scopes}.")
         if self.fresh and identity.scopes is None:
             must_be_fresh(identity)
         return identity

@@ -107,7 +107,9 @@ def forward(address: str, entries: list[dict[str, object]]) -> None:
         try:
             waiting.put_nowait(json.dumps(kept))
         except queue.Full:
-            log.warning("the audit log could not be sent to syslog: %d entries wait already", WAITING_MAX)
+            log.warning(
+                "the audit log could not be sent to syslog: %d entries are already waiting", WAITING_MAX
+            )
             return
 
 
@@ -157,7 +159,7 @@ class _Stream(_Handler):
             try:
                 self._send(line)
             except OSError:
-                log.info("the connection to syslog was lost; the same message is sent over a new one")
+                log.info("the connection to syslog was lost; the message is sent again over a new connection")
             else:
                 return
         self._hang_up()
@@ -331,7 +333,7 @@ async def note_refusal(
         try:
             await run_in_threadpool(_write_refusal, request, refusal, actor, database, records)
         except (SQLAlchemyError, OSError, ValueError) as error:
-            log.error("a refusal could not be put into the audit log: %s", describe_error(error))
+            log.error("a refusal could not be written to the audit log: %s", describe_error(error))
 
 
 def _write_refusal(

@@ -47,8 +47,10 @@ def verify_chain(
     if chain.broken is not None:
         raise InputError(f"the audit log is broken: {chain.broken}")
     notes = [f"{chain.position} entries in the chain"]
-    notes += [f"details of {chain.erased} erased with their persons"] if chain.erased else []
-    notes += [f"{chain.before} rows from before there was a chain"] if chain.before else []
+    notes += (
+        [f"details of {chain.erased} entries erased with the data of their persons"] if chain.erased else []
+    )
+    notes += [f"{chain.before} rows from before the chain existed"] if chain.before else []
     out.print(f"whole: {', '.join(notes)}\nhead {chain.position}:{chain.hash}")
 
 
@@ -64,7 +66,7 @@ def _head(text: str) -> tuple[int, str]:
 @app.command("export")
 def export(
     out_file: Annotated[Path, typer.Option("--out", help="File to write; - for the terminal.")] = Path("-"),
-    after: Annotated[int, typer.Option(min=0, help="Leave out entries up to this position.")] = 0,
+    after: Annotated[int, typer.Option(min=0, help="Omit entries up to this position.")] = 0,
 ) -> None:
     """Write the entries as JSON lines; the last line says that it is complete, and the chain's head.
 

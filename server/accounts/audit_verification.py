@@ -61,11 +61,11 @@ def verify(
         erased += entry.details_salt is None
         seen = seen or kept == (position, previous)
     if broken is None and not seen and kept is not None:
-        broken = f"entry {kept[0]}, whose hash was kept, is not in the chain: it was changed or cut off"
+        broken = f"entry {kept[0]}, whose hash was saved, is not in the chain: it was changed or removed"
     first = repository.first_id(session)
     older, stray = repository.unchained_entries(session, first)
     if broken is None and stray is not None:
-        broken = f"row {stray} stands between the chain's rows without being in it: it was put in"
+        broken = f"row {stray} is between the rows of the chain but not part of it: it was inserted"
     return Verdict(position, previous, erased, older, broken)
 
 
@@ -91,15 +91,15 @@ class _Keys:
 def _problem(key: bytes, last: int, previous: str, entry: AuditEntry, erased_runs: set[str]) -> str | None:
     named = f"entry {entry.position} (row {entry.id}, {entry.at:%Y-%m-%d %H:%M:%S}, {entry.action})"
     if entry.position != last + 1:
-        return f"entry {last + 1} is missing; the next there is is {named}"
+        return f"entry {last + 1} is missing; the next existing entry is {named}"
     digest = entry.details_digest or ""
     if entry.chain_hash != audit.entry_hash(key, previous, chain_entry(entry), digest):
-        return f"{named} does not fit the chain: it, or the key of this server, was changed"
+        return f"{named} does not match the chain: the entry or the key of this server was changed"
     if entry.details_salt is not None:
         fits = digest == audit.details_digest(key, entry.details_salt, entry.details)
         return None if fits else f"{named}: its details were changed"
     if entry.target_kind != "run" or entry.target not in erased_runs:
-        return f"{named}: its details were taken away, and no erasure of a person says why"
+        return f"{named}: its details were removed, and no erasure of a person explains it"
     return None
 
 

@@ -17,7 +17,7 @@ from server.core.settings import Settings
 from server.models import ROLES
 
 app = command_group("Accounts of experimenters.")
-account_app = command_group("Let somebody in again who lost a password or a phone.")
+account_app = command_group("Restore access for someone who lost a password or a phone.")
 
 
 def register(parent: typer.Typer) -> None:
@@ -32,9 +32,7 @@ def create(
     role: Annotated[str, typer.Option(help="owner, experimenter or viewer.")] = "owner",
     password: Annotated[
         str,
-        typer.Option(
-            prompt=True, hide_input=True, confirmation_prompt=True, help="Asked for where not given."
-        ),
+        typer.Option(prompt=True, hide_input=True, confirmation_prompt=True, help="Prompted for if omitted."),
     ] = "",
 ) -> None:
     """Create an account.
@@ -53,7 +51,7 @@ def create(
 @app.command("link")
 def link(
     role: Annotated[str, typer.Option(help="owner, experimenter or viewer.")] = "owner",
-    label: Annotated[str, typer.Option(help="Whom it is for.")] = "",
+    label: Annotated[str, typer.Option(help="Name of the person to invite.")] = "",
 ) -> None:
     """Print a one-time link with which somebody makes an account of her own.
 
@@ -69,7 +67,7 @@ def link(
 @account_app.command("reset-password")
 def reset_password(
     name: Annotated[str, typer.Argument(help="Name of the account.")],
-    password: Annotated[str, typer.Option(help="Asked for where not given.")] = "",
+    password: Annotated[str, typer.Option(help="Prompted for if omitted.")] = "",
 ) -> None:
     """Give an account a new password; its sessions, API tokens and logins by providers end.
 
@@ -86,7 +84,7 @@ def reset_password(
         with services.database.write() as session:
             account_id, logins = service.reset_password(session, name, fresh)
         letters.send_notice(services.database, services.settings, account_id, letters.PASSWORD_RESET)
-    out.print(f"the password of '{name}' is changed; its sessions and API tokens have ended")
+    out.print(f"changed the password of '{name}'; all sessions and API tokens of the account have ended")
     if logins:
         out.print(logins)
 
@@ -102,4 +100,4 @@ def reset_second_factor(name: Annotated[str, typer.Argument(help="Name of the ac
         with services.database.write() as session:
             account_id = service.reset_second_factor(session, name)
         letters.send_notice(services.database, services.settings, account_id, letters.SECOND_FACTOR_REMOVED)
-    out.print(f"the second factor of '{name}' is off; its sessions and API tokens have ended")
+    out.print(f"removed the second factor of '{name}'; all sessions and API tokens of the account have ended")

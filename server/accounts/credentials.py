@@ -72,11 +72,13 @@ def check_strength(password: str, name: str) -> None:
     if not SHORTEST <= len(password) <= LONGEST:
         raise WeakPassword(f"Expected a password of {SHORTEST} to {LONGEST} characters, got {len(password)}.")
     if name.casefold() in password.casefold() and len(password) - len(name) < SHORTEST:
-        raise WeakPassword("That password is too easy to guess: it is little more than your name.")
+        raise WeakPassword("This password is too easy to guess, because it resembles your name.")
     judged = zxcvbn(password[:JUDGED], user_inputs=[name, *name.split(), "palpebra"], max_length=JUDGED)
     if judged["score"] < LEAST_SCORE:
-        said = judged["feedback"]["warning"] or "a few uncommon words in a row are easy to keep in mind"
-        raise WeakPassword(f"That password is too easy to guess: {said.rstrip('.')}.")
+        said = judged["feedback"]["warning"] or (
+            "use a few uncommon words in a row, which are easy to remember"
+        )
+        raise WeakPassword(f"This password is too easy to guess: {said.rstrip('.')}.")
 
 
 def hash_password(password: str, name: str) -> str:
@@ -126,7 +128,7 @@ class PasswordWork:
         """Do `work` in its turn; PasswordsBusy where too many wait. The event loop goes on meanwhile."""
         if not self._places.acquire(blocking=False):
             raise PasswordsBusy(
-                "Too many people are signing in at this moment; please try again in 5 s.",
+                "Too many people are signing in right now. Please try again in 5 s.",
                 headers={"retry-after": "5"},
             )
         try:

@@ -196,7 +196,7 @@ async def attempt(
         if fits and not device:
             # Whoever knows the password could else try codes from everywhere.
             await run_in_threadpool(throttle.codes.failed, body.name.casefold())
-    raise failure or signing_in.WrongCredentials("Name or password are wrong.")
+    raise failure or signing_in.WrongCredentials("Name or password is wrong.")
 
 
 def address_of(request: Request) -> str:

@@ -94,4 +94,6 @@ def must_be_fresh(identity: Identity) -> None:
     """SignInAgain where the browser's session began longer ago than `FRESH_FOR`."""
     if identity.signed_in_at is None or now() - identity.signed_in_at > FRESH_FOR:
         minutes = FRESH_FOR // timedelta(minutes=1)
-        raise SignInAgain(f"For this, please sign in again: you did so more than {minutes} minutes ago.")
+        raise SignInAgain(
+            f"Please sign in again for this action: your last sign-in was more than {minutes} minutes ago."
+        )

@@ -23,7 +23,7 @@ from server.models import DEFAULT_WORKSPACE, Account, Invitation, Role
 # Invitations: one-time links by which an owner lets somebody have an account.
 
 INVITATION_DAYS = 7
-INVITATION_USED = Conflict("This invitation was used or has expired; ask for a new one.")
+INVITATION_USED = Conflict("This invitation was already used or has expired. Ask for a new one.")
 
 
 def invite(
@@ -75,7 +75,7 @@ def find_invitation(session: Session, token: str) -> Invitation:
     """The invitation of a token; NotFound where it is unknown."""
     invitation = repository.invitation_by_token(session, hash_token(token))
     if invitation is None:
-        raise NotFound("This invitation is unknown; ask for a new one.")
+        raise NotFound("This invitation is unknown. Ask for a new one.")
     return invitation
 
 

@@ -1,4 +1,4 @@
-"""Mail by the SMTP server of the settings, and the letters about one's own account."""
+"""Email by the SMTP server of the settings, and notices about your account."""
 
 import logging
 import smtplib
@@ -27,9 +27,9 @@ def can_send(settings: Settings) -> bool:
 
 
 def send_mail(settings: Settings, to: str, subject: str, text: str) -> bool:
-    """Hand one letter to the SMTP server; False, with the reason in the log, where it did not take it.
+    """Send an email through the SMTP server; return False and log the reason if it is refused.
 
-    Neither the log nor the caller tells to whom.
+    The recipient appears neither in the log nor in the return value.
     """
     try:
         letter = _letter(settings.mail_from, to, subject, text)
@@ -37,7 +37,7 @@ def send_mail(settings: Settings, to: str, subject: str, text: str) -> bool:
             server.send_message(letter, to_addrs=[to])
     except (OSError, smtplib.SMTPException, ValueError, MessageError) as error:
         code = getattr(error, "smtp_code", "")
-        log.error("a letter was not sent: %s %s", type(error).__name__, code)
+        log.error("an email was not sent: %s %s", type(error).__name__, code)
         return False
     return True
 
@@ -77,12 +77,12 @@ def _domain(address: str) -> str:
 
 @dataclass(frozen=True)
 class Notice:
-    """What happened to an account, as its letter says it.
+    """An event in an account, as described in its email.
 
     Attributes
     ----------
     subject : str
-        Head of the letter.
+        Subject of the email.
     sentence : str
         What happened; `{name}` stands for the account's name.
     """
@@ -93,35 +93,36 @@ class Notice:
 
 PASSWORD_CHANGED = Notice(
     "Your password for Palpebra was changed",
-    "The password of the account '{name}' was changed under My account; every other browser is signed out.",
+    "The password of the account '{name}' was changed under My account. All other browsers were signed out.",
 )
 PASSWORD_RESET = Notice(
     "Your password for Palpebra was reset",
-    "The password of the account '{name}' was reset by whoever runs the server.",
+    "The password of the account '{name}' was reset by an administrator of the server.",
 )
 SECOND_FACTOR_ADDED = Notice(
     "A second factor was added to your Palpebra account",
-    "The account '{name}' is now signed in to with a code of an authenticator app.",
+    "Signing in to the account '{name}' now requires a code from an authenticator app.",
 )
 SECOND_FACTOR_REMOVED = Notice(
     "The second factor of your Palpebra account was removed",
-    "The account '{name}' is signed in to without a code from now on.",
+    "Signing in to the account '{name}' no longer requires a code.",
 )
 RECOVERY_CODE_USED = Notice(
     "A recovery code of your Palpebra account was used",
-    "Somebody signed in to the account '{name}' with a recovery code, not with the authenticator app.",
+    "Someone signed in to the account '{name}' with a recovery code instead of the authenticator app.",
 )
 LOGIN_ADDED = Notice(
     "A login was added to your Palpebra account",
-    "The account '{name}' can now be signed in to by another login of a provider; My account lists them.",
+    "The account '{name}' can now be accessed with an additional provider login. My account lists all "
+    "logins.",
 )
 LOGIN_REMOVED = Notice(
     "A login was removed from your Palpebra account",
-    "A login of a provider no longer opens the account '{name}'; My account lists those that do.",
+    "A provider login was removed from the account '{name}'. My account lists the remaining logins.",
 )
 NEW_BROWSER = Notice(
-    "Your Palpebra account was signed in to from a new browser",
-    "Somebody signed in to the account '{name}' in a browser that had not been signed in to it before.",
+    "New browser signed in to your Palpebra account",
+    "Someone signed in to the account '{name}' with a new browser.",
 )
 
 
@@ -146,8 +147,8 @@ def send_notice(database: Database, settings: Settings, account_id: int, notice:
     if address is None:
         return
     text = (
-        f"{notice.sentence.format(name=name)} This is the server {settings.public_url}.\n\n"
-        "If it was you, there is nothing to do. If it was not, sign in, choose a new password under My "
-        "account, which signs every other browser out, and tell an owner of the server.\n"
+        f"{notice.sentence.format(name=name)} The server is {settings.public_url}.\n\n"
+        "If this was you, you do not need to do anything. If not, sign in and choose a new password under "
+        "My account. This signs out all other browsers. Then inform an owner of the server.\n"
     )
     send_mail(settings, address, notice.subject, text)

@@ -131,14 +131,14 @@ async def come_back(
     try:
         provider_sign_in.provider_of(services.settings, provider)
         if not browser or not state:
-            raise NotRecognised("This sign-in was begun in another browser.")
+            raise NotRecognised("This sign-in was started in another browser. Start it again here.")
         await run_in_threadpool(services.sign_ins.come_back, address_of(request))
         attempt = await run_in_threadpool(
             provider_sign_in.take_attempt, services.database, provider, state, browser
         )
         page = "/account" if attempt.purpose == "link" else page
         if not code:
-            raise NotRecognised("The service to sign in with said no.")
+            raise NotRecognised("The sign-in service refused the sign-in.")
         secrets = provider_sign_in.secrets_of(services.settings.key, browser, state)
         whom = await services.providers.of(provider).recognise(code, iss, secrets)
         finished = await run_in_threadpool(

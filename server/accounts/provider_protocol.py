@@ -52,19 +52,19 @@ class LogoutRefused(ApiError):
 def provider_away(why: str) -> ProviderAway:
     """A refusal to raise where the provider does not answer as it should."""
     log.warning("a provider of sign-in cannot be used: %s", why)
-    return ProviderAway("The service to sign in with does not answer as it should; please try again later.")
+    return ProviderAway("The sign-in service does not respond correctly. Please try again later.")
 
 
 def sign_in_refused(why: str) -> NotRecognised:
     """A refusal to raise where what was answered does not hold."""
     log.warning("a sign-in by a provider is refused: %s", why)
-    return NotRecognised("The sign-in could not be confirmed; please begin it again.")
+    return NotRecognised("The sign-in could not be confirmed. Please start it again.")
 
 
 def no_logout(why: str) -> LogoutRefused:
     """A refusal to raise where a logout token does not hold."""
     log.warning("a logout token of a provider is refused: %s", why)
-    return LogoutRefused("This is no logout token that holds; the server's log says why.")
+    return LogoutRefused("This logout token is not valid; see the server log for the reason.")
 
 
 # What a provider says of itself (OpenID Connect Discovery 1.0, 3): the part that is used here.
@@ -72,7 +72,7 @@ def no_logout(why: str) -> LogoutRefused:
 
 def _safe(value: str) -> str:
     if not is_safe(value):
-        raise ValueError("not an address by https")
+        raise ValueError("not an https URL")
     return value
 
 
@@ -145,7 +145,7 @@ class BoundedTransport(httpx2.AsyncBaseTransport):
                 await answer.aclose()
         # What was not asked for could grow without bound when it is unpacked.
         if answer.headers.get("content-encoding", "identity") != "identity":
-            raise httpx2.DecodingError("the answer is compressed, which was not asked for", request=request)
+            raise httpx2.DecodingError("the response is compressed, which was not requested", request=request)
         return httpx2.Response(answer.status_code, headers=answer.headers, content=content, request=request)
 
 
@@ -154,7 +154,7 @@ async def _content(answer: httpx2.Response, request: httpx2.Request) -> bytes:
     async for piece in answer.aiter_raw():
         content += piece
         if len(content) > BYTES_MAX:
-            raise httpx2.ReadError(f"the answer has more than {BYTES_MAX} bytes", request=request)
+            raise httpx2.ReadError(f"the response has more than {BYTES_MAX} bytes", request=request)
     return bytes(content)
 
 
@@ -279,7 +279,7 @@ class ProviderClient:
         metadata = await self._described()
         announced = metadata.authorization_response_iss_parameter_supported
         if issuer != self.provider.issuer and (issuer is not None or announced):
-            raise sign_in_refused("the answer came from another issuer")
+            raise sign_in_refused("the response came from another issuer")
         async with self._client(metadata) as client:
             token = await self._token(client, metadata, code, secrets.verifier)
             claims = await self._claims(metadata, token, secrets.nonce)
@@ -303,10 +303,10 @@ class ProviderClient:
             decoded = await self._decoded(metadata, logout_token, _registry(metadata))
             JWTClaims(decoded.claims, decoded.header, options).validate(leeway=LEEWAY_S)
         except (JoseError, ValueError, TypeError) as error:
-            raise no_logout(f"it does not hold: {type(error).__name__} {error}") from error
+            raise no_logout(f"it is not valid: {type(error).__name__} {error}") from error
         claims, events = decoded.claims, decoded.claims.get("events")
         if not isinstance(events, dict) or LOGOUT_EVENT not in events or "nonce" in claims:
-            raise no_logout("it says nothing of signing out, or has a nonce")
+            raise no_logout("it has no logout event, or it has a nonce")
         if claims["iat"] < time.time() - LOGOUT_TOKEN_S:
             raise no_logout("it is too old")
         return ProviderSignOut(self.provider.issuer, str(claims["sub"]), str(claims["jti"]))
@@ -378,7 +378,7 @@ class ProviderClient:
             claims = CodeIDToken(decoded.claims, decoded.header, options, params)
             claims.validate(leeway=LEEWAY_S)
         except (JoseError, ValueError, TypeError) as error:
-            raise sign_in_refused(f"its ID token does not hold: {type(error).__name__} {error}") from error
+            raise sign_in_refused(f"its ID token is not valid: {type(error).__name__} {error}") from error
         if not isinstance(claims["sub"], str) or not 1 <= len(claims["sub"]) <= 255:
             raise sign_in_refused("its ID token names no subject")
         return dict(claims)
@@ -416,7 +416,7 @@ class ProviderClient:
         except (AuthlibBaseError, *MALFORMED) as error:
             raise provider_away(f"userinfo: {type(error).__name__}") from error
         if not isinstance(told, dict) or told.get("sub") != claims["sub"]:
-            raise sign_in_refused("its user info is about somebody else")
+            raise sign_in_refused("its user info is about another person")
         return told
 
 

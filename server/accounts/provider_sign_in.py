@@ -61,7 +61,7 @@ def provider_of(settings: Settings, provider_id: str) -> Provider:
     """The provider declared under this name; NotFound where there is none."""
     provider = settings.oidc.get(provider_id)
     if provider is None:
-        raise NotFound("There is no such service to sign in with here.")
+        raise NotFound("This server has no such sign-in service.")
     return provider
 
 
@@ -132,9 +132,11 @@ def take_attempt(database: Database, provider_id: str, state: str, browser: str)
     with database.read() as session:
         attempt = repository.find_attempt(session, hash_token(state), hash_token(browser), "sign in", "link")
     if attempt is None or not _end_attempt(database, attempt):
-        raise NotRecognised("This sign-in was finished before, or begun in another browser.")
+        raise NotRecognised(
+            "This sign-in was already finished, or started in another browser. Start it again."
+        )
     if attempt.provider != provider_id:
-        raise NotRecognised("This sign-in was begun with another service.")
+        raise NotRecognised("This sign-in was started with another service. Start it again.")
     return attempt
 
 
@@ -165,7 +167,7 @@ def add_login(session: Session, provider_id: str, account: Account, whom: Provid
     try:
         session.flush()
     except IntegrityError as error:  # the same subject came twice at this very moment
-        raise Conflict("This login was just used elsewhere; please begin again.") from error
+        raise Conflict("This login was just used elsewhere. Please start again.") from error
     record(
         session, identity_of(account), "login added", "account", account.name,
         provider=provider_id, issuer=whom.issuer,
@@ -178,7 +180,7 @@ def link(database: Database, provider_id: str, attempt: LoginAttempt, whom: Prov
         accounts.hold(session, attempt.account_id or 0)
         asking = accounts.session_of(session, attempt.account_id or 0, attempt.session_id)
         if asking is None or asking.revoked_at or asking.expires_at <= now() or asking.account.disabled_at:
-            raise NotRecognised("The session that asked for this login has ended; please sign in again.")
+            raise NotRecognised("The session that requested this login has ended. Please sign in again.")
         login = repository.find_login(session, whom.issuer, whom.subject)
         if login is not None and login.account_id != asking.account_id:
             raise Conflict("This login belongs to another account of this server.")
@@ -202,7 +204,9 @@ def remove_login(database: Database, me: Identity, login_id: int) -> None:
         if login is None:
             raise NotFound("There is no such login.")
         if len(own) == 1 and account_of(session, me).password_hash == NO_PASSWORD:
-            raise Conflict("Without this login nobody could sign in to the account; it has no password.")
+            raise Conflict(
+                "This login cannot be removed: the account has no password, so nobody could sign in."
+            )
         record(session, me, "login removed", "account", me.name, provider=login.provider, issuer=login.issuer)
         session.delete(login)
         repository.end_sessions(session, me.account_id, login.provider, spared=me.session_id)
@@ -281,7 +285,9 @@ def bring_up_to_date(
         if before == after:
             continue
         if before == "owner" and workspaces.number_of_owners(session, workspace) == 1:
-            log.warning("'%s' stays the last owner of '%s', whatever its provider says", account.name, name)
+            log.warning(
+                "'%s' remains the last owner of '%s', despite the rules of its provider", account.name, name
+            )
             continue
         if after is None:
             workspaces.remove_member(session, workspace, account)
@@ -318,7 +324,9 @@ def new_account(
     given = roles_by_claims(provider, whom.claims)
     membership = next((Membership(held[name], role) for name, role in given.items() if name in held), None)
     if membership is None:
-        raise NotAdmitted("Nobody here belongs to this login yet: sign in by password and add it, or ask.")
+        raise NotAdmitted(
+            "This login is not linked to an account. Sign in with your password and add it, or ask an owner."
+        )
     name = _free_name(session, whom.claims, provider.label)
     account = add_account(session, name, NO_PASSWORD, "viewer", membership)
     add_login(session, provider_id, account, whom)
@@ -335,7 +343,7 @@ def account_by_invitation(
 ) -> Account:
     """The account that somebody makes by her invitation, without a password."""
     if login is not None:
-        raise Conflict("This login belongs to an account of this server already: sign in by it.")
+        raise Conflict("This login already belongs to an account of this server. Sign in with it.")
     invitation = accounts.invitation_by_token(session, invitation_hash)
     if invitation is not None:
         check_no_rule_decides(session, provider, invitation)
@@ -351,8 +359,8 @@ def check_no_rule_decides(session: Session, provider: Provider, invitation: Invi
     name = workspace.name if workspace else DEFAULT_WORKSPACE
     if any(rule.workspace == name for rule in provider.roles):
         raise Conflict(
-            f"{provider.label} says who belongs to the workspace '{name}', not an invitation: sign in with it"
-            " without the invitation, or make the account with a password."
+            f"{provider.label} manages the members of the workspace '{name}', so the invitation cannot be "
+            f"used with it. Sign in without the invitation, or create an account with a password."
         )
 
 
@@ -423,7 +431,7 @@ def finish_sign_in(
         else:
             account = new_account(session, provider_id, provider, whom, held)
         if account.disabled_at is not None:
-            raise NotAdmitted("This account is closed; ask an owner of this server.")
+            raise NotAdmitted("This account is closed. Ask an owner of this server.")
         if login is not None:
             login.last_used_at = now()
         bring_up_to_date(session, provider_id, account, roles_by_claims(provider, whom.claims), held)
@@ -453,7 +461,7 @@ def finish_with_code(
         sign_ins.codes.succeeded(name)
         return finished
     sign_ins.codes.failed(name)
-    raise failure or NotRecognised("This sign-in was finished before; please begin it again.")
+    raise failure or NotRecognised("This sign-in was already finished. Please start it again.")
 
 
 def _name_behind(session: Session, browser: str) -> str:
@@ -465,7 +473,7 @@ def _name_behind(session: Session, browser: str) -> str:
 
 
 def _no_code_asked() -> NotRecognised:
-    return NotRecognised("This sign-in has taken too long or asks for no code; please begin again.")
+    return NotRecognised("This sign-in took too long or does not need a code. Please start again.")
 
 
 def _finish_held(

@@ -36,7 +36,7 @@ async def _count_attempt(sign_ins: SignInThrottle, request: Request, what: str) 
 
 def _must_send(settings: Settings) -> None:
     if not letters.can_send(settings):
-        raise NotFound("This server sends no mail; ask an owner of it for a new password.")
+        raise NotFound("This server does not send email. Ask an owner of the server for a new password.")
 
 
 @router.post("/session/forgotten", status_code=202)

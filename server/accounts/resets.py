@@ -146,7 +146,7 @@ def ask_to_confirm(database: Database, settings: Settings, me: Identity, address
         if asking is None or asking.revoked_at is not None:
             raise NotSignedIn("Your session has ended; please sign in again.")
         if repository.open_links(session, account.id, "address") >= MAX_OPEN_LINKS:
-            raise Conflict(f"Several letters are under way already; try again in {LINK_MINUTES} minutes.")
+            raise Conflict(f"Several emails have already been sent. Try again in {LINK_MINUTES} minutes.")
         token = _store_link(session, account, "address", address)
         return _confirm_letter(settings.public_url, account, address, token)
 
@@ -181,7 +181,7 @@ def remove_address(database: Database, me: Identity) -> Letter | None:
 def _link(session: Session, token: str, purpose: LetterPurpose) -> MailedLink:
     link = repository.find_mailed_link(session, hash_token(token), purpose)
     if link is None or link.account.disabled_at is not None:
-        raise LinkOver("This link was used or is older than half an hour; ask for a new one.")
+        raise LinkOver("This link was already used or has expired (30 minutes). Request a new one.")
     return link
 
 
@@ -189,25 +189,26 @@ def _use_link(session: Session, token: str, purpose: LetterPurpose) -> Account:
     link = _link(session, token, purpose)
     account = link.account
     if not repository.use_link(session, link.id):
-        raise LinkOver("This link was used or is older than half an hour; ask for a new one.")
+        raise LinkOver("This link was already used or has expired (30 minutes). Request a new one.")
     return account
 
 
 def _reset_letter(public_url: str, account: Account, token: str) -> Letter:
     text = (
-        f"Somebody, probably you, asked for a new password for the account '{account.name}' on "
+        f"Someone, probably you, requested a new password for the account '{account.name}' on "
         f"{public_url}.\n\n"
-        f"Choose one here within {LINK_MINUTES} minutes:\n\n{public_url}/admin/letter/password#{token}\n\n"
-        "If it was not you, do nothing: the password stays as it is.\n"
+        f"To choose a new password, open this link within {LINK_MINUTES} "
+        f"minutes:\n\n{public_url}/admin/letter/password#{token}\n\n"
+        "If this was not you, you do not need to do anything. Your password stays the same.\n"
     )
     return Letter(account.email or "", "A new password for Palpebra", text)
 
 
 def _done_letter(account: Account, logins: str) -> Letter | None:
     text = (
-        f"The password of the account '{account.name}' was changed by a link sent to this address; "
-        f"everybody who was signed in to it is signed out, and its API tokens have ended. {logins}\n\n"
-        "If it was not you, tell an owner of the server.\n"
+        f"The password of the account '{account.name}' was changed with a link sent to this address. All "
+        f"browsers were signed out, and all API tokens have ended. {logins}\n\n"
+        "If this was not you, inform an owner of the server.\n"
     )
     return Letter(account.email, "Your password for Palpebra was changed", text) if account.email else None
 
@@ -216,18 +217,19 @@ def _moved_letter(account: Account, before: str | None) -> Letter | None:
     if before is None or before == account.email:
         return None
     text = (
-        f"This address is not that of the account '{account.name}' any more: somebody signed in to it, "
+        f"This is no longer the email address of the account '{account.name}'. Someone who was signed in, "
         f"probably you, {'removed it' if account.email is None else 'confirmed another one'}. "
-        "Links for a new password do not come here from now on.\n\n"
-        "If it was not you, tell an owner of the server at once.\n"
+        "Links for a new password are no longer sent here.\n\n"
+        "If this was not you, inform an owner of the server immediately.\n"
     )
-    return Letter(before, "Your address for Palpebra was changed", text)
+    return Letter(before, "Your email address for Palpebra was changed", text)
 
 
 def _confirm_letter(public_url: str, account: Account, address: str, token: str) -> Letter:
     text = (
-        f"This address was entered for the account '{account.name}' on {public_url}.\n\n"
-        f"Confirm it within {LINK_MINUTES} minutes:\n\n{public_url}/admin/letter/address#{token}\n\n"
-        "If it was not you, do nothing.\n"
+        f"This email address was entered for the account '{account.name}' on {public_url}.\n\n"
+        f"To confirm it, open this link within {LINK_MINUTES} "
+        f"minutes:\n\n{public_url}/admin/letter/address#{token}\n\n"
+        "If this was not you, you do not need to do anything.\n"
     )
-    return Letter(address, "Confirm your address for Palpebra", text)
+    return Letter(address, "Confirm your email address for Palpebra", text)

@@ -217,7 +217,7 @@ def _is_an_addr_spec(address: str) -> str:
     if len(address.rpartition("@")[0]) > 64:
         raise ValueError("expected at most 64 characters before the @")
     if "=?" in address:
-        raise ValueError("expected no '=?', with which encoded words of a letter's head begin")
+        raise ValueError("expected no '=?', which marks encoded words in email headers")
     return address
 
 
@@ -284,7 +284,7 @@ class WaysIn(BaseModel):
     """How one can sign in here, besides by name and password."""
 
     providers: list[ProviderOut]
-    resets_by_mail: bool = Field(description="Whether forgotten passwords are reset by mail.")
+    resets_by_mail: bool = Field(description="Whether forgotten passwords can be reset by email.")
 
 
 class BeginSignIn(RequestBody):
@@ -297,7 +297,7 @@ class BeginLink(RequestBody):
     """Who asks proves that she is the account's own person, not only somebody at her open browser."""
 
     proof: Annotated[str, StringConstraints(min_length=1, max_length=200)] = Field(
-        description="The present password; where the account has none, a code of its second factor."
+        description="The current password; for accounts without a password, a code of the second factor."
     )
 
 

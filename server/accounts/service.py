@@ -106,7 +106,7 @@ def add_account(
     membership : Membership, optional
         Where it belongs, and as what; the default workspace, in the same role, where None.
     """
-    taken = Conflict(f"There is already an account called '{name}'; choose another name.")
+    taken = Conflict(f"An account called '{name}' already exists. Choose another name.")
     if repository.account_named(session, name) is not None:
         raise taken
     account = Account(name=name, password_hash=password_hash, role=role)
@@ -146,9 +146,9 @@ def own_password(database: Database, identity: Identity) -> str:
 def must_fit(password: str, stored: str) -> None:
     """WrongCredentials where this is not the present password."""
     if not stored:
-        raise Conflict("This account has no password; an owner of the server can give it one.")
+        raise Conflict("This account has no password. An owner of the server can set one.")
     if not password_fits(password, stored):
-        raise WrongProof("The present password is wrong.")
+        raise WrongProof("The current password is wrong.")
 
 
 def own_code_failure(
@@ -161,7 +161,7 @@ def own_code_failure(
         session.refresh(account)
         if account.totp_confirmed_at is None:
             return Conflict(
-                "This account has neither password nor second factor; set up a second factor first."
+                "This account has neither a password nor a second factor. Set up a second factor first."
             )
         failure = second_factor_failure(settings, account, code)
         return WrongProof(failure.message) if isinstance(failure, WrongCredentials) else failure
@@ -210,14 +210,14 @@ def renew(session: Session, actor: Identity | None, account: Account, fresh: str
     if not logins:
         return ""
     if not had_password:
-        return f"It is signed in to by {issuers} as before; see under My account that the logins are yours."
+        return f"Logins from {issuers} still work; check under My account that they are yours."
     for login in logins:
         record(
             session, actor, "login removed", "account", account.name,
             provider=login.provider, issuer=login.issuer,
         )  # fmt: skip
         session.delete(login)
-    return f"Its logins by {issuers} are removed; add your own again under My account."
+    return f"Logins from {issuers} were removed; add yours again under My account."
 
 
 def reset_second_factor(session: Session, name: str) -> int:
@@ -242,7 +242,7 @@ def start_second_factor(database: Database, settings: Settings, identity: Identi
     with database.write() as session:
         account = account_of(session, identity)
         if account.totp_confirmed_at is not None:
-            raise Conflict("A second factor is set up already; remove it first.")
+            raise Conflict("A second factor is already set up. Remove it first.")
         account.totp_secret = credentials.new_seed()
         return credentials.secret_of(settings.key, account.totp_secret)
 
@@ -253,11 +253,11 @@ def confirm_second_factor(database: Database, settings: Settings, identity: Iden
     with database.write() as session:
         account = account_of(session, identity)
         if account.totp_secret is None or account.totp_confirmed_at is not None:
-            raise Conflict("There is no second factor to confirm; start its set-up first.")
+            raise Conflict("There is no second factor to confirm. Start the setup first.")
         secret = credentials.secret_of(settings.key, account.totp_secret)
         step = credentials.accepted_step(secret, code, None)
         if step is None:
-            raise WrongCredentials("That code does not fit; check the clock of your phone and try again.")
+            raise WrongCredentials("This code is not valid. Check the clock of your phone and try again.")
         account.totp_confirmed_at, account.totp_last_step = now(), step
         if (current := repository.session_of(session, identity.account_id, identity.session_id)) is not None:
             current.second_factor = True
@@ -297,7 +297,7 @@ def change_account(
             account.disabled_at = now() if disabled else None
         session.flush()
         if not repository.owners_left(session):
-            raise Conflict("One owner must remain; make another account an owner first.")
+            raise Conflict("At least one owner must remain. Make another account an owner first.")
         if account.disabled_at is not None:
             end_everything(session, account.id)
         record(

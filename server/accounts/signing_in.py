@@ -73,7 +73,7 @@ def open_session(
     with database.write() as session:
         account = repository.account_named(session, name, lock=True)
         if account is None or account.disabled_at is not None or account.password_hash != checked.stored:
-            failure: ApiError | None = WrongCredentials("Name or password are wrong.")
+            failure: ApiError | None = WrongCredentials("Name or password is wrong.")
         else:
             failure = second_factor_failure(settings, account, code)
         if account is not None and failure is None:
@@ -101,7 +101,7 @@ def second_factor_failure(settings: Settings, account: Account, code: str | None
     if account.totp_secret is None or account.totp_confirmed_at is None:
         return None
     if not code:
-        return SecondFactorRequired("Please enter the code of your authenticator app, or a recovery code.")
+        return SecondFactorRequired("Please enter the code from your authenticator app, or a recovery code.")
     secret = credentials.secret_of(settings.key, account.totp_secret)
     step = credentials.accepted_step(secret, code, account.totp_last_step)
     if step is not None:
@@ -111,7 +111,7 @@ def second_factor_failure(settings: Settings, account: Account, code: str | None
     if hashed in account.recovery_code_hashes:
         account.recovery_code_hashes = [kept for kept in account.recovery_code_hashes if kept != hashed]
         return None
-    return WrongCredentials("That code is wrong or was used before.")
+    return WrongCredentials("This code is wrong or was already used.")
 
 
 def begin_session(

@@ -76,7 +76,7 @@ class BackOff:
         if left > 0:
             wait = max(1, round(left))
             raise TooManyFailures(
-                f"Too many wrong attempts; please try again in {wait} s.", headers={"retry-after": str(wait)}
+                f"Too many failed attempts. Please try again in {wait} s.", headers={"retry-after": str(wait)}
             )
 
     def _left(self, number: int, ago_s: float) -> float:

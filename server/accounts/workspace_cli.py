@@ -42,14 +42,14 @@ def list_workspaces() -> None:
             needed = "required" if one.second_factor_required else ""
             table.add_row(one.name, one.title, str(counts.get(one.id, (0, 0))[1]), needed, people)
         out.print(
-            table if table.row_count else "no workspaces yet; the first account or study makes 'default'"
+            table if table.row_count else "no workspaces yet; the first account or study creates 'default'"
         )
 
 
 @app.command("create")
 def create(
-    name: Annotated[str, typer.Argument(help="Small letters, digits and hyphens.")],
-    title: Annotated[str, typer.Option(help="What people read; the name where not given.")] = "",
+    name: Annotated[str, typer.Argument(help="Lowercase letters, digits and hyphens.")],
+    title: Annotated[str, typer.Option(help="Title that people see; by default, the name.")] = "",
 ) -> None:
     """Make a workspace.
 
@@ -58,10 +58,10 @@ def create(
     try:
         TypeAdapter(WorkspaceName).validate_python(name)
     except ValidationError as error:
-        raise InputError(f"expected small letters, digits and hyphens, got '{name}'") from error
+        raise InputError(f"expected lowercase letters, digits and hyphens, got '{name}'") from error
     with migrated_services() as services, services.database.write() as session:
         workspaces.create(session, name, title or name, OPERATOR)
-    out.print(f"workspace {name}: made; next: server workspace member {name} ACCOUNT --role owner")
+    out.print(f"workspace {name}: created; next: server workspace member {name} ACCOUNT --role owner")
 
 
 @app.command("member")
@@ -69,7 +69,7 @@ def set_member(
     workspace: WorkspaceArgument,
     account: AccountArgument,
     role: Annotated[str, typer.Option(help="viewer, experimenter or owner.")] = "experimenter",
-    remove: Annotated[bool, typer.Option("--remove", help="Take the account out.")] = False,
+    remove: Annotated[bool, typer.Option("--remove", help="Remove the account from the workspace.")] = False,
 ) -> None:
     """Take an account into a workspace, change its role there, or take it out.
 
@@ -79,14 +79,14 @@ def set_member(
     with stored_services() as services, services.database.write() as session:
         known = workspaces.managed_workspace(session, workspace, OPERATOR)
         workspaces.set_member(session, known, account, new_role, OPERATOR)
-    out.print(f"workspace {workspace}: {account} {'is out' if remove else f'is {role}'}")
+    out.print(f"workspace {workspace}: {account} {'was removed' if remove else f'is {role}'}")
 
 
 @app.command("grant")
 def grant(
     study: StudyArgument,
     account: AccountArgument,
-    rights: Annotated[str, typer.Option(help="Of view,run,edit,export,own; empty: none.")],
+    rights: Annotated[str, typer.Option(help="Any of view,run,edit,export,own; empty for none.")],
 ) -> None:
     """Give an account rights on one study, beside those of its role in the workspace.
 

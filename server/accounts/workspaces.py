@@ -72,16 +72,16 @@ def workspace_for(session: Session, identity: Identity, name: str | None) -> Wor
     """Where a new study goes: the workspace named, or the only one (else the default one) she may use."""
     open_ones = {one.name: one for one in workspace_repository.workspaces_for_new_studies(session, identity)}
     if not open_ones:
-        raise NotAllowed("This needs the role experimenter in a workspace; you have it in none.")
+        raise NotAllowed("This requires the role experimenter in a workspace, but you do not have it in any.")
     if name is not None:
         if name not in open_ones:
-            raise NotFound(f"There is no workspace '{name[:60]}' in which you may make studies.")
+            raise NotFound(f"There is no workspace '{name[:60]}' in which you may create studies.")
         return open_ones[name]
     if len(open_ones) == 1:
         return next(iter(open_ones.values()))
     if DEFAULT_WORKSPACE in open_ones:
         return open_ones[DEFAULT_WORKSPACE]
-    raise Invalid(f"Say in which workspace: {', '.join(open_ones)}.")
+    raise Invalid(f"Specify the workspace: {', '.join(open_ones)}.")
 
 
 def place_of_copy(session: Session, study: Study, identity: Identity, name: str | None) -> Workspace:
@@ -96,8 +96,8 @@ def place_of_copy(session: Session, study: Study, identity: Identity, name: str 
     if study.workspace_id not in own:
         names = ", ".join(one.name for one in own.values())
         raise Invalid(
-            f"You may make no studies in the workspace of '{study.name}'; say which workspace the copy goes "
-            f"into, of: {names}."
+            f"You may not create studies in the workspace of '{study.name}'. Specify a workspace for the "
+            f"copy: {names}."
         )
     return own[study.workspace_id]
 
@@ -160,7 +160,7 @@ def managed_workspace(session: Session, name: str, identity: Identity | Operator
         else _owned_workspace(session, name, identity)
     )
     if workspace.second_factor_required and not identity.second_factor:
-        raise NotAllowed(f"The workspace '{name}' asks for a second factor; set one up under My account.")
+        raise NotAllowed(f"The workspace '{name}' requires a second factor. Set one up under My account.")
     return workspace
 
 
@@ -174,14 +174,14 @@ def _owned_workspace(session: Session, name: str, identity: Identity) -> Workspa
     if workspace is None or role is None:
         raise NotFound(f"There is no workspace '{name[:60]}'.")
     if role != "owner":
-        raise NotAllowed(f"This needs the role owner in the workspace '{name}'; yours is {role}.")
+        raise NotAllowed(f"This requires the role owner in the workspace '{name}'; yours is {role}.")
     return workspace
 
 
 def create(session: Session, name: str, title: str, identity: Identity | Operator) -> Workspace:
     """Make a workspace; the account that makes it owns it."""
     if workspace_repository.find_workspace(session, name) is not None:
-        raise Conflict(f"There is already a workspace called '{name}'; choose another name.")
+        raise Conflict(f"A workspace called '{name}' already exists. Choose another name.")
     workspace = Workspace(name=name, title=title, created_by=identity.account_id)
     session.add(workspace)
     session.flush()
@@ -201,7 +201,7 @@ def change(
     if workspace.second_factor_required and not second_factor_required:
         must_be_fresh(identity)
     if second_factor_required and not identity.second_factor:
-        raise Conflict("Set up a second factor of your own first, or you would shut yourself out.")
+        raise Conflict("Set up your own second factor first; otherwise you would lock yourself out.")
     workspace.title, workspace.second_factor_required = title, second_factor_required
     record(
         session, identity, "workspace changed", "workspace", workspace.name,
@@ -214,9 +214,9 @@ def delete(session: Session, workspace: Workspace, identity: Identity) -> None:
     with every_row(session):
         _, studies = workspace_repository.counts(session).get(workspace.id, (0, 0))
     if studies:
-        raise Conflict("The workspace holds studies; move them to another one first.")
+        raise Conflict("The workspace contains studies. Move them to another workspace first.")
     if workspace.name == DEFAULT_WORKSPACE:
-        raise Conflict("The default workspace stays; give it another title if you like.")
+        raise Conflict("The default workspace cannot be deleted, but you can change its title.")
     record(session, identity, "workspace deleted", "workspace", workspace.name)
     workspace_repository.delete_workspace(session, workspace)
 
@@ -225,7 +225,7 @@ def account_named(session: Session, name: str) -> Account:
     """The account of this name; NotFound where there is none (names are not guessed at)."""
     account = accounts.account_named(session, name)
     if account is None:
-        raise NotFound(f"There is no account '{name[:100]}'; invite the person first.")
+        raise NotFound(f"There is no account '{name[:100]}'; Invite the person first.")
     return account
 
 
@@ -240,7 +240,7 @@ def set_member(
     elif not workspace_repository.remove_member(session, workspace, account):
         raise NotFound(f"'{name[:100]}' does not belong to the workspace '{workspace.name}'.")
     if owners and not workspace_repository.number_of_owners(session, workspace):
-        raise Conflict("One owner must remain; make another member an owner first.")
+        raise Conflict("At least one owner must remain. Make another member an owner first.")
     action = "member removed" if role is None else "member set"
     record(session, identity, action, "workspace", workspace.name, account=account.name, role=role)
 
@@ -274,7 +274,9 @@ def move(session: Session, study: Study, workspace: Workspace, identity: Identit
 def _must_make_studies(database: Database, identity: Identity) -> Identity:
     with database.read() as session:
         if not workspace_repository.may_upload(session, identity):
-            raise NotAllowed("This needs the role experimenter in a workspace; you have it in none.")
+            raise NotAllowed(
+                "This requires the role experimenter in a workspace, but you do not have it in any."
+            )
     return identity
 
 

@@ -185,12 +185,12 @@ def refusals_in_one_line() -> Iterator[None]:
     except DBAPIError as error:
         code, said = getattr(error.orig, "sqlstate", None), str(error.orig).splitlines()[0]
         if code == NO_RIGHT:
-            raise InputError(f"the views are not those of this program: {said}; {OWN_TABLES}") from error
+            raise InputError(f"the views do not match this program: {said}; {OWN_TABLES}") from error
         if code == NEEDED_BY_OTHERS:
             # "view lab.means depends on view ratings", a line each
             further = "; ".join(str(error.orig).splitlines()[1:])
             raise InputError(
-                f"{said} ({further}); keep the text of what depends on it (\\d+ in psql), drop it, run: "
-                "server database upgrade, and make it again"
+                f"{said} ({further}); save the definition of dependent objects (\\d+ in psql), drop them, "
+                f"run: server database upgrade, and create them again"
             ) from error
         raise

@@ -118,7 +118,7 @@ class _Turns:
 
     def __enter__(self) -> None:
         if not self._lock.acquire(timeout=self._wait_s):
-            raise PoolTimeout(f"no turn to write within {self._wait_s:g} s")
+            raise PoolTimeout(f"the database was busy: no write access within {self._wait_s:g} s")
 
     def __exit__(self, *_: object) -> None:
         self._lock.release()
@@ -198,8 +198,8 @@ class Database:
         """The installation's key; refused where the database was opened without one."""
         if SIGNING_KEY not in self.carried:
             raise InputError(
-                "recruiters' ids are encrypted under the installation's key, which this address was opened "
-                "without; run: server database upgrade"
+                "recruiters' IDs are encrypted with the installation's key, which is missing here; run: "
+                "server database upgrade"
             )
         key: bytes = self.carried[SIGNING_KEY]()
         return key
@@ -255,16 +255,16 @@ def checked_url(url: str) -> URL:
     """The address of a database that this program can use; InputError, without password, for others."""
     expected = (
         "expected DATABASE_URL as postgresql://user:password@host/name or sqlite:///path/to/file, "
-        "or none for SQLite in the data folder"
+        "or empty for SQLite in the data folder"
     )
     try:
         parsed = make_url(url)
     except (ArgumentError, ValueError) as error:
-        raise InputError(f"{expected}; got an address that cannot be read") from error
+        raise InputError(f"{expected}; got an invalid URL") from error
     if parsed.drivername not in DRIVERS:
-        raise InputError(f"{expected}; got one that begins with '{parsed.drivername}:'")
+        raise InputError(f"{expected}; got a URL that begins with '{parsed.drivername}:'")
     if parsed.drivername.startswith("postgresql") and not parsed.database:
-        raise InputError(f"{expected}; got one without a name of the database behind the host")
+        raise InputError(f"{expected}; got a URL without a database name after the host")
     return parsed
 
 

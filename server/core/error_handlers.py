@@ -89,7 +89,7 @@ _NOTHING_HERE = """<!doctype html>
   </head>
   <body>
     <h1>Page not found</h1>
-    <p>The address may be mistyped. A study is reached by the link you were given.</p>
+    <p>Please check the address. To take part in a study, use the link that you received.</p>
     <p><a href="/admin/">For experimenters</a></p>
   </body>
 </html>
@@ -105,7 +105,8 @@ def _is_for_a_person(request: Request) -> bool:
 async def _out_of_range(_request: Request, _error: Exception) -> JSONResponse:
     # What no database column can hold: SQLite's driver and PostgreSQL say so only when they get it.
     message = (
-        "A value is out of range: a number is too large, or a text holds a character that cannot be stored."
+        "A value is out of range: a number is too large, or a text contains a character that cannot be "
+        "stored."
     )
     return error_response(422, "out_of_range", message)
 
@@ -115,13 +116,13 @@ async def _database(_request: Request, error: Exception) -> JSONResponse:
         raise error
     if is_busy(error):
         log.error("the database is busy: %s", describe_error(error))
-        message = "Another program keeps the database busy; nothing was stored, please try again."
+        message = "The database is busy because of another program. Nothing was stored. Please try again."
         return error_response(503, "database_busy", message, headers={"retry-after": "2"})
-    log.error("the database is away: %s", describe_error(error))
-    message = "The server cannot reach its database at the moment; please try again."
+    log.error("the database is not reachable: %s", describe_error(error))
+    message = "The server cannot reach its database at the moment. Please try again."
     return error_response(503, "database_away", message, headers={"retry-after": "2"})
 
 
 async def _answer_unexpected(_request: Request, error: Exception) -> JSONResponse:
     log.error("request failed", exc_info=error)
-    return error_response(500, "internal", "The server failed; please try again.")
+    return error_response(500, "internal", "The server had an internal error. Please try again.")

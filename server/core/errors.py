@@ -42,9 +42,9 @@ def refused_value(detail: Mapping[str, Any]) -> str:
 def _problem(detail: Mapping[str, Any]) -> str:
     kind, given = detail["type"], detail.get("input")
     if kind == "missing":
-        return "this value is required and missing"
+        return "this value is required but missing"
     if kind == "extra_forbidden":
-        return "there is no value of this name here; leave it out"
+        return "unknown value; remove it"
     if kind == "json_invalid":
         return f"expected JSON, got something else ({detail['ctx']['error']})"
     expected = FORMS.get(kind) or expectation(detail)
@@ -119,7 +119,7 @@ class ErrorDetail(BaseModel):
     """What went wrong."""
 
     code: str = Field(description="Short name of the error, for programs.")
-    message: str = Field(description="One plain sentence: expected, got, what to do.")
+    message: str = Field(description="A plain message: expected, got, what to do.")
     details: dict[str, Any] = Field(description="Further values, by error code.")
 
 
@@ -131,7 +131,7 @@ class ErrorBody(BaseModel):
 
 ERROR_RESPONSES: dict[int | str, dict[str, Any]] = {
     "4XX": {"model": ErrorBody, "description": "Refused"},
-    "422": {"model": ErrorBody, "description": "The request's content is not acceptable"},
+    "422": {"model": ErrorBody, "description": "The content of the request is not valid"},
 }
 """For `responses=` of a router: documents the one error shape in the OpenAPI schema."""
 

@@ -164,7 +164,7 @@ class RateLimit:
         if left < 1:
             wait = max(1, round((1 - left) * self._window_s / self.per_minute))
             raise TooManyRequests(
-                f"Too many requests; please try again in {wait} s.", headers={"retry-after": str(wait)}
+                f"Too many requests. Please try again in {wait} s.", headers={"retry-after": str(wait)}
             )
 
 
@@ -213,12 +213,13 @@ class OpenStreams:
         """Refuse one more stream where there are too many."""
         if self._open[account] >= self._maximum:
             raise TooManyRequests(
-                f"At most {self._maximum} monitors of one account are kept up to date at a time; close some."
+                f"At most {self._maximum} live monitors per account are allowed at a time. Close some of "
+                f"them."
             )
         if self._open.total() >= self._overall:
             raise TooManyRequests(
-                f"At most {self._overall} monitors are kept up to date at a time, and all are taken; "
-                "try again once somebody has closed one."
+                f"All {self._overall} live monitors of this server are in use. Try again when someone has "
+                f"closed one."
             )
 
     @contextmanager

@@ -102,8 +102,8 @@ def refuse_without_views(before: str | None, after: str | None) -> None:
     """Refuse a way down to a revision whose programs made their views by migrations, which are gone."""
     if before is not None and after is not None and after < before and after < FIRST_WITH_DERIVED_VIEWS:
         raise CommandError(
-            f"programs of revision {after} expect views that this one cannot make; keep revision "
-            f"{FIRST_WITH_DERIVED_VIEWS} or newer, or restore a backup of then with the program of then"
+            f"programs of revision {after} need views that this program cannot create; use revision "
+            f"{FIRST_WITH_DERIVED_VIEWS} or newer, or restore an old backup with the old program"
         )
 
 

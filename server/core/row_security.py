@@ -113,7 +113,8 @@ LOG = logging.getLogger(__name__)
 NO_RIGHT = "42501"
 """PostgreSQL's code where a user may not do what was asked."""
 OWN_TABLES = (
-    "let the user of DATABASE_URL own its tables and views (ALTER TABLE ... OWNER TO, or REASSIGN OWNED), "
+    "make the user of DATABASE_URL the owner of its tables and views (ALTER TABLE ... OWNER TO, or "
+    "REASSIGN OWNED), "
     "then run: server database upgrade"
 )
 OLDEST_POSTGRES = 150_000
@@ -171,7 +172,7 @@ def _condition(name: str, columns: set[str]) -> str:
         if column in columns
     ]
     if not parents:
-        raise RuntimeError(f"say in {__name__} on which study a row of the table {name} hangs")
+        raise RuntimeError(f"specify in {__name__} to which study a row of the table {name} belongs")
     return " OR ".join(parents)
 
 
@@ -212,8 +213,8 @@ def _carry_out_all(connection: Connection, statements: list[str], stood: bool) -
             raise
         said = str(error.orig).splitlines()[0]
         if stood:
-            raise InputError(f"rows are kept apart as by an earlier version: {said}; {OWN_TABLES}") from error
-        LOG.warning("rows are not kept apart by PostgreSQL: %s; %s", said, OWN_TABLES)
+            raise InputError(f"rows are separated as in an earlier version: {said}; {OWN_TABLES}") from error
+        LOG.warning("PostgreSQL does not separate the rows of workspaces: %s; %s", said, OWN_TABLES)
         return False
     return True
 

@@ -135,14 +135,14 @@ class RoleRule(_DeclaredTable):
     workspace: Annotated[str, StringConstraints(min_length=1, max_length=60)] = Field(
         description="Name of the workspace."
     )
-    role: Role = Field(description="What she is in it: viewer, experimenter or owner.")
-    claim: str = Field(default="", description="Name of the claim; dots lead into nested ones.")
-    value: str = Field(default="", description="What the claim must be, or hold where it is a list.")
+    role: Role = Field(description="Role in the workspace: viewer, experimenter or owner.")
+    claim: str = Field(default="", description="Name of the claim; use dots for nested claims.")
+    value: str = Field(default="", description="Required value of the claim, or an element if it is a list.")
 
     @model_validator(mode="after")
     def _claim_with_value(self) -> Self:
         if bool(self.value) != bool(self.claim):
-            raise ValueError("expected claim and value together, or neither of them")
+            raise ValueError("expected both claim and value, or neither")
         return self
 
 
@@ -150,31 +150,36 @@ class Provider(_DeclaredTable):
     """A service that signs people in; declared as PALPEBRA_OIDC__NAME__KEY."""
 
     label: Annotated[str, StringConstraints(min_length=1, max_length=60)] = Field(
-        description="What the button says after 'Sign in with'."
+        description="Label of the button after 'Sign in with'."
     )
-    issuer: str = Field(description="Address of the provider, exactly as its tokens write it.")
+    issuer: str = Field(description="URL of the provider, exactly as in its tokens.")
     client_id: Annotated[str, StringConstraints(min_length=1)] = Field(
-        description="What the provider calls this server."
+        description="Name of this server at the provider."
     )
     client_secret_file: Path | None = Field(
-        default=None, description="File with the secret; none for a public client."
+        default=None, description="File with the secret; empty for a public client."
     )
-    scopes: str = Field(default="openid profile", description="What is asked for, `openid` among it.")
+    scopes: str = Field(
+        default="openid profile", description="Requested scopes, which must include `openid`."
+    )
     roles: tuple[RoleRule, ...] = Field(
-        default=(), description="Who belongs where; without a rule that fits only linked accounts sign in."
+        default=(),
+        description=(
+            "Rules for workspace membership; without a matching rule, only linked accounts can sign in."
+        ),
     )
     second_factor_amr: tuple[str, ...] = Field(
-        default=(), description="Values of `amr` that count as a second factor here; none where empty."
+        default=(), description="Values of `amr` that count as a second factor here; empty for none."
     )
     second_factor_acr: tuple[str, ...] = Field(
-        default=(), description="Values of `acr` that count as a second factor here; none where empty."
+        default=(), description="Values of `acr` that count as a second factor here; empty for none."
     )
 
     @field_validator("issuer")
     @classmethod
     def _is_safe(cls, value: str) -> str:
         if not is_safe(value) or urlsplit(value).query or urlsplit(value).fragment:
-            raise ValueError("expected https://... without a query (http only on this machine itself)")
+            raise ValueError("expected https://... without a query (http only on this machine)")
         return value
 
     @field_validator("scopes")
@@ -216,7 +221,7 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 class Settings(BaseSettings):
     """Settings of the server: `PALPEBRA_<NAME>` in the environment, and `DATABASE_URL`.
 
-    Times are minutes, hours or seconds as the name says; sizes are bytes.
+    Times are in minutes, hours or seconds, as the name indicates; sizes are in bytes.
     """
 
     model_config = SettingsConfigDict(
@@ -225,26 +230,34 @@ class Settings(BaseSettings):
 
     data_folder: Path = Field(
         default=Path("data"),
-        description="Folder of everything the server keeps: database, clips, secret key.",
+        description="Folder for all data of the server: database, clips, secret key.",
     )
     shared_folder: Path | None = Field(
         default=None,
-        description="Folder that every host of a server mounts, for what one makes and another hands out: "
-        "uploads, reports, capsules, rehearsals, the ledger of erasures; empty: the data folder.",
+        description=(
+            "Folder mounted by all hosts of a server, for shared files: uploads, reports, "
+            "capsules, rehearsals, the ledger of erasures. Empty: the data folder."
+        ),
     )
     database_url: str = Field(
         default="",
         validation_alias=AliasChoices("DATABASE_URL", "PALPEBRA_DATABASE_URL"),
-        description="Database: empty for SQLite in the data folder, or postgresql://user:password@host/name.",
+        description=(
+            "Database URL: empty for SQLite in the data folder, or postgresql://user:password@host/name."
+        ),
     )
-    database_pool: int = Field(default=20, ge=1, description="Database connections a worker may hold.")
+    database_pool: int = Field(
+        default=20, ge=1, description="Maximum number of database connections per worker."
+    )
     public_url: str = Field(
-        default="http://localhost:8000", description="Address under which participants reach the server."
+        default="http://localhost:8000", description="URL under which participants reach the server."
     )
     secret_key: str = Field(
         default="",
-        description="Key from which tokens are derived, at least 32 random characters; empty: "
-        "data_folder/secret_key, made at first start.",
+        description=(
+            "Key from which tokens are derived, at least 32 random characters. Empty: "
+            "data_folder/secret_key, generated at the first start."
+        ),
     )
     frontend_folder: Path = Field(
         default=built_pages(),
@@ -252,73 +265,92 @@ class Settings(BaseSettings):
     )
     library_folder: Path = Field(
         default=REPOSITORY / "stimuli_builder" / "blinks" / "library",
-        description="Folder of the shipped blink profiles and model, for the figures page.",
+        description="Folder of the included blink profiles and model, for the figures page.",
     )
-    max_body_bytes: int = Field(default=512 * 1024, ge=1024, description="Largest request of a participant.")
+    max_body_bytes: int = Field(
+        default=512 * 1024, ge=1024, description="Maximum size of a request from a participant."
+    )
     max_upload_bytes: int = Field(
-        default=2 * 1024**3, ge=1024, description="Largest request of an experimenter, clip uploads included."
+        default=2 * 1024**3,
+        ge=1024,
+        description=("Maximum size of a request from an experimenter, including clip uploads."),
     )
     max_uploads_bytes: int = Field(
         default=64 * 1024**3,
         ge=1024,
-        description="What one account's uploads may hold together; each is removed after a day.",
+        description="Maximum total size of one account's uploads. Each upload is removed after a day.",
     )
     run_starts_per_minute: int = Field(
-        default=3000, ge=1, description="Runs that may be started by one link a minute."
+        default=3000, ge=1, description="Maximum number of runs started per link and minute."
     )
     audit_syslog: str = Field(
         default="",
-        description="Syslog that gets the audit log too, without details: /dev/log, host:port (UDP), or "
-        "tls://host:port (certificate checked), tcp://host:port; an IPv6 address in [].",
+        description=(
+            "Syslog that also receives the audit log, without details: /dev/log, host:port (UDP), "
+            "tls://host:port (certificate checked) or tcp://host:port. IPv6 addresses in []."
+        ),
     )
     evidence: Literal["refuse", "record"] = Field(
         default="refuse",
-        description="Answers that cannot have been given as they say: refuse them, or record and judge.",
+        description="What to do with implausible answers: refuse them, or record and judge them.",
     )
     unsupported_per_minute: int = Field(
-        default=300, ge=1, description="Reports of unsupported browsers accepted for one link a minute."
+        default=300,
+        ge=1,
+        description=("Maximum number of reports of unsupported browsers per link and minute."),
     )
     preview_keep_hours: float = Field(
-        default=24.0, gt=0, description="Hours after which the answers of a preview are deleted."
+        default=24.0, gt=0, description="Hours until the answers of a preview are deleted."
     )
     session_hours: float = Field(default=12.0, gt=0, description="Hours an experimenter stays signed in.")
     session_idle_minutes: float = Field(
         default=120.0,
         gt=0,
-        description="Minutes without a request after which an experimenter is signed out.",
+        description="Minutes of inactivity until an experimenter is signed out.",
     )
     owners_second_factor: bool = Field(
         default=False,
-        description="Owners of the server are no more than experimenters until they sign in with a second "
-        "factor.",
+        description=(
+            "Owners of the server have only the rights of experimenters until they sign in with a "
+            "second factor."
+        ),
     )
     logins_per_minute: int = Field(
         default=30,
         ge=1,
-        description="Sign-in attempts a minute from one range of addresses (/24, /64), or one known browser.",
+        description=(
+            "Sign-in attempts per minute from one range of addresses (/24, /64), or from one known browser."
+        ),
     )
     logins_per_minute_overall: int = Field(
-        default=120, ge=1, description="Sign-in attempts a minute from browsers not seen before."
+        default=120, ge=1, description="Sign-in attempts per minute from browsers not seen before."
     )
     oidc: dict[ProviderId, Provider] = Field(
         default={},
         description="Services that sign people in (OpenID Connect): LABEL, ISSUER, CLIENT_ID, "
-        "CLIENT_SECRET_FILE and more of each; see docs/how-to/sign-in.md.",
+        "CLIENT_SECRET_FILE and more for each; see docs/how-to/sign-in.md.",
     )
     smtp_host: str = Field(
-        default="", description="Server that takes mail, for new passwords; empty: none is sent."
+        default="", description="SMTP server for email, such as new passwords. Empty: no email is sent."
     )
-    smtp_port: int = Field(default=587, ge=1, le=65535, description="Its port; 465 goes with tls.")
+    smtp_port: int = Field(
+        default=587, ge=1, le=65535, description="Port of the SMTP server; use 465 for tls."
+    )
     smtp_security: Literal["starttls", "tls", "none"] = Field(
-        default="starttls", description="How the way there is encrypted; none: on this machine alone."
+        default="starttls",
+        description=(
+            "Encryption of the connection to the SMTP server; none is allowed only on this machine."
+        ),
     )
-    smtp_user: str = Field(default="", description="Name to sign in with there; empty: without.")
-    smtp_password_file: Path | None = Field(default=None, description="File with the password for it.")
+    smtp_user: str = Field(default="", description="User name for the SMTP server; empty if none is needed.")
+    smtp_password_file: Path | None = Field(
+        default=None, description="File with the password for the SMTP server."
+    )
     mail_from: str = Field(
-        default="", description="Address that letters come from, as 'Palpebra <palpebra@lab.example>'."
+        default="", description="Sender of emails, such as 'Palpebra <palpebra@lab.example>'."
     )
     monitor_stream_minutes: float = Field(
-        default=60.0, gt=0, description="After so long the live monitor's browser connects anew."
+        default=60.0, gt=0, description="Minutes after which the browser of the live monitor reconnects."
     )
     s3_bucket: str = Field(
         default="", description="Bucket of an S3-compatible store for clips; empty: the data folder."
@@ -326,64 +358,77 @@ class Settings(BaseSettings):
     s3_prefix: str = Field(default="", description="Folder of the clips within the bucket.")
     s3_endpoint: str = Field(
         default="",
-        description="Address of the object store where it is not Amazon's, as https://s3.lab.example.",
+        description="URL of the object store if it is not Amazon's, such as https://s3.lab.example.",
     )
     s3_region: str = Field(default="us-east-1", description="Region of the bucket.")
     s3_presigned: bool = Field(
         default=False,
-        description="Browsers fetch clips from the store by signed addresses; else through the server.",
+        description="Browsers download clips from the store with signed URLs; otherwise through the server.",
     )
     capsules_kept: int = Field(
         default=5,
         ge=1,
-        description="Finished capsules of a study that are kept; a newer one takes the place of the oldest.",
+        description="Number of finished capsules kept per study; a new one replaces the oldest.",
     )
     capsule_keep_days: float = Field(
         default=90.0,
         gt=0,
-        description="Days after which a capsule, or a failed attempt at one, goes when the next one is done.",
+        description=(
+            "Days after which a capsule or a failed attempt is removed, when the next one is finished."
+        ),
     )
     log_format: Literal["auto", "json", "text"] = Field(
-        default="auto", description="Form of the log on stderr: json, text, or auto (text on a terminal)."
+        default="auto", description="Format of the log on stderr: json, text, or auto (text on a terminal)."
     )
     log_requests: Literal["problems", "all", "none"] = Field(
         default="problems",
-        description="Which requests are logged; problems: those that failed or were slow. Never an address.",
+        description=(
+            "Which requests are logged; problems: those that failed or were slow. IP addresses are "
+            "never logged."
+        ),
     )
-    log_slow_ms: float = Field(default=1000.0, gt=0, description="From when on a request counts as slow.")
+    log_slow_ms: float = Field(
+        default=1000.0, gt=0, description="Milliseconds above which a request counts as slow."
+    )
     free_megabytes_min: float = Field(
-        default=200.0, ge=0, description="With less room on the data folder's disk /readyz says 503."
+        default=200.0,
+        ge=0,
+        description=("Minimum free space on the disk of the data folder; with less, /readyz returns 503."),
     )
     backup_folder: str = Field(
         default="",
-        description="Folder of the backups, or s3://BUCKET/PREFIX: the newest one's age is told, and it is "
-        "brought back weekly.",
+        description=(
+            "Folder of the backups, or s3://BUCKET/PREFIX. The server reports the age of the "
+            "newest backup and test-restores it weekly."
+        ),
     )
     snapshot_minutes: float = Field(
         default=0.0,
         ge=0,
-        description="Minutes between two snapshots of a SQLite database into data_folder/snapshots; 0: none.",
+        description="Minutes between snapshots of a SQLite database in data_folder/snapshots; 0: none.",
     )
     backup_keys: Path | None = Field(
         default=None,
         description="Key file of backups that are not encrypted, for `server backup`, `restore` and `drill`; "
-        "palpebra-keys.json beside the backup where not given.",
+        "by default, palpebra-keys.json next to the backup.",
     )
     backup_recipient: str = Field(
         default="",
-        description="Public key (age1...) for which `server backup --to` encrypts; by server backup-key.",
+        description="Public key (age1...) for which `server backup --to` encrypts; see `server backup-key`.",
     )
     backup_identity: Path | None = Field(
         default=None,
-        description="File of the private key of encrypted backups; only where they are to be drilled here.",
+        description=(
+            "File of the private key of encrypted backups; only needed for restore tests on this server."
+        ),
     )
     security_contact: str = Field(
         default="",
-        description="Where weaknesses are reported, mailto: or https:; shown in /.well-known/security.txt.",
+        description="Contact for security reports, mailto: or https:; shown in /.well-known/security.txt.",
     )
     metrics_token: str = Field(
         default="",
-        description="Token that /metrics asks for; empty: it answers requests from this machine alone.",
+        description="Token required by /metrics. Empty: only requests from this machine are answered.",
     )
 
     @field_validator("database_url")
@@ -409,15 +454,18 @@ class Settings(BaseSettings):
     @classmethod
     def _is_one_address(cls, value: str) -> str:
         if value and ("@" not in parseaddr(value)[1] or not value.isprintable()):
-            raise ValueError("expected one address of mail, as 'Palpebra <palpebra@lab.example>'")
+            raise ValueError("expected one email address, such as 'Palpebra <palpebra@lab.example>'")
         return value
 
     @model_validator(mode="after")
     def _mail_is_private(self) -> Self:
         if self.smtp_host and self.smtp_security == "none" and self.smtp_host not in LOCAL_HOSTS:
-            raise ValueError("PALPEBRA_SMTP_SECURITY none sends links in the open; only to this machine")
+            raise ValueError(
+                "PALPEBRA_SMTP_SECURITY is none, which sends links unencrypted; it is allowed "
+                "only for an SMTP server on this machine"
+            )
         if self.smtp_host and not self.mail_from:
-            raise ValueError("PALPEBRA_MAIL_FROM is needed beside PALPEBRA_SMTP_HOST")
+            raise ValueError("PALPEBRA_MAIL_FROM is required if PALPEBRA_SMTP_HOST is set")
         return self
 
     @field_validator("public_url")
@@ -427,7 +475,7 @@ class Settings(BaseSettings):
 
     @property
     def is_https(self) -> bool:
-        """True where participants reach the server by https."""
+        """True if participants reach the server through https."""
         return self.public_url.startswith("https://")
 
     @property
@@ -442,7 +490,7 @@ class Settings(BaseSettings):
 
     @property
     def stimuli_folder(self) -> Path:
-        """Folder of the clip sets that `make run` builds, one a shipped experiment."""
+        """Folder of the clip sets that `make run` builds, one per shipped experiment."""
         return self.data_folder / "stimuli"
 
     @property
@@ -517,7 +565,7 @@ def _is_open(path: Path) -> bool:
 def close_to_others(settings: Settings) -> None:
     """Take from others what an older version, or another program, left open to them.
 
-    What belongs to another user stays as it is; the doctor tells.
+    Files of other users stay unchanged; the doctor reports them.
     """
     for path in (one for folder in own_folders(settings) for one in open_to_others(folder)):
         try:

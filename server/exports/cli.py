@@ -87,7 +87,7 @@ def export(
         bool, typer.Option(help="Beside the long CSV, write scripts that analyse it with R and Python.")
     ] = True,
 ) -> None:
-    """Write a study's data: as csv, the columns of experiments/columns and one column a factor.
+    """Export a study's data, for example as CSV with one column per factor.
 
     Participants have the study's pseudonyms. The file appears under its name only when complete. Beside a CSV
     with one row a play stand a script for R (afex, emmeans, lme4) and one for Python (pandas, statsmodels).
@@ -240,7 +240,7 @@ def seal(
         Path | None, typer.Option(help="JSON of `analysis power --json`, to be sealed with the plan.")
     ] = None,
 ) -> None:
-    """Seal design, exclusions, analysis plan and power before the first participant; or write the seal again.
+    """Seal design, exclusions, analysis plan and power before the first participant, or write the seal again.
 
     Examples:
 
@@ -308,7 +308,7 @@ def methods(
         typer.Option(help="Folder of `analysis run --out`, for what each declared rule left out."),
     ] = None,
 ) -> None:
-    """Write a study's Methods paragraph; each number is followed by the query that gives it.
+    """Write a study's Methods paragraph with the query behind each number.
 
     Examples:
 

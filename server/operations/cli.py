@@ -55,7 +55,7 @@ def _register_doctor(parent: typer.Typer) -> None:
 def doctor(
     as_json: Annotated[bool, typer.Option("--json", help="Machine-readable output.")] = False,
 ) -> None:
-    """Check the installation and say what to fix; exit code 1 where something failed.
+    """Check the installation and report what to fix; exit code 1 if a check failed.
 
     Nothing is changed. The keys of --json: a list of objects with subject, verdict (ok, warning, failed),
     state, advice.

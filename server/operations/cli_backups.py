@@ -80,7 +80,7 @@ def backup(
     ] = "",
     replace: Annotated[bool, typer.Option("--replace", help="Write over a FILE that is there.")] = False,
 ) -> None:
-    """Write database, clips and secret key of this moment into one file, while the server goes on.
+    """Back up database, clips and secret key in one file while the server runs.
 
     The file holds everybody's answers and the secret key: keep it where only you can read it (mode 600), or
     encrypt it for another host by --to. The keys of recruiters' ids are in palpebra-keys.json, which each
@@ -150,7 +150,7 @@ def _back_up_to(to: str, recipient: str, name: str, *, with_clips: bool, keep: i
 def backup_key(
     file: Annotated[Path, typer.Argument(help="Where to write the private key.", show_default=False)],
 ) -> None:
-    """Make a pair of keys for encrypted backups, and print the public one.
+    """Create a key pair for encrypted backups, and print the public key.
 
     Set PALPEBRA_BACKUP_RECIPIENT to the public key. Keep the private key off the server, in two safe places:
     without it no backup can be read. It is a key of age (age-encryption.org); `age -d -i FILE` reads backups.
@@ -197,7 +197,7 @@ def restore(
         ),
     ] = False,
 ) -> None:
-    """Bring a backup back into an empty database (SQLite or PostgreSQL) and clip store.
+    """Restore a backup into an empty database (SQLite or PostgreSQL) and clip store.
 
     The database of the settings must be empty; stop the server first. Counts and hashes are compared. People
     who were erased since the backup are erased again, by the ledger of erasures (erasures.ndjson) next to the
@@ -257,7 +257,8 @@ def drill(
     identity: IdentityFile = None,
     keys: KeyFile = None,
 ) -> None:
-    """Bring the newest backup back beside the data, examine it and remove it; exit code 1 where it failed.
+    """Test the newest backup: restore it to a temporary place, check it and remove it; exit code 1 on
+    failure.
 
     Nothing of the server's own data is touched. The server makes this drill weekly by itself where it knows
     the folder of its backups; /metrics and `server doctor` tell how the last one went. Encrypted backups it

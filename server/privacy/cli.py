@@ -116,7 +116,7 @@ def retention(
         bool, typer.Option("--dry-run", help="Show what is due and when more will be; erase nothing.")
     ] = False,
 ) -> None:
-    """Erase what is due by the retention that studies declare; the server does so each hour.
+    """Erase data that are due by the retention rules of studies; the server does so every hour.
 
     Erased visits are in the ledger of erasures, so that no restore brings them back, and in the audit log.
 

@@ -49,7 +49,7 @@ def simulate(
         Path | None, typer.Option("--json", help="With --as: file for the verdict and signals of each run.")
     ] = None,
 ) -> None:
-    """Let simulated participants take part through the HTTP API; their runs have the origin `simulated`.
+    """Run simulated participants through the HTTP API; their runs have the origin `simulated`.
 
     No count, quota, result or report of people's answers holds them: a study is rehearsed as a draft.
 

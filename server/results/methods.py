@@ -108,6 +108,11 @@ def write_beside(folder: Path, methods: Methods) -> None:
         (folder / f"methods.{name}").write_text(content, encoding="utf-8")
 
 
+def _excluded(noun: str, rule: str) -> str:
+    name = f"{noun}s_{_key(rule)}"
+    return f"{{{name}}} {{{name}:{noun}|{noun}s}} ({_words(rule)})"
+
+
 def _exclusion_counts(results: dict[str, Any] | None) -> dict[str, tuple[str, Number]]:
     """Number of runs (or trials) by declared rule, as the report of the analysis counts them."""
     left_out = (results or {}).get("exclusions") or {}
@@ -117,11 +122,11 @@ def _exclusion_counts(results: dict[str, Any] | None) -> dict[str, tuple[str, Nu
             rule = str(reason).split(":", 1)[0]
             counts[rule] = counts.get(rule, 0) + 1
     excluded = {
-        f"visits_{_key(rule)}": (f"visits by {_words(rule)}", count, "exclusions.runs[].reasons")
+        f"visits_{_key(rule)}": (_excluded("visit", rule), count, "exclusions.runs[].reasons")
         for rule, count in counts.items()
     }
     for dropped in left_out.get("trials", []):
-        words = f"trials by {_words(dropped['rule'])}"
+        words = _excluded("trial", dropped["rule"])
         excluded[f"trials_{_key(dropped['rule'])}"] = (words, int(dropped["trials"]), "exclusions.trials[]")
     return {
         name: (words, Number(name, count, f"{RESULTS} of the report: {source} of this rule"))

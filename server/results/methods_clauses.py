@@ -13,9 +13,8 @@ from server.participation.recruiter import NAMES
 from server.results.methods_repository import Number, UsedVersion, begun_with
 
 # The Methods paragraph: sentences whose every number names its source; plain text, LaTeX, HTML.
-#
-# A sentence is a template with {name} for a number, {name:was|were} for the word that goes with one and with
-# several, and words for what was declared.
+# A sentence is a template. {name} is a number, {name:was|were} is the word for one and for several, and the
+# rest describes what was declared.
 
 _HOLE = re.compile(r"\{(\w+)\}")
 _AGREEING = re.compile(r"\{(\w+):([^|{}]*)\|([^|{}]*)\}")
@@ -87,14 +86,37 @@ class Methods:
         return {name: mark for mark, name in enumerate(names, start=1)}
 
     def _filled(self, sentence: str, order: Mapping[str, int], form: str) -> str:
-        def number(hole: re.Match[str]) -> str:
-            name = hole[1]
-            return form.format(value=self.numbers[name].value, mark=order.get(name, 0))
-
         def agreeing(word: re.Match[str]) -> str:
             return word[2] if self.numbers[word[1]].value == 1 else word[3]
 
-        return _HOLE.sub(number, _AGREEING.sub(agreeing, sentence))
+        def number(hole: re.Match[str]) -> str:
+            name, before = hole[1], agreed[: hole.start()]
+            begins = not before or before.endswith(". ")
+            value = in_words(self.numbers[name].value, begins=begins)
+            if self.numbers[name].value == 0 and _STANDS_ALONE.match(agreed, hole.end()):
+                value = "None" if begins else "none"
+            return form.format(value=value, mark=order.get(name, 0))
+
+        agreed = _AGREEING.sub(agreeing, sentence)
+        return _HOLE.sub(number, agreed)
+
+
+_STANDS_ALONE = re.compile(r" (?:consented|completed it|w[ae][sr]e?|could)\b")
+"""What follows a number without a noun: there a zero is called none."""
+UNITS = ("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
+
+
+def in_words(value: int, *, begins: bool = False) -> str:
+    """A number as APA style writes it: a word below ten, and no numeral at the beginning of a sentence.
+
+    Examples
+    --------
+    >>> in_words(4), in_words(12), in_words(4, begins=True), in_words(12, begins=True)
+    ('four', '12', 'Four', 'A total of 12')
+    """
+    if 0 <= value < len(UNITS):
+        return UNITS[value].capitalize() if begins else UNITS[value]
+    return f"A total of {value}" if begins else str(value)
 
 
 def _latex_text(text: str) -> str:
@@ -120,7 +142,7 @@ class DescribedSeries:
     used : sequence of (UsedVersion, Experiment)
         The versions of the series that visits were begun with, oldest first.
     rules : sequence of (str, str)
-        Name of the number and words of each declared exclusion that a report has applied.
+        Name of the number and words of each declared exclusion rule that a report has applied.
     elsewhere : str
         Where visits are, in words, if this series has none; empty otherwise.
     numbers : dict of str to Number
@@ -182,52 +204,62 @@ def _completed_clauses(of: DescribedSeries) -> list[str]:
     if of.value("complete"):
         return [*_checks(of), *_display(of), *_evidence(of)]
     return [
-        "Nobody has completed a visit yet: how clips were shown, and whether answers were given by people, "
-        "is reported of completed visits."
+        "No participant has completed the study yet. Presentation of clips and evidence of human answers "
+        "are reported for completed visits."
     ]
 
 
 def _origin(of: DescribedSeries) -> list[str]:
     if of.origin == PARTICIPANTS:
         return []
-    return [f"These visits are no data of participants: their origin is '{of.origin}'."]
+    return [f"These visits are not data from participants: their origin is '{of.origin}'."]
 
 
 def _recruitment(of: DescribedSeries) -> list[str]:
     if of.elsewhere:
         return [f"{of.elsewhere}; data series {of.series} has no visits yet."]
-    lines = ["Visits begun: {begun}; consent was given in {agreed}."]
+    # Someone who starts over has two visits: then only visits can be counted.
+    lines = [
+        "{begun} {begun:visit was|visits were} begun; consent was given in {agreed}, and {complete} "
+        "{complete:was|were} completed."
+        if of.value("restarted")
+        else "{begun} {begun:participant|participants} began the study; {agreed} consented, and {complete} "
+        "completed it."
+    ]
     lines += [
-        f"Through {name} {{by_{kind}}} {{by_{kind}:visit was|visits were}} recruited."
+        f"{{by_{kind}}} {{by_{kind}:participant was|participants were}} recruited through {name}."
         for kind, name in NAMES.items()
         if of.value(f"by_{kind}")
     ]
     if of.value("by_personal_link"):
-        lines.append("By personal link came {by_personal_link} {by_personal_link:visit|visits}.")
+        lines.append("{by_personal_link} {by_personal_link:participant|participants} used a personal link.")
     if of.value("by_recruiter"):
         lines.append(
-            "The address named the participant in {by_recruiter} {by_recruiter:visit|visits}; the data hold "
-            "pseudonyms of this study instead."
+            "The link identified the participant in {by_recruiter} {by_recruiter:visit|visits}; the data "
+            "contain pseudonyms instead."
         )
-    if of.value("begun"):
-        lines.append(_ways_visits_ended(of))
+    lines += _ways_visits_ended(of)
     if of.value("erased"):
-        lines.append("Erased afterwards, answers and consent with them: {erased}.")
+        lines.append(
+            "The data of {erased} {erased:visit|visits}, including answers and consent, were erased later."
+        )
     return lines
 
 
-def _ways_visits_ended(of: DescribedSeries) -> str:
-    ends = [
-        "{complete} {complete:was|were} completed",
-        "{withdrew} {withdrew:was|were} ended at the participant's wish",
-        "{screened_out} {screened_out:was|were} ended by screening",
-        "{unfinished} {unfinished:was|were} left open",
-    ]
-    if of.value("declined"):
-        ends.insert(1, "{declined} {declined:was|were} ended because consent was declined")
-    if of.value("restarted"):
-        ends.insert(-1, "{restarted} {restarted:was|were} replaced by a new visit of the same participant")
-    return f"Of all visits {_joined_parts(ends)}."
+def _ways_visits_ended(of: DescribedSeries) -> list[str]:
+    """How the visits that were not completed ended; ways without a visit are left out."""
+    ways = {
+        "declined": "{declined} ended because consent was declined",
+        "withdrew": "{withdrew} {withdrew:was|were} withdrawn by the participant",
+        "screened_out": "{screened_out} {screened_out:was|were} screened out",
+        "restarted": "{restarted} {restarted:was|were} replaced by a new visit of the same participant",
+        "unfinished": "{unfinished} {unfinished:was|were} not finished",
+    }
+    ends = [words for name, words in ways.items() if of.value(name)]
+    if not ends:
+        return []
+    listed = " and ".join(ends) if len(ends) < 3 else _joined_parts(ends)
+    return [f"Of the visits that were not completed, {listed}."]
 
 
 def _joined_parts(parts: Sequence[str]) -> str:
@@ -262,11 +294,15 @@ def _in_force(
 
 def _screening(of: DescribedSeries) -> list[str]:
     always, partly = _in_force(of, lambda experiment: experiment.screening)
-    lines = [f"Rules of screening, declared before the data: {', '.join(always)}."] if always else []
+    lines = (
+        [f"The following screening rules were declared before data collection: {', '.join(always)}."]
+        if always
+        else []
+    )
     for versions, names in partly.items():
         visits = of.begun_with(versions)
         lines.append(
-            f"Rules of screening that held for {{{visits}}} of {{begun}} visits: {', '.join(names)}."
+            f"The following screening rules applied to {{{visits}}} of {{begun}} visits: {', '.join(names)}."
         )
     return lines
 
@@ -277,26 +313,26 @@ def _warnings(of: DescribedSeries) -> list[str]:
     if not names and not of.value("warned"):
         return []
     if not of.value("warned"):
-        return [f"Warnings of {names} were declared; no visit was warned."]
+        return [f"Warnings about {names} were declared, but no participant was warned."]
     ended = (
-        " {ended_by_warnings} {ended_by_warnings:visit was|visits were} ended because such answers went on."
+        " {ended_by_warnings} {ended_by_warnings:visit was|visits were} ended because such answers continued."
         if of.value("ended_by_warnings")
         else ""
     )
-    return [f"While taking part people were warned of {names}, in {{warned}} {{warned:visit|visits}}.{ended}"]
+    return [f"Participants were warned about {names} in {{warned}} {{warned:visit|visits}}.{ended}"]
 
 
 def _exclusions(of: DescribedSeries) -> list[str]:
     lines = _declared_exclusions(of)
     if of.rules:
-        lines.append(f"They excluded: {'; '.join(f'{words}: {{{name}}}' for name, words in of.rules)}.")
+        lines.append(f"These rules excluded {', '.join(words for _, words in of.rules)}.")
     if of.value("excluded_by_hand"):
         lines.append(
-            "{excluded_by_hand} {excluded_by_hand:visit was|visits were} excluded by hand, with a reason on "
-            "record."
+            "{excluded_by_hand} {excluded_by_hand:visit was|visits were} excluded manually, with a "
+            "recorded reason."
         )
     elif of.value("begun"):
-        lines.append("No visit was excluded by hand.")
+        lines.append("No visit was excluded manually.")
     return lines
 
 
@@ -315,14 +351,18 @@ def _declared_exclusions(of: DescribedSeries) -> list[str]:
         if without:
             later.setdefault(without, []).append(name)
             before = [one for one in before if one != name]
-    lines = [f"Exclusions declared before the data: {', '.join(before)}."] if before else []
+    lines = (
+        [f"The following exclusion rules were declared before data collection: {', '.join(before)}."]
+        if before
+        else []
+    )
     for without, names in later.items():
         visits = of.begun_with(without)
         lines.append(
-            f"Exclusions declared or changed after {{{visits}}} {{{visits}:visit|visits}} had begun: "
-            f"{', '.join(names)}."
+            f"The following exclusion rules were declared or changed after {{{visits}}} "
+            f"{{{visits}:visit|visits}} had begun: {', '.join(names)}."
         )
-    return lines or ["No exclusion was declared before the data."]
+    return lines or ["No exclusion rule was declared before data collection."]
 
 
 def _numbers_asked(
@@ -349,17 +389,18 @@ def _checks(of: DescribedSeries) -> list[str]:
     asked = _numbers_asked(of, attention_by_block)
     if of.value("checks"):
         each = _number_in_each(asked)
-        how = "instructed answers" + _number_changed(asked)
+        how = "instructed-response items" + _number_changed(asked)
         if each:
             number = of.number("attention_per_block", each, "declaration: attention.per_block")
-            how = f"{number} instructed {{attention_per_block:answer|answers}} per block"
+            how = f"{number} instructed-response {{attention_per_block:item|items}} per block"
         lines.append(
-            f"Attention was checked by {how}; completed visits hold {{checks}} {{checks:answer|answers}}."
+            f"Attention was checked with {how}; completed visits contained {{checks}} "
+            f"{{checks:answer|answers}} to these checks."
         )
     lines += _motion_checks(of)
     if of.value("motion_checks_other_way"):
         lines.append(
-            "{motion_checks_other_way} {motion_checks_other_way:was|were} answered the other way that is "
+            "{motion_checks_other_way} {motion_checks_other_way:was|were} answered by the alternative "
             "offered to people who cannot see such clips."
         )
     return lines
@@ -377,15 +418,15 @@ def _motion_checks(of: DescribedSeries) -> list[str]:
     ]
     kinds = ", ".join(dict.fromkeys(kind.replace("_", " ") for kind in every))
     each = _number_in_each(asked)
-    shown = "Between the trials short clips showed"
+    shown = "Short clips between the trials showed"
     if each:
         source = "declaration: evidence.motion_checks.per_block"
         number = of.number("motion_checks_per_block", each, source)
-        shown = f"In each block {number} short {{motion_checks_per_block:clip|clips}} showed"
+        shown = f"In each block, {number} short {{motion_checks_per_block:clip|clips}} showed"
     return [
-        f"{shown} what was asked by motion alone ({kinds}){_number_changed(asked)}; of {{motion_checks}} "
-        "{motion_checks:answer|answers} to them in completed visits {motion_checks_right} "
-        "{motion_checks_right:was|were} right."
+        f"{shown} content defined by motion only ({kinds}){_number_changed(asked)}; of {{motion_checks}} "
+        "{motion_checks:answer|answers} in completed visits, {motion_checks_right} "
+        "{motion_checks_right:was|were} correct."
     ]
 
 
@@ -395,7 +436,7 @@ def _display(of: DescribedSeries) -> list[str]:
         lines += [_drawing_clause(of), _as_declared(of)]
     if of.experiment.display.calibrate != "off":
         lines.append(
-            "The size on the screen was calibrated in {calibrated} of {complete} completed "
+            "The physical size of clips was calibrated in {calibrated} of {complete} completed "
             "{complete:visit|visits}."
         )
     return lines
@@ -414,7 +455,7 @@ def _drawing_clause(of: DescribedSeries) -> str:
     if of.value("plays_not_drawn"):
         ways.append("not shown at all in {plays_not_drawn}")
     listed = " and ".join(ways) if len(ways) < 3 else _joined_parts(ways)
-    return f"Of {{plays}} {{plays:play|plays}} in completed visits the clip was {listed}."
+    return f"Of {{plays}} {{plays:presentation|presentations}} in completed visits, the clip was {listed}."
 
 
 def _as_declared(of: DescribedSeries) -> str:
@@ -427,7 +468,7 @@ def _as_declared(of: DescribedSeries) -> str:
     if of.value("plays_failed"):
         parts.append("{plays_failed} failed")
     listed = " and ".join(parts) if len(parts) < 3 else _joined_parts(parts)
-    return f"Of {{plays}} {{plays:play|plays}} in completed visits {listed}."
+    return f"Of {{plays}} {{plays:presentation|presentations}} in completed visits, {listed}."
 
 
 def _reasons(of: DescribedSeries) -> list[str]:
@@ -443,14 +484,14 @@ def _evidence(of: DescribedSeries) -> list[str]:
     judged = sum(of.value(name) for name in ("likely", "unclear", "unlikely"))
     if not judged:
         return [
-            "Whether answers were given by people was not judged ({not_judged} completed "
-            "{not_judged:visit brings|visits bring} no evidence)."
+            "Human answers could not be verified, because {not_judged} completed {not_judged:visit "
+            "provided|visits provided} no evidence."
         ]
     lines = [
-        f"Automated answers: {_evidence_gathered(of)}; by this evidence {{likely}} completed "
-        "{likely:visit was|visits were} likely a person's, {unclear} unclear, {unlikely} unlikely, and "
-        "{not_judged} could not be judged.",
-        "This is evidence, not proof: it does not detect a person who lets a program choose the answers.",
+        f"To detect automated answers, {_evidence_gathered(of)}. Based on this evidence, {{likely}} "
+        "completed {likely:visit was|visits were} likely human, {unclear} {unclear:was|were} unclear, "
+        "{unlikely} {unlikely:was|were} unlikely human, and {not_judged} could not be judged.",
+        "This evidence is not proof: it cannot detect a person who lets a program choose the answers.",
     ]
     if of.value("refused"):
         lines.append("Answers or views were refused in {refused} {refused:visit|visits}.")
@@ -460,7 +501,7 @@ def _evidence(of: DescribedSeries) -> list[str]:
 def _evidence_gathered(of: DescribedSeries) -> str:
     """What was gathered as evidence; with numbers where it was not of every completed visit."""
     kinds: Mapping[str, str] = {
-        "with_tickets": "tickets of the server and the server's time",
+        "with_tickets": "server tickets with server times",
         "with_digests": "digests of the clips",
         "with_presses": "summaries of key and pointer presses",
     }
@@ -470,4 +511,4 @@ def _evidence_gathered(of: DescribedSeries) -> str:
         if visits or name == "with_tickets":
             everywhere = visits == of.value("complete")
             parts.append(words if everywhere else f"{words} (in {{{name}}} {{{name}:visit|visits}})")
-    return f"{' and '.join(parts) if len(parts) < 3 else _joined_parts(parts)} were gathered"
+    return f"{' and '.join(parts) if len(parts) < 3 else _joined_parts(parts)} were recorded"

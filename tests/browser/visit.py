@@ -80,7 +80,7 @@ class Visit:
             page.wait_for_selector(".feedback")
             self.look("feedback")
             page.keyboard.press("Enter")
-        page.wait_for_selector("text=That was the practice")
+        page.wait_for_selector("text=Practice is complete")
         self.look("practice done")
         page.click(".primary")
         return self

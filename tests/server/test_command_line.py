@@ -269,14 +269,14 @@ def test_a_database_without_tables_gets_none(
     run_server_command(settings, "doctor")
     refused = run_server_command(settings, "study", "list")
     assert refused.returncode == 2
-    assert refused.stderr.startswith("error: there is nothing in the database ")
+    assert refused.stderr.startswith("error: there is an empty database at ")
 
 
 def test_an_export_makes_no_folders(settings: Settings, study, tmp_path: Path) -> None:
     out = tmp_path / "mistyped" / "x.csv"
     refused = run_server_command(settings, "export", "short", "--out", str(out))
     assert refused.returncode == 2
-    assert "does not exist; make it first" in refused.stderr
+    assert "does not exist; create it first" in refused.stderr
     assert not out.parent.exists()
 
 
@@ -306,7 +306,7 @@ def test_a_database_of_a_newer_program_is_left_alone(settings: Settings, service
 
 @pytest.mark.parametrize(
     ("form", "begins"),
-    [("runs", b"study,run,"), ("raw", b'{"'), ("codebook", b"# "), ("psych-ds", b"PK\x03\x04")],
+    [("runs", b"study,version,"), ("raw", b'{"'), ("codebook", b"# "), ("psych-ds", b"PK\x03\x04")],
 )
 def test_every_form_of_the_data_page_is_there_on_the_command_line(
     settings: Settings,

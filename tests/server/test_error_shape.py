@@ -73,7 +73,7 @@ def test_a_failure_of_the_server_tells_nothing_of_its_inside(client: TestClient,
     assert answer.status_code == 500
     assert answer.json()["error"] == {
         "code": "internal",
-        "message": "The server failed; please try again.",
+        "message": "The server had an internal error. Please try again.",
         "details": {},
     }
 

@@ -68,7 +68,11 @@ def test_a_provider_of_sign_in_is_declared_key_by_key(
         ("ISSUER", "http://login.uni.example", "expected https"),
         ("CLIENT_SECRET_FILE", "/nowhere/secret", "expected a readable file"),
         ("SCOPES", "profile", "expected 'openid'"),
-        ("ROLES", '[{"claim": "groups", "workspace": "lab", "role": "viewer"}]', "claim and value together"),
+        (
+            "ROLES",
+            '[{"claim": "groups", "workspace": "lab", "role": "viewer"}]',
+            "expected both claim and value",
+        ),
         ("ROLES", '[{"workspace": "lab", "role": "emperor"}]', "'viewer', 'experimenter' or 'owner'"),
         ("SECRET", "in the environment", "Extra inputs"),
     ],

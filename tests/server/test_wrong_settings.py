@@ -11,8 +11,8 @@ WRONG = [
     ("postgre://me:hunter2@host/palpebra", "begins with 'postgre:'"),
     ("postgresql+asyncpg://me:hunter2@host/palpebra", "begins with 'postgresql+asyncpg:'"),
     ("mysql://me:hunter2@host/palpebra", "begins with 'mysql:'"),
-    ("postgresql://me:hunter2@host:54x2/palpebra", "cannot be read"),
-    ("palpebra.sqlite hunter2", "cannot be read"),
+    ("postgresql://me:hunter2@host:54x2/palpebra", "got an invalid URL"),
+    ("palpebra.sqlite hunter2", "got an invalid URL"),
     ("postgresql://me:hunter2@host", "without a name"),
 ]
 

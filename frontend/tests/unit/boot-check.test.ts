@@ -59,7 +59,7 @@ describe("a page that has not begun", () => {
     const opened = [1, 2, 3, 4].map(() => lose(storage));
     expect(opened.map(({ reloads }) => reloads)).toEqual([1, 1, 1, 0]);
     for (const { told, reports } of opened) {
-      expect(told).toContain('The connection failed</h1><p><a href="">Load the page again');
+      expect(told).toContain('The connection failed</h1><p><a href="">Reload the page');
       expect(reports).toEqual([]);
     }
     expect(lose(storage).reloads, "by hand the count begins anew").toBe(1);

@@ -31,11 +31,11 @@ def test_a_new_series_is_confirmed_and_says_where_the_answers_are(dashboard: Das
     page = dashboard.open("/studies/short/results")
     expect(page.get_by_text("4 participants are in series 1 (version 1).").first).to_be_visible()
     expect(page.get_by_text("No answers of participants")).to_have_count(0)
-    expect(page.get_by_text("Visits begun: 0")).to_have_count(0)
+    expect(page.get_by_text("Zero participants began")).to_have_count(0)
     expect(page.get_by_text("data series 2 has no visits yet")).to_be_visible()
     picture(page, "empty-series")
     page.get_by_role("button", name="Show them").first.click()
-    expect(page.get_by_text("Visits begun: 4")).to_be_visible()
+    expect(page.get_by_text("Four participants began")).to_be_visible()
     expect(page.get_by_text("How clips were shown")).to_be_visible()
 
     page = dashboard.open("/studies/short/build")

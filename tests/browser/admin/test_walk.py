@@ -265,7 +265,7 @@ def test_signing_out_and_in(dashboard: Dashboard) -> None:
     page.get_by_label("Name").fill("ada")
     page.locator("input[autocomplete=current-password]").fill("wrong")
     page.get_by_role("button", name="Sign in").click()
-    expect(page.get_by_text("Name or password are wrong.")).to_be_visible()
+    expect(page.get_by_text("Name or password is wrong.")).to_be_visible()
     page.locator("input[autocomplete=current-password]").fill("correct horse battery")
     page.get_by_role("button", name="Sign in").click()
     expect(page.get_by_role("heading", name="Studies")).to_be_visible()

@@ -140,7 +140,7 @@ def test_a_page_whose_every_script_was_lost_can_be_loaded_again(
     server.start()
     page.route("**/assets/participant/*.js*", lambda route: route.abort())
     page.goto(f"{server.address}/run/{study.link_token}")
-    link = page.get_by_role("link", name="Load the page again")
+    link = page.get_by_role("link", name="Reload the page")
     assert not link.is_visible()
     page.evaluate("document.getAnimations().forEach((one) => one.finish())")
     assert axe_violations(page) == []

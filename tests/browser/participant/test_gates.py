@@ -98,7 +98,7 @@ def test_without_h264_the_participant_is_warned_and_may_try(
     page.wait_for_selector("text=H.264")
     page.wait_for_load_state("networkidle")
     assert axe_violations(page) == []
-    page.click("text=Go on all the same")
+    page.click("text=Continue anyway")
     visit.begin()
     assert "gate_h264" in reasons(server)
 
@@ -198,7 +198,7 @@ def test_a_clip_that_is_gone_is_told_and_passed_over(
     page.click(".primary")
     page.wait_for_selector("text=Some clips could not be loaded", timeout=60_000)
     assert axe_violations(page) == []
-    page.click("text=Go on without these clips")
+    page.click("text=Continue without these clips")
     page.wait_for_selector("text=This clip cannot be shown", timeout=60_000)
     assert axe_violations(page) == []
     assert "clip_unavailable" in reasons(server)

@@ -26,7 +26,7 @@ def test_space_goes_on_after_presses_of_the_mouse(server: ServerProcess, tmp_pat
     page.click(".key >> nth=4")
     page.wait_for_selector(".feedback")
     page.keyboard.press(" ")
-    page.wait_for_selector("text=That was the practice")
+    page.wait_for_selector("text=Practice is complete")
     page.keyboard.press(" ")
     visit.trials()
     expect(page.get_by_role("button", name="Another person takes part")).to_be_visible()

@@ -79,7 +79,7 @@ def test_a_second_tab_is_told_and_may_take_over(
     visit = Visit(second, server.address).open(link)
     second.wait_for_selector("text=open in another tab")
     assert axe_violations(second) == []
-    second.click("text=Go on here")
+    second.click("text=Continue here")
     second.wait_for_selector(".prose")
     page.wait_for_selector("text=goes on in another tab")
     assert axe_violations(page) == []
@@ -144,7 +144,7 @@ def test_a_resume_code_goes_on_in_another_browser_and_an_id_alone_does_not(
         field = other.page.get_by_label("Resume code")
         field.fill("0000-0000-0000")
         field.press("Enter")
-        other.page.wait_for_selector("text=No visit has this code")
+        other.page.wait_for_selector("text=There is no visit with this code")
         field.fill(code.lower())
         field.press("Enter")
         other.page.wait_for_selector("text=Welcome back")

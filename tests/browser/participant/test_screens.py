@@ -91,7 +91,7 @@ def test_full_screen_is_entered_left_and_asked_for_again(
     page.keyboard.press(" ")
     page.wait_for_selector(".scale")
     page.keyboard.press("4")
-    page.wait_for_selector("text=Full screen, please")
+    page.wait_for_selector("text=Please return to full screen")
     assert axe_violations(page) == []
     page.keyboard.press("Enter")
     page.wait_for_selector(".ready")
@@ -257,7 +257,7 @@ def test_the_whole_visit_by_keyboard_alone(server: ServerProcess, tmp_path: Path
     page.keyboard.press("Enter")
     page.wait_for_selector(".feedback")
     page.keyboard.press("Enter")
-    page.wait_for_selector("text=That was the practice")
+    page.wait_for_selector("text=Practice is complete")
     page.keyboard.press("Enter")
     while page.wait_for_selector(".ready, .attention, .break, form"):
         if page.query_selector("form"):

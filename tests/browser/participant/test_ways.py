@@ -127,9 +127,9 @@ def test_practice_comes_once_more_where_a_key_was_pressed_during_the_clip(served
     page.wait_for_selector("text=Please try this one once more")
     page.keyboard.press("Enter")
     visit.rate("5")
-    page.wait_for_selector("text=Good: that is how it works")
+    page.wait_for_selector("text=Good, that is how it works")
     page.keyboard.press("Enter")
-    page.wait_for_selector("text=That was the practice")
+    page.wait_for_selector("text=Practice is complete")
     assert visit.problems == []
 
 

@@ -112,7 +112,7 @@ def test_a_refusal_is_answered_where_it_cannot_be_written(
     finally:
         with services.database.write() as session:
             session.execute(text("ALTER TABLE away RENAME TO audit_entries"))
-    assert "a refusal could not be put into the audit log" in caplog.text
+    assert "a refusal could not be written to the audit log" in caplog.text
 
 
 def test_a_nul_in_a_path_is_refused_before_anybody_is_recognised(

@@ -46,10 +46,10 @@ def test_erased_visits_are_no_withdrawals_and_other_origins_are_named(
     answer = viewer.get("/studies/short/methods").json()
     numbers = {one["name"]: one["value"] for one in answer["numbers"]}
     assert (numbers["withdrew"], numbers["erased"]) == (1, 1)
-    assert "Erased afterwards, answers and consent with them: 1." in answer["paragraph"]
-    assert "no data of participants" not in answer["paragraph"]
+    assert "The data of one visit, including answers and consent, were erased later." in answer["paragraph"]
+    assert "not data from participants" not in answer["paragraph"]
     simulated = viewer.get("/studies/short/methods?origin=simulated").json()["paragraph"]
-    assert simulated.startswith("These visits are no data of participants: their origin is 'simulated'.")
+    assert simulated.startswith("These visits are not data from participants: their origin is 'simulated'.")
 
 
 def test_the_counts_are_those_of_the_runs(
@@ -70,13 +70,14 @@ def test_the_counts_are_those_of_the_runs(
     assert numbers["plays"] == sum(
         numbers[f"plays_{verdict}"] for verdict in ("good", "uncertain", "flagged", "failed")
     )
-    assert "2 were completed" in answer["paragraph"]
+    assert "Four participants began the study; three consented, and two completed it." in answer["paragraph"]
     assert "Every clip was drawn frame by frame" in answer["paragraph"]
     assert (
-        "Automated answers: tickets of the server and the server's time (in 0 visits)" in answer["paragraph"]
+        "To detect automated answers, server tickets with server times (in zero visits)"
+        in answer["paragraph"]
     )
-    assert "Nobody has completed" not in answer["paragraph"]
-    assert "and 1 was left open" in answer["paragraph"]
+    assert "No participant has completed" not in answer["paragraph"]
+    assert "and one was not finished" in answer["paragraph"]
     assert "attention checks failed" in answer["paragraph"]
     with services.database.read() as session:  # as somebody who doubts a number would
         declared = [one for one in answer["numbers"] if one["source"].startswith("declaration: ")]
@@ -95,7 +96,7 @@ def test_every_number_of_the_text_has_its_source_below(
 ) -> None:
     taken_part(client, study)
     paragraph, sources = viewer.get("/studies/short/methods/methods.txt").text.split("\n\n")
-    marks = {int(mark) for mark in re.findall(r"\d+ \[(\d+)\]", paragraph)}
+    marks = {int(mark) for mark in re.findall(r"\w+ \[(\d+)\]", paragraph)}
     assert marks == {int(line[1 : line.index("]")]) for line in sources.splitlines()}
     assert not re.findall(r"[{}]", paragraph)
 
@@ -111,22 +112,25 @@ def test_a_report_adds_what_each_declared_rule_left_out(
         found = methods_of(
             session, find_study(session, "short", OPERATOR, "view"), "participant", None, results
         )
-    assert "visits by attention checks failed: 2; trials by slow trials: 9" in found.plain()
+    assert "excluded two visits (attention checks failed), nine trials (slow trials)." in found.plain()
     assert json.loads(found.json())["paragraph"] == found.plain()
 
 
 def test_nobody_has_taken_part_yet(viewer: Admin, study: StudyInDatabase) -> None:
     paragraph = viewer.get("/studies/short/methods").json()["paragraph"]
-    assert "Visits begun: 0" in paragraph
-    assert "Nobody has completed a visit yet" in paragraph
-    assert not re.search("was drawn|plays|not judged|was calibrated", paragraph)
+    assert "Zero participants began the study" in paragraph
+    assert "No participant has completed the study yet" in paragraph
+    assert not re.search("was drawn|presentations|verified|was calibrated", paragraph)
 
 
 def test_other_origins_and_series_are_not_counted(
     client: TestClient, study: StudyInDatabase, viewer: Admin
 ) -> None:
     taken_part(client, study)
-    assert "Visits begun: 0" in viewer.get("/studies/short/methods?origin=pilot").json()["paragraph"]
+    assert (
+        "Zero participants began the study"
+        in viewer.get("/studies/short/methods?origin=pilot").json()["paragraph"]
+    )
     assert viewer.get("/studies/short/methods?series=7").status_code == 404
 
 
@@ -169,7 +173,7 @@ def test_motion_checks_are_told_with_how_many_were_right(
     with services.database.read() as session:
         declared_study = find_study(session, "short", OPERATOR, "view")
         written = methods_of(session, declared_study, "participant", None).latex()
-    assert "motion alone (digit, direction)" in written
+    assert "motion only (digit, direction)" in written
     assert "% motion\\_checks" not in written
     assert "% motion_checks_right = 3: SELECT count(*)" in written
     assert "% motion_checks_per_block = 2: declaration: evidence.motion_checks.per_block" in written
@@ -228,12 +232,12 @@ def test_only_visits_that_a_recruiter_sent_were_recruited_through_it(
     complete(client, study.link_token, query={"PROLIFIC_PID": PERSON})
     complete(client, study.link_token)
     complete(client, study.link("personal", label="P1"))
-    assert "Through Prolific 1 visit was recruited." in paragraph(viewer)
+    assert "One participant was recruited through Prolific." in paragraph(viewer)
     study.change(recruiter={"kind": "sona"})
-    assert "Through Prolific 1 visit was recruited." in paragraph(viewer)
+    assert "One participant was recruited through Prolific." in paragraph(viewer)
     assert "SONA" not in paragraph(viewer)
     complete(client, study.link(recruiter={"kind": "sona"}), query={"survey_code": "7"})
-    assert "Through SONA 1 visit was recruited." in paragraph(viewer)
+    assert "One participant was recruited through SONA." in paragraph(viewer)
     assert values(viewer, services)["begun"] == 5
     assert "recruited" not in paragraph(viewer, origin="simulated")
 
@@ -257,11 +261,11 @@ def test_every_clip_was_drawn_only_where_every_play_was(
     assert "Every clip" not in said
     assert "frame's time" not in said
     assert (
-        "drawn frame by frame in 15, shown by the browser's video element in 1, and not shown at all in 1."
-        in said
+        "drawn frame by frame in 15, shown by the browser's video element in one, and not shown at all "
+        "in one." in said
     )
-    assert "2 were flagged (" in said
-    assert "missing frames: 1" in said
+    assert "two were flagged (" in said
+    assert "missing frames: one" in said
     found = values(viewer, services)
     assert (found["plays"], found["plays_by_frame"], found["plays_not_drawn"]) == (17, 15, 1)
 
@@ -271,23 +275,23 @@ def test_rules_are_declared_before_the_data_only_where_every_visit_had_them(
 ) -> None:
     complete(client, study.link_token)
     save_version(owner, SHORT + MORE_RULES)
-    later = "Exclusions declared or changed after 1 visit had begun: median response time."
+    later = "declared or changed after one visit had begun: median response time."
     said = paragraph(viewer)
-    assert "Exclusions declared before the data: attention checks failed." in said
+    assert "rules were declared before data collection: attention checks failed." in said
     assert later in said
-    assert "Rules of screening" not in said
+    assert "screening rules" not in said
     complete(client, study.link_token)
     said = paragraph(viewer)
     assert later in said
-    assert "Rules of screening that held for 1 of 2 visits: form answer." in said
+    assert "screening rules applied to one of two visits: form answer." in said
     assert values(viewer, services)["begun_with_2"] == 1
     # Another limit is another rule: the data were there when it was chosen.
     save_version(
         owner, SHORT.replace('"attention_checks_failed"', '"attention_checks_failed"\nmore_than = 1')
     )
     said = paragraph(viewer)
-    assert "before the data" not in said.replace("No exclusion was declared before", "")
-    assert "changed after 2 visits had begun: attention checks failed." in said
+    assert "before data collection" not in said.replace("No exclusion rule was declared before", "")
+    assert "changed after two visits had begun: attention checks failed." in said
 
 
 def test_a_number_of_checks_that_was_changed_is_not_stated_as_one(
@@ -295,13 +299,15 @@ def test_a_number_of_checks_that_was_changed_is_not_stated_as_one(
 ) -> None:
     assert "Attention was checked" not in paragraph(viewer)
     complete(client, study.link_token)
-    one = "Attention was checked by 1 instructed answer per block; completed visits hold 2 answers"
+    one = "with one instructed-response item per block; completed visits contained two answers"
     assert one in paragraph(viewer)
     save_version(owner, SHORT.replace("per_block = 1", "per_block = 2"))
     assert one in paragraph(viewer)
     complete(client, study.link_token)
     assert one not in paragraph(viewer)
-    assert "their number per visit was changed (2, 4); completed visits hold 6 answers" in paragraph(viewer)
+    assert "their number per visit was changed (2, 4); completed visits contained six answers" in paragraph(
+        viewer
+    )
 
 
 def test_warnings_that_nobody_got_were_not_given(
@@ -310,8 +316,8 @@ def test_warnings_that_nobody_got_were_not_given(
     save_version(owner, SHORT + '\n[[warnings.rules]]\nrule = "same_answer"\nanswers = 20\n')
     complete(client, study.link_token)
     said = paragraph(viewer)
-    assert "people were warned" not in said
-    assert "Warnings of same answer were declared; no visit was warned." in said
+    assert "were warned" not in said
+    assert "Warnings about same answer were declared, but no participant was warned." in said
 
 
 def test_who_declined_or_began_again_did_not_wish_to_end(
@@ -327,8 +333,8 @@ def test_who_declined_or_began_again_did_not_wish_to_end(
     said = paragraph(viewer)
     found = values(viewer, services)
     assert (found["declined"], found["restarted"], found["withdrew"]) == (1, 1, 0)
-    assert "1 was ended because consent was declined" in said
-    assert "1 was replaced by a new visit of the same participant" in said
+    assert "one ended because consent was declined" in said
+    assert "one was replaced by a new visit of the same participant" in said
 
 
 def test_an_empty_series_says_where_the_data_are(
@@ -339,8 +345,8 @@ def test_an_empty_series_says_where_the_data_are(
     save_version(owner, SHORT.replace("[trial.scale]\n", "[trial.scale]\nmaximum = 9\n"))
     said = paragraph(viewer)
     assert said.startswith("3 participants are in series 1 (version 1); data series 2 has no visits yet.")
-    assert "Visits begun: 0" not in said
-    assert "Visits begun: 3" in paragraph(viewer, series=1)
+    assert "Zero participants began" not in said
+    assert "Three participants began" in paragraph(viewer, series=1)
 
 
 @pytest.mark.parametrize("people", [1, 2])

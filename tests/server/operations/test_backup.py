@@ -167,7 +167,7 @@ class TestRefusals:
         self, services: Services, empty_database_url: str, path: str, keys: str | None, tmp_path: Path
     ) -> None:
         (tmp_path / "file").write_text("")
-        with pytest.raises(InputError, match=r"the folder .*(no|file) does not exist; make it first$"):
+        with pytest.raises(InputError, match=r"the folder .*(no|file) does not exist; create it first$"):
             back_up(
                 services.database,
                 services.settings,

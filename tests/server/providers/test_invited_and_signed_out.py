@@ -115,7 +115,7 @@ def test_a_workspace_whose_members_the_provider_says_is_not_entered_by_its_invit
     if when == "begin":
         refused = visitor.browser.post(f"/api/admin/invitations/{token}/providers/uni")
         assert refused.status_code == 409
-        assert "The University says who belongs to" in refused.json()["error"]["message"]
+        assert "The University manages the members of" in refused.json()["error"]["message"]
     else:
         assert visitor.come_back(address) == "/admin/sign-in?refused=conflict"
     assert visitor.browser.get(f"/api/admin/invitations/{token}/state").json()["status"] == "open"

@@ -271,16 +271,16 @@ def test_no_letter_goes_to_a_server_that_nobody_vouches_for(
         strict = settings.model_copy(update={"smtp_port": port, "smtp_security": "starttls"})
         assert not letters.send_mail(strict, ADDRESS, "subject", "text")
     assert letterbox.letters == []
-    assert "a letter was not sent" in caplog.text
+    assert "an email was not sent" in caplog.text
     assert ADDRESS not in caplog.text
 
 
 @pytest.mark.parametrize(
     ("values", "said"),
     [
-        ({"smtp_host": "mail.example"}, "PALPEBRA_MAIL_FROM is needed"),
-        ({"smtp_host": "mail.example", "mail_from": "a@b.example", "smtp_security": "none"}, "in the open"),
-        ({"mail_from": "nobody"}, "expected one address"),
+        ({"smtp_host": "mail.example"}, "PALPEBRA_MAIL_FROM is required"),
+        ({"smtp_host": "mail.example", "mail_from": "a@b.example", "smtp_security": "none"}, "unencrypted"),
+        ({"mail_from": "nobody"}, "expected one email address"),
     ],
 )
 def test_settings_that_would_lose_letters_are_refused(values: dict[str, Any], said: str) -> None:

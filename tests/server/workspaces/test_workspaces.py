@@ -133,7 +133,7 @@ def test_a_copy_lands_beside_its_source_or_where_the_copier_says(
     with services.database.write() as session:
         workspaces.set_member(session, workspaces.find_workspace(session, "new-lab"), "other", None, OPERATOR)
     nowhere = other.send("POST", "/studies/short/copies", {"name": "nowhere"})
-    assert (nowhere.status_code, "you have it in none" in nowhere.text) == (403, True)
+    assert (nowhere.status_code, "you do not have it in any" in nowhere.text) == (403, True)
 
 
 def test_one_owner_of_a_workspace_must_remain(owner: Admin) -> None:

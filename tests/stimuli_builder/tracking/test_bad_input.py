@@ -207,7 +207,7 @@ def test_outputs_that_cannot_be_written_are_refused_first(stimuli, recording, tm
         "track", recording.video, "--labels", recording.labels, "--out", tmp_path / "no" / "track.csv"
     )
     assert code == 2
-    assert "does not exist; make it first" in error
+    assert "does not exist; create it first" in error
 
 
 @pytest.fixture
@@ -253,7 +253,7 @@ def test_a_folder_takes_no_options_of_one_video(stimuli, folder, recording, tmp_
     assert "no video in this folder" in stimuli("track", tmp_path / "none", "--out", tmp_path / "t")[2]
     assert not (tmp_path / "tracks").exists()
     nowhere = tmp_path / "no" / "tracks"
-    assert "does not exist; make it first" in stimuli("track", folder, "--out", nowhere)[2]
+    assert "does not exist; create it first" in stimuli("track", folder, "--out", nowhere)[2]
 
 
 def test_accuracy_of_files_that_do_not_belong_together(stimuli, recording, tmp_path):
