@@ -1,15 +1,30 @@
-"""Motion checks: short clips whose answer is visible through motion only, and their questions."""
+"""Motion checks: short clips whose answer is visible through motion only, and their questions.
 
+The words of each page language are in `check_words/TAG.toml`, found by their names. English and German are
+reviewed by the authors; every other file says at its top that it awaits review.
+"""
+
+import tomllib
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
-from experiments.check_words import WORDS
-from experiments.check_words.words import Asked
 from experiments.declaration.base import Translated
 
 CheckName = Literal["digit", "direction", "shape", "first_blink", "first_eye"]
 CHECK_CELL = ""
 """The cell of a check's clip where clips are stored by cell: no design has a cell without a name."""
+DIGITS = [str(digit) for digit in range(1, 10)]
+"""Choices of checks that show a digit: as the clip writes it, in every language."""
+FOLDER = Path(__file__).parent / "check_words"
+
+
+@dataclass(frozen=True)
+class CheckWords:
+    """The wording of one kind of check: the question, and the choices in the order of their answers."""
+
+    question: str
+    choices: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -29,12 +44,29 @@ class CheckKind:
     own_look: bool = False
 
 
+def _words_of(file: Path) -> dict[str, CheckWords]:
+    tables = tomllib.loads(file.read_text(encoding="utf-8"))
+    return {
+        name: CheckWords(table["question"], tuple(table.get("choices", DIGITS)))
+        for name, table in tables.items()
+    }
+
+
+WORDS: dict[str, dict[str, CheckWords]] = {
+    file.stem: _words_of(file) for file in sorted(FOLDER.glob("*.toml"))
+}
+"""Words of every language, by its tag and by the name of the check."""
+
+
 def _kind(name: CheckName, *, own_look: bool = False) -> CheckKind:
-    said: dict[str, Asked] = {language: getattr(words, name) for language, words in WORDS.items()}
-    numbers = range(len(next(iter(said.values())).choices))
+    # A language may lack a kind while it is being translated; the page then asks in English.
+    by_language = {language: words.get(name, WORDS["en"][name]) for language, words in WORDS.items()}
     return CheckKind(
-        {language: asked.question for language, asked in said.items()},
-        tuple({language: asked.choices[number] for language, asked in said.items()} for number in numbers),
+        {language: words.question for language, words in by_language.items()},
+        tuple(
+            {language: words.choices[number] for language, words in by_language.items()}
+            for number in range(len(WORDS["en"][name].choices))
+        ),
         own_look,
     )
 

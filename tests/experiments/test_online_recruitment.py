@@ -6,7 +6,7 @@ from itertools import product
 import pytest
 
 from experiments.assignment.order import attention_by_block, motion_checks_by_block, with_checks
-from experiments.check_words import WORDS as CHECK_WORDS
+from experiments.checks import WORDS as CHECK_WORDS
 from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError
 from experiments.kinds import KINDS

@@ -164,18 +164,14 @@ export const messages: Messages = { ...english, continue: "Fortsätt" };
 """
 
 SWEDISH_CHECKS = """\
-\"""Words of motion checks in Swedish, a sentence of them.\"""
+# Words of motion checks in Swedish, a sentence of them.
 
-from dataclasses import replace
-
-from experiments.check_words.en import WORDS as ENGLISH
-from experiments.check_words.words import DIGITS, Asked
-
-WORDS = replace(ENGLISH, digit=Asked("Vilken siffra såg du?", DIGITS))
+[digit]
+question = "Vilken siffra såg du?"
 """
 
 LANGUAGE: dict[str, str | Edit] = {
-    "experiments/check_words/sv.py": SWEDISH_CHECKS,
+    "experiments/check_words/sv.toml": SWEDISH_CHECKS,
     "frontend/src/i18n/languages/sv.ts": SWEDISH,
 }
 
