@@ -42,6 +42,7 @@ html_theme = "pydata_sphinx_theme"
 html_title = "Palpebra"
 html_static_path = ["_static"]
 html_css_files = ["palpebra.css"]
+html_search_scorer = str(ROOT / "docs" / "_extensions" / "search_scorer.js")
 html_show_sourcelink = False
 html_copy_source = False
 html_last_updated_fmt = None

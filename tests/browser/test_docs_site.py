@@ -20,6 +20,37 @@ PAGES = (
     "search.html?q=retention",
 )
 
+TASKS = {
+    "power analysis": "plan-the-sample",
+    "counterbalance": "order-and-counterbalance",
+    "demographics": "ask-questions",
+    "between subjects": "choose-a-design",
+    "screen size": "size-and-devices",
+    "keyboard": "size-and-devices",
+    "prolific": "recruit",
+    "completion code": "recruit",
+    "bots": "check-participants",
+    "replay": "look-at-one-participant",
+    "pause study": "change-a-running-study",
+    "exclude participant": "exclude-participants",
+    "consent form": "privacy-template",
+    "withdraw": "erase-a-person",
+    "offline": "lab-study",
+    "preregistration": "share-a-study",
+    "spss": "use-r-python-spss",
+    "cronbach": "analyze-ratings",
+    "p value check": "check-a-paper",
+    "incomplete blinks": "measure-blinks",
+    "many videos": "many-recordings",
+    "webcam": "track-a-video",
+    "maya": "animate-blinks",
+    "password reset": "accounts",
+    "upgrade": "update",
+    "docker": "deploy",
+}
+"""Words that a newcomer searches for, and the guide that answers."""
+SHOWN_FIRST = 5
+
 
 @pytest.fixture
 def docs_server(server: ServerProcess) -> ServerProcess:
@@ -58,6 +89,22 @@ def test_search_finds_a_page_and_dark_mode_stays(docs_server: ServerProcess, chr
     page.goto(f"{docs_server.address}/docs/tutorials/blinks.html")
     assert page.evaluate("document.documentElement.dataset.theme") == "dark"
     assert axe_violations(page) == []
+    page.close()
+
+
+def test_search_lists_the_guide_for_a_task_among_the_first(
+    docs_server: ServerProcess, chromium: Browser
+) -> None:
+    page = chromium.new_page()
+    missed = {}
+    for words, guide in TASKS.items():
+        page.goto(f"{docs_server.address}/docs/search.html?q={words.replace(' ', '+')}")
+        expect(page.locator("#search-results .search-summary")).to_contain_text("found")
+        links = page.locator("ul.search > li > a").all()[:SHOWN_FIRST]
+        names = [(link.get_attribute("href") or "").partition("?")[0] for link in links]
+        if not any(f"how-to/{guide}.html" in name for name in names):
+            missed[words] = names
+    assert not missed
     page.close()
 
 
