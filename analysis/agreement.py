@@ -49,7 +49,7 @@ class ItemAnswers:
 
 @dataclass(frozen=True)
 class ItemStatistics:
-    """An item beside the others.
+    """An item compared with the others.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class ItemStatistics:
     alpha_without : float or None
         Cronbach's alpha of the others; None for two items, or others whose sum does not vary.
     loading : float or None
-        On the one factor, standardised; None where omega is not defined.
+        On the one factor, standardized; None where omega is not defined.
     """
 
     name: str
@@ -91,7 +91,7 @@ def read_items(
     scale: tuple[float, float] | None = None,
     case: str | None = None,
 ) -> ItemAnswers:
-    """Read one row a case (a person, or a person's rating of a clip) and one column an item.
+    """Read one row per case (a person, or a person's rating of a clip) and one column per item.
 
     Raises
     ------
@@ -115,15 +115,18 @@ def read_items(
     keep: NDArray[np.bool_] = np.asarray(np.isfinite(answers).all(axis=1))
     if not keep.all():
         left_out = int((~keep).sum())
-        said = f"{left_out} case{'s' * (left_out > 1)} without an answer to every item left out"
+        said = f"{left_out} case{'s' * (left_out > 1)} without an answer to every item excluded"
         table.decisions.append(f"{said} ({name_lines(table, ~keep)})")
     if keep.sum() < MIN_CASES:
         raise InputError(f"{path.name}: expected {MIN_CASES} complete cases or more, got {int(keep.sum())}")
     for name, column in zip(items, answers[keep].T, strict=True):
         if np.ptp(column) == 0:
-            raise InputError(f"{path.name}: every answer to '{name}' is {column[0]:g}; leave the item out")
+            raise InputError(f"{path.name}: every answer to '{name}' is {column[0]:g}; remove the item")
     if np.ptp(answers[keep].sum(axis=1)) == 0:
-        raise InputError(f"{path.name}: the sum of the items is the same in every case; turn with --reverse")
+        raise InputError(
+            f"{path.name}: the sum of the items is the same in every case; name reverse-keyed items with "
+            "--reverse"
+        )
     cases = (
         list(table.columns[case].astype(str)) if case else [f"line {table.line(i)}" for i in range(len(keep))]
     )
@@ -143,9 +146,9 @@ def _refuse_items(items: Sequence[str], reverse: Sequence[str], scale: tuple[flo
         raise InputError(f"expected two items or more, e.g. --items calm,tense,glad; got {len(items)}")
     for name in reverse:
         if name not in items:
-            raise InputError(f"--reverse names '{name}', which is none of the items {', '.join(items)}")
+            raise InputError(f"--reverse names '{name}', which is not one of the items {', '.join(items)}")
     if reverse and scale is None:
-        raise InputError("--reverse needs the ends of the scale to turn an item: add e.g. --scale 1:7")
+        raise InputError("--reverse needs the ends of the scale: add, for example, --scale 1:7")
 
 
 def _refuse_outside(
@@ -201,7 +204,7 @@ def _item(data: ItemAnswers, position: int, loading: float | None) -> ItemStatis
 
 
 def _one_factor(answers: Floats) -> tuple[Floats | None, str]:
-    """Standardised loadings on one factor, the sum positive; None with the reason where there are none."""
+    """Standardized loadings on one factor, the sum positive; None with the reason where there are none."""
     n, items = answers.shape
     if items < MIN_OMEGA_ITEMS:
         return None, f"omega needs {MIN_OMEGA_ITEMS} items or more"
@@ -209,12 +212,12 @@ def _one_factor(answers: Floats) -> tuple[Floats | None, str]:
         return None, f"omega needs more cases than items, got {n} and {items}"
     correlations: Floats = np.atleast_2d(np.corrcoef(answers, rowvar=False))
     if np.linalg.cond(correlations) > 1e8:
-        return None, "an item follows from the others, so that omega is not defined"
+        return None, "an item is determined by the others, so omega is not defined"
     loadings = _likeliest(correlations, n)
     if not np.isfinite(loadings).all() or (np.abs(loadings) > 1 - 1e-6).any():
-        return None, "one factor explains an item wholly (a Heywood case), so that omega is not defined"
+        return None, "one factor explains an item completely (a Heywood case), so omega is not defined"
     if not _is_maximum(correlations, loadings):
-        return None, "the fit of one factor did not end, so that omega is not defined"
+        return None, "the one-factor fit did not converge, so omega is not defined"
     return loadings * (np.sign(loadings.sum()) or 1.0), ""
 
 
@@ -225,7 +228,7 @@ def _likeliest(correlations: Floats, n: int) -> Floats:
 
     model: Any = Factor(corr=correlations, n_factor=1, method="ml", nobs=n)
     with warnings.catch_warnings():
-        # of where it ended the refusals of `_one_factor` tell more: not converged, nothing left of an item
+        # the errors of `_one_factor` say more about where it ended: not converged, nothing left of an item
         for sort in (ConvergenceWarning, EstimationWarning):
             warnings.simplefilter("ignore", sort)
         fits = [fit for start in range(STARTS) if (fit := _fit(model, start)) is not None]
@@ -305,10 +308,10 @@ class Agreement:
 
 
 _MEANINGS = {
-    "ICC(1,1)": "one rating, people differ from item to item",
-    "ICC(A,1)": "one rating, absolute agreement",
-    "ICC(C,1)": "one rating, consistency",
-    "ICC(1,k)": "mean of all ratings, people differ from item to item",
+    "ICC(1,1)": "single rating, different people for each item",
+    "ICC(A,1)": "single rating, absolute agreement",
+    "ICC(C,1)": "single rating, consistency",
+    "ICC(1,k)": "mean of all ratings, different people for each item",
     "ICC(A,k)": "mean of all ratings, absolute agreement",
     "ICC(C,k)": "mean of all ratings, consistency",
 }
@@ -358,7 +361,7 @@ def agreement(votes: Votes, level: Level = "interval") -> Agreement:
 def _usable(votes: Votes, level: Level) -> Floats:
     """Ratings (people, items) of the items that two people or more rated."""
     scores = votes.scores[:, np.isfinite(votes.scores).sum(axis=0) >= 2]
-    # Who rated only items that nobody else did tells nothing either.
+    # People who rated only items that nobody else rated say nothing about agreement either.
     scores = scores[np.isfinite(scores).any(axis=1)]
     if len(scores) < 2 or scores.shape[1] < 2:
         raise InputError(
@@ -378,9 +381,9 @@ def _decisions(votes: Votes) -> tuple[str, ...]:
     alone = int((np.isfinite(votes.scores).sum(axis=0) < 2).sum())
     said = list(votes.decisions)
     if repeated:
-        said.append(f"{repeated} times a person rated an item more than once; the mean counts")
+        said.append(f"{repeated} times a person rated an item more than once; their mean was used")
     if alone:
-        said.append(f"{alone} items rated by one person tell nothing of agreement and are left out")
+        said.append(f"{alone} items were rated by only one person and were excluded")
     return tuple(said)
 
 
@@ -408,12 +411,12 @@ def _intraclass(complete: Floats) -> tuple[tuple[IntraclassCorrelation, ...], st
 
     people, items = complete.shape
     if items < 3:
-        return (), f"{items} items were rated by everybody; intraclass correlations need three or more"
+        return (), f"{items} items were rated by everybody; intraclass correlations need at least three"
     if np.ptp(complete) == 0:
         return (), "the items that everybody rated do not vary"
     person, item = np.meshgrid(np.arange(people), np.arange(items), indexing="ij")
     long = pd.DataFrame({"person": person.ravel(), "item": item.ravel(), "rating": complete.ravel()})
-    # pingouin rounds intervals to two decimals unless told otherwise
+    # pingouin rounds intervals to two decimals by default
     rounding = pingouin.options.copy()
     pingouin.options["round.column.CI95"] = None
     try:

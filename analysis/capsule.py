@@ -22,7 +22,7 @@ from experiments.seal import read_clips_sha256, read_seal
 # Make the report of a capsule again, from its declaration and its table of answers alone.
 
 ANSWERS = "answers.csv"
-"""Name of the table while it is analysed, which stands in the report."""
+"""Name of the table during the analysis; the report shows it."""
 
 
 def rebuild(source: ReportSource, folder: Path, work: Path, progress: Progress = lambda _: None) -> Path:
@@ -47,12 +47,15 @@ def rebuild(source: ReportSource, folder: Path, work: Path, progress: Progress =
     return report
 
 
-# What changed on purpose in reports: what `analysis verify` says of it in an older capsule.
+# Changes that were made on purpose in reports: `analysis verify` lists them for an older capsule.
 #
-# Each has its line under "Numbers changed" in CHANGELOG.md: the command, the wrong number, how to notice it.
+# A changed number has its line under "Numbers changed" in CHANGELOG.md: the command, the wrong number, how to
+# notice it. A change of wording leaves every number as it was.
 
 CHANGED = date(2026, 11, 28)
 """The day of the changes of 0.2.0's last week."""
+REWORDED = date(2026, 11, 29)
+"""The day on which sentences, captions and notes were rewritten in plain English."""
 
 
 @dataclass(frozen=True)
@@ -62,17 +65,20 @@ class IntendedChange:
     Attributes
     ----------
     since : date
-        The day of the change: capsules made later than that have the new numbers.
+        The day of the change: later capsules have the new numbers.
     part : str
         Regular expression of places in `results.json`, such as `pairwise[3].cell_a`, and of headings in
         `report.md`.
     why : str
         What is different now, without a full stop.
+    wording : bool
+        Whether the change explains sentences whose numbers are equal, and nothing else.
     """
 
     since: date
     part: str
     why: str
+    wording: bool = False
 
 
 INTENDED = (
@@ -96,20 +102,62 @@ INTENDED = (
     ),
     IntendedChange(
         CHANGED,
-        r"Evidence that answers are a person's|evidence\b.*",
+        r"Evidence that responses are from a person|evidence\b.*",
         "the verdict 'likely' needs checks that were passed",
     ),
     IntendedChange(
         CHANGED,
-        r"Who and what was left out|decisions\b.*",
+        r"Exclusions and decisions|decisions\b.*",
         "copied rows and repeated ids are named as decisions",
     ),
+    IntendedChange(REWORDED, r".*", "the wording is in plainer English; all numbers are equal", wording=True),
 )
+RENAMED = {
+    "Who and what was left out": "Exclusions and decisions",
+    "Evidence that answers are a person's": "Evidence that responses are from a person",
+    "Ratings behind blinks": "Lag of ratings after blinks",
+    "Yes or right": "Yes or correct",
+    "(turned)": "(reversed)",
+}
+"""Headings, titles and short cells of older reports, and what they are called now."""
 
 
-def intended_change(spot: str, made: date) -> IntendedChange | None:
-    """The change that explains a difference at this spot in a capsule made on this day; None elsewhere."""
-    return next((one for one in INTENDED if made <= one.since and re.fullmatch(one.part, spot)), None)
+def intended_change(spot: str, made: date, reworded: bool = False) -> IntendedChange | None:
+    """The change that explains a difference at this spot in a capsule made on this day; None elsewhere.
+
+    Parameters
+    ----------
+    spot : str
+        Place in `results.json`, or heading in `report.md`.
+    made : date
+        The day on which the capsule was made.
+    reworded : bool
+        Whether only the words of sentences differ there: `is_reworded`.
+    """
+    return next(
+        (
+            one
+            for one in INTENDED
+            if made <= one.since and one.wording is reworded and re.fullmatch(one.part, spot)
+        ),
+        None,
+    )
+
+
+def is_reworded(was: str, now: str) -> bool:
+    """Whether two texts differ only in sentences and renamed terms: equal numbers, equal rows of tables."""
+    for old, new in RENAMED.items():
+        was = was.replace(old, new)
+    return _fixed_parts(was) == _fixed_parts(now)
+
+
+def _fixed_parts(text: str) -> list[str]:
+    """Numbers of the sentences and rows of the tables of a text; names and other short cells whole."""
+    fixed: list[str] = []
+    for line in text.splitlines():
+        sentence = len(line.split()) >= SENTENCE_WORDS and not line.startswith("|")
+        fixed += _NUMBER.findall(line) if sentence else [line.strip()]
+    return [one for one in fixed if one]
 
 
 # Hold a report that was made again against the one in the capsule, file by file.
@@ -118,6 +166,9 @@ Kind = Literal["same", "figure", "rounding", "table"]
 RELATIVE = 1e-9
 """Numbers that differ by less than this share of themselves differ by rounding: other processors add up in
 another order."""
+SENTENCE_WORDS = 4
+"""A line with fewer words is a name or a cell of a table, whose change no new wording explains."""
+_NUMBER = re.compile(r"\d[\d.,]*\d|\d")
 _PICTURE = re.compile(r"data:image/[a-z+]+;base64,[A-Za-z0-9+/=]+")
 
 
@@ -174,18 +225,29 @@ def _compare(name: str, before: bytes, after: bytes, made: date) -> FileComparis
     return FileComparison(name, "table", _first_line(_PICTURE.sub("", was), _PICTURE.sub("", now)))
 
 
-def _sections_that_differ(was: str, now: str) -> Iterator[tuple[str, str]]:
+@dataclass(frozen=True)
+class Difference:
+    """A place where two reports differ: which, how in words, and whether only wording differs."""
+
+    spot: str
+    said: str
+    reworded: bool
+
+
+def _sections_that_differ(was: str, now: str) -> Iterator[Difference]:
     """The headings below which two reports differ, each with its first line that does."""
     before, after = _sections(was), _sections(now)
     for heading in dict.fromkeys((*before, *after)):
         old, new = before.get(heading, ""), after.get(heading, "")
         if old != new:
-            yield heading, f"'{heading}', {_first_line(old, new)}"
+            yield Difference(heading, f"'{heading}', {_first_line(old, new)}", is_reworded(old, new))
 
 
 def _sections(report: str) -> dict[str, str]:
+    """The text below each heading, by the heading's name of today."""
     parts = re.split(r"^#+ (.*)$", report, flags=re.MULTILINE)
-    return {"": parts[0], **dict(zip(parts[1::2], parts[2::2], strict=True))}
+    headings = (RENAMED.get(heading, heading) for heading in parts[1::2])
+    return {"": parts[0], **dict(zip(headings, parts[2::2], strict=True))}
 
 
 def _first_line(was: str, now: str) -> str:
@@ -210,27 +272,29 @@ def _numbers(name: str, was: str, now: str, made: date) -> FileComparison:
     return FileComparison(name, "table", _explained(spots, made))
 
 
-def _explained(spots: Iterable[tuple[str, str]], made: date) -> str:
+def _explained(differences: Iterable[Difference], made: date) -> str:
     """What differs, in words: what nothing explains first, then what changed on purpose with its reason."""
-    reasons: dict[str, list[str]] = {}
-    for spot, said in spots:
-        change = intended_change(spot, made)
-        reason = f"changed on purpose on {change.since}: {change.why}" if change else ""
-        reasons.setdefault(reason, []).append(said)
-    unexplained = reasons.pop("", [])
-    parts = [f"{said[0]}{_more(said)}, {reason}" for reason, said in reasons.items()]
-    if parts:
-        parts[-1] += " (CHANGELOG.md, Numbers changed)"
-    if unexplained:
-        parts.insert(0, f"{unexplained[0]}{_more(unexplained)}")
-    return "; ".join(parts)
+    by_change: dict[IntendedChange | None, list[str]] = {}
+    for one in differences:
+        by_change.setdefault(intended_change(one.spot, made, one.reworded), []).append(one.said)
+    unexplained = by_change.pop(None, [])
+    numbers = [_reason(change, said) for change, said in by_change.items() if change and not change.wording]
+    words = [_reason(change, said) for change, said in by_change.items() if change and change.wording]
+    if numbers:
+        numbers[-1] += " (CHANGELOG.md, Numbers changed)"
+    rest = [f"{unexplained[0]}{_more(unexplained)}"] if unexplained else []
+    return "; ".join((*rest, *numbers, *words))
+
+
+def _reason(change: IntendedChange, said: list[str]) -> str:
+    return f"{said[0]}{_more(said)}, changed on purpose on {change.since}: {change.why}"
 
 
 def _more(said: list[str]) -> str:
     return f" and {len(said) - 1} more" if len(said) > 1 else ""
 
 
-def _differences(was: Any, now: Any, spot: str) -> Iterator[tuple[str, str]]:
+def _differences(was: Any, now: Any, spot: str) -> Iterator[Difference]:
     """Every spot where two JSON values differ by more than rounding, and how."""
     if isinstance(was, dict) and isinstance(now, dict):
         for key in dict.fromkeys((*was, *now)):
@@ -241,7 +305,9 @@ def _differences(was: Any, now: Any, spot: str) -> Iterator[tuple[str, str]]:
     elif _are_numbers(was, now) and math.isclose(was, now, rel_tol=RELATIVE, abs_tol=1e-12):
         return
     elif was != now:
-        yield spot, f"{spot}: {_short(str(was))} became {_short(str(now))}"
+        words = isinstance(was, str) and isinstance(now, str)
+        said = f"{spot}: {_short(str(was))} became {_short(str(now))}"
+        yield Difference(spot, said, words and is_reworded(was, now))
 
 
 def _are_numbers(*values: Any) -> bool:

@@ -12,7 +12,7 @@ from experiments.columns.column import plain_name, unlike
 from experiments.errors import InputError, as_toml, expectation, wrong_value
 from table_files.open import reader_of
 
-# A CSV with the declaration of its columns beside, as a table of numbers, times and named levels.
+# A CSV with a separate declaration of its columns, as a table of numbers, times and named levels.
 
 Columns = tuple[Column, ...]
 _COLUMNS = TypeAdapter(Columns)
@@ -26,18 +26,18 @@ def read_columns(path: Path) -> Columns:
         raise InputError(f"{path}: cannot be read ({error.strerror or error}); check the path") from error
     except ValidationError as error:
         raise InputError(
-            f"{path.name}: expected the columns of a table as JSON, as `server export --format columns` "
-            f"writes them ({_reason(error.errors()[0])})"
+            f"{path.name}: expected the JSON file from `server export --format columns` "
+            f"({_reason(error.errors()[0])})"
         ) from error
 
 
 def _reason(detail: Mapping[str, Any]) -> str:
     """What is wrong with the first value refused, without the names of Python's types."""
     if detail["type"] == "json_invalid":
-        return "this is no JSON"
+        return "this is not valid JSON"
     parts = [f"column {part + 1}" if isinstance(part, int) else str(part) for part in detail["loc"][:2]]
     said = expectation(detail) is not None or detail["type"] == "missing"
-    # what it says of the way out after the semicolon is TOML's
+    # its advice after the semicolon is about TOML
     problem = wrong_value(detail).partition("; ")[0] if said else f"got {as_toml(detail['input'])}"
     return ": ".join([*parts, problem])
 

@@ -33,7 +33,7 @@ CHANGE_MAX = 1e-10
 """Qualities stand still where they move by less, in units of the range of the votes."""
 SMALLEST = float(np.finfo(np.float64).tiny) ** 0.25
 COLLAPSED = 0.01
-"""An inconsistency below this share of the common one is none: whoever has it would decide alone."""
+"""An inconsistency below this share of the common one counts as zero: that person alone would decide."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ class Projection:
         that of their residuals.
     groups, person_groups : (j,) and (i,) int64
         Which items and people votes tie together, numbered from 0; biases are 0 on average in each. -1 with
-        NaN for people of one vote, who tell no bias, and items that nobody else rated.
+        NaN for people of one vote, whose bias is unknown, and items that nobody else rated.
     converged : bool
         Whether the qualities stood still.
     """
@@ -81,15 +81,15 @@ def alternating_projection(
     move by less than 1e-10 of the votes' range.
 
     Its likelihood has no maximum: it grows without end where one person's residuals go to zero, which the
-    projection often ends in. Whoever falls there is weighted by the common inconsistency, the root mean
-    square of all residuals, and the rest fitted anew, until nobody falls (decision 0791).
+    projection often ends in. People for whom this happens are weighted by the common inconsistency, the root
+    mean square of all residuals, and the rest is fitted again, until it happens to nobody (decision 0791).
 
     Parameters
     ----------
     scores : (i, j) array
         Votes, NaN where a person did not see an item; means of votes where `counts` are given.
     counts, squares : (i, j) array, optional
-        How many votes each mean is of, and the sum of their squared distances from it: every vote counts.
+        How many votes each mean is of, and the sum of their squared distances from it: every vote was used.
 
     Returns
     -------
@@ -220,7 +220,7 @@ def _tied(seen: Flags) -> tuple[Codes, Codes]:
     return codes[:people], codes[people:]
 
 
-# What must be said of recovered scores: who told nothing of them, and what has no common scale.
+# Caveats about recovered scores: who contributed nothing, and what has no common scale.
 
 NAMED_MAX = 6
 
@@ -229,23 +229,29 @@ def doubts(model: Projection, people: Sequence[str], items: Sequence[str]) -> It
     """Decisions on the model of votes by the people and items named, in words."""
     if (alone := model.person_groups < 0).any():
         counts = "counts" if alone.sum() == 1 else "count"
-        yield f"one vote tells no bias: {_named(people, alone)} {counts} in MOS, but not in recovered scores"
+        yield (
+            f"bias cannot be estimated from one vote: {_named(people, alone)} {counts} in MOS, but not in "
+            "recovered scores"
+        )
     if (lacking := model.groups < 0).any():
-        yield f"only people of one vote rated {_named(items, lacking)}: no recovered score"
+        yield f"only people with one vote rated {_named(items, lacking)}: no recovered score"
     if model.held.any():
         yield (
-            f"the inconsistency of {_named(people, model.held)} fell to nothing, so that the scores would be "
-            "theirs alone: weighted by the common one"
+            f"the estimated inconsistency of {_named(people, model.held)} is zero, which would let them "
+            "alone determine the scores: the common inconsistency was used"
         )
     if (number := int(model.groups.max()) + 1) > 1:
         told = " | ".join(_named(items, model.groups == group) for group in range(min(number, NAMED_MAX)))
         more = f" and {number - NAMED_MAX} more" if number > NAMED_MAX else ""
         yield (
-            f"the items fall into {number} groups that no person rated across ({told}{more}): scores and "
-            "biases of one group cannot be compared with those of another, whose people may be more lenient"
+            f"the items form {number} groups with no person in common ({told}{more}): scores and biases "
+            "cannot be compared between groups"
         )
     if not model.converged:
-        yield f"recovered scores still moved after {model.iterations} rounds: too few people join the items"
+        yield (
+            f"recovered scores did not converge in {model.iterations} rounds: too few people rated several "
+            "items"
+        )
 
 
 def _named(names: Sequence[str], which: NDArray[np.bool_]) -> str:
@@ -383,12 +389,12 @@ class OpinionResult:
 
 
 def read_votes(path: Path, item: str, participant: str, rating: str, levels: Sequence[str] = ()) -> Votes:
-    """Read one row a vote; `levels` may give the order of the items (`given_orders`).
+    """Read one row per vote; `levels` may give the order of the items (`given_orders`).
 
     Raises
     ------
     InputError
-        As `read_text_table`; a rating that is no number, no rating at all.
+        As `read_text_table`; a rating that is not a number, no rating at all.
     """
     roles = [item, participant, rating]
     refuse_shared_roles(roles)
@@ -400,9 +406,9 @@ def read_votes(path: Path, item: str, participant: str, rating: str, levels: Seq
     keep = np.isfinite(values)
     if not keep.all():
         lines = name_lines(table, ~keep)
-        table.decisions.append(f"{int((~keep).sum())} rows without a rating left out ({lines})")
+        table.decisions.append(f"{int((~keep).sum())} rows without a rating excluded ({lines})")
     if not keep.any():
-        raise InputError(f"{path.name}: '{rating}' holds no rating in any row")
+        raise InputError(f"{path.name}: column '{rating}' has no rating in any row")
     people, person = np.unique(table.columns[participant].astype(str).to_numpy()[keep], return_inverse=True)
     items = names_in_order(table.columns[item], keep)
     orders, said = given_orders({item: items}, levels)
@@ -451,7 +457,7 @@ def fit_opinion(votes: Votes, repeats: Repeats = "mean") -> OpinionResult:
     model = alternating_projection(votes.scores, *each)
     decisions = list(votes.decisions)
     if np.any(votes.counts > 1):
-        word = "a person's mean counts once" if repeats == "mean" else "every vote counts"
+        word = "a person's mean counts once" if repeats == "mean" else "every vote was used"
         decisions.append(f"some people rated an item more than once: {word}")
     decisions += doubts(model, votes.people, votes.items)
     return OpinionResult(

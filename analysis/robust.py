@@ -32,7 +32,7 @@ TIE = 1e-9
 class PermutationTest:
     """One effect's univariate F held against the F of rearranged data.
 
-    `p_value` is NaN where the error is zero. `exact` tells that every rearrangement was tried; otherwise
+    `p_value` is NaN where the error is zero. `exact` is true if every rearrangement was tried; otherwise
     `n_rearranged` of them were drawn and p = (1 + those at least as large) / (1 + n_rearranged).
     """
 
@@ -195,7 +195,7 @@ def rank_tests(result: AnovaResult) -> tuple[RankTest, ...]:
     """
     if result.between.covariates:
         named = ", ".join(covariate.name for covariate in result.between.covariates)
-        raise InputError(f"aligned ranks are for factors alone; leave the covariates out: {named}")
+        raise InputError(f"aligned ranks are for factors only; remove the covariates: {named}")
     means = _group_means(result)
     own = means[tuple(result.between.codes.T)] if result.between.factors else means[None]
     tests = []
@@ -221,7 +221,7 @@ def rank_tests(result: AnovaResult) -> tuple[RankTest, ...]:
 
 
 def _group_means(result: AnovaResult) -> Floats:
-    """Cell means over the participants of each group, one axis a factor: between, then within."""
+    """Cell means over the participants of each group, one axis per factor: between, then within."""
     if not result.between.factors:
         return np.asarray(result.y.mean(axis=0), dtype=np.float64)
     means = np.zeros((*(len(names) for names in result.between.levels), *result.y.shape[1:]))
@@ -295,7 +295,7 @@ def trimmed_pairs(
     -----
     Of n participants :math:`g = \lfloor n \, trim \rfloor` are left out at each end, :math:`h = n - 2 g`
     remain; x and y are their means at the two levels, :math:`s` the covariances of the values with the g
-    outermost pulled in to the next (winsorised):
+    outermost pulled in to the next (winsorized):
 
     1. within: :math:`SE^2 = (n - 1)(s_{xx} + s_{yy} - 2 s_{xy}) / (h (h - 1))`, df :math:`h - 1`;
     2. between: :math:`SE^2 = d_x + d_y`, :math:`d = (n - 1) s / (h (h - 1))`, df
@@ -399,7 +399,7 @@ def _compared(
 
 @dataclass(frozen=True)
 class Companions:
-    """Tests beside those of the ANOVA; `ranks` is empty where `ranks_reason` says why."""
+    """Tests in addition to those of the ANOVA; `ranks` is empty where `ranks_reason` says why."""
 
     permutations: tuple[PermutationTest, ...]
     ranks: tuple[RankTest, ...]

@@ -77,7 +77,7 @@ def event_train(events_s: Sequence[float], samples: int, rate_hz: float) -> Arra
 def correlogram(values: Array, train: Array) -> Array:
     """(people, samples) circular cross-correlation of change and events, r(l) = mean_t z_d(t + l) z_e(t).
 
-    d(t) = v(t) - v(t - 1), d(0) = 0; z is standardised over the clip. A constant trace has r = 0.
+    d(t) = v(t) - v(t - 1), d(0) = 0; z is standardized over the clip. A constant trace has r = 0.
     """
     change = np.diff(values, axis=1, prepend=values[:, :1])
     spectrum = np.conj(np.fft.rfft(_standard(train[None, :])))

@@ -25,7 +25,7 @@ SCRIPTS = (
 
 
 def bench_commands() -> dict[str, list[str]]:
-    """The arguments of Python for each bench, by its name."""
+    """The arguments of Python for each bench, by name."""
     series, kit = os.environ.get("BLINK_SERIES", ""), os.environ.get("FACEKIT", "")
     scripts = [f"{name} {series}".strip() if name == "lid_events compare" else name for name in SCRIPTS]
     if kit:
@@ -39,7 +39,7 @@ def bench_commands() -> dict[str, list[str]]:
 
 
 def run_benches(commands: dict[str, list[str]], longest_s: float = LONGEST_S) -> dict[str, str]:
-    """Run the benches; what went wrong with each that failed, by its name."""
+    """Run the benches; what went wrong with each that failed, by name."""
     failed: dict[str, str] = {}
     for name, arguments in commands.items():
         began = time.monotonic()
@@ -65,7 +65,7 @@ def main(words: list[str]) -> int:
     failed = run_benches(commands)
     for name, why in failed.items():
         print(f"failed: {name} ({why})", file=sys.stderr)
-    print(f"{len(commands) - len(failed)} of {len(commands)} benches ran to their end")
+    print(f"{len(commands) - len(failed)} of {len(commands)} benches completed")
     return 1 if failed else 0
 
 

@@ -1,7 +1,7 @@
 """Attacks on a real server while honest raters rate: what clips and ratings take, and the server's memory.
 
 python -m bench.attack                       every attack, about five minutes
-python -m bench.attack --database postgres   the same on PostgreSQL, a server of its own
+python -m bench.attack --database postgres   the same on a separate PostgreSQL server
 python -m bench.attack --only "passwords for the owner, 100/s" --seconds 20
 
 Before each attack the raters are alone for as long as it lasts, so that each line compares with its own quiet

@@ -1,4 +1,5 @@
-"""What ratings, the start of a run and `analysis run exp3` cost beside an earlier revision, in one run.
+"""What ratings, the start of a run and `analysis run exp3` cost compared with an earlier revision, in one
+run.
 
     python -m bench.before_and_after [REVISION, default c84c2e8] [rounds, default 3]
 

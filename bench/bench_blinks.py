@@ -6,7 +6,7 @@ Blink labels of tracked video against the synthetic actor's plan: the table of d
 
     python -m bench.bench_blinks [seconds of actor a seed, default 90] [folder that keeps the drawings]
 
-Seeds 2, 3 and 4 are drawn, tracked with 20 exactly labelled frames and labelled, both eyes. Truth: 5% of the
+Seeds 2, 3 and 4 are drawn, tracked with 20 exactly labeled frames and labeled, both eyes. Truth: 5% of the
 amplitude, apex and 95% recovery of the plan, in fractions of a frame at 300 frames/s. Every blink of the plan
 is at least 30% deep.
 """

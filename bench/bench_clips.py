@@ -144,7 +144,7 @@ def test_speed_up(benchmark: BenchmarkFixture, tmp_path: Path) -> None:
     assert [many[index] for index in range(len(jobs))] == alone
 
 
-# In a process of its own: the most that a process ever held does not sink again.
+# In a separate process: the peak memory of a process never decreases.
 READING = """
 import resource, sys, time
 import cv2

@@ -62,7 +62,7 @@ class IntervalFit:
     slow_kept: float = 0.0
 
     def sample(self, count: int, times: int, rng: np.random.Generator) -> Array:
-        """Logarithms of intervals (times, count), each row a recording of its own."""
+        """Logarithms of intervals (times, count), each row a separate recording."""
         size = (times, count)
         if self.kind == "gamma":
             own = np.log(rng.gamma(self.spread, 1.0, size)) - special.digamma(self.spread)

@@ -3,11 +3,11 @@
     python -m bench.covers VIDEO... [--one-eye] [--kinds hand,paper]
 
 Over one eye of each recording, and over both, a cover is pasted that comes in over 0.15 s, stays and goes,
-from 45% to 75% of the recording's frames (at most 1.5 s): four fingers in the skin's colour, a printed
+from 45% to 75% of the recording's frames (at most 1.5 s): four fingers in the skin's color, a printed
 sheet, a dark thing that shines, the face's own cheek enlarged, a checked cloth, and 'half': fingers that
 leave a half of one eye free. It keeps to the eyes as they move, trembles, has soft edges and throws a
-shadow. Told of the recording itself: how many frames have which status. Of each cover: frames at which it
-hides 80% of an eye (25% for 'half') and how many of them are called tracked; those at which it hides less,
+shadow. Reported for the recording itself: how many frames have which status. Of each cover: frames at which
+it hides 80% of an eye (25% for 'half') and how many of them are called tracked; those at which it hides less,
 and how many are; all others, and how many of them have another status than without a cover. Labels are not
 refined. Needs the detector's environment.
 """
@@ -35,7 +35,7 @@ SEED = 7
 
 
 class Cover(NamedTuple):
-    """Grey levels (h, w, 3), opacity (h, w) and the shift of its middle from the eyes', in pixels."""
+    """Gray levels (h, w, 3), opacity (h, w) and the shift of its middle from the eyes', in pixels."""
 
     levels: np.ndarray
     opacity: np.ndarray
@@ -49,7 +49,7 @@ def clouds(size, blur, rng):
 
 
 def skin(picture, eye):
-    """Colour of the skin below an eye."""
+    """Color of the skin below an eye."""
     _, down, wide = eye_axis(eye)
     x, y = ((eye[0] + eye[5]) / 2 + 0.75 * wide * down).astype(int)
     half = max(2, int(0.15 * wide))
@@ -76,7 +76,7 @@ def fingers(size, wide, tone, rng):
 
 
 def sheet(kind, size, wide, picture, eye, rng):
-    """What is no hand: its grey levels and where it is."""
+    """A cover that is not a hand: its gray levels and where it is."""
     y, x = np.mgrid[: size[0], : size[1]] * 1.0
     whole = np.ones(size)
     if kind == "paper":

@@ -122,7 +122,7 @@ def brought(
 
 
 def cpu(process: ServerProcess) -> float:
-    """CPU seconds of the server so far, with those of its own processes."""
+    """CPU seconds of the server so far, including its child processes."""
     assert process.process is not None
     return sum(cpu_of(one) for one in with_children(process.process.pid))
 

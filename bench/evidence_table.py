@@ -1,6 +1,6 @@
-"""`make evidence`: people and programs of every manner take part, and which signal speaks against whom.
+"""`make evidence`: people and programs of every kind take part, and which signal each of them triggers.
 
-python -m bench.evidence_table --runs 200 --honest 1000   a study of its own, `server simulate` once a manner
+python -m bench.evidence_table --runs 200 --honest 1000   a separate study, `server simulate` once per manner
 python -m bench.evidence_table --out FOLDER               keep MANNER.json files there, and go on
 python -m bench.evidence_table --folder FOLDER            the table of MANNER.json files that are there
 """
@@ -101,7 +101,7 @@ def read(folder: Path, name: str) -> list[Run]:
 
 
 def table(runs: dict[str, list[Run]]) -> str:
-    """A column a manner, a row a verdict and a signal, as Markdown."""
+    """One column per kind of rater, one row per verdict and signal, as Markdown."""
     rows: list[tuple[str, Mapping[str, int | str]]] = [
         ("Runs", {name: len(verdicts) for name, verdicts in runs.items()})
     ]

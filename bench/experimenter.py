@@ -3,7 +3,7 @@
     python -m bench.experimenter [rows, default 1000000]
     python -m bench.experimenter ROWS postgres
 
-Real servers on SQLite, or the pages and exports alone on a PostgreSQL of its own. Prints one table; the
+Real servers on SQLite, or the pages and exports alone on a separate PostgreSQL. Prints one table; the
 monitor's page is opened in Chromium where there is one.
 """
 
@@ -304,7 +304,7 @@ def command_line(process: ServerProcess, folder: Path, rows: int) -> None:
         assert sum(1 for _ in stream) == rows + 1
     print_line("`server export`, rows a second, start included", f"{rows / seconds:,.0f}", EXPORT_AIM)
     spent = used.ru_utime + used.ru_stime
-    print_line("the same of its own processor time", f"{rows / spent:,.0f}", EXPORT_AIM)
+    print_line("the same for its processor time", f"{rows / spent:,.0f}", EXPORT_AIM)
     print_line("its peak memory", f"{peak:.0f} MB")
 
 
@@ -368,7 +368,7 @@ def change(process: ServerProcess, number: int) -> None:
 
 
 def on_postgres(rows: int) -> None:
-    """The pages and exports, each on a database of its own."""
+    """The pages and exports, each on a separate database."""
     for measure in (pages, export):
         with tempfile.TemporaryDirectory() as folder, load_database("postgres", Path(folder)) as database:
             measure(Path(folder), rows, database.url)

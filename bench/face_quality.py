@@ -17,9 +17,9 @@ renders references with a quarter of it; --closures 0.094,0.906 leaves out the o
 Letters: a, b references, x the atlas's picture, n the noise of the references' mean, e the error without it.
 
 spacing: how far apart rendered levels may lie. SHOTS is a bake's folder in --work, face-NAME-.... For every
-level with rendered neighbours at one, two and four steps it prints the PSNR of the picture moved in
+level with rendered neighbors at one, two and four steps it prints the PSNR of the picture moved in
 between, and the PSNR to which the three tend at no distance: what is left there is the noise of rendering,
-of the level itself and of its neighbours, which only more samples lessen.
+of the level itself and of its neighbors, which only more samples lessen.
 
     e(d) = n + a d^p,   r = (e(4d) - e(2d)) / (e(2d) - e(d)) = 2^p                                       (2)
     n = e(d) - (e(2d) - e(d)) / (r - 1)                                                                  (3)
@@ -78,7 +78,7 @@ def midpoints(closures: list[float]) -> list[float]:
 
 
 def picture(character: Atlas, closure: float) -> np.ndarray:
-    """(h, w, 3) linear light of the crop as clips mix it from the neighbouring levels."""
+    """(h, w, 3) linear light of the crop as clips mix it from the neighboring levels."""
     weights = level_weights(character.closures, [closure])[0].astype(np.float32)
     return sum(weights[i] * srgb_to_linear(character.level_srgb(int(i))) for i in np.flatnonzero(weights))
 
@@ -105,7 +105,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("facekit", type=Path, help="your copy of ICT-FaceKit")
     parser.add_argument("--work", type=Path, help="where renders wait (build/bake/truth-NAME-SAMPLES)")
     parser.add_argument("--samples", type=int, help="of the references (as many as the levels have)")
-    parser.add_argument("--seeds", type=seed_pair, help="two, of references with noise of their own")
+    parser.add_argument("--seeds", type=seed_pair, help="two, of references with independent noise")
     parser.add_argument("--closures", type=closure_list, help="these alone, separated by commas")
     parser.add_argument("--blender", type=Path, default=Path(".venv-bake"), help="Blender's environment")
     parser.add_argument("--threads", type=int, default=2, help="render threads on the CPU")
@@ -124,7 +124,7 @@ def seed_pair(text: str) -> tuple[int, int]:
 
 
 def scene_of(character: Atlas, facekit: Path) -> FaceScene:
-    """The scene that the character's provenance tells of; a line where the recipe is another by now."""
+    """The scene in the character's provenance; a line if the recipe has changed since."""
     made = character.declaration.provenance
     framing = "face" if "--framing face" in made["command"] else "eyes"
     if made["recipe"] != RECIPES[framing]:

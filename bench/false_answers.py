@@ -1,9 +1,10 @@
-"""Answers and views with false evidence at full speed against a real server, and honest raters beside them.
+"""Answers and views with false evidence at full speed against a real server, and honest raters at the same
+time.
 
 python -m bench.false_answers                    twenty seconds, six raters
 python -m bench.false_answers --seconds 60 --json counts.json
 
-The attacker holds visits of its own and an honest rater's tickets: it sends none, changed ones, those of
+The attacker has its own visits and an honest rater's tickets: it sends none, changed ones, those of
 another visit, trial or time, one used before, and the digest of another clip. Printed is what each kind was
 answered with, what became of the honest answers, and how many lines the server's log grew by. Ends with
 code 1 where a false answer was taken or stored, an honest one refused, or a refusal noted more than once for
@@ -329,7 +330,7 @@ def main() -> int:
     """Print what came of it; 1 where something must not be so."""
     asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     asked.add_argument("--seconds", type=float, default=20, help="how long (20)")
-    asked.add_argument("--raters", type=int, default=6, help="honest raters beside it (6)")
+    asked.add_argument("--raters", type=int, default=6, help="honest raters at the same time (6)")
     asked.add_argument("--json", type=Path, help="keep the counts here")
     options = asked.parse_args()
     with tempfile.TemporaryDirectory() as folder:

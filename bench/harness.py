@@ -19,7 +19,7 @@ from rich.table import Table
 
 ROOT = Path(__file__).resolve().parent.parent
 RECORDINGS = Path("../shared/data/face_video")
-"""Real recordings with labels, beside the checkout: NAME.mp4 and NAME.points.json."""
+"""Real recordings with labels, next to the checkout: NAME.mp4 and NAME.points.json."""
 MARKS = {True: "yes", False: "NO", None: ""}
 
 

@@ -1,4 +1,4 @@
-"""Which blinks the labelling page chooses, and how near its first points are (docs/how-to/label-frames.md).
+"""Which blinks the labeling page chooses, and how near its first points are (docs/how-to/label-frames.md).
 
     python -m bench.label_choice develop|held-out [folder with the real clips]
 
@@ -153,7 +153,7 @@ SEEDS = {"develop": (range(1, 4), range(1, 4)), "held-out": (range(101, 111), ra
 
 @dataclass(frozen=True)
 class Set:
-    """Recordings of one kind, and how many eyes the page is told to look for."""
+    """Recordings of one kind, and how many eyes the page looks for."""
 
     name: str
     eyes: int

@@ -1,4 +1,5 @@
-"""Blinks told from squints, gaze shifts and closed eyes: classifier, prominent peaks, the paper's rule.
+"""Blinks distinguished from squints, gaze shifts and closed eyes: classifier, prominent peaks, the paper's
+rule.
 
     python -m bench.lid_events compare [FOLDER]
     python -m bench.lid_events compare --seed 8001 --series 24 --rates 30,120,240    # no recordings
@@ -7,7 +8,7 @@
 
 compare: prints precision, recall and F1 on generated series that trained nothing, at several rates, and how
 many squints and closed eyes were called blinks: those held for 0.25 s or more, and brief ones. FOLDER,
-where given, holds hand-labelled series: CSV files with the columns frame, ear and tag ('0' where no blink
+where given, holds hand-labeled series: CSV files with the columns frame, ear and tag ('0' where no blink
 is), 30 frames a second, as made from the eyeblink8 videos by `webcam`. Recordings of ../shared/data, where
 there, are compared with a table made by others.
 
@@ -17,19 +18,19 @@ distances of 50 frames at 240 frames a second.
 errors: what the classifier makes of the blinks that it misses, on generated series.
 Blinks are matched as above, the first eye's. Each one missed is counted by what the
 classifier lists with its deepest moment at the hold (a squint, a gaze shift, a closed eye, a blink that
-another has taken, nothing) and by what the generator did: full or partial, on a gaze shift, beside another
+another has taken, nothing) and by what the generator did: full or partial, on a gaze shift, next to another
 blink (less than 0.1 s away), alone. `faint` counts those whose depth is below 0.2 or below five times the
 noise of a frame. False blinks are counted by the event that they lie in.
 
-webcam: hand-labelled webcam series, from a published evaluation on eyeblink8.
+webcam: hand-labeled webcam series, from a published evaluation on eyeblink8.
 FOLDER is `original_svm` of github.com/QuangPham2404/Blink-Detection-Using-Adaptive-Eye-Aspect-Ratio (commit
 3fd1191): `ear1.txt` to `ear8.txt` are the mean eye aspect ratio of both eyes by MediaPipe's face mesh with
-refined lids, a frame of eyeblink8's eight videos a line; `zzz_target.txt` holds, a video a line, 1 where
-eyeblink8's people labelled a blink. Writes one CSV a video: frame, ear, tag.
+refined lids, one line per frame of eyeblink8's eight videos; `zzz_target.txt` has one line per video, with 1
+where eyeblink8's people labeled a blink. Writes one CSV per video: frame, ear, tag.
 
-Some label lists lack frames that the series have (up to 90, in one or two places). The place is told by the
-series itself: labels are shifted by what makes the aspect ratio lowest within the labelled blinks, shifts
-never decrease, and a change costs as much as 0.3 of an open eye. No classifier takes part.
+Some label lists lack frames that the series have (up to 90, in one or two places). The series itself shows
+the place: labels are shifted by what makes the aspect ratio lowest within the labeled blinks, shifts never
+decrease, and a change costs as much as 0.3 of an open eye. No classifier takes part.
 """
 
 import argparse
@@ -141,7 +142,7 @@ def compare_generated(fps: float, seed: int, count: int) -> None:
 
 def compare_recorded(folder: Path) -> None:
     files = sorted(folder.glob("*.csv"))
-    sys.stdout.write(f"{len(files)} hand-labelled series, 30 frames/s, one column, {folder}\n")
+    sys.stdout.write(f"{len(files)} hand-labeled series, 30 frames/s, one column, {folder}\n")
     series = [hand_labelled(file) for file in files]
     for name, method in METHODS.items():
         as_labelled, as_defined = [], []
@@ -179,7 +180,7 @@ def measured_by_others() -> None:
 
 
 def hand_labelled(file: Path) -> tuple[Array, list[tuple[float, float]], list[tuple[float, float]]]:
-    """Eye aspect ratio, the labelled blinks, and those shut for half a second: closed eyes."""
+    """Eye aspect ratio, the labeled blinks, and those shut for half a second: closed eyes."""
     table = pd.read_csv(file, dtype={"tag": str})
     ear = pd.to_numeric(table["ear"], errors="coerce").to_numpy(np.float64).copy()
     ear[ear <= 0] = np.nan
@@ -214,7 +215,7 @@ def compare_arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("folder", nargs="?", type=Path, metavar="FOLDER", help="hand-labelled series")
+    parser.add_argument("folder", nargs="?", type=Path, metavar="FOLDER", help="hand-labeled series")
     parser.add_argument("--seed", type=int, help=f"of the generated series ({SEED}); leaves recordings out")
     parser.add_argument("--series", type=int, default=SERIES, help=f"generated series a rate ({SERIES})")
     parser.add_argument("--rates", type=rates, default=RATES, help="frames/s, separated by commas")
@@ -254,12 +255,12 @@ def listed_as(motion: Motion, events: Sequence[LidEvent]) -> str:
 
 
 def circumstance(motion: Motion, motions: Sequence[Motion]) -> str:
-    """Whether a blink lies on a gaze shift, beside another blink, or alone."""
+    """Whether a blink lies on a gaze shift, next to another blink, or alone."""
     others = [other for other in motions if other is not motion]
     if any(other.onset_s < motion.end_s and other.end_s > motion.onset_s for other in others):
         return "on a gaze shift"
     gaps = [max(o.onset_s - motion.end_s, motion.onset_s - o.end_s) for o in others if o.kind == "blink"]
-    return "beside a blink" if any(gap < BESIDE_S for gap in gaps) else "alone"
+    return "next to a blink" if any(gap < BESIDE_S for gap in gaps) else "alone"
 
 
 def is_faint(motion: Motion, series: GeneratedSeries) -> bool:
@@ -296,7 +297,7 @@ def judge(series: Sequence[GeneratedSeries]) -> None:
             of_kind["faint"] += is_faint(motion, one)
         for event in free:
             kinds = [m.kind for m in one.motions if m.onset_s <= event.minimum_s <= m.end_s]
-            false["blink told twice" if "blink" in kinds else kinds[0] if kinds else "nothing"] += 1
+            false["blink detected twice" if "blink" in kinds else kinds[0] if kinds else "nothing"] += 1
     right, alarms, misses = totals
     sys.stdout.write(f"F1 {f1(totals):.3f} ({right:.0f} hits, {alarms:.0f} false, {misses:.0f} missed)\n")
     for kind, counts in sorted(missed.items(), key=lambda item: -item[1]["in all"]):
@@ -332,7 +333,7 @@ def relative(ear: Array) -> Array:
 
 
 def shifts(ear: Array, blinks: list[tuple[int, int]], lacking: int) -> list[int]:
-    """Frames by which each labelled blink lies later in the series, by dynamic programming."""
+    """Frames by which each labeled blink lies later in the series, by dynamic programming."""
     level, places = relative(ear), np.arange(lacking + 3)
     cost = np.array(
         [

@@ -293,7 +293,7 @@ def divided(tally: Tally, windows: list[Window]) -> tuple[list[float], list[floa
 
 
 async def _watch(folder: Path, windows: list[Window]) -> None:
-    """Note when an unfinished snapshot is there: it has a name of its own until it is whole."""
+    """Note when an unfinished snapshot is there: it has a temporary name until it is complete."""
     begun = None
     while True:
         now, under_way = time.perf_counter(), any(folder.glob(".palpebra-*.sqlite"))

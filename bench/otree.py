@@ -1,4 +1,4 @@
-"""oTree, the most used open platform for such studies, under the same load: in an environment of its own."""
+"""oTree, the most used open platform for such studies, under the same load: in a separate environment."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class OTree:
 
 @contextmanager
 def otree(count: int) -> Iterator[OTree]:
-    """oTree on SQLite in a folder of its own; UnavailableError where it does not install or start."""
+    """oTree on SQLite in a separate folder; UnavailableError if it does not install or start."""
     _install()
     with tempfile.TemporaryDirectory(prefix="palpebra-otree-") as name:
         folder, port = Path(name), free_port()

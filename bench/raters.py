@@ -151,7 +151,7 @@ class Tally:
 
 
 class LoadRater:
-    """One rater: begins a visit, then rates at a steady pace until told to stop."""
+    """One rater: begins a visit, then rates at a steady pace until stopped."""
 
     def __init__(self, port: int, link: str, number: int, tally: Tally) -> None:
         self.connection, self.link, self.tally = Connection(port), link, tally

@@ -40,7 +40,7 @@ def request(method: bytes, path: bytes, head: bytes = b"", body: bytes = b"") ->
 
 
 async def flood(port: int, end: float, requests: Sequence[bytes], per_second: float) -> dict[str, int]:
-    """The requests in turn at this pace, each on a connection of its own; how often each status came."""
+    """The requests in turn at this pace, each on a separate connection; how often each status came."""
     answers: dict[str, int] = {}
     begun, number, ready = time.monotonic(), count(), cycle(requests)
 

@@ -5,21 +5,21 @@
     python -m bench.recordings reflections [FOLDER]
 
 label-free: FOLDER (../shared/data/face_video) holds NAME.mp4 and NAME.points.json. Distances are means over
-lid points from the labelled lid curve, as part of the eye's width; 'worse eye' takes the worse of both in
+lid points from the labeled lid curve, as part of the eye's width; 'worse eye' takes the worse of both in
 each frame. Blinks are counted on lid distances of MediaPipe (the detector alone) and of the track: by the
 classifier, by prominent peaks as JeFaPaTo finds them, and by the paper's rule. Needs the detector's
 environment, made at first use.
 
 label-error: FOLDER (../shared/data/face_video) holds NAME.mp4 and NAME.points.json. Trained without a fifth
-of the labels, five times, points and lids (distance of lid points from the labelled lid's curve: a point's
-way along the lid is no error) are compared with those left out. Then the labels are taken for the truth,
+of the labels, five times, points and lids (distance of lid points from the labeled lid's curve: a point's
+way along the lid is not an error) are compared with those left out. Then the labels are taken for the truth,
 and other labels with so many pixels of error across the lid for each point (independent of one another) are
 correlated with it in their lid distances, as label-free does with the track's.
 
 reflections: FOLDER (../shared/data/face_video) holds recordings NAME.mp4 with NAME.points.json. Two bright
-panes, or a bar across the lids, are added to every frame in grey levels and slide by 6% of the eye's width,
-as a reflection on glasses does when the head turns. Told of the quarter of labelled frames that are most
-shut: the opening in percent of the eye's width by the labels, by the detector and by the track, how many
+panes, or a bar across the lids, are added to every frame in gray levels and slide by 6% of the eye's width,
+as a reflection on glasses does when the head turns. Reported for the quarter of labeled frames that are most
+closed: the opening in percent of the eye's width by the labels, by the detector and by the track, how many
 are called doubtful, and how many percent of the pixels between the lids are saturated, there and in all
 frames. Needs the detector's environment, made at first use.
 """
@@ -85,7 +85,7 @@ def measure_label_free() -> None:
             continue
         info = scan_video(folder / f"{name}.mp4")
         labels = load_labels(folder / f"{name}.points.json", info.size_px, info.frame_count)
-        say(f"{name}: {info.frame_count} frames, {labels.eyes} eye(s), {len(labels.frames)} labelled")
+        say(f"{name}: {info.frame_count} frames, {labels.eyes} eye(s), {len(labels.frames)} labeled")
         begun = time.perf_counter()
         seen = survey(info, one_eye=one_eye)
         say(f"  detector  {(time.perf_counter() - begun) / seen.looked_at * 1000:.0f} ms a frame")

@@ -10,8 +10,8 @@ close-up: KIT is ICT-FaceKit's packed file. Each eye of the rendered faces that 
 at nine closures, and of FOLDER's single_face (../shared/data/face_video; labels good to 3 to 6%) is
 enlarged to 416 px of a picture of 640 x 480; FOLDER's short_human_3blink is a close-up. Mean distance of
 the lids from the true ones in percent of the eye's width: of all pictures, of those open, of those shut;
-correlation of the lid distance; height of the widest opening beside the true one; and how long the eye was
-looked for and read. FACES are so many of the rendered faces (6 at most, 0: recordings alone): two are a
+correlation of the lid distance; height of the widest opening compared with the true one; and how long the eye
+was looked for and read. FACES are so many of the rendered faces (6 at most, 0: recordings alone): two are a
 sample, since all six did not end within an hour on two busy cores. The recordings come first, and each line
 is printed as soon as it is known. Needs the detector's environment, made at first use.
 """
@@ -55,7 +55,7 @@ class AtlasScene(SampleScene):
 
 
 def rendered_eyes(name: str, kit, every: int) -> Iterator[tuple]:
-    """Grey picture and labels of each eye at every n-th closure of a face."""
+    """Gray picture and labels of each eye at every n-th closure of a face."""
     atlas = load_atlas(SHIPPED / name)
     scene = AtlasScene(kit, name, atlas.size_px)
     picture = linear_to_srgb(atlas.base_linear())

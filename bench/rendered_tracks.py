@@ -6,12 +6,12 @@ KIT is ICT-FaceKit's packed file. Eight recordings of 360 frames: two faces, eac
 two sizes, and close-ups of four, with a blink every second, a moving head, unsteady light, noise, blur and
 compression; every third run of 12 frames is spoilt as in `stated_error.py`. Lids are compared with the
 geometry the faces were rendered from: how far off the detector and the track are, r of the lid distance,
-the stated error beside the true one, and how many wrong frames are called `tracked`. PICTURE, where given,
-becomes the calibration curve. Nothing is fitted to these recordings. Needs the detector's environment.
+the stated error compared with the true one, and how many wrong frames are called `tracked`. PICTURE, where
+given, becomes the calibration curve. Nothing is fitted to these recordings. Needs the detector's environment.
 
 Blinks, head and light are those of the synthetic actor (`stimuli_builder.actor.recording`), but for a blink
 every second. Each frame is the level of the face whose closure is nearest, so that the geometry it was
-rendered from tells where its lids are; it is moved, turned and scaled by that head, blurred, noisy and
+rendered from gives the position of its lids; it is moved, turned and scaled by that head, blurred, noisy and
 written as H.264.
 """
 
@@ -51,7 +51,7 @@ TURNED, GROWN = 2.0, 2.0
 
 @dataclass(frozen=True)
 class Look:
-    """A face before a camera: the mean width of its eyes in the picture, noise as an sd in grey levels."""
+    """A face before a camera: the mean width of its eyes in the picture, noise as an sd in gray levels."""
 
     face: str
     one_eye: bool

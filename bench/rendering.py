@@ -5,7 +5,7 @@
     python -m bench.rendering workers [--clips 40]
 
 memory: one process renders clips of both characters in turn: the most a build's worker ever holds.
-performance: the peak of a clip of 60 s and of one of 5 s, each in a process of its own; with a character and
+performance: the peak of a clip of 60 s and of one of 5 s, each in a separate process; with a character and
 seconds it renders that one.
 workers: by one process, by two, and on a Dask cluster of two: how much faster, and the same bytes?
 """

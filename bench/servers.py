@@ -1,4 +1,4 @@
-"""Real servers for what is measured: `server run` on a database of its own, and nginx in front of it."""
+"""Real servers for what is measured: `server run` on a separate database, and nginx in front of it."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ class LoadServer(ServerProcess):
 
 @contextmanager
 def load_server(kind: str, workers: int, **further: str) -> Iterator[LoadServer]:
-    """A started server with a live study on `sqlite` or `postgres`; `further` are settings of its own."""
+    """A started server with a live study on `sqlite` or `postgres`; `further` are its additional settings."""
     folder = Path(tempfile.mkdtemp(prefix="palpebra-load-"))
     try:
         with load_database(kind, folder) as database:
@@ -171,7 +171,7 @@ def nginx_configuration(folder: Path, server_port: int, port: int) -> Path:
     """Write the whole configuration into a folder; return its file."""
     (folder / "site.conf").write_text(nginx_site(server_port, port, folder / "clips"), encoding="utf-8")
     temporary = "\n".join(f"  {name}_temp_path {folder / name};" for name in _TEMPORARY)
-    # Its workers give up root's rights, unless told not to, and could not read the folder then.
+    # By default its workers give up root's rights, and could not read the folder then.
     user = "user root;\n" if hasattr(os, "geteuid") and os.geteuid() == 0 else ""
     path = folder / "nginx.conf"
     path.write_text(

@@ -5,8 +5,8 @@
 The truth is exact on the synthetic actor: recordings of four seeds, tracked with 20 labels of 0, 1 or 2 px
 noise, with runs of frames spoilt (blurred, darkened, noisy, an eye half covered) so that some may be far off.
 FOLDER (../shared/data/face_video) holds recordings NAME.mp4 with NAME.points.json: tracked with every second
-labelled frame and compared on the others, and tracked without labels and compared on all. Their labels have
-errors of their own, see the docs.
+labeled frame and compared on the others, and tracked without labels and compared on all. Their labels have
+errors too, see the docs.
 """
 
 import sys
@@ -69,7 +69,7 @@ def spoilt(picture: Picture, how: str, points: Points, rng: np.random.Generator)
 
 
 def spoilt_video(actor: Actor, truth: list[Points], labelled: set[int], path: Path, seed: int) -> None:
-    """Write the actor's recording; every third run of 12 frames is spoilt, but no labelled frame."""
+    """Write the actor's recording; every third run of 12 frames is spoilt, but no labeled frame."""
     rng = np.random.default_rng(seed)
     with VideoWriter(path, FPS, (512, 384)) as writer:
         for number, points in enumerate(truth):
@@ -105,7 +105,7 @@ def tracked_rows(info: VideoInfo, model: CoupledModel, hints: dict[int, Points])
 def compared(
     rows: dict[int, dict], eyes: int, path: str, truth: dict[int, Points], *, along: bool
 ) -> list[Compared]:
-    """Stated and true error of every frame with a truth; not `along`: lid points from the labelled curves."""
+    """Stated and true error of every frame with a truth; not `along`: lid points from the labeled curves."""
     lids = [9 * eye + point for eye in range(eyes) for point in UPPER_LID + LOWER_LID]
     results = []
     for number, true in truth.items():
@@ -153,7 +153,7 @@ def tell(name: str, frames_compared: list[Compared]) -> None:
     doubted = sum(f.status == "doubtful" for f in good)
     sys.stdout.write(
         f"  all: stated {np.sqrt((stated**2).mean()):.2f}, true {np.sqrt((true**2).mean()):.2f}; "
-        f"off by more than 5%: {len(off)}, {caught} of them doubtful, beside {lost} lost; "
+        f"off by more than 5%: {len(off)}, {caught} of them doubtful, in addition to {lost} lost; "
         f"{doubted} of {len(good)} others doubtful\n"
     )
 
@@ -170,7 +170,7 @@ def tell_wrong(frames_compared: list[Compared]) -> None:
 
 
 def recordings(folder: Path) -> None:
-    """Recorded clips, by every second labelled frame and without labels."""
+    """Recorded clips, by every second labeled frame and without labels."""
     for name, one_eye in CLIPS.items():
         if not (folder / f"{name}.mp4").exists():
             sys.stdout.write(f"{name}: not in {folder}, left out\n")

@@ -1,4 +1,4 @@
-"""How fast real recordings are tracked, beside an earlier revision, in turns and from the same models.
+"""How fast real recordings are tracked compared with an earlier revision, in turns, from the same models.
 
     python -m bench.track_speed [FOLDER] [REVISION, df3da2d] [rounds, 5]
 
@@ -66,7 +66,7 @@ def measure(folder: Path, models: Path, out: Path) -> dict[str, list[float]]:
 
 
 def one_round(tree: Path, folder: Path, models: Path, out: Path) -> dict[str, list[float]]:
-    """A round of one revision in a process of its own."""
+    """A round of one revision in a separate process."""
     out.mkdir(exist_ok=True)
     speeds: dict[str, list[float]] = figures_of(tree, __file__, folder.resolve(), models, out)
     return speeds

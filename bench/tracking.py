@@ -91,7 +91,7 @@ def actor_tables(seconds: float, folder: Path) -> None:
         print_line(name + "landmark RMS, px", f"{report.rms_px:.3f}", must, aim)
         print_line(name + "95th percentile in blinks, px", f"{report.blink_p95_px or 0:.3f}", "1")
         print_line(name + "inter-eyelid distance sd, px", f"{report.distance_sd_px:.3f}", "0.3", "0.1")
-        print_line(name + "re-initialised / lost", f"{report.reinitialised} / {report.lost}", "0", "0")
+        print_line(name + "re-initialized / lost", f"{report.reinitialised} / {report.lost}", "0", "0")
 
 
 def measure_actor() -> None:

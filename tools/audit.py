@@ -1,6 +1,8 @@
-"""Ask the advisory databases about every locked package: fail on a known weakness, say where nobody answered.
+"""Ask the advisory databases about every locked package: fail on a known weakness, report where nobody
+answered.
 
-No answer (no internet, a mirror without advisories) is no failure, but never passes for "none known" either.
+No answer (no internet, a mirror without advisories) is not a failure, but never passes for "none known"
+either.
 """
 
 from __future__ import annotations
@@ -55,7 +57,7 @@ def _weaknesses(packages: list[dict[str, Any]]) -> Iterator[str]:
             names = {weakness["id"], *weakness.get("aliases", [])}
             if not names & set(ACCEPTED):
                 fixed = ", ".join(weakness.get("fix_versions", [])) or "nothing yet"
-                yield f"  {package['name']} {package['version']}: {weakness['id']}, mended in {fixed}"
+                yield f"  {package['name']} {package['version']}: {weakness['id']}, fixed in {fixed}"
 
 
 def npm_outcome(answer: str) -> Outcome:
@@ -67,9 +69,7 @@ def npm_outcome(answer: str) -> Outcome:
         f"  {name}: {weakness['severity']}" for name, weakness in sorted(report["vulnerabilities"].items())
     ]
     if weaknesses:
-        return Outcome(
-            "\n".join(["npm: weaknesses are known (npm audit tells more):", *weaknesses]), weak=True
-        )
+        return Outcome("\n".join(["npm: weaknesses are known (details: npm audit):", *weaknesses]), weak=True)
     return Outcome("npm: no weakness known")
 
 

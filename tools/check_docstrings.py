@@ -1,4 +1,4 @@
-"""Refuse docstrings that numpydoc cannot read, or that tell of parameters and fields outside its sections.
+"""Refuse docstrings that numpydoc cannot read, or that describe parameters and fields outside its sections.
 
 The help of a command is its docstring, with plain `Examples:` and no sections; it is checked all the same.
 """
@@ -19,7 +19,7 @@ Documented = ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
 NAMES = re.compile(r"[*`]{0,3}\w+`{0,2}(?:, [*`]{0,3}\w+`{0,2})*")
 ERROR = re.compile(r"[A-Z]\w*(?:\.[A-Z]\w*)*(?:, [A-Z]\w*)*")
 SENTENCE = re.compile(r"\.$|[.;] |[a-z] (?:is|are|was|were|has|have) ")
-"""What a type never looks like: a description stands indented on the next line."""
+"""What a type never looks like: a description is indented on the next line."""
 
 
 def arguments(function: ast.FunctionDef | ast.AsyncFunctionDef) -> set[str]:
@@ -64,10 +64,10 @@ def read(text: str) -> tuple[NumpyDocString | None, str | None]:
 def entry_fault(entry: Parameter, names: set[str]) -> str | None:
     """What is wrong with one entry of Parameters or Attributes."""
     if not NAMES.fullmatch(entry.name):
-        return f"'{entry.name}' is no entry: write `name : type`, the description indented below"
+        return f"'{entry.name}' is not an entry: write `name : type`, the description indented below"
     called = {part.strip("*` ") for part in entry.name.split(",")}
     if called - names:
-        return f"'{', '.join(sorted(called - names))}' is no parameter or field"
+        return f"'{', '.join(sorted(called - names))}' is not a parameter or field"
     if not entry.type or SENTENCE.search(entry.type):
         return f"'{entry.name}' has no type: write `{entry.name} : type`, the description indented below"
     return None
@@ -95,7 +95,10 @@ def docstring_faults(text: str, names: set[str]) -> Iterator[str]:
             yield said
     for entry in parsed["Raises"]:
         if not ERROR.fullmatch(entry.type):
-            yield f"'{entry.name or entry.type}' is no error: write its name, the description indented below"
+            yield (
+                f"'{entry.name or entry.type}' is not an error: write its name, the description indented "
+                "below"
+            )
     prose = [*parsed["Summary"], *parsed["Extended Summary"], *parsed["Notes"]]
     for name in leftovers(prose + [line for entry in entries for line in entry.desc], names):
         yield f"'{name}: ...' belongs into a section Parameters or Attributes"
@@ -109,7 +112,7 @@ def documented(tree: ast.AST) -> Iterator[tuple[Documented, str]]:
 
 
 def faults(path: str, text: str, classes: Mapping[str, ast.ClassDef] | None = None) -> list[str]:
-    """The faults of one module, a line each; `classes` of all modules tell of inherited fields."""
+    """The faults of one module, one line each; `classes` of all modules give inherited fields."""
     tree = ast.parse(text)
     return [
         f"{path}:{node.lineno}: {node.name}: {said}"

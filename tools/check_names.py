@@ -65,7 +65,7 @@ def fault(path: str, name: str) -> str | None:
 
 
 def faults(path: str, text: str) -> list[str]:
-    """The faults of one module, a line each."""
+    """The faults of one module, one line each."""
     bound = sorted(set(names(ast.parse(text))))
     return [f"{path}:{line}: {said}" for line, name in bound if (said := fault(path, name))]
 

@@ -67,7 +67,7 @@ CALLED_FROM_OUTSIDE = {
 def unused(
     paths: Iterable[Path], own: Sequence[Path], allowed: Iterable[str] = CALLED_FROM_OUTSIDE
 ) -> list[str]:
-    """What is defined below `own` and called nowhere in `paths`, a line each."""
+    """What is defined below `own` and called nowhere in `paths`, one line each."""
     finder = Vulture(ignore_names=[*allowed, TIMINGS], ignore_decorators=DECORATORS)
     finder.scavenge([str(path) for path in paths])
     kinds = (finder.unused_funcs, finder.unused_classes, finder.unused_methods, finder.unused_props)

@@ -1,6 +1,6 @@
 """Do the steps of the Dockerfile in a clean folder, where there is no Docker engine.
 
-Each stage gets a folder of its own for its file system; COPY copies, RUN runs there with this machine's
+Each stage gets a separate folder for its file system; COPY copies, RUN runs there with this machine's
 shell, Python and Node in the place of the base image's. USER, HEALTHCHECK and volumes are not tried.
 At the end the last stage's ENTRYPOINT is run with `--help` and `database upgrade` on an empty data folder.
 

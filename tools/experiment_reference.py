@@ -31,11 +31,10 @@ HEADER = ("key", "type", "default", "range", "meaning", "example")
 LONGEST_EXAMPLE = 70
 
 INTRODUCTION = """\
-A study is declared in one TOML file. `stimuli plan FILE` says what it expands to, and names mistakes
-with their line. `experiments/exp1.toml` is a whole study to start from; [every-key.toml](every-key.toml)
-sets most keys, and most examples below are taken from it. A key that may be left out has a default;
-times, sizes and counts carry their unit in the name or in the meaning. A text in several languages is a
-table: `{ en = "...", de = "..." }`.
+A study is declared in one TOML file. `stimuli plan FILE` shows what it expands to, and reports errors with
+their line. `experiments/exp1.toml` is a whole study to start from; [every-key.toml](every-key.toml) sets most
+keys, and most examples below are taken from it. Optional keys have a default. Times, sizes and counts have
+their unit in the name or the meaning. A text in several languages is a table: `{ en = "...", de = "..." }`.
 """
 
 
@@ -68,7 +67,7 @@ def tables() -> Iterator[tuple[str, type[BaseModel], str]]:
 
 
 def heading(key: Key, model: type[BaseModel]) -> str:
-    """As the TOML writes the table: in two brackets where it may stand several times."""
+    """As the TOML writes the table: in two brackets if it may occur several times."""
     path = f"{key.path}.en" if get_origin(key.field.annotation) is dict else key.path
     written = f"[[{path}]]" if get_origin(key.field.annotation) is tuple else f"[{path}]"
     tag = next((name for name, field in model.model_fields.items() if _tells_apart(key, field)), None)
@@ -255,7 +254,7 @@ class Examples:
         return (key.name, key.model) in self._anywhere
 
     def of(self, key: Key) -> str:
-        """The key's example as TOML, shortened where it is long; tables have a section of their own."""
+        """The key's example as TOML, shortened where it is long; tables have a separate section."""
         if not self.has(key) or key.tables:
             return ""
         written = toml(self._set.get((key.path, key.model), self._anywhere[key.name, key.model]))

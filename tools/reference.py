@@ -65,20 +65,20 @@ def data_dictionary() -> str:
     """The export's columns, and the tables behind them."""
     lines = [MADE, "# Data dictionary", ""]
     lines += [
-        "Declared in `experiments/columns` and the kinds of trial. A CSV has a column a factor",
-        "in the place of `levels`; there what is missing is empty and booleans are 0 and 1. Times are UTC.",
-        "Previews and erased people are left out.",
+        "Declared in `experiments/columns` and the kinds of trial. A CSV has one column per factor",
+        "instead of `levels`; there, missing values are empty and booleans are 0 and 1. Times are UTC.",
+        "Previews and erased people are excluded.",
         "",
     ]
     header = ("column", "type", "unit", "values or range", "meaning")
     for view in views():
         lines += [f"## {view.title} (the view `{view.name}`, and its CSV)", ""]
         lines += [*table(header, map(column_row, view.columns)), ""]
-    lines += ["## Runs: one row a visit (the runs CSV)", "", *table(header, map(column_row, RUN_COLUMNS))]
+    lines += ["## Runs: one row per visit (the runs CSV)", "", *table(header, map(column_row, RUN_COLUMNS))]
     lines += ["", "## Tables of the database", ""]
     lines += [
         "The tables may change from version to version (by migrations); the views above are the contract.",
-        "They are made from the columns at each start whose code has others; no change by hand lasts.",
+        "The server creates them again at a start whose code has other columns; manual changes are lost.",
         "",
     ]
     for each in Base.metadata.sorted_tables:
@@ -107,7 +107,7 @@ def _told(kind: Any) -> str:
 
 def settings_reference() -> str:
     """Every environment variable of the server."""
-    lines = [MADE, "# Settings of the server", "", "All come from the environment.", ""]
+    lines = [MADE, "# Settings of the server", "", "All settings come from the environment.", ""]
     rows = (setting_row(name, field) for name, field in Settings.model_fields.items())
     lines += table(("variable", "type", "default", "meaning"), rows)
     return "\n".join(lines) + "\n"

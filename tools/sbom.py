@@ -1,6 +1,6 @@
-"""Bill of materials of what a server runs (CycloneDX 1.6) and licences of its parts, from the lock files.
+"""Bill of materials of what a server runs (CycloneDX 1.6) and licenses of its parts, from the lock files.
 
-Fails on a licence that the GPL 3 cannot be joined with, and on a part of which none is known.
+Fails on a license that the GPL 3 cannot be joined with, and on a part of which none is known.
 """
 
 import json
@@ -21,14 +21,14 @@ COMPATIBLE = re.compile(
     r"GPL-2\.0-or-later|GPLv2\+|Unlicense|Zlib|HPND|CC0|BlueOak|OFL|BSL|Boost|Public Domain)\b",
     re.IGNORECASE,
 )
-"""Families of licences that may be joined with GPL-3.0-or-later, as packages write them."""
+"""Families of licenses that may be joined with GPL-3.0-or-later, as packages write them."""
 MAX_SAID = 60
-"""Longer texts in the field are the licence itself, not its name."""
+"""Longer texts in the field are the license itself, not its name."""
 KNOWN = {
     "pyrage": "MIT",
     "questplus": "GPL-3.0",
 }
-"""Licences of parts whose metadata say nothing useful, looked up in their sources."""
+"""Licenses of parts whose metadata say nothing useful, looked up in their sources."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Part:
 
     @property
     def is_compatible(self) -> bool:
-        """Whether its licence may be joined with ours; False where none is known."""
+        """Whether its license may be joined with ours; False where none is known."""
         return self.licence is not None and bool(COMPATIBLE.search(self.licence))
 
 
@@ -62,7 +62,7 @@ def python_parts(lock: str) -> Iterator[Part]:
 
 
 def _licence_of(told: Any) -> str | None:
-    """What a package says of its licence: the expression, a short text, or the classifiers."""
+    """What a package says of its license: the expression, a short text, or the classifiers."""
     if expression := told.get("License-Expression"):
         return str(expression)
     classifiers = [
@@ -127,17 +127,17 @@ def locked_parts() -> list[Part]:
 
 
 def main() -> int:
-    """Say which licences there are; with `--check` alone, write nothing."""
+    """Say which licenses there are; with `--check` alone, write nothing."""
     parts = locked_parts()
     wrong = [part for part in parts if not part.is_compatible]
     for part in wrong:
         print(
-            f"licences: {part.name} {part.version}: expected a licence that goes with GPL-3.0-or-later, got "
+            f"licenses: {part.name} {part.version}: expected a license that goes with GPL-3.0-or-later, got "
             f"{part.licence or 'none'}; leave the package out, or add what its source says to tools/sbom.py"
         )
     counted = {part.ecosystem: sum(p.ecosystem == part.ecosystem for p in parts) for part in parts}
     print(
-        "licences: "
+        "licenses: "
         + ", ".join(f"{number} packages of {name}" for name, number in counted.items())
         + ("" if wrong else ", all go with GPL-3.0-or-later")
     )

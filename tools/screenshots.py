@@ -468,7 +468,7 @@ def performance_pictures(_: Path) -> None:
 
 
 def strip(painter: FramePainter, curve: ClipCurve, start: int) -> Rgb:
-    """One character's frames from `start` on, beside one another."""
+    """One character's frames from `start` on, side by side."""
     windows = list(frame_windows(len(curve.closure), PERFORMANCE_FPS, True))
     cells = []
     for samples, weights in windows[start : start + COLUMNS]:

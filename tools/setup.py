@@ -119,7 +119,7 @@ def keep_bytecode() -> None:
     """Import once what the programs import, so that its bytecode is kept.
 
     Where PYTHONDONTWRITEBYTECODE is set and the installer compiles nothing, every start of a program would
-    compile each module it imports anew: most of the processor time of a short command.
+    compile each module it imports again: most of the processor time of a short command.
     """
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     code = f"import {', '.join(STARTED)}"

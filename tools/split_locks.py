@@ -1,6 +1,6 @@
 """Write the part of one lock file that another lacks.
 
-A package that the whole wants on more systems than the base does stands in both, at one version.
+A package that the whole needs on more systems than the base is in both, at one version.
 
     python tools/split_locks.py WHOLE BASE REST
 

@@ -38,20 +38,20 @@ def register_agreement(app: typer.Typer) -> None:
 
 def reliability(
     file: Annotated[
-        Path, typer.Argument(help="One row a case (a person, or a rated clip), a column an item.")
+        Path, typer.Argument(help="One row per case (a person, or a rated clip), one column per item.")
     ],
     items: Annotated[str, typer.Option(help="Columns of the items of one scale, separated by commas.")],
-    reverse: Annotated[str, typer.Option(help="Those of them that are reverse-keyed.")] = "",
+    reverse: Annotated[str, typer.Option(help="Items that are reverse-keyed.")] = "",
     scale: Annotated[
-        str | None, typer.Option(help="Ends of the scale, e.g. 1:7; needed by --reverse.")
+        str | None, typer.Option(help="Ends of the scale, e.g. 1:7; required by --reverse.")
     ] = None,
-    case: Annotated[str | None, typer.Option(help="Column that names the case, for its scale score.")] = None,
+    case: Annotated[str | None, typer.Option(help="Column with the name of the case, for --scores.")] = None,
     scores: Annotated[
         Path | None, typer.Option(help="Write each case's scale score to this CSV file.")
     ] = None,
     json: JsonOption = None,
 ) -> None:
-    """Whether items measure one thing: Cronbach's alpha, McDonald's omega, each item, scale scores.
+    """Reliability of a scale: Cronbach's alpha, McDonald's omega, item statistics, scale scores.
 
     Examples:
 
@@ -75,7 +75,7 @@ def reliability(
 
 
 def agreement(
-    file: Annotated[Path, typer.Argument(help="One row a rating, such as the server's export.")],
+    file: Annotated[Path, typer.Argument(help="One row per rating, such as the server's export.")],
     item: Annotated[str, typer.Option(help="Column that names what was rated.")] = "stimulus",
     participant: Annotated[str, typer.Option(help="Column that names the person.")] = "participant",
     rating: Annotated[str, typer.Option(help="Column with the rating.")] = "response",
@@ -84,7 +84,7 @@ def agreement(
     ] = LevelChoice.INTERVAL,
     json: JsonOption = None,
 ) -> None:
-    """Whether people say the same of the same items: intraclass correlations, Krippendorff's alpha.
+    """Agreement between people who rated the same items: intraclass correlations, Krippendorff's alpha.
 
     Examples:
 
@@ -122,7 +122,7 @@ def _save_scores(path: Path, scores: tuple[tuple[str, float], ...], case: str) -
 
 
 class RepeatsChoice(StrEnum):
-    """What a person's repeated votes on one item count as."""
+    """How a person's repeated votes on one item are counted."""
 
     MEAN = "mean"
     VOTES = "votes"
@@ -134,7 +134,7 @@ def register_opinion(app: typer.Typer) -> None:
 
 
 def opinion(
-    file: Annotated[Path, typer.Argument(help="CSV file, one row a vote, such as the server's export.")],
+    file: Annotated[Path, typer.Argument(help="CSV file, one row per vote, such as the server's export.")],
     item: Annotated[str, typer.Option(help="Column that names the clip or condition.")] = "stimulus",
     participant: Annotated[str, typer.Option(help="Column that names the person.")] = "participant",
     rating: Annotated[str, typer.Option(help="Column with the vote.")] = "response",

@@ -30,7 +30,10 @@ def anova(
     file: Annotated[
         Path,
         typer.Argument(
-            help="CSV file, one row a trial (or one a cell); of a folder all files .csv, as one table."
+            help=(
+                "CSV file, one row per trial (or per cell); or a folder, whose .csv files are read as one "
+                "table."
+            )
         ),
     ],
     participant: Annotated[str, typer.Option(help="Column that names the participant.")],
@@ -44,26 +47,28 @@ def anova(
     covariate: Annotated[
         str, typer.Option(help="Columns of numbers that belong to participants, separated by commas.")
     ] = "",
-    type: Annotated[int, typer.Option(help="Type of sums of squares, 2 or 3.", min=2, max=3)] = 3,
-    centre: Annotated[bool, typer.Option(help="Centre covariates at their mean over participants.")] = True,
+    type: Annotated[int, typer.Option(help="Type of the sums of squares, 2 or 3.", min=2, max=3)] = 3,
+    centre: Annotated[bool, typer.Option(help="Center covariates at their mean over participants.")] = True,
     covariate_by_group: Annotated[
-        bool, typer.Option("--covariate-by-group", help="Let slopes of covariates differ between groups.")
+        bool,
+        typer.Option("--covariate-by-group", help="Allow slopes of covariates to differ between groups."),
     ] = False,
     json: JsonOption = None,
     out: Annotated[
         Path | None, typer.Option(help="Write figures and the whole report to this folder.")
     ] = None,
     trial: Annotated[
-        str | None, typer.Option(help="Column that numbers a participant's trials; repeats are found by it.")
+        str | None,
+        typer.Option(help="Column with the number of a participant's trial; used to find repeated rows."),
     ] = None,
-    scale: Annotated[str | None, typer.Option(help="Refuse ratings outside, e.g. 1:7.")] = None,
+    scale: Annotated[str | None, typer.Option(help="Reject ratings outside this range, e.g. 1:7.")] = None,
     verify_with_r: VerifyOption = False,
     two_factor_pairs: Annotated[
         bool, typer.Option("--two-factor-pairs", help="Also compare all cells of every two-factor margin.")
     ] = False,
     equivalence: Annotated[
         str | None,
-        typer.Option(help="Bounds within which pairs count as equal, in rating units: 0.5 or -0.3,0.5."),
+        typer.Option(help="Bounds of equivalence of pairs, in rating units: 0.5 or -0.3,0.5."),
     ] = None,
     robust: Annotated[
         bool, typer.Option("--robust", help="Add permutation tests, aligned ranks and trimmed means.")
@@ -71,7 +76,7 @@ def anova(
     levels: LevelsOption = None,
     contrast: Annotated[
         list[str] | None,
-        typer.Option(help="Weights of a factor's levels in their order: face:1,-1,0. Repeatable."),
+        typer.Option(help="Weights of a factor's levels, in order: face:1,-1,0. Repeatable."),
     ] = None,
 ) -> None:
     """ANOVA of a long table: factors within and between participants, covariates, groups of any sizes.
@@ -97,11 +102,11 @@ def anova(
 
     factors, groups, covariates = names_in(within), names_in(between), names_in(covariate)
     if not [*factors, *groups, *covariates]:
-        raise InputError("no factor named; expected e.g. --within face,blur or --between group")
+        raise InputError("no factor is named; add, for example, --within face,blur or --between group")
     if out is not None:
         check_folder(out)
     elif verify_with_r:
-        raise InputError("--verify-with-r needs the folder of a report: add e.g. --out results")
+        raise InputError("--verify-with-r needs a report folder: add, for example, --out results")
     with progress_spinner("reading ratings"):
         data = read_long_table(
             file, participant, rating, factors, trial, scale_bounds(scale), groups, covariates
@@ -127,7 +132,7 @@ def anova(
             decisions=data.decisions,
         )
     if robust:
-        # scipy.stats takes a second to import, which only those who ask for it pay
+        # scipy.stats takes a second to import: only commands that use it import it
         from analysis.robust import companions_of
 
         with progress_spinner("permutations"):

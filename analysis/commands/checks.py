@@ -27,13 +27,15 @@ def check_paper(
     file: Annotated[
         Path | None,
         typer.Argument(
-            help="A manuscript or report (HTML, TeX, DOCX, PDF, Markdown, text), or a TOML file of printed "
-            "figures; the shipped figures of the paper if left out."
+            help=(
+                "A manuscript or report (HTML, TeX, DOCX, PDF, Markdown, text), or a TOML file of printed "
+                "figures. Default: the shipped figures of the paper."
+            )
         ),
     ] = None,
-    json: Annotated[Path | None, typer.Option(help="Write the findings to this JSON file too.")] = None,
+    json: Annotated[Path | None, typer.Option(help="Also write the findings to this JSON file.")] = None,
 ) -> None:
-    """Check a paper from what it prints: p, df and effect sizes of its statistics; SE or SD; joint means.
+    """Check the statistics printed in a paper: p, df and effect sizes; SE or SD; means that fit together.
 
     Examples:
 
@@ -43,7 +45,7 @@ def check_paper(
 
       analysis check-paper figures.toml
 
-    Exit code 1 where a statistic or figure does not fit.
+    Exit code 1 if a statistic or figure is inconsistent.
     The shipped analysis/paper/published/FIGURES.toml shows the format of figures.
     """
     from analysis.paper.printed import SHIPPED
@@ -70,11 +72,11 @@ def _check_document(file: Path, json: Path | None) -> int:
             temporary.write_text(json_text({"file": file.name, **counts, **asdict(result)}), encoding="utf-8")
     typer.echo(
         f"{file.name}: {len(result.statistics)} statistics read, {result.n_checked} checked, "
-        f"{result.n_wrong} do not fit, {len(result.unread)} could not be read"
+        f"{result.n_wrong} inconsistent, {len(result.unread)} could not be read"
     )
     for statistic in result.statistics:
         for problem in statistic.problems:
-            grave = " (significant by one, not by the other)" if statistic.verdict == "decision" else ""
+            grave = " (one is significant, the other is not)" if statistic.verdict == "decision" else ""
             typer.echo("\n".join(wrap(f"- {statistic.text}: {problem}{grave}")))
     for fragment in result.unread:
         typer.echo("\n".join(wrap(f"- could not be read: {fragment}")))
@@ -120,15 +122,15 @@ def verify(
         Path, typer.Argument(help="The zip of a capsule, or the folder it was unpacked into.")
     ],
     report: Annotated[
-        bool, typer.Option(help="Make the report again, or only compare every file with its hash.")
+        bool, typer.Option(help="Regenerate the report, or only compare every file with its hash.")
     ] = True,
 ) -> None:
-    """Verify a capsule: every file is as listed, and the report comes out again from the data in it.
+    """Verify a capsule: check every file against the list, and regenerate the report from its data.
 
-    Every table is rebuilt as printed, and under the same versions every figure byte for byte. What differs is
-    named, with the versions that differ, and numbers that a later release changed on purpose with the reason.
-    Ends with code 0 where all is well, or only figures differ under
-    other versions; 1 where the report differs; 2 where a file was changed, is missing or foreign.
+    Every table is rebuilt as printed. Under the same versions, every figure is the same byte for byte.
+    Differences are listed with the versions that differ. Changes that a later release made on purpose are
+    listed with their reason. Exit code 0: all equal, or only figures differ under other versions. 1: the
+    report differs. 2: a file was changed, is missing, or does not belong to the capsule.
 
     Examples:
 
@@ -145,7 +147,7 @@ def verify(
         say("hashes")
         listed, folder = open_capsule(capsule, files)
         typer.echo(f"capsule of the study {listed.study}, made {listed.made}, sha256 {listed.sha256}")
-        typer.echo(f"{len(listed.files)} files, every one as listed")
+        typer.echo(f"{len(listed.files)} files, all as listed")
         if not report:
             return
         from analysis.capsule import compare_reports, rebuild
@@ -170,27 +172,27 @@ def _check_software(listed: "Capsule", folder: Path) -> None:
         mode="json"
     ):
         raise InputError(
-            f"{SOFTWARE_FILE}: expected the versions that the list names, got others; nothing says by which "
-            "versions the report was made"
+            f"{SOFTWARE_FILE}: expected the versions in the list, got others; the versions that made the "
+            "report are unknown"
         )
 
 
 def _tell(compared: "list[FileComparison]", versions: list[str]) -> None:
     """Say what differs; exit code 1 where a table does, or a figure under the same versions."""
     same = sum(one.kind == "same" for one in compared)
-    typer.echo(f"the report made again: {same} of {len(compared)} files are the same byte for byte")
+    typer.echo(f"regenerated report: {same} of {len(compared)} files are the same byte for byte")
     for one in compared:
         if one.kind != "same":
             typer.echo(f"{one.name}: {one.said}")
     if same == len(compared):
-        typer.echo("verified: every table as printed, every figure byte for byte")
+        typer.echo("verified: every table is as printed, every figure is the same byte for byte")
         return
-    said = "; ".join(versions) or "none: the software is the same"
-    typer.echo(f"versions that differ, by what the capsule says of itself: {said}")
+    said = "; ".join(versions) or "none, the software is the same"
+    typer.echo(f"versions that differ, according to the capsule: {said}")
     if any(one.kind == "table" for one in compared):
         typer.echo("NOT verified: tables differ", err=True)
         raise typer.Exit(1)
     if any(one.kind == "figure" for one in compared) and not versions:
         typer.echo("NOT verified: figures differ under the same versions", err=True)
         raise typer.Exit(1)
-    typer.echo("verified: every table as printed; what differs is due to other versions or processors")
+    typer.echo("verified: every table is as printed; the differences are due to other versions or processors")

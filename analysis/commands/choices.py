@@ -38,32 +38,40 @@ def register_pairs(app: typer.Typer) -> None:
 
 def pairs(
     file: Annotated[
-        Path, typer.Argument(help="CSV file, one row a comparison, such as the server's export.")
+        Path, typer.Argument(help="CSV file, one row per comparison, such as the server's export.")
     ],
     left: Annotated[str, typer.Option(help="Column of the item on the left (or shown first).")] = "left",
     right: Annotated[str, typer.Option(help="Column of the item on the right (or shown second).")] = "right",
     winner: Annotated[
         str, typer.Option(help="Column of the winner: left, right, or the item's name.")
     ] = "winner",
-    tie: Annotated[str | None, typer.Option(help="What stands in the winner's column for a tie.")] = None,
+    tie: Annotated[str | None, typer.Option(help="The value for a tie in the winner's column.")] = None,
     participant: Annotated[
         str | None, typer.Option(help="Column that names the rater, for robust standard errors.")
     ] = None,
     method: Annotated[
         MethodChoice | None,
-        typer.Option(help="bradley-terry, davidson (ties) or thurstone (case V); by the ties if not given."),
+        typer.Option(
+            help=(
+                "bradley-terry, davidson (ties) or thurstone (case V). Default: depends on whether there are "
+                "ties."
+            )
+        ),
     ] = None,
     factors: Annotated[
         Path | None,
         typer.Option(
-            help="CSV of the items: first column the item, the others factors; abilities are linear in them."
+            help=(
+                "CSV of the items: the first column is the item, the others are factors; abilities are "
+                "linear in them."
+            )
         ),
     ] = None,
     order_effect: Annotated[
-        bool, typer.Option("--order-effect", help="Let the left (first) side have an advantage.")
+        bool, typer.Option("--order-effect", help="Include an advantage of the left (first) side.")
     ] = False,
     firth: Annotated[
-        bool, typer.Option("--firth", help="Finite estimates also where an item always wins (penalised).")
+        bool, typer.Option("--firth", help="Finite estimates even if an item always wins (penalized).")
     ] = False,
     levels: LevelsOption = None,
     json: JsonOption = None,
@@ -86,7 +94,7 @@ def pairs(
     from analysis.report.choice_tables import abilities_table, contrasts_table, factors_table, pairs_text
 
     with progress_spinner("reading comparisons"):
-        # The items are levels of `left`; what else is ordered is a factor of theirs.
+        # The items are levels of `left`; any other ordered column is a factor of the items.
         orders = levels or []
         of_items = [one for one in orders if factors is None or one.partition("=")[0].strip() == left]
         of_factors = [one for one in orders if one not in of_items]
@@ -121,7 +129,7 @@ def register_thresholds(app: typer.Typer) -> None:
 
 
 def thresholds(
-    file: Annotated[Path, typer.Argument(help="CSV file, one row a trial.")],
+    file: Annotated[Path, typer.Argument(help="CSV file, one row per trial.")],
     x: Annotated[str, typer.Option(help="Column of the stimulus, a number.")] = "x",
     response: Annotated[
         str, typer.Option(help="Column of the answer: 1 or 0, yes or no, correct or wrong.")
@@ -134,21 +142,20 @@ def thresholds(
     ] = "0",
     function: Annotated[FunctionChoice, typer.Option(help="Shape of the function.")] = FunctionChoice.NORMAL,
     participant: Annotated[
-        str | None, typer.Option(help="Column that names the person: each is fitted, and their mean.")
+        str | None,
+        typer.Option(help="Column with the person: each person is fitted, and their mean is reported."),
     ] = None,
-    by: Annotated[
-        str | None, typer.Option(help="Column of a condition: each of its levels is fitted.")
-    ] = None,
+    by: Annotated[str | None, typer.Option(help="Column with the condition: each level is fitted.")] = None,
     second: Annotated[
         str | None,
         typer.Option(
-            help="Column of a second stimulus variable, a number: the threshold is a straight line over it."
+            help="Column of a second stimulus variable (a number); the threshold varies linearly with it."
         ),
     ] = None,
     hierarchical: Annotated[
         bool,
         typer.Option(
-            help="One model over all people: threshold and spread differ between them (--participant)."
+            help="One model over all people, whose threshold and spread differ (requires --participant)."
         ),
     ] = False,
     levels: LevelsOption = None,
@@ -186,7 +193,7 @@ def thresholds(
         answers = read_answers(file, x, response, participant, by, second, levels or ())
     if second is not None:
         if hierarchical:
-            raise InputError("--hierarchical is of one stimulus variable; leave out --second or it")
+            raise InputError("--hierarchical takes one stimulus variable; remove --second or --hierarchical")
         _planes(answers, function, guess, upper, (x, second), file.stem, json)
         return
     with progress_spinner("fitting"):
@@ -219,9 +226,9 @@ def _planes(
     from experiments.errors import InputError
 
     if function is FunctionChoice.WEIBULL:
-        raise InputError("--second: expected --function normal or logistic, whose thresholds may pass 0")
+        raise InputError("--second needs --function normal or logistic, because thresholds may be below 0")
     if lapse is None:
-        raise InputError("--second: expected --lapse as a number; it is not fitted beside a tilt")
+        raise InputError("--second needs --lapse as a number; it cannot be fitted together with a tilt")
     with progress_spinner("fitting"):
         result = fit_planes(
             answers, "logistic" if function is FunctionChoice.LOGISTIC else "normal", guess, lapse

@@ -20,20 +20,24 @@ if TYPE_CHECKING:
     from analysis.read.model_csv import ModelInput
 
 
-FileArgument = Annotated[Path, typer.Argument(help="CSV file, one row a trial, such as the server's export.")]
+FileArgument = Annotated[
+    Path, typer.Argument(help="CSV file, one row per trial, such as the server's export.")
+]
 ParticipantOption = Annotated[str, typer.Option(help="Column that names the participant.")]
 RatingOption = Annotated[str, typer.Option(help="Column with the rating.")]
 WithinOption = Annotated[
     str,
     typer.Option(
-        help="Columns of the within factors, separated by commas; an export's factors if not given."
+        help="Columns of the within factors, separated by commas. Default: the factors of an export."
     ),
 ]
 ItemOption = Annotated[
     str,
     typer.Option(
-        help="Column that names the clip (or what clips share, like the blink shown); several columns, "
-        "separated by commas, together name it. An export's profile_id if not given."
+        help=(
+            "Column that names the clip (or what clips share, such as the blink shown). Several columns, "
+            "separated by commas, name it together. Default: profile_id of an export."
+        )
     ),
 ]
 
@@ -45,15 +49,19 @@ BetweenOption = Annotated[
 CovariateOption = Annotated[
     str,
     typer.Option(
-        help="Columns with numbers (age, trial), centred, separated by commas; age:blur or age:trial adds an "
-        "interaction with a factor or another covariate."
+        help=(
+            "Columns with numbers (age, trial), separated by commas; they are centered. age:blur or "
+            "age:trial adds an interaction with a factor or another covariate."
+        )
     ),
 ]
 RandomOption = Annotated[
     str,
     typer.Option(
-        help="Further columns with a random intercept each, separated by commas: face, or face/clip for "
-        "clips nested in faces."
+        help=(
+            "Additional columns with a random intercept each, separated by commas: face, or face/clip for "
+            "clips nested in faces."
+        )
     ),
 ]
 
@@ -103,13 +111,17 @@ def mixed(
     slopes: Annotated[
         SlopesChoice,
         typer.Option(
-            help="all: an own variance for every effect; main: for main effects; correlated: main effects "
-            "and intercept with all correlations; none: intercepts only (anti-conservative)."
+            help=(
+                "all: a separate variance for every effect; main: for main effects; correlated: main "
+                "effects and intercept with all correlations; none: intercepts only (anti-conservative)."
+            )
         ),
     ] = SlopesChoice.ALL,
     df: Annotated[
         DfChoice,
-        typer.Option(help="Denominator df; kenward-roger also widens standard errors, for few participants."),
+        typer.Option(
+            help="Denominator df; kenward-roger also corrects standard errors for few participants."
+        ),
     ] = DfChoice.SATTERTHWAITE,
     intervals: Annotated[
         bool,
@@ -173,16 +185,20 @@ def ordinal(
     slopes: Annotated[
         OrdinalSlopesChoice,
         typer.Option(
-            help="all: an own variance for every effect; main: for main effects; none: intercepts only "
-            "(anti-conservative where people differ in an effect)."
+            help=(
+                "all: a separate variance for every effect; main: for main effects; none: intercepts only "
+                "(anti-conservative if people differ in an effect)."
+            )
         ),
     ] = OrdinalSlopesChoice.NONE,
     quadrature: Annotated[
         int | None,
         typer.Option(
-            help="Nodes of adaptive Gauss-Hermite quadrature, for participants' intercepts alone (the "
-            "item of an export is then left out); 1 is Laplace's approximation. Not given: as many nodes as "
-            "change nothing, or Laplace with items or slopes, with a warning where it is inaccurate.",
+            help=(
+                "Nodes of adaptive Gauss-Hermite quadrature, for models with participants' intercepts only "
+                "(the item of an export is then ignored). 1 is Laplace's approximation. Default: as many "
+                "nodes as needed; with items or slopes Laplace, with a warning if it is inaccurate."
+            ),
             min=1,
             max=100,
         ),

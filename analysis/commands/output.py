@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def _writable(path: Path | None) -> Path | None:
-    """Refuse, before the work, a file that cannot be written."""
+    """Reject a file that cannot be written before the work begins."""
     from experiments.files import check_targets
 
     check_targets([path])
@@ -28,12 +28,12 @@ def _writable(path: Path | None) -> Path | None:
 
 VerifyOption = Annotated[
     bool,
-    typer.Option("--verify-with-r", help="Let R compute the report's tables anew, and compare."),
+    typer.Option("--verify-with-r", help="Recompute the report's tables in R, and compare."),
 ]
 LevelsOption = Annotated[
     list[str] | None,
     typer.Option(
-        help="Order of a factor's levels (else by name, numbers by value): time=before,after. Repeatable."
+        help="Order of a factor's levels: time=before,after. Repeatable. Default: by name, numbers by value."
     ),
 ]
 JsonOption = Annotated[
@@ -76,19 +76,19 @@ def show(contents: "Contents") -> None:
             typer.echo(f"\n{part.title}")
         for table in part.tables:
             if table.folded:
-                folded = f"{table.title}: {len(table.rows)} rows, in the report and the JSON file"
+                folded = f"{table.title}: {len(table.rows)} rows; see the report or the JSON file"
                 typer.echo("\n" + "\n".join(wrap(folded)))
             else:
                 typer.echo("\n" + as_text(table))
 
 
 def check_folder(folder: Path) -> None:
-    """Refuse, before the work, a folder that could not be made or written to."""
+    """Reject a folder that cannot be created or written to before the work begins."""
     ancestor = folder
     while not ancestor.exists() and ancestor != ancestor.parent:
         ancestor = ancestor.parent
     if not ancestor.is_dir():
-        raise InputError(f"{folder}: expected a folder, {ancestor} is a file")
+        raise InputError(f"{folder}: expected a folder, but {ancestor} is a file")
     if not os.access(ancestor, os.W_OK):
         raise InputError(f"{folder}: the folder {ancestor} cannot be written to")
 
@@ -110,7 +110,7 @@ def save_json(path: Path | None, numbers: dict[str, Any], synthetic: bool | None
 
 
 def save_report(contents: "Contents", folder: Path, more: bool = False, with_r: bool = False) -> None:
-    """Write the report; `more` adds what takes long, `with_r` lets R compute its tables anew."""
+    """Write the report; `more` adds slow parts, `with_r` recomputes its tables in R."""
     from analysis.report.formats import wrap
     from analysis.report.r_models import rscript, verify_with_r
     from analysis.report.write import write_report
@@ -127,7 +127,10 @@ def save_report(contents: "Contents", folder: Path, more: bool = False, with_r: 
 
 
 def _say_model(script: str) -> None:
-    typer.echo(f"{script}: R fits the model anew, which takes minutes; Ctrl-C leaves it unverified", err=True)
+    typer.echo(
+        f"{script}: R fits the model again, which takes minutes; press Ctrl-C to leave it unverified",
+        err=True,
+    )
 
 
 @contextmanager

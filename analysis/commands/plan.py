@@ -1,4 +1,4 @@
-"""`analysis plan`: how many participants, clips and faces a study needs, before there are data."""
+"""`analysis plan`: how many participants, clips and faces a study needs, before data collection."""
 
 from dataclasses import asdict
 from enum import StrEnum
@@ -16,17 +16,17 @@ if TYPE_CHECKING:
     from analysis.power.simulate import Design
 
 
-# Options of `analysis plan`, and what stands in them.
+# Options of `analysis plan`, and their values.
 
 SizesOption = Annotated[
     str, typer.Option("--n", help="Numbers of participants: first:last:step, or 20,30,43.")
 ]
-SimulationsOption = Annotated[int, typer.Option(help="Data sets a number of participants.", min=1)]
-AlphaOption = Annotated[float, typer.Option(help="Level of the tests.", min=1e-6, max=0.5)]
-PowerOption = Annotated[float, typer.Option("--power", help="Power to look for.", min=0.01, max=0.999)]
-SeedOption = Annotated[int, typer.Option(help="Same seed, same numbers.", min=0)]
+SimulationsOption = Annotated[int, typer.Option(help="Data sets per number of participants.", min=1)]
+AlphaOption = Annotated[float, typer.Option(help="Significance level of the tests.", min=1e-6, max=0.5)]
+PowerOption = Annotated[float, typer.Option("--power", help="Target power.", min=0.01, max=0.999)]
+SeedOption = Annotated[int, typer.Option(help="Random seed; the same seed gives the same numbers.", min=0)]
 PlotOption = Annotated[
-    Path | None, typer.Option(help="Draw the curves into this PNG, SVG or PDF.", show_default=False)
+    Path | None, typer.Option(help="Draw the curves to this PNG, SVG or PDF file.", show_default=False)
 ]
 
 
@@ -130,11 +130,18 @@ def simulate(
 
 def pairs(
     abilities: Annotated[
-        str, typer.Option(help="Log odds of the items: 0,0.3,0.6. One above another wins 73% of the time.")
+        str,
+        typer.Option(
+            help="Log odds of the items: 0,0.3,0.6. A difference of 1 means winning 73% of the time."
+        ),
     ],
     repeats: Annotated[int, typer.Option(help="Comparisons of each pair by a participant.", min=1)] = 1,
-    sd_rater: Annotated[float, typer.Option(help="SD of participants' own log odds of a pair.", min=0)] = 0.0,
-    tie: Annotated[float, typer.Option(help="Probability that two equal items tie (Davidson).")] = 0.0,
+    sd_rater: Annotated[
+        float, typer.Option(help="SD over participants of the log odds of a pair.", min=0)
+    ] = 0.0,
+    tie: Annotated[
+        float, typer.Option(help="Probability of a tie between two equal items (Davidson).")
+    ] = 0.0,
     n: SizesOption = "10:60:10",
     simulations: SimulationsOption = 500,
     alpha: AlphaOption = 0.05,
@@ -162,11 +169,13 @@ def pairs(
 def thresholds(
     levels: Annotated[str, typer.Option(help="Stimuli shown: 100,120,140,160.")],
     threshold: Annotated[float, typer.Option(help="Mean threshold of the first condition.")],
-    difference: Annotated[float, typer.Option(help="How much higher that of the second is.")],
-    spread: Annotated[float, typer.Option(help="Spread of a person's function.")],
+    difference: Annotated[
+        float, typer.Option(help="Difference of the second condition's mean threshold from the first.")
+    ],
+    spread: Annotated[float, typer.Option(help="Spread of each person's function.")],
     sd_people: Annotated[float, typer.Option(help="SD of thresholds over people.")] = 0.0,
     sd_difference: Annotated[float, typer.Option(help="SD of differences over people.")] = 0.0,
-    trials: Annotated[int, typer.Option(help="Trials of each stimulus in a condition.", min=1)] = 10,
+    trials: Annotated[int, typer.Option(help="Trials per stimulus and condition.", min=1)] = 10,
     guess: Annotated[float, typer.Option(help="Guess rate: 0 for yes/no, 0.5 for two alternatives.")] = 0.0,
     lapse: Annotated[float, typer.Option(help="Lapse rate.")] = 0.0,
     function: Annotated[ShapeChoice, typer.Option(help="Shape of the function.")] = ShapeChoice.NORMAL,
@@ -194,7 +203,8 @@ def thresholds(
 
 
 plan = command_group(
-    "Sample size by simulation: participants, clips and faces for a power, and a text that says so.",
+    "Sample size by simulation: participants, clips and faces for a target power, and a paragraph for the "
+    "plan.",
     name="plan",
 )
 
@@ -219,7 +229,7 @@ def anova(
             "Repeatable."
         ),
     ] = None,
-    correlation: Annotated[float, typer.Option(help="Between two cells of a participant.")] = 0.5,
+    correlation: Annotated[float, typer.Option(help="Correlation between two cells of a participant.")] = 0.5,
     statistic: Annotated[StatisticChoice, typer.Option(help="Which test.")] = (
         StatisticChoice.GREENHOUSE_GEISSER
     ),
@@ -257,20 +267,29 @@ def anova(
 def mixed(
     difference: Annotated[
         str,
-        typer.Option(help="Of each further condition from the first, in rating points: 0.4, or 0.2,0.4."),
+        typer.Option(
+            help="Difference of each other condition from the first, in rating points: 0.4, or 0.2,0.4."
+        ),
     ],
-    clips: Annotated[str, typer.Option(help="Numbers of clips, each tried: 8,16,32.")] = "8,16",
-    faces: Annotated[str, typer.Option(help="Numbers of faces that the clips are of, each tried: 2,4.")] = "",
+    clips: Annotated[str, typer.Option(help="Numbers of clips to try: 8,16,32.")] = "8,16",
+    faces: Annotated[str, typer.Option(help="Numbers of faces in the clips to try: 2,4.")] = "",
     crossed: Annotated[
-        bool, typer.Option("--crossed", help="Each clip in every condition; else as many in each.")
+        bool,
+        typer.Option(
+            "--crossed", help="Show each clip in every condition. Default: each clip in one condition."
+        ),
     ] = False,
-    repeats: Annotated[int, typer.Option(help="Ratings of a clip by a participant.", min=1)] = 1,
+    repeats: Annotated[int, typer.Option(help="Ratings per clip and participant.", min=1)] = 1,
     sd_participant: Annotated[float, typer.Option(help="SD of participants' mean ratings.", min=0)] = 0.6,
-    sd_slope: Annotated[float, typer.Option(help="SD of participants' differences.", min=0)] = 0.4,
+    sd_slope: Annotated[
+        float, typer.Option(help="SD of participants' differences between conditions.", min=0)
+    ] = 0.4,
     sd_clip: Annotated[float, typer.Option(help="SD of clips' mean ratings.", min=0)] = 0.3,
     sd_face: Annotated[float, typer.Option(help="SD of faces' mean ratings.", min=0)] = 0.3,
-    sd_face_slope: Annotated[float, typer.Option(help="SD of faces' differences.", min=0)] = 0.1,
-    sd_residual: Annotated[float, typer.Option(help="SD of a rating's rest.", min=0.001)] = 1.0,
+    sd_face_slope: Annotated[
+        float, typer.Option(help="SD of faces' differences between conditions.", min=0)
+    ] = 0.1,
+    sd_residual: Annotated[float, typer.Option(help="Residual SD of a rating.", min=0.001)] = 1.0,
     n: SizesOption = "10:50:10",
     simulations: SimulationsOption = 200,
     alpha: AlphaOption = 0.05,
@@ -308,18 +327,28 @@ def ordinal(
     difference: Annotated[
         str,
         typer.Option(
-            help="Of each further condition from the first, in log odds of a higher rating: 0.5 is 1.65 to 1."
+            help=(
+                "Difference of each other condition from the first, in log odds of a higher rating: 0.5 is "
+                "1.65 to 1."
+            )
         ),
     ],
     shares: Annotated[
         str, typer.Option(help="How often each rating is given in the first condition: 5,10,20,30,20,10,5.")
     ],
-    clips: Annotated[int, typer.Option(help="Clips, shared evenly by the conditions.", min=2)] = 8,
+    clips: Annotated[
+        int, typer.Option(help="Number of clips, divided evenly between conditions.", min=2)
+    ] = 8,
     crossed: Annotated[
-        bool, typer.Option("--crossed", help="Each clip in every condition; else as many in each.")
+        bool,
+        typer.Option(
+            "--crossed", help="Show each clip in every condition. Default: each clip in one condition."
+        ),
     ] = False,
     sd_participant: Annotated[float, typer.Option(help="SD of participants, in log odds.", min=0)] = 1.0,
-    sd_slope: Annotated[float, typer.Option(help="SD of participants' differences.", min=0)] = 0.5,
+    sd_slope: Annotated[
+        float, typer.Option(help="SD of participants' differences between conditions.", min=0)
+    ] = 0.5,
     sd_clip: Annotated[float, typer.Option(help="SD of clips.", min=0)] = 0.5,
     n: SizesOption = "10:50:10",
     simulations: SimulationsOption = 200,

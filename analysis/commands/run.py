@@ -40,8 +40,10 @@ def run(
     database: Annotated[
         str | None,
         typer.Option(
-            help="Database URL; without it and without --csv: DATABASE_URL, or palpebra.sqlite in the data "
-            "folder (PALPEBRA_DATA_FOLDER, default ./data).",
+            help=(
+                "Database URL. Default without --csv: DATABASE_URL, or palpebra.sqlite in the data folder "
+                "(PALPEBRA_DATA_FOLDER, default ./data)."
+            ),
             show_default=False,
         ),
     ] = None,
@@ -49,15 +51,15 @@ def run(
     runs: Annotated[
         Path | None,
         typer.Option(
-            help="The runs CSV (`server export --format runs`): verdicts on the runs and their signals.",
+            help="The runs CSV (`server export --format runs`) with each run's verdict and signals.",
             show_default=False,
         ),
     ] = None,
-    study: Annotated[str | None, typer.Option(help="Name of the study, where there are several.")] = None,
+    study: Annotated[str | None, typer.Option(help="Name of the study, if there are several.")] = None,
     origin: Annotated[
         Origin | None,
         typer.Option(
-            help="Whose answers; without it the first there are of participant, pilot and simulated.",
+            help="Whose responses. Default: the first that exist of participant, pilot and simulated.",
             show_default=False,
         ),
     ] = None,
@@ -65,7 +67,7 @@ def run(
         int | None,
         typer.Option(
             min=1,
-            help="Data series: the answers of all versions that measure the same; without it the latest.",
+            help="Data series: the responses of all versions that measure the same. Default: the latest.",
             show_default=False,
         ),
     ] = None,
@@ -73,21 +75,23 @@ def run(
         int | None,
         typer.Option(
             min=1,
-            help="The answers given under this version of the study alone, without the rest of its series.",
+            help="Only responses to this version of the study, without the rest of its series.",
             show_default=False,
         ),
     ] = None,
     scale: Annotated[
         str | None,
-        typer.Option(help="One scale of a study that has several; all without it.", show_default=False),
+        typer.Option(help="One scale of a study with several scales. Default: all.", show_default=False),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder of the report; default out/analysis/NAME.", show_default=False)
+        Path | None, typer.Option(help="Report folder; default out/analysis/NAME.", show_default=False)
     ] = None,
     json: JsonOption = None,
-    report: Annotated[bool, typer.Option(help="Write figures and report, or only print the tables.")] = True,
+    report: Annotated[
+        bool, typer.Option(help="Write figures and the report, or only print the tables.")
+    ] = True,
     sensitivity: Annotated[
-        bool, typer.Option(help="Add what takes long to the report: mixed and ordinal models, Bayes factors.")
+        bool, typer.Option(help="Add slow parts to the report: mixed and ordinal models, Bayes factors.")
     ] = True,
     verify_with_r: VerifyOption = False,
     seal: Annotated[
@@ -96,10 +100,10 @@ def run(
     ] = None,
     manifest: Annotated[
         Path | None,
-        typer.Option(help="manifest.json of the clips shown, to be held against the sealed plan."),
+        typer.Option(help="manifest.json of the clips shown, to compare with the sealed plan."),
     ] = None,
 ) -> None:
-    """Analyse a study as its experiment declares: exclusions, the paper's table, every test, one report.
+    """Analyze a study as declared: exclusions, the paper's table, every test, and a report.
 
     Examples:
 
@@ -126,9 +130,9 @@ def run(
     from experiments.seal import read_clips_sha256, read_seal
 
     if database is not None and csv is not None:
-        raise InputError("--database and --csv exclude each other; give one")
+        raise InputError("--database and --csv cannot be combined; use one")
     if verify_with_r and not report:
-        raise InputError("--verify-with-r needs the report; leave --no-report out")
+        raise InputError("--verify-with-r needs the report; remove --no-report")
     declared = _declared_experiment(experiment)
     reading = plan_of(declared.trial.kind).reading
     folder = out or Path("out") / "analysis" / declared.name
@@ -144,7 +148,7 @@ def run(
             )
             contents = study_contents(declared, answers, pool, read_runs(runs) if runs else None, scale)
     except NoRatingsError as error:
-        typer.echo(f"nothing to analyse: {error}", err=True)
+        typer.echo(f"nothing to analyze: {error}", err=True)
         raise typer.Exit(1) from None
     if seal is not None:
         clips = read_clips_sha256(manifest) if manifest else None
@@ -166,6 +170,6 @@ def _declared_experiment(name_or_path: str) -> "Experiment":
             raise
         # A study has a name on the server too, by which its declaration cannot be read here.
         raise InputError(
-            f"{error}; a study of a server is analysed by its TOML file, which is under "
-            "materials/ in the zip of `server export NAME --format psych-ds --out NAME.zip`"
+            f"{error}. To analyze a study on a server, use its TOML file: run `server export NAME --format "
+            "psych-ds --out NAME.zip` and look in materials/"
         ) from error

@@ -20,15 +20,19 @@ if TYPE_CHECKING:
 MeanOption = Annotated[
     list[str] | None,
     typer.Option(
-        help="Another mean: profile.real=4.80 or blur.MB,amplitude.FC=4.9; of one scale of several: "
-        "eeriness/character.cartoon=60. Repeatable."
+        help=(
+            "A different mean: profile.real=4.80 or blur.MB,amplitude.FC=4.9; for one of several scales: "
+            "eeriness/character.cartoon=60. Repeatable."
+        )
     ),
 ]
 EffectOption = Annotated[
     list[str] | None,
     typer.Option(
-        help="Another effect size, as its F: blur:amplitude=12.5; =0 for none; on one scale of several: "
-        "eeriness/character=9. Repeatable."
+        help=(
+            "A different effect size, as F: blur:amplitude=12.5; =0 for none; for one of several scales: "
+            "eeriness/character=9. Repeatable."
+        )
     ),
 ]
 
@@ -47,19 +51,17 @@ def register_synthetic(app: typer.Typer) -> None:
 
 
 def power(
-    experiment: Annotated[
-        str, typer.Argument(help="exp1 to exp3; or another study of ratings, with --effect.")
-    ],
+    experiment: Annotated[str, typer.Argument(help="exp1 to exp3, or another rating study with --effect.")],
     n: Annotated[str, typer.Option("--n", help="Sample sizes: first:last:step, or 20,30,43.")] = "10:60:5",
-    simulations: Annotated[int, typer.Option(help="Data sets a sample size.", min=1)] = 1000,
-    alpha: Annotated[float, typer.Option(help="Level of the tests.")] = 0.05,
+    simulations: Annotated[int, typer.Option(help="Data sets per sample size.", min=1)] = 1000,
+    alpha: Annotated[float, typer.Option(help="Significance level of the tests.")] = 0.05,
     statistic: Annotated[StatisticChoice, typer.Option(help="Which test.")] = StatisticChoice.MULTIVARIATE,
     scale: Annotated[
         str | None,
-        typer.Option(help="Scale of the ratings, where there are several; the first if not given."),
+        typer.Option(help="Scale of the ratings, if there are several. Default: the first."),
     ] = None,
-    target: Annotated[float, typer.Option("--wanted", help="Power to look for.")] = 0.8,
-    seed: Annotated[int, typer.Option(help="Same seed, same numbers.", min=0)] = 1,
+    target: Annotated[float, typer.Option("--wanted", help="Target power.")] = 0.8,
+    seed: Annotated[int, typer.Option(help="Random seed; the same seed gives the same numbers.", min=0)] = 1,
     mean: MeanOption = None,
     effect: EffectOption = None,
     plot: Annotated[
@@ -97,23 +99,21 @@ def power(
 
 
 def synthesise_command(
-    experiment: Annotated[
-        str, typer.Argument(help="exp1 to exp3; or another study of ratings, with --effect.")
-    ],
-    seed: Annotated[int, typer.Option(help="Same seed, same file.", min=0)] = 1,
+    experiment: Annotated[str, typer.Argument(help="exp1 to exp3, or another rating study with --effect.")],
+    seed: Annotated[int, typer.Option(help="Random seed; the same seed gives the same file.", min=0)] = 1,
     out: Annotated[
         Path, typer.Option(help="CSV file to write, with the columns of the server's export.")
     ] = Path("ratings.csv"),
     n: Annotated[
-        int | None, typer.Option("--n", help="Participants; the paper's number if not given.")
+        int | None, typer.Option("--n", help="Number of participants. Default: as in the paper.")
     ] = None,
     mean: MeanOption = None,
     effect: EffectOption = None,
 ) -> None:
-    """Make ratings of synthetic participants whose analysis gives the published figures.
+    """Generate ratings of synthetic participants whose analysis gives the published figures.
 
-    They are synthetic: every row says so, and nothing made from them is a replication. Figures that cannot
-    hold together are named. Exit code 1 where a figure was missed.
+    Every row is marked as synthetic. Nothing made from these ratings is a replication. Figures that are
+    inconsistent with each other are listed. Exit code 1 if a figure was not reached.
 
     Examples:
 
@@ -150,7 +150,7 @@ def say_power(result: "PowerResult", target: float) -> None:
         for effect, row in zip(result.effects, result.power, strict=True)
     )
     header = ("Effect", *(f"n={result.n[i]}" for i in shown), f"n for {target:g}")
-    notes = (f"Test: {result.statistic}. {result.simulations} synthetic data sets a size.",)
+    notes = (f"Test: {result.statistic}. {result.simulations} synthetic data sets per sample size.",)
     show_tables(Table("power", f"Power, {result.experiment}", header, rows, 1, notes))
 
 
@@ -161,15 +161,15 @@ def _say_synthetic(made: "Synthetic", invented: int, several: bool) -> None:
     of = f"{made.experiment.name}, scale {made.scale.name}" if several else made.experiment.name
     typer.echo(f"SYNTHETIC {of}, seed {made.seed}: {hit} of {len(made.reached)} figures reached")
     if not made.reached:
-        typer.echo("- no effect was named for this scale; what it shows is chance")
+        typer.echo("- no effect was specified for this scale; differences are due to chance")
     if invented:
-        said = f"- invented: {invented} means that the paper does not print; they only make whole data"
+        said = f"- invented: {invented} means that the paper does not print, to complete the data"
         typer.echo("\n".join(wrap(said)))
     for given in made.given_way:
         typer.echo("\n".join(wrap(f"- {given}")))
     for missed in made.missed:
         window = f"{missed.low:.4f} to {missed.high:.4f}"
-        said = f"- missed: {missed.name}: wanted {window}, reached {missed.value:.4f}"
+        said = f"- not reached: {missed.name}: target {window}, got {missed.value:.4f}"
         typer.echo("\n".join(wrap(said)))
 
 

@@ -16,11 +16,13 @@ def register_convert(app: typer.Typer) -> None:
 
 
 def convert(
-    table: Annotated[Path, typer.Argument(help="CSV of a study, as `server export` writes it.")],
-    columns: Annotated[Path, typer.Option(help="Its columns as JSON: `server export --format columns`.")],
+    table: Annotated[Path, typer.Argument(help="CSV of a study from `server export`.")],
+    columns: Annotated[
+        Path, typer.Option(help="JSON description of its columns: `server export --format columns`.")
+    ],
     out: Annotated[Path, typer.Option(help="File to write: .sav (SPSS) or .parquet.")],
 ) -> None:
-    """Write a study's CSV as SPSS or Parquet, with labels of variables and levels.
+    """Convert a study's CSV to SPSS or Parquet, with variable and value labels.
 
     `server export STUDY --format spss` does both steps at once.
 
@@ -51,14 +53,17 @@ def register_reshape(app: typer.Typer) -> None:
 
 
 def reshape(
-    file: Annotated[Path, typer.Argument(help="CSV, Excel or SPSS file, one row a person.")],
+    file: Annotated[Path, typer.Argument(help="CSV, Excel or SPSS file, one row per person.")],
     columns: Annotated[
-        str, typer.Option(help="Names of the columns of ratings, each factor in braces: '{face}_{blur}'.")
+        str,
+        typer.Option(
+            help="Pattern of the rating columns' names, with each factor in braces: '{face}_{blur}'."
+        ),
     ],
     out: Annotated[Path, typer.Option(help="CSV file to write.")],
     rating: Annotated[str, typer.Option(help="Name of the column of ratings in the new file.")] = "rating",
 ) -> None:
-    """Make a wide table long: one row a person and cell, as every other command expects.
+    """Make a wide table long: one row per person and cell, as the other commands expect.
 
     Examples:
 
@@ -80,6 +85,7 @@ def reshape(
     for factor in table.factors:
         typer.echo(f"- {factor}: {', '.join(dict.fromkeys(table.rows[factor]))}")
     typer.echo(
-        f"- {table.n_columns} columns became '{rating}'; beside stay: {', '.join(table.beside) or 'none'}"
+        f"- {table.n_columns} columns became '{rating}'; unchanged columns: "
+        f"{', '.join(table.beside) or 'none'}"
     )
     typer.echo(f"written: {out} ({len(table.rows)} rows)")

@@ -21,7 +21,7 @@ class ModelTerms:
     """What a model is of: columns by their role.
 
     `within` vary within participants, `between` do not; `item` (several columns together) names what was
-    rated; `covariates` are numbers, centred; `interactions` are products of covariates with covariates or
+    rated; `covariates` are numbers, centered; `interactions` are products of covariates with covariates or
     factors, by the names of their members; `random` are further groupings with an intercept each, `a/b` for
     b nested in a.
     """
@@ -62,7 +62,7 @@ def split_covariates(
         numbers = [member for member in members if member not in factors]
         if not numbers:
             raise InputError(
-                f"'{name}' names factors alone, whose interactions are always in the model; expected an "
+                f"'{name}' names only factors, whose interactions are always in the model; expected an "
                 "interaction with a covariate, such as age:blur"
             )
         if len(set(members)) < len(members) or "" in members:
@@ -101,11 +101,11 @@ def refuse_unknown_columns(rows: pd.DataFrame, terms: ModelTerms) -> None:
                 "rename the column"
             )
     if rows.empty:
-        raise InputError("there are no ratings to analyse; the table has a header but no rows")
+        raise InputError("there are no ratings to analyze; the table has a header but no rows")
 
 
 def ratings(rows: pd.DataFrame, name: str) -> Floats:
-    """The ratings (n,); refused where they are no numbers, or all the same."""
+    """The ratings (n,); rejected if they are not numbers, or all the same."""
     values = numbers(rows, name)
     if np.ptp(values) == 0:
         raise InputError(f"every rating is {values[0]:g}; a model needs ratings that vary")
@@ -150,8 +150,8 @@ def _grouping(rows: pd.DataFrame, columns: list[str], name: str, what: str) -> G
         raise InputError(f"expected at least two {what}, got {len(names)}")
     if len(names) == len(rows):
         raise InputError(
-            f"every row has {what} of its own, which cannot be told from the residual; name a column whose "
-            "values come again"
+            f"every row has a different value for {what}, which is confounded with the residual; name a "
+            "column whose values repeat"
         )
     return Grouping(name, tuple(str(text) for text in names), codes.astype(np.int64))
 
@@ -160,32 +160,32 @@ def _refuse_same(group: Grouping, before: list[Grouping]) -> None:
     for other in before:
         pairs = len(np.unique(group.codes * len(other.names) + other.codes))
         if pairs == len(group.names) == len(other.names):
-            raise InputError(
-                f"'{group.name}' groups the rows as '{other.name}' does; one of the two is enough"
-            )
+            raise InputError(f"'{group.name}' groups the rows exactly as '{other.name}' does; remove one")
 
 
 def covariate_columns(
     rows: pd.DataFrame, terms: ModelTerms, people: Integers
 ) -> tuple[Floats, tuple[str, ...]]:
-    """Covariates (n, k) centred, and what was done.
+    """Covariates (n, k) centered, and what was done.
 
-    Those with one value for each participant are centred at the mean over participants, others over rows.
+    Those with one value for each participant are centered at the mean over participants, others over rows.
     """
     columns, said = [np.empty((len(rows), 0))], []
     for name in terms.covariates:
         values = numbers(rows, name)
         if np.ptp(values) == 0:
-            raise InputError(f"the covariate '{name}' is {values[0]:g} in every row; leave it out")
+            raise InputError(f"the covariate '{name}' is {values[0]:g} in every row; remove it")
         each = pd.DataFrame({"who": people, "value": values}).groupby("who")["value"]
         of_people = bool((each.nunique() == 1).all())
         mean = float(each.first().mean() if of_people else values.mean())
         columns.append((values - mean)[:, None])
-        said.append(f"{name} centred at its mean over {'participants' if of_people else 'rows'}, {mean:.6g}")
+        said.append(
+            f"{name} was centered at its mean over {'participants' if of_people else 'rows'}, {mean:.6g}"
+        )
     return np.hstack(columns), tuple(said)
 
 
-# Ratings in units of their own, so that neither a far origin nor a large unit costs a model its digits.
+# Ratings in standardized units, so that neither a far origin nor a large unit costs a model its digits.
 
 
 @dataclass(frozen=True)

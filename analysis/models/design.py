@@ -111,7 +111,7 @@ class ModelData:
     effect_of : tuple of str
         The effect of each column, `intercept` first.
     numbers : float64 array (n, k)
-        Centred covariates.
+        Centered covariates.
     number_effects : tuple of NumberEffect
         Covariates in the order of `numbers`, then their interactions.
     groups : tuple of Grouping
@@ -297,7 +297,7 @@ class ModelData:
 
 
 def model_data(rows: pd.DataFrame, terms: ModelTerms) -> ModelData:
-    """Code long rows, one a trial.
+    """Code long rows, one per trial.
 
     A factor of `within` with one level for each participant is taken as one between them, and said.
 
@@ -359,7 +359,7 @@ def _number_effects(
     names = [effect.name for effect in effects]
     for name in names:
         if names.count(name) > 1:
-            raise InputError(f"the interaction {name} is named twice; leave one out")
+            raise InputError(f"the interaction {name} is named twice; remove one")
     return tuple(effects)
 
 
@@ -383,7 +383,7 @@ def _by_participant(
             two = pd.unique(rows[name].astype(str).iloc[at])[:2]
             raise InputError(
                 f"'{name}' differs within participant {rows[terms.participant].iloc[at[0]]} ({two[0]} and "
-                f"{two[1]}); what changes within a participant belongs in --within"
+                f"{two[1]}); use --within for what changes within a participant"
             )
         if name in terms.within and (per_person == 1).all() and rows[name].nunique() > 1:
             constant.append(name)
@@ -391,7 +391,7 @@ def _by_participant(
         return terms, ()
     within = tuple(name for name in terms.within if name not in constant)
     moved = replace(terms, within=within, between=(*terms.between, *constant))
-    said = f"{', '.join(constant)}: one level for each participant, taken as between participants"
+    said = f"{', '.join(constant)}: one level per participant, treated as a factor between participants"
     return moved, (said,)
 
 
@@ -407,7 +407,7 @@ def _refuse_empty_cells(cell: Integers, factors: Sequence[str], levels: Sequence
     if (counts == 0).any():
         names = list(product(*levels))[int(np.flatnonzero(counts == 0)[0])]
         where = ", ".join(f"{factor}={level}" for factor, level in zip(factors, names, strict=True))
-        raise InputError(f"nobody rated the cell {where}; leave out a factor or level")
+        raise InputError(f"nobody rated the cell {where}; remove a factor or level")
 
 
 def _refuse_collinear(data: ModelData) -> None:
@@ -418,7 +418,7 @@ def _refuse_collinear(data: ModelData) -> None:
     if np.linalg.matrix_rank(scaled.T @ scaled, tol=1e-10) < x.shape[1]:
         raise InputError(
             f"the covariates {', '.join(data.terms.covariates)} are determined by the factors or by one "
-            "another; leave one out"
+            "another; remove one"
         )
 
 
@@ -438,7 +438,10 @@ def slope_groups(data: ModelData, slopes: Slopes) -> tuple[list[str], list[str]]
     inside = data.slope_effects
     kept, said = _without_residual_slopes(data, ["intercept", *_without_last(data, inside)])
     last = [effect for effect in inside if effect not in _without_last(data, inside)]
-    return kept, [*(f"no slope of {name}: with one rating a cell it is the residual" for name in last), *said]
+    return kept, [
+        *(f"no slope of {name}: with one rating per cell it is the residual" for name in last),
+        *said,
+    ]
 
 
 def _without_last(data: ModelData, inside: list[str]) -> list[str]:
@@ -472,7 +475,7 @@ def _refuse_too_few(data: ModelData, effects: Sequence[str]) -> None:
     if own * people >= ratings:
         raise InputError(
             f"expected more than {own * people} ratings for {own} correlated coefficients of each of "
-            f"{people} participants, got {ratings}; with one rating a cell use --slopes none or all"
+            f"{people} participants, got {ratings}; with one rating per cell use --slopes none or all"
         )
 
 
@@ -482,6 +485,6 @@ def unmodelled_slopes(data: ModelData, slopes: Slopes) -> list[str]:
         return []
     named = ", ".join(data.covariate_slopes)
     return [
-        f"{named} varies within participants and has no by-participant slope: where people differ in it its "
-        "p is too small; --slopes all gives it one"
+        f"{named} varies within participants and has no by-participant slope: if people differ in it, its p "
+        "is too small; add --slopes all"
     ]

@@ -19,7 +19,7 @@ Integers = NDArray[np.int64]
 FLAT = 1e-8
 """Curvature of the deviance, as a share of the largest, below which a direction counts as level.
 
-Of real data it was 1e-4 and more; where two variances cannot be told apart it is 1e-13.
+Of real data it was 1e-4 and more; where two variances cannot be separated it is 1e-13.
 """
 
 LEAST_THETA = 0.1
@@ -56,7 +56,7 @@ class Uncertainty:
 
     @property
     def untold(self) -> Integers:
-        """The theta whose size the ratings do not tell."""
+        """The theta whose size the ratings do not determine."""
         weight = np.abs(self.level[:-1]).max(axis=1, initial=0.0)
         untold: Integers = self.free[weight > np.sqrt(FLAT) * weight.max(initial=0.0)]
         return untold
@@ -100,7 +100,7 @@ def uncertainty(c: CrossProducts, theta: Floats, at: Criterion) -> Uncertainty:
         \text{where } \sigma^2 = r^2 / \nu \tag{3} \\
         A &= 2 H^{-1} \tag{4}
 
-    r^2 is the penalised residual sum of squares, h what the random effects' determinants add, H the matrix of
+    r^2 is the penalized residual sum of squares, h what the random effects' determinants add, H the matrix of
     (3) with the second derivatives by theta, A the covariance of (theta, sigma) in (1).
 
     A theta at its bound of zero is left out: neither deviance nor covariance changes there to first order.
@@ -288,8 +288,8 @@ def kenward_roger(terms: Sequence[Term], c: CrossProducts, theta: Floats, at: Cr
     size = sum(term.size for term in terms)
     if size > MAX_COEFFICIENTS:
         raise InputError(
-            f"Kenward and Roger's df are for at most {MAX_COEFFICIENTS} random coefficients, this model has "
-            f"{size}; with as many groups Satterthwaite's are as good"
+            f"Kenward-Roger df support at most {MAX_COEFFICIENTS} random coefficients, but this model has "
+            f"{size}; with so many groups, use Satterthwaite's"
         )
     m = _inner(terms, [block.factor(theta) for block in c.blocks])
     phi = at.unscaled

@@ -199,7 +199,7 @@ class LaplaceLikelihood:
                 return t, hessian
             u, v, t, value = self._step(p, (u, v), hessian.solve(*score), value)
         raise InputError(
-            "the random effects of the ordinal model do not settle; ratings may be separated or few"
+            "the random effects of the ordinal model did not converge; ratings may be separated or too few"
         )
 
     def _step(

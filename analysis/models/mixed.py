@@ -55,8 +55,8 @@ def refused_where_exact(data: ModelData, terms: Sequence[Term]) -> Iterator[None
         if residual > EXACT * float(np.linalg.norm(data.rating - data.rating.mean())):
             raise
         raise InputError(
-            "the ratings have no residual variance: factors, people and items repeat every one exactly, "
-            "as where each person gives one rating throughout; check the rating column"
+            "the ratings have no residual variance: factors, people and items predict each one exactly. "
+            "Does each person give one rating throughout? Check the rating column"
         ) from error
 
 
@@ -86,7 +86,7 @@ def fit_mixed(
     Parameters
     ----------
     rows : DataFrame
-        One row a trial.
+        One row per trial.
     item : str or sequence of str, optional
         The column (or columns, together) that names what was rated; None for a model of participants alone,
         which generalises to no other clips.
@@ -98,7 +98,7 @@ def fit_mixed(
     between : sequence of str, optional
         Factors with one level for each participant, crossed with those within.
     covariates : sequence of str, optional
-        Numbers, centred. `age:blur` and `age:trial` are interactions with a factor or another covariate;
+        Numbers, centered. `age:blur` and `age:trial` are interactions with a factor or another covariate;
         their covariates are in the model too. A covariate that varies within participants has a
         by-participant slope wherever factors have one, correlated with the intercept.
     random : sequence of str, optional
@@ -148,7 +148,7 @@ def fit_mixed(
 
 @dataclass(frozen=True)
 class _RemlFit:
-    """Coded trials, their random terms, cross-products in units of their own, the REML estimate's theta."""
+    """Coded trials, their random terms, cross-products in standardized units, the REML estimate's theta."""
 
     data: ModelData
     terms: list[Term]

@@ -156,16 +156,16 @@ def _effects(data: ModelData, beta: Floats, covariance: Floats) -> tuple[Ordinal
 def _search_notes(maximum: Maximum) -> tuple[str, ...]:
     if maximum.settled:
         return ()
-    return ("the likelihood still rises where the search ended: it may have no finite maximum (separation)",)
+    return (
+        "the likelihood was still rising when the search ended: it may have no finite maximum (separation)",
+    )
 
 
 def _sd_notes(p: Parameters, terms: RandomTerms, data: ModelData) -> list[str]:
     names = ["participants", *(f"participants' slopes of {group}" for group in terms.groups[1:])]
     names += ["items"] * (data.items is not None)
     zero = "the SD of {} is estimated as zero"
-    limit = (
-        "the SD of {} is at its upper limit of {:.1f}: the ratings hardly bound it, and with it the estimates"
-    )
+    limit = "the SD of {} is at its upper limit of {:.1f}: the ratings hardly determine it or the estimates"
     return [
         zero.format(name) if sd == 0 else limit.format(name, SD_MAX)
         for name, sd in zip(names, p.sd, strict=False)
@@ -208,8 +208,8 @@ def refuse_separation(data: ModelData) -> None:
             if top <= min(ratings[k].min() for k in order[cut:]):
                 low = ", ".join(levels[k] for k in sorted(order[:cut]))
                 raise InputError(
-                    f"no rating at {name}={low} lies above any other of {name}: they are separated, and "
-                    "an ordinal model has no finite estimate; use analysis mixed, or leave the factor out"
+                    f"no rating at {name}={low} is above any other rating of {name}: they are separated, and "
+                    "an ordinal model has no finite estimate; use analysis mixed, or remove the factor"
                 )
 
 
@@ -274,7 +274,7 @@ def fit_ordinal(
 
     Parameters are those of `analysis.models.mixed.fit_mixed`; slopes of one effect share one variance over
     its orthonormal contrasts and do not correlate. Categories are the distinct ratings met, in order; a
-    rating of the scale that nobody gave has no threshold of its own. A model without items and slopes is
+    rating of the scale that nobody gave has no separate threshold. A model without items and slopes is
     fitted by adaptive Gauss-Hermite quadrature of each participant's integral, with as many nodes as more
     would change nothing; others by Laplace's approximation, with a note where it is not accurate. With
     `quadrature` there are as many nodes; 1 is Laplace's approximation, without a check.
@@ -286,7 +286,7 @@ def fit_ordinal(
         ratings, for correlated slopes, and for effects that so few ratings leave undetermined.
     """
     if slopes == "correlated":
-        raise InputError("slopes of the ordinal model do not correlate; expected all, main or none")
+        raise InputError("slopes of the ordinal model cannot correlate; expected all, main or none")
     items = (item,) if isinstance(item, str) else tuple(item or ())
     _refuse_quadrature(quadrature or 1, items, slopes)
     numbers, interactions = split_covariates(covariates, (*within, *between))
@@ -336,7 +336,7 @@ def _by_enough_nodes(ordinal: OrdinalData, start: Maximum) -> tuple[Maximum, int
         maximum,
         nodes,
         [
-            f"quadrature is not converged: with {MAX_NODES} nodes an estimate would move by about "
+            f"quadrature did not converge: with {MAX_NODES} nodes an estimate would change by about "
             f"{share:.2g} of its standard error"
         ],
     )
@@ -365,8 +365,8 @@ def _laplace_notes(
     if not moved:
         return []
     return [
-        "Laplace's approximation is not accurate for these ratings: exact integrals would move "
-        f"{', '.join(moved)}; a model of participants' intercepts alone is fitted by quadrature"
+        "Laplace's approximation is not accurate for these ratings: exact integrals would change "
+        f"{', '.join(moved)}; a model with participants' intercepts only is fitted by quadrature"
     ]
 
 
@@ -376,8 +376,8 @@ def _refuse_quadrature(nodes: int, items: Sequence[str], slopes: Slopes) -> None
     if nodes > 1 and (items or slopes != "none"):
         further = f"the item {', '.join(items)}" if items else "slopes"
         raise InputError(
-            f"quadrature is for participants' intercepts alone, and the model has {further} too; "
-            "use Laplace's approximation (1 node), or leave these out"
+            f"quadrature is for participants' intercepts only, but the model also has {further}; use "
+            "Laplace's approximation (1 node), or remove these"
         )
 
 
@@ -389,8 +389,8 @@ def _refuse_undetermined(data: ModelData, variances: Floats) -> None:
         raise InputError(_separated(separated))
     if undetermined:
         raise InputError(
-            f"the ordinal model has too few ratings or participants to tell {', '.join(undetermined)} apart "
-            "from chance; use the linear mixed model, or collect more"
+            f"the ordinal model has too few ratings or participants to estimate {', '.join(undetermined)}; "
+            "use the linear mixed model, or collect more"
         )
     errors = np.sqrt(variances) * data.x[:, 1:].std(axis=0)
     endless = [name for name, error in zip(names, errors, strict=True) if error > ENDLESS]
@@ -400,9 +400,9 @@ def _refuse_undetermined(data: ModelData, variances: Floats) -> None:
 
 def _separated(names: Sequence[str]) -> str:
     return (
-        f"ratings are separated: the likelihood rises without end as {', '.join(names)} grow, and an ordinal "
-        "model has no finite estimate, however many ratings there are; use analysis mixed, or leave a factor "
-        "out"
+        f"ratings are separated: the likelihood rises without limit as {', '.join(names)} grow, so an "
+        "ordinal model has no finite estimate, however many ratings there are; use analysis mixed, or "
+        "remove a factor"
     )
 
 

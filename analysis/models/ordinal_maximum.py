@@ -1,4 +1,4 @@
-"""Parameters that maximise the likelihood of the cumulative-logit mixed model, and their covariance."""
+"""Parameters that maximize the likelihood of the cumulative-logit mixed model, and their covariance."""
 
 from dataclasses import dataclass, replace
 
@@ -31,9 +31,9 @@ class QuadratureLikelihood:
     1. :math:`u_{ik} = \hat u_i + \sqrt 2 \tau_i x_k`;
     2. :math:`\ell = \sum_i \log \Big( \tau_i \pi^{-1/2} \sum_k w_k \exp(x_k^2 + g_i(u_{ik})) \Big)`.
 
-    One node is Laplace's approximation. Modes and spreads follow the parameters, so that beside the gradient
-    of 2 with nodes held, at each node that of the ratings weighted by its share of the integral
-    :math:`\pi_{ik}`, stands what moved nodes do:
+    One node is Laplace's approximation. Modes and spreads follow the parameters, so the gradient has two
+    parts: that of 2 with nodes held, at each node that of the ratings weighted by its share of the integral
+    :math:`\pi_{ik}`, and the effect of moved nodes:
 
     3. :math:`\partial \ell / \partial \hat u_i = \alpha_i = \sum_k \pi_{ik} g_i'(u_{ik})` and
        :math:`\partial \ell / \partial \log \tau_i = \beta_i =
@@ -146,7 +146,7 @@ NEWTON_STEPS = 8
 class Maximum:
     """Estimates, the log-likelihood there, and the covariance of thresholds' logs, coefficients and SDs.
 
-    SDs of zero are held fixed in `covariance`; `settled` tells whether no Newton step can gain anything.
+    SDs of zero are held fixed in `covariance`; `settled` says whether no Newton step can gain anything.
     """
 
     parameters: Parameters

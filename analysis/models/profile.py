@@ -30,7 +30,7 @@ TOLERANCE = 1e-6
 
 MAX_RESTARTS = 6
 SETTLED = 1e-7
-"""L-BFGS, which may stop early or at zero, starts anew until the deviance falls by less than this."""
+"""L-BFGS, which may stop early or at zero, starts again until the deviance falls by less than this."""
 
 LIFT = 0.05
 """Relative standard deviations start at this at least."""
@@ -58,7 +58,7 @@ class Profile:
 
     Notes
     -----
-    With :math:`d(\psi)` the deviance (-2 log likelihood) minimised over everything but :math:`\psi`, an end
+    With :math:`d(\psi)` the deviance (-2 log likelihood) minimized over everything but :math:`\psi`, an end
     solves :math:`d(\psi) - d(\hat\psi) = \chi^2_{1; confidence}`. For a standard deviation
     :math:`s = \sigma\theta_k` the deviance is
     :math:`\log|V| + n \log 2\pi\sigma^2 + r^2 / \sigma^2` with :math:`\theta_k = s / \sigma`; for a
@@ -254,7 +254,7 @@ def _without(c: CrossProducts, column: int, value: float) -> CrossProducts:
     return replace(c, pb=c.pb @ turn, cb=c.cb @ turn, bb=turn.T @ c.bb @ turn)
 
 
-# Profile likelihood intervals beside the estimates of a linear mixed model.
+# Profile likelihood intervals in addition to the estimates of a linear mixed model.
 
 
 def with_intervals(
@@ -265,7 +265,7 @@ def with_intervals(
     progress: Callable[[str], None] | None = None,
     scales: Sequence[float] = (),
 ) -> MixedResult:
-    """Add profile intervals; standard deviations of correlated slopes are no parameters and have none.
+    """Add profile intervals; standard deviations of correlated slopes are not parameters and have none.
 
     Parameters
     ----------
@@ -326,5 +326,5 @@ def _said(result: MixedResult) -> MixedResult:
     open_ended = [name for name, ci in named if ci and not np.isfinite(ci).all()]
     if not open_ended:
         return result
-    note = f"the likelihood bounds no profile interval of {', '.join(open_ended)} on at least one side"
+    note = f"the profile interval of {', '.join(open_ended)} is open on at least one side"
     return replace(result, notes=(*result.notes, note))

@@ -1,4 +1,4 @@
-"""The random part of a mixed model: words, standard deviations, and what the ratings do not tell."""
+"""The random part of a mixed model: words, standard deviations, and what the ratings do not determine."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -14,7 +14,7 @@ from analysis.models.fixed_effect_tests import Uncertainty
 from analysis.models.reml import CrossProducts, criterion
 from experiments.errors import InputError
 
-# Relative standard deviations that minimise the criterion of a mixed model.
+# Relative standard deviations that minimize the criterion of a mixed model.
 
 Floats = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ NEWTON_DECREMENT = 1e-8
 
 
 def fit_theta(c: CrossProducts) -> Floats:
-    """Minimise; a theta that ended at zero, always stationary, is lifted where zero is no minimum."""
+    """Minimize; a theta that ended at zero, always stationary, is lifted where zero is not a minimum."""
     # theta on the diagonal of a factor cannot be negative
     bounded = [bool(np.trace(pattern) > 0) for block in c.blocks for pattern in block.patterns]
     theta = _descend(c, np.where(bounded, START, 0.0), bounded, ROUGHLY)
@@ -85,7 +85,7 @@ def _lifted(c: CrossProducts, theta: Floats, bounded: list[bool]) -> Floats | No
 
 
 def _zeroed(c: CrossProducts, theta: Floats, bounded: list[bool]) -> Floats:
-    """Put tiny standard deviations at zero where that is no worse."""
+    """Put tiny standard deviations at zero where that is not worse."""
     for k in np.flatnonzero((np.abs(theta) < ZERO_THETA) & np.array(bounded)):
         trial = theta.copy()
         trial[k] = 0.0
@@ -133,7 +133,7 @@ def _gradient_slope(c: CrossProducts, theta: Floats, gradient: Floats, k: int) -
 class Component:
     """Standard deviation of a random term; `correlations` with the group's earlier terms, where estimated.
 
-    `ci` is its profile likelihood interval, where asked for and where it is a parameter of its own.
+    `ci` is its profile likelihood interval, where requested and where it is a separate parameter.
     """
 
     group: str
@@ -169,13 +169,13 @@ def indistinct_variances_note(known: Uncertainty, names: list[str]) -> tuple[str
     told = ", ".join(dict.fromkeys(names[k] for k in known.untold))
     if known.settled:
         return (
-            f"the ratings do not tell apart the variances of {told} and of the residual; those printed are "
-            "one choice of many, the tests are the same with all of them",
+            f"the ratings cannot separate the variances of {told} and of the residual; the printed ones are "
+            "one choice of many, and the tests are the same for all",
         )
     raise InputError(
-        f"the ratings do not tell how large the variance of {told} is, and the tests depend on it; expected "
-        "each of its levels in more than one condition, or several of its levels in each, with more than one "
-        "rating; collect such ratings, or leave the grouping out"
+        f"the ratings do not determine the variance of {told}, and the tests depend on it. Each of its "
+        "levels should be in several conditions, or each condition should have several of its levels, with "
+        "more than one rating. Collect such ratings, or remove the grouping"
     )
 
 
@@ -186,8 +186,8 @@ def degenerate_terms(
     zero = [f"{c.group} {c.term}" for c in components if c.sd * data.unit(c.term) < SINGULAR_THETA * sigma]
     if zero:
         return (
-            f"singular fit: the variance of {', '.join(zero)} is estimated as zero; these terms are kept at "
-            "zero, which leaves the tests of other effects as they are",
+            f"singular fit: the variance of {', '.join(zero)} is estimated as zero; these terms stay at "
+            "zero, which does not affect the tests of other effects",
         )
     if np.linalg.svd(factor, compute_uv=False).min() < SINGULAR_THETA:
         return ("singular fit: the random terms of participants depend on one another (a correlation of 1)",)

@@ -52,7 +52,7 @@ def intercept_term(codes: Integers, levels: int) -> Term:
 
 @dataclass(frozen=True)
 class Block:
-    """Where a term stands: `theta` among the parameters, `columns` among the rest (none if it is first)."""
+    """Where a term is: `theta` among the parameters, `columns` among the rest (none if it is first)."""
 
     levels: int
     patterns: Floats = field(repr=False)
@@ -195,7 +195,7 @@ def summed_product(a: Floats, b: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class SparseCrossing:
-    """`sums` (N p, J): the p rows of a level stand together."""
+    """`sums` (N p, J): the p rows of a level are adjacent."""
 
     sums: sparse.csr_matrix = field(repr=False)
     p: int
@@ -405,7 +405,7 @@ def cross_products(x: Floats, y: Floats, terms: Sequence[Term]) -> CrossProducts
 class Criterion:
     """The model at one theta: deviance parts, estimates, and their derivatives.
 
-    `h` = log|V|, with log|X'V^-1 X| for REML, `r2` the penalised residual sum of squares; `grad_h`, `grad_r2`
+    `h` = log|V|, with log|X'V^-1 X| for REML, `r2` the penalized residual sum of squares; `grad_h`, `grad_r2`
     (m,). `curve_at_zero` (m,) is what the second derivative of `value` by theta_k would be at theta_k = 0.
     `unscaled` (f, f) is the covariance of beta over sigma^2; `terms_x` are Z_t'V^-1 X (levels, p, f) of every
     term. `nu` = n - f for REML, n for maximum likelihood.

@@ -44,7 +44,7 @@ Array = NDArray[np.float64]
 class FactorTest:
     """A likelihood-ratio test of one factor, and its coefficients against its first level.
 
-    `levels` names the levels whose coefficients stand in `estimates`; treatment coding, additive.
+    `levels` names the levels whose coefficients are in `estimates`; treatment coding, additive.
     """
 
     factor: str
@@ -81,11 +81,13 @@ class ItemFactors:
         Raises
         ------
         InputError
-            Where an item is not in the table, or the factors do not tell the levels apart.
+            Where an item is not in the table, or the factors do not distinguish the levels.
         """
         for item in items:
             if item not in self.levels:
-                raise InputError(f"{self.source}: no row for item '{item}'; every compared item needs one")
+                raise InputError(
+                    f"{self.source}: there is no row for item '{item}'; every compared item needs one"
+                )
         columns = [
             [float(self.levels[item][self.factors.index(factor)] == level) for item in items]
             for factor in self.factors
@@ -95,7 +97,7 @@ class ItemFactors:
         design = np.array(columns).T.reshape(len(items), len(columns))
         centred = design - design.mean(axis=0)
         if design.shape[1] and np.linalg.matrix_rank(centred) < design.shape[1]:
-            raise InputError(f"{self.source}: the factors cannot be told apart on these items; leave one out")
+            raise InputError(f"{self.source}: the factors are confounded on these items; remove one")
         return design
 
 
@@ -116,7 +118,9 @@ def read_item_factors(path: Path, levels: Sequence[str] = ()) -> ItemFactors:
     """
     table = read_text_table(path, None, copies=False)
     if len(table.header) < 2:
-        raise InputError(f"{path.name}: expected a column of items and a column a factor, got one column")
+        raise InputError(
+            f"{path.name}: expected one column of items and one column per factor, got one column"
+        )
     for name in table.header:
         texts_required(table, name, factor=name != table.header[0])
     rows = table.columns.astype(str).to_numpy()
@@ -131,7 +135,7 @@ def read_item_factors(path: Path, levels: Sequence[str] = ()) -> ItemFactors:
     factors = ItemFactors(tuple(table.header[1:]), of_items, path.name, orders)
     for factor in factors.factors:
         if len(factors.names(factor)) < 2:
-            raise InputError(f"{path.name}: factor '{factor}' has one level only; leave it out")
+            raise InputError(f"{path.name}: factor '{factor}' has only one level; remove it")
     return factors
 
 
@@ -166,7 +170,7 @@ def factor_tests(
     return (*tests, FactorTest("lack of fit", "", (), (), (), chi2, df, p))
 
 
-# What a model of paired comparisons tells: abilities, contrasts, parameters, fit.
+# What a model of paired comparisons gives: abilities, contrasts, parameters, fit.
 
 
 @dataclass(frozen=True)
@@ -263,7 +267,7 @@ SCALES: dict[Method, str] = {
 
 
 def goodness_of_fit(model: Model, counts: Counts, fitted: Fit) -> Goodness:
-    """Compare with the saturated model of the pairs: only this pair form tells a fit.
+    """Compare with the saturated model of the pairs: only this pair form allows a test of fit.
 
     Pairs are taken together over their two orders unless the model has an order effect.
     """
@@ -306,9 +310,9 @@ def fit_abilities(
     comparisons : Comparisons
     method : {"bradley-terry", "davidson", "thurstone"}
     order_effect : bool
-        Whether the left (first) side has an advantage of its own.
+        Whether the left (first) side has a separate advantage.
     firth : bool
-        Firth's penalised likelihood (Bradley-Terry only).
+        Firth's penalized likelihood (Bradley-Terry only).
     factors : ItemFactors, optional
         Abilities as a linear function of the items' factors.
 
@@ -356,8 +360,8 @@ def _refuse_unfit(comparisons: Comparisons, method: Method, firth: bool) -> None
         )
     if comparisons.ties and method != "davidson":
         raise InputError(
-            f"{comparisons.source}: {comparisons.ties} comparisons are ties, which {method} does not know; "
-            "use --method davidson"
+            f"{comparisons.source}: {comparisons.ties} comparisons are ties, which {method} does not "
+            "support; use --method davidson"
         )
     if not comparisons.ties and method == "davidson":
         raise InputError(f"{comparisons.source}: no comparison is a tie; use --method bradley-terry")
@@ -367,8 +371,8 @@ def _refuse_unfit(comparisons: Comparisons, method: Method, firth: bool) -> None
     always = separated_items(comparisons)
     if always and not firth:
         raise InputError(
-            f"{comparisons.source}: {always}, so that no finite ability fits; add --firth for finite "
-            "estimates (--method bradley-terry), or leave the item out"
+            f"{comparisons.source}: {always}, so no finite ability fits; add --firth for finite estimates "
+            "(--method bradley-terry), or remove the item"
         )
 
 

@@ -74,7 +74,7 @@ def read_comparisons(
     participant: str | None = None,
     levels: Sequence[str] = (),
 ) -> Comparisons:
-    """Read one row a comparison.
+    """Read one row per comparison.
 
     Of the server's export only main trials count, without failed plays and runs excluded by hand.
 
@@ -85,7 +85,7 @@ def read_comparisons(
     left, right, winner : str
         Columns. A cell of `winner` is `left`, `right`, the name of one of the row's two items, or `tie`.
     tie : str, optional
-        What stands in `winner` for a tie.
+        The value of `winner` for a tie.
     participant : str, optional
         Column that names the rater.
     levels : sequence of str, optional
@@ -109,7 +109,7 @@ def read_comparisons(
         judged, left_out = rows_that_count(table.columns, judged)
         table.decisions.extend(left_out)
         if not judged.any():
-            raise InputError(f"{path.name}: no comparison counts; {', '.join(left_out)}")
+            raise InputError(f"{path.name}: there are no usable comparisons; {', '.join(left_out)}")
     items = _items(table.columns[left], table.columns[right], judged)
     orders, said = given_orders({left: items}, levels)
     items = orders.get(left, items)
@@ -163,7 +163,7 @@ def _outcomes(
     confused = sides.keys() & {name.casefold() for name in (*left, *right)}
     if confused:
         name = min(confused)
-        raise InputError(f"{table.source}: an item is called '{name}', as is a side; rename the item")
+        raise InputError(f"{table.source}: an item is called '{name}', like a side; rename the item")
     if tie is not None:
         _refuse_tie(table, tie, {*left, *right})
     outcome = np.full(left.size, -1, dtype=np.int64)
@@ -178,9 +178,9 @@ def _outcomes(
     _refuse_unknown(table, outcome, missing, said, winner)
     if missing.any():
         lines = name_lines(table, missing)
-        table.decisions.append(f"{int(missing.sum())} rows without a winner left out ({lines})")
+        table.decisions.append(f"{int(missing.sum())} rows without a winner excluded ({lines})")
     if missing.all():
-        raise InputError(f"{table.source}: '{winner}' names a winner in no row")
+        raise InputError(f"{table.source}: column '{winner}' names no winner in any row")
     return outcome, ~missing
 
 
@@ -189,8 +189,8 @@ def _refuse_tie(table: TextTable, tie: str, items: set[str]) -> None:
     other = "an item" if tie in items else "a side" if tie.casefold() in ("left", "right") else ""
     if other:
         raise InputError(
-            f"{table.source}: --tie {tie} is {other} too; expected a word for ties that names no winner: "
-            "write another in the rows that are ties"
+            f"{table.source}: --tie {tie} is also {other}; expected a word for ties that does not name a "
+            "winner: use another word in the rows that are ties"
         )
 
 
@@ -202,7 +202,7 @@ def _refuse_unknown(
         row = int(np.argmax(unknown))
         raise InputError(
             f"{table.source}: '{winner}' is '{said[row]}' in line {table.line(row)}; expected left, right or "
-            f"one of the row's two items (where it means a tie: --tie {said[row]})"
+            f"one of the row's two items (if it means a tie: --tie {said[row]})"
         )
 
 
@@ -222,8 +222,8 @@ def refuse_disconnected(comparisons: Comparisons) -> None:
     if len(groups) > 1:
         told = " | ".join(_named(group) for group in groups[:NAMED_MAX])
         raise InputError(
-            f"{comparisons.source}: the items fall into {len(groups)} groups that were never compared: "
-            f"{told}; compare some across, or analyse each group by itself"
+            f"{comparisons.source}: the items form {len(groups)} groups that were never compared: {told}; "
+            "compare some across groups, or analyze each group separately"
         )
 
 
@@ -351,8 +351,8 @@ def _circles(comparisons: Comparisons) -> tuple[int, int, int]:
         d &= \binom{n}{3} - \sum_i \binom{w_i}{2} \tag{1} \\
         d_{\max} &= (n^3 - n) / 24 \text{ for odd } n, \; (n^3 - 4 n) / 24 \text{ for even} \tag{2}
 
-    w_i is how often item i of n won: a triad that is no circle has one item that won both its pairs (Kendall
-    and Babington Smith 1940).
+    w_i is how often item i of n won: a triad that is not a circle has one item that won both its pairs
+    (Kendall and Babington Smith 1940).
     """
     size = len(comparisons.items)
     raters = circles = 0

@@ -45,7 +45,7 @@ class Findings:
     equal : LikelihoodRatio or None
         Whether they are all equal.
     order : Parameter or None
-        Advantage of the left (first) side, beside free abilities.
+        Advantage of the left (first) side, in addition to free abilities.
     factors : PairsResult or None
         Abilities as the sum of the effects of the items' factors; the last test is the lack of fit.
     """

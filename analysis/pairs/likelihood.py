@@ -164,9 +164,9 @@ def sandwich(fitted: Fit, clusters: Array) -> Array:
 
 def no_maximum(firth: bool = False) -> InputError:
     """The likelihood grows without end, or `firth` was of no avail."""
-    remedy = "leave it out" if firth else "add --firth for finite estimates, or leave it out"
+    remedy = "leave it out" if firth else "add --firth for finite estimates, or remove it"
     return InputError(
-        "the likelihood has no maximum: some item (or level) wins or loses every comparison with the others; "
+        "the likelihood has no maximum: an item (or level) wins or loses every comparison with the others; "
         f"{remedy}"
     )
 
@@ -176,7 +176,7 @@ def _solved(information: Array, gradient: Array) -> Array:
         change = np.linalg.solve(information, gradient).astype(np.float64)
     except np.linalg.LinAlgError as error:
         raise InputError(
-            "the abilities cannot be told apart: a factor repeats another, or some levels are never compared"
+            "the abilities are not identified: a factor repeats another, or some levels are never compared"
         ) from error
     return change
 

@@ -36,8 +36,8 @@ def joint_findings(
 def possible(study: PrintedStudy, means: Sequence[PrintedMean]) -> bool:
     """Whether cell means exist whose margins round to every printed mean (upper ends excluded).
 
-    A linear programme over the cell means: the room t left above every lower and below every upper end
-    is maximised; the figures are possible where t is positive.
+    A linear program over the cell means: the room t left above every lower and below every upper end
+    is maximized; the figures are possible where t is positive.
     """
     cells = list(product(*study.factors.values()))
     weights = np.array([_weights(study, mean, cells) for mean in means])
@@ -105,7 +105,11 @@ def _repairs(study: PrintedStudy, clash: list[PrintedMean]) -> str:
             others = [changed if other is mean else other for other in study.mean]
             if possible(study, others):
                 healed.append(f"{changed.name} {changed.mean}")
-    return f". One figure is off by one in its last digit ({' or '.join(healed)} would fit)" if healed else ""
+    return (
+        (f". One figure may be off by one in its last digit ({' or '.join(healed)} would fit)")
+        if healed
+        else ""
+    )
 
 
 Kind = Literal["impossible", "contradiction", "doubt", "note"]
@@ -123,7 +127,7 @@ class Finding:
 
 
 def check_paper(paper: PrintedPaper) -> tuple[Finding, ...]:
-    """Run every check on every study; notes say what was found right where that tells something."""
+    """Run every check on every study; notes report correct results where they are informative."""
     return tuple(finding for study in paper.study for finding in check_study(study))
 
 
@@ -298,6 +302,6 @@ def _correction(study: PrintedStudy) -> Iterator[Finding]:
         if p < 0.05 <= min(1.0, m * p):
             why = (
                 f"p = {p_value(p)}; corrected over {m} tests it would be {p_value(min(1.0, m * p))}, so the "
-                "correction named concerns the pairs, not the F tests"
+                "correction applies to the pairs, not to the F tests"
             )
             yield Finding(study.name, "note", "correction", test.name, why)

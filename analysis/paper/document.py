@@ -57,7 +57,7 @@ _DAMAGED = (
     *(BadZipFile, zlib.error, EOFError, OSError, KeyError, ValueError),
     *(AttributeError, TypeError, IndexError, SyntaxError, RecursionError),
 )
-"""What the packages raise of damaged files beside errors of their own; broken XML is a SyntaxError."""
+"""What the packages raise for damaged files besides their own errors; broken XML is a SyntaxError."""
 _HIDDEN_IN_HTML = frozenset({"script", "style", "head", "svg", "template"})
 _BLOCKS = frozenset({"p", "li", "tr", "td", "th", "div", "h1", "h2", "h3", "h4", "figcaption", "br", "table"})
 _TEX_WORDS = {
@@ -121,7 +121,7 @@ def read_document(path: Path) -> str:
         No file, another suffix, a damaged file, or a PDF without a text layer.
     """
     if not path.is_file():
-        raise InputError(f"no file {path}; expected {', '.join(KINDS)} or a TOML file of figures")
+        raise InputError(f"there is no file {path}; expected {', '.join(KINDS)} or a TOML file of figures")
     suffix = path.suffix.lower()
     if suffix == ".docx":
         return plain(_docx(path))
@@ -146,7 +146,7 @@ def plain(text: str) -> str:
 
 
 def unbroken(text: str) -> str:
-    """Text whose lines end within no statistic; for files in which a line is no paragraph."""
+    """Text whose lines never end within a statistic; for files whose lines are not paragraphs."""
     return _BROKEN.sub(" ", text)
 
 

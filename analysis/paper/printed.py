@@ -102,7 +102,7 @@ class PrintedStudy(Declaration):
                     raise ValueError(f"no factor is called '{factor}'{did_you_mean(factor, self.factors)}")
                 if level not in self.factors[factor]:
                     hint = did_you_mean(level, self.factors[factor])
-                    raise ValueError(f"'{level}' is no level of '{factor}'{hint}")
+                    raise ValueError(f"'{level}' is not a level of '{factor}'{hint}")
         for test in self.test:
             for factor in test.effect.split(":"):
                 if factor not in self.factors:
@@ -128,7 +128,7 @@ class PrintedPaper(Declaration):
 def load_figures(path: Path) -> PrintedPaper:
     """Read a figures file; InputError names the first thing wrong in it."""
     if not path.is_file():
-        raise InputError(f"no file {path}; leave the name out to check the shipped figures of the paper")
+        raise InputError(f"there is no file {path}; omit the name to check the shipped figures of the paper")
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:

@@ -14,7 +14,7 @@ from analysis.paper.printed import PrintedInterval
 from analysis.report.numbers import share
 from analysis.within.eta_squared import partial_eta_squared_ci
 
-# How far behind a statistic its own p and effect size stand: to where another clause begins.
+# How far behind a statistic its own p and effect size may be: up to where another clause begins.
 
 _END_OF_SENTENCE = re.compile(r"[.!?][\"')\]]*\s+(?=[A-Z])")
 _CONTRAST = re.compile(r"\b(?:whereas|while|although|though|but|however|nor|and the|or the)\b", re.IGNORECASE)
@@ -29,7 +29,7 @@ _OF_REPORTS = re.compile(
     re.IGNORECASE,
 )
 WORDS_MAX = 2
-"""So many words that reports of statistics do not have may stand between one and its p."""
+"""Maximum number of words that reports of statistics do not have between a statistic and its p."""
 
 
 def own_clause(tail: str) -> str:
@@ -292,7 +292,7 @@ def _p_problems(p: re.Match[str], allowed: tuple[float, float]) -> Iterator[str]
     low, high = allowed
     printed = float(p["p"])
     if printed > 1 or printed < 0:
-        yield f"p = {p['p']} is no probability"
+        yield f"p = {p['p']} is not a probability"
         return
     if p["sign"] == "<":
         fits = low < printed
@@ -324,7 +324,7 @@ def _eta_problems(df: tuple[str, ...], value: str, eta: re.Match[str]) -> Iterat
     least, largest = corners(eta["eta"])
     before, after = eta["before"] or "", eta["after"] or ""
     partial = before.startswith("partial") or "p" in after
-    # a generalised or plain eta squared may be smaller than the partial one, never larger
+    # a generalized or plain eta squared may be smaller than the partial one, never larger
     if sizes and (max(sizes) < least or (partial and min(sizes) > largest)):
         yield f"η² = {eta['eta']} is printed, F and df give a partial η² of {share(float(np.mean(sizes)), 2)}"
         return
@@ -341,7 +341,7 @@ def _eta_problems(df: tuple[str, ...], value: str, eta: re.Match[str]) -> Iterat
     ):
         return
     if not low <= float(eta["eta"]) <= high:
-        yield f"the interval [{eta['low']}, {eta['high']}] does not hold its own η² = {eta['eta']}"
+        yield f"the interval [{eta['low']}, {eta['high']}] does not include its η² = {eta['eta']}"
         return
     yield (
         f"the {eta['level']}% interval [{eta['low']}, {eta['high']}] is not that of the noncentral F, "

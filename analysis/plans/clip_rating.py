@@ -1,4 +1,4 @@
-"""The analysis of single-clip ratings: cell means, their tests, and models beside them."""
+"""The analysis of single-clip ratings: cell means, their tests, and additional models."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -29,7 +29,7 @@ from experiments.errors import InputError
 from experiments.kinds.clip_rating import RATINGS
 from experiments.kinds.scales import scale_called, scales_of
 
-# Ratings of a study: cell means, their tests, and what is computed beside them.
+# Ratings of a study: cell means, their tests, and what is computed in addition.
 
 
 def on_scale(experiment: Experiment, rows: pd.DataFrame, name: str) -> pd.DataFrame:
@@ -146,7 +146,7 @@ def _refuse_unrated(rows: pd.DataFrame, factor: str, unrated: set[str], source: 
         at = int(np.argmax(off))
         raise InputError(
             f"{source}: {where(rows, at)}: a rating of the reference's level '{rows[factor].iloc[at]}' of "
-            f"'{factor}', which is not rated; leave the row out, or set rate_itself = true"
+            f"'{factor}', which is not rated; remove the row, or set rate_itself = true"
         )
 
 
@@ -199,11 +199,11 @@ def _ratings(prepared: PlanRows) -> Contents:
 PLAN = Plan(READING, check, contents, keys=("scale",))
 
 
-# Ratings on several scales: each analysed for itself, and how far they measure the same.
+# Ratings on several scales: each analyzed for itself, and how far they measure the same.
 
 METHODS = (
-    "Each scale is analysed for itself, as it was answered. Cronbach's alpha is over the scales as items and "
-    "the participants' ratings of clips as cases, reverse-keyed scales turned. "
+    "Each scale is analyzed separately, as answered. Cronbach's alpha treats scales as items and the "
+    "participants' ratings of clips as cases; reverse-keyed scales are reversed. "
 )
 
 
@@ -254,7 +254,7 @@ def _part(scale: RatedScale, analysis: Analysis, prepared: PlanRows) -> Part:
 
 
 def scale_cases(prepared: PlanRows, scales: Sequence[RatedScale]) -> pd.DataFrame:
-    """A row a rated trial and a column a scale, reverse-keyed ones turned; trials with every scale alone."""
+    """One row per rated trial, one column per scale, reverse-keyed ones reversed; only complete trials."""
     rows = prepared.rows
     keys = [name for name in ("run", "trial_index", "play") if name in rows.columns]
     if "trial_index" not in keys:
@@ -280,11 +280,14 @@ def cronbach_alpha(cases: pd.DataFrame) -> dict[str, Any] | None:
 
 def _reliability(alpha: dict[str, Any] | None, scales: int, name: str, synthetic: bool) -> Part:
     row = ("all", str(scales), DASH, DASH, DASH)
-    said = "Cronbach's alpha is not defined: a scale does not vary, or too few trials have an answer on each."
+    said = (
+        "Cronbach's alpha is not defined: a scale does not vary, or too few trials have an answer on every "
+        "scale."
+    )
     if alpha is not None:
         bounds = f"[{fixed(alpha['ci_low'], 3)}, {fixed(alpha['ci_high'], 3)}]"
         row = ("all", str(scales), fixed(alpha["alpha"], 3), bounds, str(alpha["n"]))
-        said = f"The {scales} scales agree with Cronbach's alpha = {fixed(alpha['alpha'])}, 95% CI {bounds}."
+        said = f"Cronbach's alpha of the {scales} scales was {fixed(alpha['alpha'])}, 95% CI {bounds}."
     header = ("Scales", "Items", "alpha", "95% CI", "Ratings")
     table = Table("reliability", caption("Reliability of the scales", name, synthetic), header, (row,), 1)
     return Part((table,), (said,), "Reliability")

@@ -24,7 +24,7 @@ READING = Reading(
 
 
 def check(experiment: Experiment, rows: pd.DataFrame, source: str) -> None:
-    """Refuse a trace that is no list of numbers within the declared range."""
+    """Reject a trace that is not a list of numbers within the declared range."""
     trial = continuous_rating_of(experiment)
     for position, text in enumerate(rows["trace"].astype(str)):
         if text in ("", "nan") or _is_trace(text, trial):
@@ -66,7 +66,7 @@ def clips_of(prepared: PlanRows) -> list[ClipTraces]:
     rates = rows["clip_fps"].to_numpy(dtype=float) / rows["step_frames"].to_numpy(dtype=float)
     if len(np.unique(np.round(rates[np.isfinite(rates)], 6))) > 1:
         raise InputError(
-            f"{prepared.source}: expected traces of one sampling rate, got several; analyse clips of one "
+            f"{prepared.source}: expected traces with one sampling rate, got several; analyze clips of one "
             "frame rate at a time"
         )
     for (cell, clip), mine in rows.assign(rate_hz=rates).groupby(["cell", "clip_sha256"], observed=True):
@@ -81,7 +81,7 @@ def clips_of(prepared: PlanRows) -> list[ClipTraces]:
         people = tuple(given["participant"].astype(str))
         clips.append(ClipTraces(str(clip), str(cell), float(mine["rate_hz"].iloc[0]), events, people, values))
     if not clips:
-        raise InputError(f"{prepared.source}: no trial has a trace; nothing to analyse")
+        raise InputError(f"{prepared.source}: no trial has a trace; nothing to analyze")
     return clips
 
 

@@ -19,16 +19,16 @@ from experiments.declaration.trial import ClipSpec, RatedScale
 from experiments.kinds.scales import scales_of
 
 METHODS = (
-    " DMOS is the mean over participants of their mean rating of a cell after its reference, with a 95% "
-    "interval from t with n - 1 degrees of freedom (ITU-T P.910)."
+    " DMOS is the mean over participants of their mean rating of a cell shown after its reference. Its 95% "
+    "interval is from t with n - 1 degrees of freedom (ITU-T P.910)."
 )
 TURNED = (
-    " Answers on a reverse-keyed scale are turned first (its lowest + its highest answer - the answer), so "
-    "that high scores mean little impairment throughout."
+    " Answers on a reverse-keyed scale are reversed first (lowest + highest answer - the answer), so high "
+    "scores always mean little impairment."
 )
 DIFFERENTIAL = (
-    " Where the hidden reference was rated, the differential score of a participant is V(P) - V(R) + the "
-    "highest answer, V being their mean ratings of the cell (P) and of its reference (R)."
+    " If the hidden reference was rated, a participant's differential score is V(P) - V(R) + the highest "
+    "answer. V(P) and V(R) are the mean ratings of the cell and of its reference."
 )
 
 
@@ -123,7 +123,7 @@ def _reference_of(prepared: PlanRows) -> RatingReference:
 def _scored(
     scale: RatedScale, named: tuple[str, str], means: Mapping[str, "pd.Series[float]"], reference: str | None
 ) -> CellScore:
-    """The score of a cell `named` by its name and its label."""
+    """The score of a cell `named` by name and label."""
     mine = means[named[0]]
     mean, sd, low, high = _interval(mine.to_numpy(dtype=float))
     differential: tuple[float | None, ...] = (None, None, None)
@@ -167,7 +167,7 @@ def _methods(every: tuple[CellScore, ...], reference: RatingReference) -> str:
 def _table(every: tuple[CellScore, ...], prepared: PlanRows) -> Table:
     rows = tuple(
         (
-            f"{one.scale} (turned)" if one.turned else one.scale,
+            f"{one.scale} (reversed)" if one.turned else one.scale,
             one.label,
             fixed(one.dmos),
             fixed(one.sd),
@@ -202,6 +202,6 @@ def _extremes_of(cells: list[CellScore], scale: str) -> str:
         return f"No cell has a rating{on_scale}."
     least, most = max(told, key=lambda one: one.dmos), min(told, key=lambda one: one.dmos)
     return (
-        f"The least impaired cell{on_scale} is {least.label} (DMOS {fixed(least.dmos)}, n = {least.n}), the "
-        f"most impaired {most.label} (DMOS {fixed(most.dmos)}, n = {most.n})."
+        f"The least impaired cell{on_scale} was {least.label} (DMOS {fixed(least.dmos)}, n = {least.n}); the "
+        f"most impaired was {most.label} (DMOS {fixed(most.dmos)}, n = {most.n})."
     )

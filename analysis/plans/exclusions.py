@@ -104,7 +104,7 @@ class RuleVerdicts:
 
 
 def apply_exclusions(experiment: Experiment, ratings: StudyAnswers) -> Exclusions:
-    """Set aside what is no main trial, then apply every declared rule.
+    """Set aside everything but main trials, then apply every declared rule.
 
     Rules about participants see all their main trials; rules about trials see those of who remains. A
     participant's second run is left out, the first that no rule excludes counts.
@@ -113,7 +113,7 @@ def apply_exclusions(experiment: Experiment, ratings: StudyAnswers) -> Exclusion
 
 
 def judge_rows(experiment: Experiment, ratings: StudyAnswers) -> RuleVerdicts:
-    """Set aside what is no main trial, and ask every declared rule."""
+    """Set aside everything but main trials, and apply every declared rule to them."""
     rows, aside = _with_run(ratings.rows), list[str]()
     kind = rows["kind"] if "kind" in rows.columns else pd.Series("main", index=rows.index)
     main, attention = rows[(kind == "main").to_numpy()], rows[(kind == "attention").to_numpy()]
@@ -124,8 +124,8 @@ def judge_rows(experiment: Experiment, ratings: StudyAnswers) -> RuleVerdicts:
     unrated = np.isnan(main["response"].to_numpy())
     not_applicable = unrated & _not_applicable(main)
     silent = n_plays(main[unrated & ~not_applicable])
-    aside += [f"{silent} plays without a rating"] if silent else []
-    aside += [f"{not_applicable.sum()} answers that the scale does not apply"] if not_applicable.any() else []
+    aside += [f"{silent} presentations without a rating"] if silent else []
+    aside += [f"{not_applicable.sum()} answers of 'does not apply'"] if not_applicable.any() else []
     plays, main = main, main[~unrated]
     sources: dict[Source, pd.DataFrame] = {"rows": rows, "plays": plays, "attention": attention}
     lacking = tuple(_lacking(rule, rows) for rule in experiment.exclusions)
@@ -144,7 +144,7 @@ def judge_rows(experiment: Experiment, ratings: StudyAnswers) -> RuleVerdicts:
 
 
 def n_plays(rows: pd.DataFrame) -> int:
-    """How many plays the rows are of: a play rated on several scales has a row a scale."""
+    """Number of presentations: one that was rated on several scales has one row per scale."""
     keys = [name for name in ("run", "trial_index", "play") if name in rows.columns]
     if "scale" not in rows.columns or "trial_index" not in keys:
         return len(rows)
@@ -152,7 +152,7 @@ def n_plays(rows: pd.DataFrame) -> int:
 
 
 def _not_applicable(rows: pd.DataFrame) -> NDArray[np.bool_]:
-    """True where the answer beside the scale was chosen, that it does not apply."""
+    """True where the participant chose that the scale does not apply."""
     if "not_applicable" not in rows.columns:
         return np.zeros(len(rows), dtype=bool)
     said = rows["not_applicable"].astype(str).str.casefold()

@@ -51,7 +51,7 @@ class Universe:
 
 @dataclass(frozen=True)
 class Multiverse:
-    """Every choice that could be analysed, and how many could not."""
+    """Every choice that could be analyzed, and how many could not."""
 
     rules: tuple[str, ...]
     effects: tuple[tuple[str, ...], ...]
@@ -75,7 +75,7 @@ Analyse = Callable[[PlanRows], TestedSample]
 
 
 def multiverse(prepared: PlanRows, analyse: Analyse) -> Multiverse:
-    """Analyse under every choice among the declared exclusion rules.
+    """Analyze under every choice among the declared exclusion rules.
 
     Parameters
     ----------

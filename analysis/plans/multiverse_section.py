@@ -18,9 +18,9 @@ TITLE = "Multiverse of exclusions"
 def multiverse_section(analysis: Analysis, prepared: PlanRows, analyse: Analyse) -> Section:
     """The section of the report: how far the tests hang on the rules."""
     if not prepared.experiment.exclusions:
-        return Section(TITLE, "The experiment declares no exclusion rule, so that there is nothing to vary.")
+        return Section(TITLE, "The experiment declares no exclusion rule, so there is nothing to vary.")
     if len(prepared.checked.rows) > MAX_RATINGS:
-        said = f"{len(prepared.checked.rows)} ratings are more than {MAX_RATINGS}."
+        said = f"{len(prepared.checked.rows)} ratings exceed the limit of {MAX_RATINGS}."
         return Section(TITLE, f"Not computed: {said}")
     # matplotlib takes a second to import, which commands that draw nothing need not pay
     from analysis.report.multiverse_figure import multiverse_picture
@@ -29,10 +29,10 @@ def multiverse_section(analysis: Analysis, prepared: PlanRows, analyse: Analyse)
     choices = "every choice among" if len(result.rules) <= MAX_RULES else "leaving out one or all of"
     text = (
         f"The tests under {choices} the {len(result.rules)} declared exclusion rules: "
-        f"{len(result.universes)} analyses. Exclusions by hand always apply."
+        f"{len(result.universes)} analyses. Manual exclusions always apply."
     )
     if result.n_failed:
-        text += f" {result.n_failed} further choices could not be analysed."
+        text += f" {result.n_failed} other choices could not be analyzed."
     picture = multiverse_picture(analysis, result)
     return Section(TITLE, text, (_table(analysis, result),), (picture,))
 
@@ -51,7 +51,11 @@ def _table(analysis: Analysis, result: Multiverse) -> Table:
         )
         for i, factors in enumerate(result.effects)
     )
-    kind = "Multivariate tests." if analysis.multivariate_first else "p by Greenhouse-Geisser."
+    kind = (
+        ("Multivariate tests.")
+        if analysis.multivariate_first
+        else "p with the Greenhouse-Geisser correction."
+    )
     people = [universe.n_participants for universe in result.universes]
     header = ("Effect", "p as declared", "p", f"significant at {share(SIGNIFICANCE, 2)}", "partial η²")
     notes = (f"N = {_range([str(min(people)), str(max(people))])}. {kind}",)

@@ -48,14 +48,16 @@ def cells_of(experiment: Experiment) -> list[tuple[str, tuple[str, ...]]]:
 
 
 def comparisons_of(prepared: PlanRows) -> Comparisons:
-    """The comparisons as indices; two clips of one cell tell nothing of the cells and are left out."""
+    """The comparisons as indices; two clips of one cell say nothing about the cells and are excluded."""
     rows, decisions = prepared.rows, list(prepared.decisions)
     same = (rows["left_cell"].astype(str) == rows["right_cell"].astype(str)).to_numpy()
     if same.any():
-        decisions.append(f"{same.sum()} comparisons of two clips of one cell left out of the abilities")
+        decisions.append(f"{same.sum()} comparisons of two clips of one cell excluded from the abilities")
         rows = rows[~same]
     if rows.empty:
-        raise InputError(f"{prepared.source}: every comparison is of two clips of one cell; nothing to rank")
+        raise InputError(
+            f"{prepared.source}: every comparison is between two clips of one cell; nothing to rank"
+        )
     decisions += _arrangements(rows)
     shown = {*rows["left_cell"].astype(str), *rows["right_cell"].astype(str)}
     items = tuple(name for name, _ in cells_of(prepared.experiment) if name in shown)
@@ -140,8 +142,8 @@ PLAN = Plan(READING, check, analyse, number_answers)
 # Paired comparisons of groups of participants: the abilities in each group, and whether groups agree.
 
 METHODS = (
-    "Each group is analysed for itself, since nobody compares clips of two groups. Whether groups agree is a "
-    "likelihood ratio test: abilities of its own in every group against the same abilities in all of them. "
+    "Each group is analyzed separately, because nobody compares clips from different groups. Agreement of "
+    "groups is tested by a likelihood ratio: separate abilities in each group against common abilities. "
 )
 
 
@@ -199,7 +201,7 @@ def _agreement(
     with (G - 1) p degrees of freedom, p being the parameters of one set: abilities but one, and ties.
     """
     if len(every) < 2:
-        return None, "one group alone has comparisons"
+        return None, "only one group has comparisons"
     within = [index for index, factor in enumerate(experiment.factors) if not factor.between]
     named = [_without_groups(one, within) for one in every]
     if any(set(one.items) != set(named[0].items) for one in named):
@@ -239,8 +241,8 @@ def _together(every: Sequence[Comparisons]) -> Comparisons:
 
 def _agreement_part(test: LikelihoodRatio | None, reason: str | None, name: str, synthetic: bool) -> Part:
     if test is None:
-        return Part((), (f"Whether the groups agree was not tested: {reason}.",), "Agreement of the groups")
-    verdict = "differ" if test.p < 0.05 else "do not differ significantly"
+        return Part((), (f"Agreement of the groups was not tested: {reason}.",), "Agreement of the groups")
+    verdict = "differ" if test.p < 0.05 else "did not differ significantly"
     said = f"Abilities {verdict} between the groups, χ²({test.df}) = {fixed(test.chi2)}, {apa_p(test.p)}."
     row = ("Same abilities in all groups", fixed(test.chi2), str(test.df), p_value(test.p))
     header = ("Hypothesis", "χ²", "df", "p")

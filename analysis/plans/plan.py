@@ -24,7 +24,7 @@ from experiments.schema.canonical import definition_sha256
 
 
 def as_they_are(rows: pd.DataFrame) -> pd.DataFrame:
-    """Rows whose answer stands as a number in `response` already."""
+    """Rows whose answer is already a number in `response`."""
     return rows
 
 
@@ -63,7 +63,7 @@ def plan_of(kind: str) -> Plan:
         if error.name != module:
             raise
         raise InputError(
-            f"trials of the kind {kind} have no analysis yet; export their data (server export)"
+            f"trials of the kind '{kind}' have no analysis yet; export the data with `server export`"
         ) from error
     return plan
 
@@ -83,7 +83,7 @@ class PlanRows:
     checked: StudyAnswers = field(repr=False)
     """The answers before exclusion."""
     scale: str | None = None
-    """The scale to analyse, where not all are."""
+    """The scale to analyze, where not all are."""
 
     @property
     def rows(self) -> pd.DataFrame:
@@ -137,7 +137,7 @@ def refuse_unknown(rows: pd.DataFrame, column: str, known: list[str], what: str,
         if name not in known:
             at = int(np.argmax((rows[column] == name).to_numpy()))
             raise InputError(
-                f"{source}: {where(rows, at)}: '{name}' is no {what}{did_you_mean(str(name), known)}"
+                f"{source}: {where(rows, at)}: '{name}' is not a valid {what}{did_you_mean(str(name), known)}"
             )
 
 
@@ -155,10 +155,10 @@ def _without_repeats(
     differ = again & ~rows.duplicated().to_numpy()
     if differ.any():
         raise InputError(
-            f"{source}: {where(rows, int(np.argmax(differ)))} stands there twice with different data; "
-            "remove the wrong row"
+            f"{source}: {where(rows, int(np.argmax(differ)))} occurs twice with different data; remove the "
+            "wrong row"
         )
-    return rows[~again], (f"{again.sum()} repeated rows of trials already there, counted once",)
+    return rows[~again], (f"{again.sum()} repeated rows of the same trials were counted once",)
 
 
 def _refuse_nobody(exclusions: Exclusions, answers: StudyAnswers, chosen: pd.DataFrame, pool: Pool) -> None:
@@ -169,8 +169,8 @@ def _refuse_nobody(exclusions: Exclusions, answers: StudyAnswers, chosen: pd.Dat
     if exclusions.rows.empty:
         excluded = "; ".join(f"{run.participant} ({', '.join(run.reasons)})" for run in exclusions.runs[:5])
         raise NoRatingsError(
-            f"{source}: no participant remains after the declared exclusions: {excluded}"
-            f"{_other_origins(answers.rows, chosen)}"
+            f"{source}: no participant remains after the declared exclusions: "
+            f"{excluded}{_other_origins(answers.rows, chosen)}"
         )
 
 
@@ -190,9 +190,9 @@ def study_contents(
     runs: RunEvidence | None = None,
     scale: str | None = None,
 ) -> Contents:
-    """Analyse a study by the plan of its kind of trial.
+    """Analyze a study by the plan of its kind of trial.
 
-    `runs` are verdicts and signals of a runs file; `scale` names the one to analyse, where not all are.
+    `runs` are verdicts and signals of a runs file; `scale` names the one to analyze, where not all are.
     """
     plan = plan_of(experiment.trial.kind)
     if scale is not None:

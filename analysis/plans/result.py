@@ -24,7 +24,7 @@ TIMES = " × "
 
 @dataclass(frozen=True)
 class Labels:
-    """What tables call factors and levels; a name without a label is called by its name."""
+    """What tables call factors and levels; without a label the name itself is used."""
 
     factors: Mapping[str, str] = field(default_factory=dict)
     levels: Mapping[tuple[str, str], str] = field(default_factory=dict)
@@ -57,7 +57,7 @@ class Labels:
         return ", ".join(labels.values())
 
     def pair(self, cell_a: Mapping[str, str], cell_b: Mapping[str, str]) -> str:
-        """Two cells of a margin, each factor's level by its name."""
+        """Two cells of a margin, each factor's level by name."""
         texts = [self.cell(cell_a), self.cell(cell_b)]
         if any(" - " in text for text in texts):
             texts = [f'"{text}"' for text in texts]
@@ -171,39 +171,41 @@ def plans_multivariate(experiment: "Experiment | None") -> bool:
 def cell_decisions(cells: CellTable) -> tuple[str, ...]:
     """What the table of cell means did: who was dropped for empty cells, uneven counts, constant ratings."""
     said = [
-        f"participant {d.participant} dropped: no rating in {name_cells(d.missing_cells)}"
+        f"participant {d.participant} excluded: no rating in {name_cells(d.missing_cells)}"
         for d in cells.dropped
     ]
     low, high = int(cells.counts.min()), int(cells.counts.max())
     if low != high:
-        said.append(f"cells hold {low} to {high} ratings; every cell mean weighs the same")
+        said.append(f"cells have {low} to {high} ratings; all cell means have equal weight")
     said += [
-        f"participant {participant} gave one and the same rating throughout; kept"
-        for participant in cells.constant
+        f"participant {participant} gave the same rating throughout; kept" for participant in cells.constant
     ]
     return tuple(said)
 
 
 def group_decisions(anova: AnovaResult) -> tuple[str, ...]:
-    """What was done about groups and covariates: sizes of uneven groups, the type of tests, centring."""
+    """What was done about groups and covariates: sizes of uneven groups, the type of tests, centering."""
     said, design = [], anova.between
     sizes = design.group_sizes() if design.factors else {}
     if len(set(sizes.values())) > 1:
         named = ", ".join(f"{' '.join(levels)} {size}" for levels, size in sizes.items())
-        kind = "III (every group mean weighs the same)" if anova.sum_of_squares == 3 else "II"
-        said.append(f"groups differ in size ({named}); sums of squares of type {kind}")
+        kind = "III (equal weight for every group mean)" if anova.sum_of_squares == 3 else "II"
+        said.append(f"groups differ in size ({named}); sums of squares are type {kind}")
     for levels, size in sizes.items():
         if size == 1:
             said.append(
-                f"group {' '.join(levels)} is one participant: its own spread is unknown, so that its tests "
-                "and errors take that of the other groups"
+                f"group {' '.join(levels)} has one participant: its variance is unknown, so its tests and "
+                "errors use the variance of the other groups"
             )
     for covariate in design.covariates:
         if covariate.centred:
             said.append(
-                f"covariate '{covariate.name}' centred at its mean {covariate.centre:.4g}: other effects and "
-                "means are those of a participant with this value"
+                f"covariate '{covariate.name}' was centered at its mean {covariate.centre:.4g}: other "
+                "effects and means are evaluated at this value"
             )
         else:
-            said.append(f"covariate '{covariate.name}' not centred: effects within are those at its value 0")
+            said.append(
+                f"covariate '{covariate.name}' was not centered: effects within participants are evaluated "
+                "at 0"
+            )
     return tuple(said)

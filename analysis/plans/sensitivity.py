@@ -1,4 +1,5 @@
-"""Sensitivity analyses beside the ANOVA: Bayes factors, robust companions, mixed and ordinal models."""
+"""Sensitivity analyses in addition to the ANOVA: Bayes factors, robust companions, mixed and ordinal
+models."""
 
 import re
 from collections.abc import Callable
@@ -22,7 +23,9 @@ if TYPE_CHECKING:
 
 # What is said under the table of a report's model: its random terms and its doubts, in labels.
 
-_MOVED = re.compile(r"(?P<names>.+)(?P<said>: one level for each participant, taken as between participants)")
+_MOVED = re.compile(
+    r"(?P<names>.+)(?P<said>: one level per participant, treated as a factor between participants)"
+)
 _SLOPES = ("slope", "slopes")
 
 
@@ -38,7 +41,7 @@ def notes_of(result: "MixedResult | OrdinalResult", labels: Labels) -> tuple[str
 
 
 def _in_labels(note: str, result: "MixedResult | OrdinalResult", labels: Labels) -> str:
-    """A note with labels where terms stand; a factor may be called as a word of the note is, such as fit."""
+    """A note with labels instead of terms; a factor may have the name of a word in the note, such as fit."""
     if moved := _MOVED.fullmatch(note):
         return ", ".join(map(labels.term, moved["names"].split(", "))) + moved["said"]
     said = {
@@ -124,16 +127,19 @@ def said_of_random(random: list[str], slopes: "RandomSlopes") -> str:
     names = ", ".join(random)
     if slopes == "none":
         return (
-            f"{names}: random, with an intercept for each level only, since effects that differ "
-            "between levels could not be fitted: the tests hold for those shown."
+            f"{names}: random, with an intercept per level only, because effects that differ between levels "
+            "could not be fitted. The tests hold only for the levels shown."
         )
     which = "every effect" if slopes == "all" else "each main effect"
     text = (
-        f"{names}: random, with an intercept and slopes for {which} at each level, so that tests of these "
-        "hold for others like those shown; with few of them they have few df."
+        f"{names}: random, with an intercept and slopes for {which} per level. Tests of these effects "
+        "generalize to similar levels; with few levels they have few df."
     )
     if slopes == "main":
-        text += " Slopes for interactions were too many to fit: tests of interactions hold for those shown."
+        text += (
+            " There were too many slopes for interactions to fit them: tests of interactions hold only for "
+            "the levels shown."
+        )
     return text
 
 
@@ -163,7 +169,7 @@ def sensitivity_sections(
 
 
 def robust_companions(analysis: Analysis, progress: Callable[[str], None] = lambda _: None) -> Section:
-    """Permutations, aligned ranks and trimmed means beside the ANOVA."""
+    """Permutations, aligned ranks and trimmed means in addition to the ANOVA."""
     from analysis.report.rating_tables import robust_section
     from analysis.robust import companions_of
 
@@ -173,12 +179,14 @@ def robust_companions(analysis: Analysis, progress: Callable[[str], None] = lamb
 
 def _no_models(analysis: Analysis) -> str | None:
     if analysis.exclusions is None or analysis.experiment is None:
-        return "no experiment is declared, so what was rated is unknown"
+        return "no experiment is declared, so the rated items are unknown"
     rows = analysis.exclusions.rows
     if "exemplar" not in rows.columns or rows["exemplar"].isna().any():
         return "the data do not say which exemplar was rated"
     if len(rows) > MAX_RATINGS:
-        return f"{len(rows)} ratings are more than {MAX_RATINGS}; use analysis mixed and analysis ordinal"
+        return (
+            f"{len(rows)} ratings exceed the limit of {MAX_RATINGS}; use analysis mixed and analysis ordinal"
+        )
     return None
 
 
@@ -204,7 +212,7 @@ def _random_factors(analysis: Analysis) -> list[str]:
 
 
 def mixed_model(analysis: Analysis) -> Section:
-    """The linear mixed model's tests beside those of the ANOVA."""
+    """The linear mixed model's tests next to those of the ANOVA."""
     every = len(analysis.cells.cells) <= MAX_CELLS
     random = _random_factors(analysis)
     arguments = _model_arguments(analysis)
@@ -235,14 +243,14 @@ def mixed_model(analysis: Analysis) -> Section:
     text = (
         f"Participants crossed with blinks, by-participant slopes for {slopes}, REML, type III tests with "
         f"Satterthwaite's df; {result.n_ratings} ratings of {result.n_items} blinks by "
-        f"{result.n_participants} participants. Unlike the ANOVA it counts the blinks shown as a sample."
+        f"{result.n_participants} participants. Unlike the ANOVA, it treats the blinks shown as a sample."
     )
     if random:
         text += f" {said_of_random(random, random_slopes)}"
     if not every:
         text += (
-            f" With more than {MAX_CELLS} cells slopes for every effect take minutes (analysis mixed fits "
-            "them); without them the p of interactions are too small where people differ in them."
+            f" With more than {MAX_CELLS} cells, slopes for every effect take minutes (analysis mixed fits "
+            "them). Without them, the p of interactions is too small if people differ in them."
         )
     if random:
         return Section("Linear mixed model", text, (table,))
@@ -252,7 +260,7 @@ def mixed_model(analysis: Analysis) -> Section:
 
 
 def ordinal_model(analysis: Analysis) -> Section:
-    """The cumulative-link mixed model's tests beside those of the ANOVA."""
+    """The cumulative-link mixed model's tests next to those of the ANOVA."""
     from analysis.models.ordinal import fit_ordinal
 
     arguments = _model_arguments(analysis)
@@ -288,14 +296,15 @@ def ordinal_model(analysis: Analysis) -> Section:
     )
     if not every:
         text += (
-            f" With more than {MAX_CELLS} cells slopes for every effect take minutes (analysis ordinal "
-            "--slopes all fits them); without them the p of interactions are too small where people "
-            "differ in them."
+            f" With more than {MAX_CELLS} cells, slopes for every effect take minutes (analysis ordinal "
+            "--slopes all fits them). Without them, the p of interactions is too small if people differ in "
+            "them."
         )
     if named := _random_factors(analysis):
         text += (
-            f" Items are the blinks of each {' and '.join(named)}; effects are not let differ between these, "
-            "so that the tests hold for those shown: the linear mixed model says what holds for others."
+            f" Items are the blinks of each {' and '.join(named)}. Effects do not differ between these in "
+            "this model, so the tests hold only for those shown. See the linear mixed model for tests that "
+            "generalize."
         )
     return Section(
         "Ordinal mixed model", text, (table,), (), partial(model_files, analysis, arguments, result)
@@ -319,8 +328,8 @@ def bayes_factors(analysis: Analysis) -> Section:
         "bayes", caption("Bayes factors of pairs", analysis.name, analysis.synthetic), header, tuple(rows), 1
     )
     text = (
-        "BF₁₀ says how much better a difference predicts the data than none, BF₀₁ the reverse. JZS prior, "
-        "Cauchy scale r = √2/2. Between 1/3 and 3 the data do not tell."
+        "BF₁₀ compares a difference with no difference; BF₀₁ is the reverse. JZS prior, Cauchy scale r = "
+        "√2/2. Values between 1/3 and 3 are inconclusive."
     )
     return Section("Bayes factors", text, (table,))
 

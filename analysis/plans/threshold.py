@@ -35,7 +35,7 @@ def check(experiment: Experiment, rows: pd.DataFrame, source: str) -> None:
     bare = rows["response"].notna().to_numpy() & rows["value"].isna().to_numpy()
     if bare.any():
         at = int(np.argmax(bare))
-        raise InputError(f"{source}: {where(rows, at)}: expected the stimulus's number in 'value', got none")
+        raise InputError(f"{source}: {where(rows, at)}: expected the stimulus value in 'value', got none")
 
 
 def analyse(prepared: PlanRows) -> Contents:

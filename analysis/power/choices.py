@@ -56,7 +56,7 @@ class PairsDesign:
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Whether items differ at all, and every pair of neighbours in ability."""
+        """Whether items differ at all, and every pair of neighbors in ability."""
         return ("all items", *(f"item {a + 1} or {b + 1}" for a, b in self._neighbours))
 
     @cached_property
@@ -69,8 +69,8 @@ class PairsDesign:
         """The test, in a few words."""
         model = "Davidson" if self.tie else "Bradley-Terry"
         if self.rater_sd:
-            return f"{model}, errors robust to raters: F of all, t of neighbours"
-        return f"{model}: likelihood ratio of all, Wald of neighbours"
+            return f"{model}, errors robust to raters: F of all, t of neighbors"
+        return f"{model}: likelihood ratio of all, Wald of neighbors"
 
     @property
     def population(self) -> str:
@@ -80,7 +80,7 @@ class PairsDesign:
         said = f"{len(self.abilities)} items have abilities (log odds) {abilities}"
         said += f"; every participant compares each pair {often}"
         if self.rater_sd:
-            said += f"; participants' log odds of a pair vary with SD {self.rater_sd:g}"
+            said += f"; participants' log odds of a pair have an SD of {self.rater_sd:g}"
         if self.tie:
             said += f"; two equal items tie with probability {self.tie:g}"
         return said
@@ -88,7 +88,7 @@ class PairsDesign:
     def p_values(self, n: int, rng: np.random.Generator) -> Sequence[float]:
         """The p of each test in one data set; Firth's penalty where an item wins or loses throughout.
 
-        Where raters differ, comparisons of one rater are no independent trials: tests then have raters as
+        Where raters differ, comparisons of one rater are not independent trials: tests then have raters as
         clusters (Liang & Zeger 1986), F on (q, n - q) df for q + 1 items, t on n - 1. With ties the penalty
         does not exist: data without finite estimates then allow no test.
         """
@@ -228,7 +228,7 @@ class ThresholdDesign:
         if self.spread <= 0 or self.person_sd < 0 or self.difference_sd < 0:
             raise InputError("expected a spread above 0 and SDs of at least 0")
         if not 0 <= self.guess < 1 - self.lapse <= 1:
-            raise InputError("expected guess and lapse rates of at least 0 that leave room between them")
+            raise InputError("expected guess and lapse rates of at least 0 whose sum is below 1")
         if self.shape == "weibull" and min(self.levels) <= 0:
             raise InputError("the Weibull function needs stimuli above 0; use the normal")
 

@@ -31,7 +31,7 @@ class FactorialDesign:
         means, in SDs of a cell over participants. The share is a straight line over the levels of a factor,
         and the product of these lines for interactions. Effects not named are zero.
     correlation : float
-        Between two cells of a participant.
+        Correlation between two cells of a participant.
     statistic : {"multivariate", "greenhouse-geisser"}
     covariate : float
         Correlation of a covariate with participants' mean ratings within groups; 0 is a design without one.
@@ -55,20 +55,22 @@ class FactorialDesign:
     def __post_init__(self) -> None:
         levels = {**self.between, **self.within}
         if len(levels) < len(self.between) + len(self.within):
-            raise InputError("a factor is named both within and between participants")
+            raise InputError("a factor is named both within and between participants; remove it from one")
         if not self.sizes:
             raise InputError("no effect has a size; name one with --effect, such as face=0.25")
         for effect in self.sizes:
             for name in effect.split(":"):
                 if name not in levels:
-                    raise InputError(f"--effect names no factor '{name}'{did_you_mean(name, list(levels))}")
+                    raise InputError(
+                        f"--effect: there is no factor '{name}'{did_you_mean(name, list(levels))}"
+                    )
         if any(size < 2 for size in levels.values()):
             raise InputError("expected at least 2 levels of every factor")
         if not -1 < self.covariate < 1:
             raise InputError(f"expected a covariate's correlation between -1 and 1, got {self.covariate:g}")
         k = int(np.prod(list(self.within.values()), dtype=np.int64))
         if not -1 / max(k - 1, 1) < self.correlation < 1:
-            raise InputError(f"no {k} cells can all correlate by {self.correlation:g} with each other")
+            raise InputError(f"{k} cells cannot all correlate {self.correlation:g} with each other")
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -92,12 +94,12 @@ class FactorialDesign:
         parts += [f"{name} ({size} groups)" for name, size in self.between.items()]
         sizes = ", ".join(f"{effect} f = {size:g}" for effect, size in self.sizes.items())
         means = (
-            f"cell means of participants correlate by {self.correlation:g}"
+            f"participants' cell means correlate {self.correlation:g}"
             if self.within
             else "each participant gives one mean, so no correlation is assumed"
         )
         return (f"The design has {', '.join(parts)}; {means}; assumed effects (Cohen's f): {sizes}") + (
-            f"; a covariate correlates by {self.covariate:g} with participants' mean ratings"
+            f"; a covariate correlates {self.covariate:g} with participants' mean ratings"
             if self.covariate
             else ""
         )

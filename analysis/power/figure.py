@@ -35,7 +35,7 @@ def draw_power(result: PowerResult, target: float = 0.8) -> Figure:
         axes.set_xlabel("participants")
         axes.set_ylabel(f"power at α = {result.alpha:g}")
         axes.set_title(
-            f"{result.experiment}: {result.statistic}, {result.simulations} synthetic data sets a point",
+            f"{result.experiment}: {result.statistic}, {result.simulations} synthetic data sets per point",
             fontsize=9.5,
             loc="left",
         )

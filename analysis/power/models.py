@@ -23,10 +23,10 @@ from experiments.errors import InputError
 
 
 def refuse_no_difference(differences: Sequence[float]) -> None:
-    """Refuse a design without a further condition, and differences that are no numbers."""
+    """Refuse a design without a further condition, and differences that are not numbers."""
     if not differences or not np.isfinite(differences).all():
         raise InputError(
-            "expected how far each further condition lies from the first, such as 0.4 or 0.2,0.4"
+            "power cannot be computed: no condition is compared; add --difference, such as 0.4 or 0.2,0.4"
         )
 
 
@@ -36,8 +36,8 @@ def said_of_differences(differences: Sequence[float]) -> str:
         return f"Two conditions differ by {differences[0]:g}"
     told = ", ".join(f"{difference:g}" for difference in differences[:-1])
     return (
-        f"{len(differences) + 1} conditions, of which the further ones lie {told} and {differences[-1]:g} "
-        "from the first, in"
+        f"{len(differences) + 1} conditions, where the others differ from the first by {told} and "
+        f"{differences[-1]:g}"
     )
 
 
@@ -78,7 +78,7 @@ class MixedDesign:
     clips : tuple of int
         Numbers of clips, each tried; shared evenly by conditions (and faces).
     faces : tuple of int
-        Numbers of faces, each tried; empty where faces are no random factor.
+        Numbers of faces, each tried; empty if faces are not a random factor.
     crossed : bool
         Whether each clip is shown in every condition; else in one, as many in each.
     repeats : int
@@ -102,18 +102,17 @@ class MixedDesign:
             cell = faces * (1 if self.crossed else self.conditions)
             if clips % cell or clips // cell < 1 or clips < 2:
                 raise InputError(
-                    f"{clips} clips cannot be shared evenly by {faces} faces"
-                    f"{'' if self.crossed else f' in {self.conditions} conditions'}; expected a multiple of "
-                    f"{max(cell, 2)}"
+                    f"{clips} clips cannot be divided evenly between {faces} "
+                    f"faces{'' if self.crossed else f' in {self.conditions} conditions'}; expected a "
+                    f"multiple of {max(cell, 2)}"
                 )
             if not self.faces and clips == cell:
                 raise InputError(
-                    f"{clips} clips are one a condition, and what is the clip's cannot be told from what is "
-                    f"the condition's; expected {2 * cell} or more, or --crossed where each clip is shown in "
-                    "every condition"
+                    f"{clips} clips are one per condition, so clip and condition are confounded; use "
+                    f"{2 * cell} clips or more, or add --crossed if each clip is shown in every condition"
                 )
         if self.faces and min(self.faces) < 2:
-            raise InputError("expected at least two faces; leave --faces out for a study of one")
+            raise InputError("expected at least two faces; omit --faces for a study of one face")
 
     @property
     def conditions(self) -> int:
@@ -151,7 +150,7 @@ class MixedDesign:
         shown = (
             "each clip is shown in every condition"
             if self.crossed
-            else "each condition has as many of the clips"
+            else "each condition has the same number of clips"
         )
         return (
             f"{said}; {shown}, rated {'once' if self.repeats == 1 else f'{self.repeats} times'} by everybody"
@@ -225,8 +224,8 @@ class OrdinalDesign:
     differences : tuple of float
         Of every further condition from the first, in log odds of a higher category.
     shares : tuple of float
-        How often each category is given to a clip of the first condition by a participant, both of no
-        leaning of their own; they are divided by their sum.
+        How often each category is given to a clip of the first condition by a participant, both without
+        individual bias; they are divided by their sum.
     clips : int
         Shared evenly by the conditions.
     crossed : bool
@@ -256,8 +255,8 @@ class OrdinalDesign:
         refuse_no_difference(self.differences)
         if self.clips < 2 or (not self.crossed and self.clips % self.conditions):
             raise InputError(
-                f"{self.clips} clips cannot be shared evenly by {self.conditions} conditions; expected a "
-                f"multiple of {self.conditions}, or --crossed"
+                f"{self.clips} clips cannot be divided evenly between {self.conditions} conditions; use a "
+                f"multiple of {self.conditions}, or add --crossed"
             )
 
     @property
@@ -279,7 +278,7 @@ class OrdinalDesign:
     def population(self) -> str:
         """The population in a sentence."""
         shares = ", ".join(f"{share:.0%}" for share in self._shares)
-        shown = "each shown in every condition" if self.crossed else "as many of each condition"
+        shown = "each shown in every condition" if self.crossed else "as many in each condition"
         odds = ", ".join(f"{np.exp(difference):.3g}" for difference in self.differences)
         which = "the second" if self.conditions == 2 else "the further conditions"
         return (

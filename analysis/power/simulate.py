@@ -181,7 +181,7 @@ def simulate_design(
     simulations : int
         Data sets a size.
     alpha : float
-        Level of the tests.
+        Significance level of the tests.
     seed : int
         The same seed gives the same numbers.
     progress : callable, optional
@@ -222,13 +222,15 @@ def sample_size_text(result: PowerResult, design: Design, target: float, version
         n = smallest[effect]
         if n is None:
             best = float(np.nanmax(row)) if not np.isnan(row).all() else float("nan")
-            said.append(f"{effect}: not reached with up to {result.n[-1]} participants (at most {best:.2f})")
+            said.append(
+                f"{effect}: not reached with up to {result.n[-1]} participants (maximum power {best:.2f})"
+            )
         else:
             at = result.n.index(n)
             said.append(f"{effect}: N = {n} (power {row[at]:.2f}, simulation error {errors[at]:.3f})")
     return (
         f"Sample size was planned by simulation with Palpebra {version}. {design.population}. For each "
-        f"number of participants {result.simulations} data sets were drawn (seed {result.seed}) and analysed "
-        f"as the study will be ({design.test}), at alpha = {result.alpha:g}. Smallest number of participants "
-        f"with a power of {target:g}: {'; '.join(said)}."
+        f"number of participants, {result.simulations} data sets were simulated (seed {result.seed}) and "
+        f"analyzed as planned for the study ({design.test}), with alpha = {result.alpha:g}. The smallest "
+        f"numbers of participants with a power of {target:g} were: {'; '.join(said)}."
     )

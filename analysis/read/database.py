@@ -37,13 +37,13 @@ class AnswersQuery:
         file = location.database if location.get_backend_name() == "sqlite" else None
         if file and file != ":memory:" and not Path(file).is_file():
             raise NoRatingsError(
-                f"there is no database at {file}; run a study first, or name one with --database or --csv"
+                f"there is no database at {file}; run a study first, or use --database or --csv"
             )
         try:
             connection = self._engine.connect()
             if self._view not in inspect(connection).get_view_names():
                 raise NoRatingsError(
-                    f"{self.name} has no view '{self._view}'; start the server once to make it"
+                    f"{self.name} has no view '{self._view}'; start the server once to create it"
                 )
         except DBAPIError as error:
             raise InputError(f"cannot read {self.name}: {_first_line(error)}") from error
@@ -165,7 +165,7 @@ def _describe(url: str) -> str:
         parsed.get_dialect()
     except (ArgumentError, NoSuchModuleError) as error:
         raise InputError(
-            f"'{url}' is no database URL; expected e.g. sqlite:///data/palpebra.sqlite"
+            f"'{url}' is not a database URL; expected, for example, sqlite:///data/palpebra.sqlite"
         ) from error
     if parsed.get_backend_name() == "sqlite":
         return Path(parsed.database or ":memory:").name

@@ -30,7 +30,7 @@ FEWEST_KINDS = 6
 
 
 class Joined(NamedTuple):
-    """A file that holds the rows of two others or more and none beside; `kinds` of them are distinct."""
+    """A file that has exactly the rows of two or more other files; `kinds` of them are distinct."""
 
     file: Path
     parts: tuple[Path, ...]
@@ -160,9 +160,9 @@ def _look_through(folder: Path, stamps: tuple[tuple[Path, int, int], ...]) -> Fo
     sort = "Psych-DS folder" if _is_psych_ds(folder) else "folder"
     said = [f"read {len(files)} data file{'s' * (len(files) > 1)} of the {sort} {folder.name}"]
     if without_rows := [path.name for path in paths if path not in filled]:
-        said.append(f"files without rows left out: {_listed(without_rows)}")
+        said.append(f"files without rows ignored: {_listed(without_rows)}")
     if copies := _copies(filled):
-        said.append(f"files that are like another, byte for byte, count too: {_listed(copies)}")
+        said.append(f"files that are identical to another file were also counted: {_listed(copies)}")
     return Folder(files, (*said, *_columns_of_some(files), *_joined(files, tables)))
 
 
@@ -173,7 +173,7 @@ def _data_paths(folder: Path) -> list[Path]:
         expected = "data/..._data.csv in a Psych-DS folder"
     else:
         candidates = (path for path in folder.iterdir() if path.suffix.lower() == ".csv")
-        expected = f"files .csv, one a person, or a Psych-DS folder ({DESCRIPTION})"
+        expected = f".csv files, one per person, or a Psych-DS folder ({DESCRIPTION})"
     files = sorted(
         path
         for path in candidates
@@ -199,11 +199,11 @@ def _columns_of_some(files: Sequence[DataFile]) -> list[str]:
     """Name the columns that are left out because not every file has them."""
     times = Counter(name for file in files for name in file.columns if name)
     some = [name for name, count in times.items() if count < len(files)]
-    lines = [f"'{ORIGIN}' stands in some files alone; rows of the others are taken as given by people"]
+    lines = [f"only some files have a column '{ORIGIN}'; rows of the others are treated as given by people"]
     left = [name for name in some if name != ORIGIN]
     return [
         *lines * (ORIGIN in some),
-        *[f"columns that only some files have left out: {_listed(left)}"] * bool(left),
+        *[f"columns that only some files have were ignored: {_listed(left)}"] * bool(left),
     ]
 
 
@@ -220,9 +220,9 @@ def _joined(files: Sequence[DataFile], tables: Mapping[Path, pd.DataFrame]) -> l
     if joined is None:
         return []
     parts = [path.name for path in joined.parts]
-    where = f"every row of {len(parts)} files ({_listed(parts)}) stands in {joined.file.name} too"
+    where = f"every row of {len(parts)} files ({_listed(parts)}) is also in {joined.file.name}"
     if joined.kinds < FEWEST_KINDS:
-        return [f"{where}, by chance or since they were joined to it; all rows count"]
+        return [f"{where}, by chance or because they were merged into it; all rows were counted"]
     raise InputError(f"{where} and would count twice; move that file, or the others, out of the folder")
 
 
@@ -239,12 +239,12 @@ def _copies(files: Sequence[Path]) -> list[str]:
 
 
 def _contradictions(files: Sequence[DataFile], parts: Sequence[Cells], names: Sequence[str]) -> list[str]:
-    """Say it where a column has another value than the name of the file it stands in."""
+    """Report a column whose value differs from the one in the name of its file."""
     for file, part in zip(files, parts, strict=True):
         for name, value in file.beside.items():
             own = part.rows[name].iloc[0] if name in names else value
             if own != value:
-                return [f"'{name}' is {own} in {file.path.name}; the column counts, not the name of the file"]
+                return [f"'{name}' is {own} in {file.path.name}; the column was used, not the file name"]
     return []
 
 

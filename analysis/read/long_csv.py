@@ -42,7 +42,7 @@ def read_long_table(
     between: Sequence[str] = (),
     covariates: Sequence[str] = (),
 ) -> LongData:
-    """Read one row a trial.
+    """Read one row per trial.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def read_long_table(
     within, between : sequence of str
         Columns of factors, within and between participants.
     trial : str, optional
-        Column that tells a participant's trials apart.
+        Column that identifies a participant's trials.
     scale : (float, float), optional
         Lowest and highest rating.
     covariates : sequence of str
@@ -75,9 +75,9 @@ def read_long_table(
     unusual_numbers(table, rating, values)
     keep = ~np.isnan(values)
     if not keep.all():
-        table.decisions.append(f"{(~keep).sum()} rows without a rating left out ({name_lines(table, ~keep)})")
+        table.decisions.append(f"{(~keep).sum()} rows without a rating excluded ({name_lines(table, ~keep)})")
     if not keep.any():
-        raise InputError(f"{path.name}: '{rating}' holds no rating in any row")
+        raise InputError(f"{path.name}: column '{rating}' has no rating in any row")
     if trial is not None:
         keep &= ~_repeats(table, [participant, trial], values, within)
     else:
@@ -87,7 +87,7 @@ def read_long_table(
         unusual_numbers(table, name, given, IN_COVARIATE)
         keep &= _with_covariate(table, participant, name, given)
     if not keep.any():
-        raise InputError(f"{path.name}: no participant has a rating and every covariate")
+        raise InputError(f"{path.name}: no participant has a rating and all covariates")
     rows = table.columns.assign(**{rating: values, **measured})[keep].reset_index(drop=True)
     synthetic = "synthetic" in rows.columns and bool((rows["synthetic"] == "1").any())
     return LongData(rows, path.name, tuple(table.decisions), synthetic, table.header)
@@ -101,7 +101,7 @@ def _with_covariate(
     lacking = list(dict.fromkeys(people_of_rows[np.isnan(given)]))
     if lacking:
         people = f"participant{'s' if len(lacking) > 1 else ''} {', '.join(map(str, lacking))}"
-        table.decisions.append(f"left out for want of '{name}': {people}")
+        table.decisions.append(f"excluded because '{name}' is missing: {people}")
     return np.asarray(~np.isin(people_of_rows, lacking), dtype=bool)
 
 
@@ -132,11 +132,11 @@ def _repeats(
         row = int(np.argmax(again & ~same))
         which = ", ".join(f"{key} {table.columns[key].iloc[row]}" for key in keys)
         raise InputError(
-            f"{table.source}: {which} stands twice with different data, again in line {table.line(row)}"
+            f"{table.source}: {which} occurs twice with different data, again in line {table.line(row)}"
         )
     if again.any():
         table.decisions.append(
-            f"{again.sum()} repeated rows of one trial counted once ({name_lines(table, again)})"
+            f"{again.sum()} repeated rows of one trial were counted once ({name_lines(table, again)})"
         )
     return np.asarray(again, dtype=bool)
 
@@ -149,8 +149,8 @@ def _report_copies(table: TextTable, names: list[str], values: NDArray[np.float6
         copies = cells.assign(_rating=values).duplicated().to_numpy()
         more = f", {copies.sum()} of them with the same rating" if copies.any() else ""
         table.decisions.append(
-            f"most cells hold one row, but {int((counts > 1).sum())} hold more{more}; all rows count "
-            "(name the column of trials with --trial to have repeats found)"
+            f"most cells have one row, but {int((counts > 1).sum())} have more{more}; all rows were counted "
+            "(use --trial with the column of trials to find repeats)"
         )
 
 
@@ -173,7 +173,7 @@ def design_of(
     Parameters
     ----------
     rows : DataFrame
-        One row a trial; `between` columns hold text, `covariates` finite numbers.
+        One row per trial; `between` columns hold text, `covariates` finite numbers.
     participant : str
         Column of ids.
     people : sequence of str
@@ -181,7 +181,7 @@ def design_of(
     between, covariates : sequence of str
         Columns.
     centred : bool
-        Whether covariates are centred at their mean over `people`.
+        Whether covariates are centered at their mean over `people`.
     covariate_by_group : bool
         As in `between_design`.
 
@@ -219,8 +219,8 @@ def _refuse_left_out(name: str, levels: Sequence[str], codes: Integers, everybod
     if gone:
         n = int((everybody == gone[0]).sum())
         raise InputError(
-            f"nobody in {name}={levels[gone[0]]} has a rating in every cell within participants, so that all "
-            f"{n} were left out; leave out this group, or the level that they lack"
+            f"nobody in {name}={levels[gone[0]]} has a rating in every cell within participants, so all {n} "
+            "were excluded; remove this group, or the level that they lack"
         )
 
 
@@ -232,7 +232,7 @@ def _refuse_two_values(
         at = int(np.argmax(other))
         before = int(np.argmax(person == person[at]))
         raise InputError(
-            f"'{name}' differs within participant {everybody[person[at]]} "
-            f"({rows[name].iloc[before]} and {rows[name].iloc[at]}); a group or covariate has "
-            "one value for each participant, what changes within a participant belongs in --within"
+            f"'{name}' differs within participant {everybody[person[at]]} ({rows[name].iloc[before]} and "
+            f"{rows[name].iloc[at]}); a group or covariate has one value per participant; use --within for "
+            "what changes within a participant"
         )

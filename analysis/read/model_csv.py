@@ -37,7 +37,7 @@ def read_model_input(
     covariates: Sequence[str] = (),
     random: Sequence[str] = (),
 ) -> ModelInput:
-    """Read one row a trial.
+    """Read one row per trial.
 
     Of an export (it has the column `kind`) only main trials count, without failed plays and runs excluded by
     hand; its factor columns are the default of `within`, its `profile_id` (the blink shown) that of `item`.
@@ -47,7 +47,7 @@ def read_model_input(
     ------
     InputError
         Unknown columns, a column in two roles, items that are the participants under another name, ratings
-        that are no numbers, or no factor.
+        that are not numbers, or no factor.
     """
     header = read_text_table(path, [participant, rating], copies=False).header
     exported = "kind" in header and "profile_id" in header
@@ -56,7 +56,7 @@ def read_model_input(
     if not item and exported:
         item = ["profile_id"]
     if not within and not between and not covariates:
-        raise InputError("--within names no column; expected e.g. --within face,blur")
+        raise InputError("--within names no column; expected, for example, --within face,blur")
     covariates, _ = split_covariates(covariates, (*within, *between))
     _refuse_shared_roles(participant, rating, [*within, *between, *covariates], item)
     nested = list(dict.fromkeys(part for name in random for part in name.split("/")))
@@ -77,13 +77,13 @@ def read_model_input(
         keep, left_out = rows_that_count(rows, keep)
         decisions += left_out
     if np.isnan(values).any():
-        decisions.append(f"{np.isnan(values).sum()} rows without a rating left out")
+        decisions.append(f"{np.isnan(values).sum()} rows without a rating excluded")
     for name, column in measured.items():
         if (without := np.isnan(column) & keep).any():
-            decisions.append(f"{without.sum()} rows without {name} left out")
+            decisions.append(f"{without.sum()} rows without {name} excluded")
             keep = keep & ~without
     if not keep.any():
-        raise InputError(f"{path.name}: no row has a rating that counts")
+        raise InputError(f"{path.name}: no row has a usable rating")
     synthetic = "synthetic" in rows.columns and bool(rows["synthetic"].astype(str).isin(("1", "True")).any())
     return ModelInput(
         rows[keep].reset_index(drop=True),
@@ -98,13 +98,12 @@ def read_model_input(
 def _refuse_shared_roles(participant: str, rating: str, within: Sequence[str], item: Sequence[str]) -> None:
     if list(item) == [participant]:
         raise InputError(
-            f"'{participant}' is named as participant and as item; name the column of clips, or leave "
-            "--item out"
+            f"'{participant}' is named as participant and as item; name the column of clips, or omit --item"
         )
     names = [participant, rating, *within]
     for name in names:
         if names.count(name) > 1 or (name in item and name != participant and name == rating):
-            raise InputError(f"column '{name}' is named for two roles; each role needs a column of its own")
+            raise InputError(f"column '{name}' is named for two roles; each role needs a separate column")
 
 
 def _refuse_participants_as_items(table: TextTable, participant: str, item: Sequence[str]) -> None:
@@ -116,6 +115,6 @@ def _refuse_participants_as_items(table: TextTable, participant: str, item: Sequ
     people = pairs[participant].astype(str)
     if len(pairs) > 1 and len(pairs) == people.nunique() == what.nunique():
         raise InputError(
-            f"every item of '{'/'.join(item)}' belongs to one participant and every participant has one: "
-            "these are the participants again; name the column of clips, or leave --item out"
+            f"every item of '{'/'.join(item)}' belongs to one participant and every participant has one, so "
+            "items and participants are the same; name the column of clips, or omit --item"
         )

@@ -22,7 +22,7 @@ MISSING_CODES = (-9999.0, -999.0, -99.0, -88.0, -77.0, -9.0, 99.0, 999.0, 9999.0
 SIZE_MIN = 1e-100
 """Numbers all below it, or one above its inverse, have sums of squares that a float64 cannot tell apart."""
 IN_COVARIATE = "correct them or leave them empty"
-"""What to do about unusual numbers where there is no scale that would refuse them."""
+"""What to do about unusual numbers where there is no scale that would reject them."""
 
 
 def numbers(table: TextTable, name: str) -> NDArray[np.float64]:
@@ -53,12 +53,12 @@ def _refuse_out_of_bounds(table: TextTable, name: str, values: NDArray[np.float6
         row = int(np.argmax((table.columns[name] == text).to_numpy()))
         raise InputError(
             f"{table.source}: '{name}' is {text} in line {table.line(row)}: sums of squares of such numbers "
-            "cannot be computed; correct it, or give the column in a larger unit"
+            "cannot be computed; correct it, or use a larger unit for the column"
         )
     if sizes.max() < SIZE_MIN:
         raise InputError(
             f"{table.source}: every number of '{name}' is below {SIZE_MIN:g}: sums of squares of such "
-            "numbers cannot be computed; give the column in a smaller unit"
+            "numbers cannot be computed; use a smaller unit for the column"
         )
 
 
@@ -68,7 +68,7 @@ def _refuse_two_readings(table: TextTable, name: str, categories: list[str], com
     points = [text for text in categories if _DECIMAL_POINT.fullmatch(text)]
     hundreds = [text for text in categories if _HUNDREDS.fullmatch(text)]
     if points and not commas and hundreds and all(map(_POINTED_THOUSANDS.fullmatch, points)):
-        # 1.003 beside 950, as spreadsheets write it where the comma is the decimal mark
+        # 1.003 next to 950, as spreadsheets write it where the comma is the decimal mark
         text, beside = points[0], hundreds[0]
     elif points and not commas and (elsewhere := _decimal_comma_elsewhere(table, name, categories)):
         text, beside = points[0], elsewhere
@@ -80,8 +80,8 @@ def _refuse_two_readings(table: TextTable, name: str, categories: list[str], com
     row = int(np.argmax((table.columns[name] == text).to_numpy()))
     raise InputError(
         f"{table.source}: '{text}' of '{name}' in line {table.line(row)} can be read as {decimal} or as "
-        f"{whole}{f' (beside it stands {beside})' if beside else ''}; write decimals with a point and "
-        "thousands without a mark"
+        f"{whole}{f' (also found: {beside})' if beside else ''}; write decimals with a point and "
+        "thousands without a separator"
     )
 
 
@@ -115,7 +115,7 @@ def unusual_numbers(
     table: TextTable,
     name: str,
     values: NDArray[np.float64],
-    remedy: str = "correct them, leave them empty, or refuse them with --scale",
+    remedy: str = "correct them, leave them empty, or reject them with --scale",
 ) -> None:
     """Say it where a few whole-number ratings lie far outside all others: typing errors, codes for missing.
 
@@ -127,8 +127,8 @@ def unusual_numbers(
     if coded.any():
         named = ", ".join(f"{value:g}" for value in sorted(set(values[coded])))
         table.decisions.append(
-            f"'{name}' holds {named} ({name_lines(table, coded)}), by which missing values are often "
-            f"marked; they count: {remedy}"
+            f"'{name}' has {named} ({name_lines(table, coded)}), often a code for missing values; they were "
+            f"counted: {remedy}"
         )
     given = values[~np.isnan(values) & ~coded]
     values = np.where(coded, np.nan, values)
@@ -141,8 +141,8 @@ def unusual_numbers(
         named = ", ".join(f"{value:g}" for value in sorted(set(values[far])))
         inside = given[(given <= high + width + 1) & (given >= low - width - 1)]
         table.decisions.append(
-            f"'{name}' holds {named} ({name_lines(table, far)}), far from the others ({inside.min():g} to "
-            f"{inside.max():g}); they count: {remedy}"
+            f"'{name}' has {named} ({name_lines(table, far)}), far from the others ({inside.min():g} to "
+            f"{inside.max():g}); they were counted: {remedy}"
         )
 
 
@@ -168,10 +168,10 @@ def _number(text: str) -> float:
 
 
 def _refuse_words(table: TextTable, name: str, words: set[str]) -> None:
-    """Refuse texts that are no numbers by the first line on which one stands."""
+    """Reject texts that are not numbers, naming the first line with one."""
     if words:
         row = int(np.argmax(table.columns[name].isin(words).to_numpy()))
         raise InputError(
             f"{table.source}: '{name}' should be a number, got '{table.columns[name].iloc[row]}' in line "
-            f"{table.line(row)}; correct it, or leave the cell empty (or write NA) where there is none"
+            f"{table.line(row)}; correct it, or leave the cell empty (or write NA) if it is missing"
         )

@@ -1,4 +1,4 @@
-"""Whose answers are analysed together: one origin, one data series."""
+"""Whose answers are analyzed together: one origin, one data series."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -50,7 +50,7 @@ def pooled(
     Without a wish the origin is the first of participant, pilot and simulated that there is (in the version
     or series asked for), and the series the latest that has answers given under the declaration with this
     hash, else the latest; rows of others are left aside and counted. Sources without these columns (exports
-    of older programs) tell the origin by `phase` and `synthetic`, and have one series.
+    of older programs) have the origin in `phase` and `synthetic`, and have one series.
 
     Raises
     ------
@@ -67,8 +67,9 @@ def pooled(
 
 def _named(rows: pd.DataFrame, pool: Pool) -> Iterator[str]:
     if SERIES in rows.columns and len(series := _numbers(rows[SERIES])) == 1:
-        alone = f", version {pool.version} alone" if pool.version else ""
-        yield f"answers of data series {series[0]}{alone}, origin {', '.join(pd.unique(origins(rows)))}"
+        alone = f", only version {pool.version}" if pool.version else ""
+        origin = " and ".join(pd.unique(origins(rows)))
+        yield f"{origin} responses, data series {series[0]}{alone}"
 
 
 def _series_of(rows: pd.DataFrame, declaration_sha256: str) -> int | None:
@@ -88,11 +89,11 @@ def _declarations(rows: pd.DataFrame, declaration_sha256: str) -> Iterator[str]:
         {str(name) for name in pd.unique(rows[DECLARATION])} - {""} if DECLARATION in rows.columns else set()
     )
     if len(hashes) > 1:
-        yield f"{len(hashes)} versions of the experiment's declaration were used; analysed together"
+        yield f"{len(hashes)} versions of the experiment's declaration were used and analyzed together"
     if hashes and declaration_sha256 not in hashes:
         yield (
-            "the answers were given under another declaration than the one given here, by which they are "
-            "read; the study's Design page has theirs"
+            "the responses were given under a different declaration than the one used here; find theirs on "
+            "the study's Design page"
         )
 
 
@@ -113,12 +114,12 @@ def _of_origin(rows: pd.DataFrame, chosen: Origin | None, said: list[str]) -> pd
     there = [origin for origin in Origin if (origin_of_row == origin.value).any()]
     if chosen is Origin.ALL:
         if len(there) > 1:
-            said.append(f"answers of {len(there)} origins pooled: {', '.join(there)}")
+            said.append(f"responses of {len(there)} origins were pooled: {', '.join(there)}")
         return rows
     origin = chosen or (there[0] if there else Origin.PARTICIPANT)
     mine = origin_of_row == origin.value
     if not mine.all():
-        said.append(f"origin {origin}: {(~mine).sum()} rows of other origins left aside")
+        said.append(f"origin {origin}: {(~mine).sum()} rows of other origins were ignored")
     return rows if mine.all() else rows[mine]
 
 
@@ -130,13 +131,13 @@ def _of_number(
         return rows
     there = _numbers(rows[column]) if column in rows.columns else []
     if not there:
-        raise InputError(f"{source} does not say the {what} of its rows; leave the choice of one out")
+        raise InputError(f"{source} does not record the {what} of its rows; do not choose one")
     if chosen not in there:
-        raise InputError(f"{source} has no answers of {what} {chosen}; there are those of {_known(rows)}")
+        raise InputError(f"{source} has no responses of {what} {chosen}; it has {_known(rows)}")
     if len(there) == 1:
         return rows
     mine = (rows[column].astype(str) == str(chosen)).to_numpy()
-    said.append(f"{what} {chosen}: {(~mine).sum()} rows of others left aside")
+    said.append(f"{what} {chosen}: {(~mine).sum()} other rows were ignored")
     return rows[mine]
 
 

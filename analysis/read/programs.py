@@ -1,4 +1,4 @@
-"""Exports of programs for experiments: known by their columns, cleared of rows that are no trial.
+"""Exports of programs for experiments: recognized by their columns, without rows that are not trials.
 
 jsPsych, PsychoPy and Gorilla write a row for everything that happened: a fixation cross, an instruction, the
 end of a task. A row that lacks one of the columns asked for is such a row; how many and of what sort is said.
@@ -45,7 +45,7 @@ def trials_only(cells: Cells, asked: list[str], sorts: Cells | None) -> Cells:
     keep = ~cells.rows[asked].isin(EMPTY).any(axis=1).to_numpy()
     said = f"read as data of {program.name}"
     if not keep.all():
-        said += f": {(~keep).sum()} rows without {' and '.join(repr(name) for name in asked)} left out"
+        said += f": {(~keep).sum()} rows without {' and '.join(repr(name) for name in asked)} excluded"
         if sorts is not None:
             counts = sorts.rows.iloc[np.flatnonzero(~keep), 0].replace("", "no sort").value_counts()
             said += f" ({', '.join(f'{sort} {count}' for sort, count in counts.items())})"
@@ -65,7 +65,7 @@ def _one_answer(rows: pd.DataFrame, name: str) -> str:
         return ""
     rows[name] = rows[name].astype(str).replace(numbers)
     shown = f"{texts[0]} read as {numbers[texts[0]]}"
-    return f"'{name}' holds surveys of one question: {shown}; jsPsych numbers their choices from 0"
+    return f"'{name}' has surveys of one question: {shown}; jsPsych numbers their choices from 0"
 
 
 def _only_number(text: str) -> str | None:

@@ -26,7 +26,7 @@ TRIAL_PLACES = ("trial_index", "play")
 
 @dataclass(frozen=True)
 class Reading:
-    """The columns a plan needs beside those of every study; all but `beside` must be there.
+    """The columns a plan needs in addition to those of every study; only `beside` may be missing.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ def rows_that_count(rows: pd.DataFrame, keep: NDArray[np.bool_]) -> tuple[NDArra
             continue
         out = keep & ~rows[column].astype(str).isin(good).to_numpy()
         if out.any():
-            decisions.append(f"{out.sum()} {why} left out")
+            decisions.append(f"{out.sum()} {why} excluded")
         keep = keep & ~out
     return keep, decisions
 
@@ -92,4 +92,4 @@ def rows_that_count(rows: pd.DataFrame, keep: NDArray[np.bool_]) -> tuple[NDArra
 
 
 class NoRatingsError(InputError):
-    """There is nothing to analyse (yet): an empty study, not a fault. Commands end with exit code 1."""
+    """There is nothing to analyze (yet): an empty study, not a fault. Commands end with exit code 1."""

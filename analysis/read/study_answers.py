@@ -95,7 +95,7 @@ def load_database(
             if study:
                 raise NoRatingsError(
                     f"{query.name} has no ratings of experiment '{experiment.name}' in a study '{study}'; "
-                    "give the definition that this study has, and its name as `server study list` shows it"
+                    "use this study's definition and its name as shown by `server study list`"
                 )
             raise NoRatingsError(
                 f"experiment '{experiment.name}' has no ratings yet in {query.name}; practice does not count"
@@ -139,7 +139,7 @@ def _of_one_study(
         rows = _only(rows, "experiment", experiment, source, decisions)
     if study is not None:
         if "study" not in rows.columns:
-            raise InputError(f"{source} has no column 'study'; leave --study out")
+            raise InputError(f"{source} has no column 'study'; omit --study")
         rows = _only(rows, "study", study, source, decisions)
     elif "study" in rows.columns and len(names := _names(rows["study"])) > 1:
         raise InputError(f"{source} holds {len(names)} studies; choose one with --study: {', '.join(names)}")
@@ -153,7 +153,7 @@ def _only(rows: pd.DataFrame, column: str, name: str, source: str, decisions: li
     if len(names) == 1:
         return rows
     mine = (rows[column] == name).to_numpy()
-    decisions.append(f"{(~mine).sum()} rows of other {column} values left aside")
+    decisions.append(f"{(~mine).sum()} rows with other {column} values were ignored")
     return rows[mine]
 
 
@@ -168,7 +168,7 @@ VERDICT = "evidence_verdict"
 
 @dataclass(frozen=True)
 class RunEvidence:
-    """Verdict of each run by its name, and the signals as columns of numbers, NaN for none."""
+    """Verdict of each run by name, and the signals as columns of numbers, NaN for none."""
 
     verdicts: dict[str, str]
     signals: pd.DataFrame

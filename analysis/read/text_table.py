@@ -26,7 +26,7 @@ NAMED_COLUMNS = 30
 class TextTable:
     """Columns of text (categorical, kept as written, stripped) and what was decided while reading.
 
-    `lines` (rows,) are where the rows stand in the file; `labels` has, of a column, the word for each code;
+    `lines` (rows,) are the rows' lines in the file; `labels` has, of a column, the word for each code;
     `numeric` are columns of numbers, not of texts like them; `reader` reads further columns of the file;
     `files` (rows,) are the names of the files of a folder.
     """
@@ -135,7 +135,7 @@ def _leave_out_empty_rows(table: TextTable, names: Sequence[str]) -> None:
         raise InputError(f"{table.source} has a header but no rows")
     if empty.any():
         table.decisions.append(
-            f"rows without a value in any column read left out ({name_lines(table, empty)})"
+            f"rows without a value in any column that is used were excluded ({name_lines(table, empty)})"
         )
         left = table.columns[~empty].reset_index(drop=True)
         table.columns = left.apply(lambda column: column.cat.remove_unused_categories())
@@ -148,7 +148,7 @@ def _names_to_read(
 ) -> list[str]:
     for name in needed:
         if name not in header:
-            # columns that are asked for are no cells of a wide table
+            # columns that are requested are not cells of a wide table
             hint = (
                 wide_hint([one for one in header if one not in needed])
                 or _lines_above(header)
@@ -172,12 +172,12 @@ def _columns_there(name: str, header: Sequence[str]) -> str:
 
 
 def _lines_above(header: Sequence[str]) -> str:
-    """What to do about a first line that is no header: a title, a comment, an unknown separator."""
+    """What to do about a first line that is not a header: a title, a comment, an unknown separator."""
     if len([name for name in header if name]) > 1:
         return ""
     return (
-        f": its first line is {max(header, key=len)!r}; it should name the columns, between commas, "
-        "semicolons or tabs: delete lines above it, and replace other separators"
+        f": its first line is {max(header, key=len)!r}; it should have the column names, separated by "
+        "commas, semicolons or tabs; delete lines above it, and replace other separators"
     )
 
 
@@ -207,7 +207,7 @@ def refuse_shared_roles(names: Sequence[str]) -> None:
     """Refuse a column that is named for two roles."""
     for name in names:
         if names.count(name) > 1:
-            raise InputError(f"column '{name}' is named for two roles; each role needs a column of its own")
+            raise InputError(f"column '{name}' is named for two roles; each role needs a separate column")
 
 
 def texts_required(table: TextTable, name: str, factor: bool = False) -> None:
@@ -227,7 +227,9 @@ def texts_required(table: TextTable, name: str, factor: bool = False) -> None:
     for text in column.cat.categories:
         other = folded.setdefault(text.casefold(), text)
         if other != text:
-            table.decisions.append(f"'{other}' and '{text}' of '{name}' differ in case only; kept apart")
+            table.decisions.append(
+                f"'{other}' and '{text}' of '{name}' differ only in case; they are separate levels"
+            )
 
 
 def refuse_ids_once(rows: pd.DataFrame, name: str, header: Sequence[str], source: str) -> None:
@@ -253,11 +255,11 @@ def refuse_ids_once(rows: pd.DataFrame, name: str, header: Sequence[str], source
         return
     hint = wide_hint([one for one in header if one and one != name])
     often = hint or (
-        "; is the table wide (one row per person: make it long with analysis reshape), or is this not the "
+        ". Is the table wide (one row per person; make it long with analysis reshape), or is this not the "
         "participant column?"
     )
     raise InputError(
-        f"{source}: each value of '{name}' is in one row only, so nothing varies within participants{often}"
+        f"{source}: each value of '{name}' is in only one row, so nothing varies within participants{often}"
     )
 
 
@@ -279,8 +281,8 @@ def _worded(
     twice = {name for name, times in Counter(names).items() if times > 1}
     if twice:
         table.decisions.append(
-            f"several codes of '{column.name}' have one word ({', '.join(sorted(twice))}); "
-            "kept apart by their codes"
+            f"several codes of '{column.name}' have the same label ({', '.join(sorted(twice))}); they are "
+            "distinguished by their codes"
         )
         names = [
             f"{name} ({code})" if name in twice else name for name, code in zip(names, codes, strict=True)

@@ -158,16 +158,16 @@ def said_of_copies(rows: pd.DataFrame, lines: Sequence[str]) -> str:
         copy, original, length = block.first, block.original, block.length
         return (
             f"lines {lines[copy]} to {lines[copy + length - 1]} are exact copies of lines {lines[original]} "
-            f"to {lines[original + length - 1]} ({length} rows), which chance alone gives with a probability "
-            f"below {_power_of_ten(block.chance)}: was something pasted twice? "
-            "All rows count; if they are copies, delete them and run this again"
+            f"to {lines[original + length - 1]} ({length} rows), which happens by chance with a probability "
+            f"below {_power_of_ten(block.chance)}. Was something pasted twice? All rows were counted; if "
+            "they are copies, delete them and run this again"
         )
     times = all_rows_twice(row_codes(rows))
     if times > 1:
         often = "twice" if times == 2 else f"{times} times"
         return (
-            f"every row is in the table {often}: was something pasted twice? All rows count; if they are "
-            "copies, delete them and run this again"
+            f"every row is in the table {often}. Was something pasted twice? All rows were counted; if they "
+            "are copies, delete them and run this again"
         )
     return ""
 
@@ -183,7 +183,7 @@ FEWEST_COLUMNS = 3
 
 @dataclass(frozen=True)
 class LongTable:
-    """Rows, one a person and cell; factors in the columns' names; what stayed beside; what was understood."""
+    """Rows, one per person and cell; factors from the column names; unchanged columns; decisions."""
 
     rows: pd.DataFrame
     factors: tuple[str, ...]
@@ -218,8 +218,8 @@ def _named(levels: Sequence[Sequence[str]], separator: str) -> str:
 
 def _hint(first: str, pattern: str) -> str:
     return (
-        f"; the table looks wide (a column like '{first}' a cell): make it long with "
-        f"analysis reshape FILE --columns '{pattern}' --out long.csv"
+        f"; the table looks wide (one column per cell, such as '{first}'); make it long with analysis "
+        f"reshape FILE --columns '{pattern}' --out long.csv"
     )
 
 
@@ -253,7 +253,7 @@ def lengthen(path: Path, pattern: str, rating: str) -> LongTable:
     for name in (*factors, rating):
         if name in beside:
             raise InputError(
-                f"{path.name} has a column '{name}' already; choose another name for the new one"
+                f"{path.name} already has a column '{name}'; choose another name for the new column"
             )
     read = reader.cells(header)
     cells = _with_words(read, beside)
@@ -270,7 +270,7 @@ def lengthen(path: Path, pattern: str, rating: str) -> LongTable:
 
 
 def _with_words(read: Cells, beside: Sequence[str]) -> pd.DataFrame:
-    """Words in the place of the codes of what stays beside, where each code has a word of its own."""
+    """Labels instead of codes in unchanged columns, where each code has a different label."""
     words = {name: read.labels[name] for name in beside if name in read.labels}
     distinct = {name: dict(of) for name, of in words.items() if len(set(of.values())) == len(of)}
     return read.rows.assign(**{name: read.rows[name].replace(of) for name, of in distinct.items()})
@@ -278,7 +278,7 @@ def _with_words(read: Cells, beside: Sequence[str]) -> pd.DataFrame:
 
 def _refuse_pattern(pattern: str, factors: tuple[str, ...]) -> None:
     if not factors:
-        raise InputError(f"'{pattern}' names no factor; expected e.g. '{{face}}_{{blur}}'")
+        raise InputError(f"'{pattern}' names no factor; expected, for example, '{{face}}_{{blur}}'")
     if len(set(factors)) < len(factors):
         raise InputError(f"'{pattern}' names a factor twice")
     if re.search(r"\}\{", pattern):

@@ -24,9 +24,9 @@ def abilities_table(result: PairsResult, name: str, synthetic: bool = False) -> 
         is_reference = item.name == result.reference
         row += [DASH if is_reference else interval((item.ci_low, item.ci_high)), p_value(item.p)]
         rows.append((*row, f"{item.wins}/{item.losses}/{item.ties}"))
-    said = f"Abilities in {result.scale}; '{result.reference}' is 0. W/L/T: won, lost, tied."
+    said = f"Abilities in {result.scale}; '{result.reference}' is fixed at 0. W/L/T: won, lost, tied."
     if robust:
-        said += " CI and p by the model's SE; robust p of every difference stand with the differences."
+        said += " CI and p use the model's SE; robust p values are in the table of differences."
     notes = (said,)
     title = caption("Abilities", name, synthetic)
     return Table("abilities", title, tuple(header), tuple(rows), 1, notes)
@@ -59,13 +59,13 @@ def _which_errors(result: PairsResult, robust: bool) -> str:
     """Which errors the p of the contrasts go by, and which to read."""
     if not robust:
         return (
-            "SE, z and p by the model, which takes every comparison for one of another rater; with "
-            "raters named there are robust ones too. p corrected by Holm."
+            "SE, z and p assume that every comparison is from a different rater. Name the column of raters "
+            "to add robust errors. p is Holm-corrected."
         )
     return (
-        "SE, z and p by the model, which takes every comparison for one of another rater; robust: raters as "
-        f"clusters, t on {(result.n_participants or 1) - 1} df. Where raters gave several comparisons and "
-        "differ, the robust p are those to report. p corrected by Holm."
+        "SE, z and p assume that every comparison is from a different rater. Robust: raters as clusters, t "
+        f"on {(result.n_participants or 1) - 1} df. Report the robust p if raters gave several comparisons. "
+        "p is Holm-corrected."
     )
 
 
@@ -99,7 +99,7 @@ def pairs_text(result: PairsResult, name: str, synthetic: bool = False) -> str:
         said.append(f"Two equal items tie with probability {fixed(result.tie_probability_max)}.")
     triples = result.transitivity
     if triples.triples:
-        said.append(f"{triples.weak_violations} of {triples.triples} triples break weak transitivity.")
+        said.append(f"{triples.weak_violations} of {triples.triples} triples violated weak transitivity.")
     return " ".join([*said, *(f"{decision}." for decision in result.decisions)])
 
 
@@ -135,7 +135,7 @@ def threshold_table(result: ThresholdsResult, name: str, synthetic: bool = False
     )
     header = ("Condition", "Threshold", "95% CI", "Spread", "x .75", "Lapse", "fit p", "Trials")
     notes = (
-        ("All trials pooled: where people differ the slope is flatter and the interval too narrow.",)
+        ("All trials pooled: if people differ, the slope is flatter and the interval is too narrow.",)
         if result.means
         else ()
     )
@@ -159,8 +159,8 @@ def means_table(result: ThresholdsResult, name: str, synthetic: bool = False) ->
     )
     header = ("Condition", "People", "Threshold", "SE", "95% CI", "SD")
     notes = (
-        "Mean of the thresholds of single people, weighed by their errors (random effects by REML, Hartung "
-        "and Knapp's interval). SD: how far people's own thresholds differ.",
+        "Mean of the individual thresholds, weighted by their errors (random effects by REML, "
+        "Hartung-Knapp interval). SD: between-person standard deviation of thresholds.",
         *_without_threshold(result),
     )
     title = caption("Thresholds, mean over people", name, synthetic)
@@ -174,9 +174,9 @@ def _without_threshold(result: ThresholdsResult) -> list[str]:
         everybody = [one.participant for one in result.people if one.condition == mean.condition]
         if lacking := len(everybody) - mean.people:
             said.append(
-                f"{mean.condition}: {lacking} of {len(everybody)} people have no threshold of their own and "
-                "are not in the mean, which is off where theirs lie outside the levels shown; "
-                "--hierarchical counts everybody."
+                f"{mean.condition}: {lacking} of {len(everybody)} people have no individual threshold and "
+                "are not in the mean. The mean is biased if their thresholds are outside the levels shown. "
+                "Add --hierarchical to include everybody."
             )
     return said
 
@@ -197,7 +197,12 @@ def population_table(result: ThresholdsResult, name: str, synthetic: bool = Fals
         for condition, fit in result.population.items()
     )
     header = ("Condition", "Threshold", "95% CI", "SD", "Spread", "SD of log", "People")
-    notes = ("Threshold and log spread are normal over people; profile likelihood interval of the mean.",)
+    notes = (
+        (
+            "Threshold and log spread are normally distributed over people. The interval of the mean is a "
+            "profile likelihood interval."
+        ),
+    )
     return Table("population", caption("Thresholds over people", name, synthetic), header, rows, 1, notes)
 
 
@@ -292,14 +297,14 @@ def _parameters(result: PlanesResult, variables: tuple[str, str], name: str, syn
     ]
     for condition, means in result.means.items():
         if means.threshold is not None and means.tilt is not None:
-            label = f"{condition}, mean of {means.threshold.people} own fits"
+            label = f"{condition}, mean of {means.threshold.people} individual fits"
             cells = (*_average(means.threshold), *_average(means.tilt))
             rows.append((label, *cells, DASH, DASH, DASH))
     header = ("Condition", "Threshold", "95% CI", "Tilt", "95% CI", "Spread", "fit p", "Trials")
     middle = next(iter(result.pooled.values())).middle
     notes = (
-        f"Threshold: in {variables[0]}, where {variables[1]} is {middle:g}. "
-        f"Tilt: change of the threshold per unit of {variables[1]}.",
+        f"Threshold: {variables[0]} at {variables[1]} = {middle:g}. Tilt: change of the threshold per unit "
+        f"of {variables[1]}.",
         *_of_people(result),
     )
     title = caption("Thresholds over two variables", name, synthetic)
@@ -314,7 +319,7 @@ def _of_people(result: PlanesResult) -> tuple[str, ...]:
         f"{condition}: {fixed(fit.threshold_sd, 3)} and {fixed(fit.tilt_sd, 3)}"
         for condition, fit in result.population.items()
     ]
-    said = "All trials: as if one person had given them, too sure where people differ."
+    said = "All trials: treated as if from one person. The intervals are too narrow if people differ."
     return (said, f"SD between people of threshold and tilt: {'; '.join(differ)}.") if differ else (said,)
 
 
@@ -353,10 +358,10 @@ def plane_text(result: PlanesResult, variables: tuple[str, str], name: str, synt
     first = next(iter(result.pooled.values()))
     said = [
         f"{mark_name(name, synthetic)}: {first.shape} psychometric function of {variables[0]} whose "
-        f"threshold is a straight line over {variables[1]}, guess rate {first.guess:g}, "
-        f"lapse rate {first.lapse:g}, {result.n_trials} trials; profile likelihood intervals."
+        f"threshold varies linearly with {variables[1]}, guess rate {first.guess:g}, lapse rate "
+        f"{first.lapse:g}, {result.n_trials} trials; profile likelihood intervals."
     ]
     said += [
-        f"{condition}: no function was fitted, {reason}." for condition, reason in result.reasons.items()
+        (f"{condition}: no function was fitted: {reason}.") for condition, reason in result.reasons.items()
     ]
     return " ".join([*said, *(f"{decision}." for decision in result.decisions)])

@@ -72,7 +72,7 @@ class Part:
     more : callable
         Makes further sections, which takes more.
     beside : callable
-        Makes files that lie beside the report, by name; it is told the key of this part.
+        Makes further files of the report's folder, by name; it receives the key of this part.
     key : str
         What the names of this part's files begin with, where there are several.
     brief : tuple of str
@@ -151,8 +151,8 @@ class Contents:
 
     @property
     def warning(self) -> str:
-        """What stands beside the mark of synthetic data."""
-        return f"No person gave these {self.given}; nothing here is a result about people."
+        """The text next to the mark of synthetic data."""
+        return f"No person gave these {self.given}. Nothing here is a finding about people."
 
 
 def held_against(

@@ -10,11 +10,12 @@ from analysis.report.formats import Table
 from experiments.columns.base import VERDICTS
 from experiments.columns.runs import EVIDENCE_COLUMNS
 
-TITLE = "Evidence that answers are a person's"
+TITLE = "Evidence that responses are from a person"
 ABOUT = (
-    "Each run has one verdict from the tickets, times, digests and presses that came with its answers. It is "
-    "evidence, not proof: it does not tell a person who lets a program choose the answers. Runs whose page "
-    "brought no evidence are not judged. Nothing is left out by a verdict unless a rule of the study says so."
+    "Each run has one verdict. It is based on the tickets, times, digests and key presses that came with "
+    "the responses. A verdict is evidence, not proof: it cannot detect a person who lets a program choose "
+    "the responses. Runs without evidence are not judged. A verdict excludes no one unless a rule of the "
+    "study says so."
 )
 
 

@@ -38,7 +38,7 @@ _SPREAD = 0.62
 
 @dataclass(frozen=True)
 class FigureSpec:
-    """What to draw: the factors along the axis (several are combined), and the factor shown by colour.
+    """What to draw: the factors along the axis (several are combined), and the factor shown by color.
 
     `key` names its files and its label in LaTeX: letters, digits, `-` and `_` of ASCII.
     """
@@ -120,7 +120,7 @@ def bars_of(analysis: Analysis) -> str:
     With groups or covariates they are the estimated marginal means of the table, and their intervals.
     """
     if _of_participants_alone(analysis):
-        return "Bars: 95% CI within participants (Cousineau-Morey)."
+        return "Bars: 95% within-participant CI (Cousineau-Morey)."
     covariates = ", ".join(covariate.name for covariate in analysis.anova.between.covariates)
     adjusted = f" at the mean of {covariates} (participants' points are not adjusted)" if covariates else ""
     return f"Means and bars: estimated marginal means{adjusted} and their 95% CI, as in the table."

@@ -80,7 +80,7 @@ def _fold(text: str, width: int) -> list[str]:
 def wrap(text: str, width: int = WIDTH, indent: str = "  ") -> list[str]:
     """Break a sentence at its spaces into lines of at most `width`, later ones indented.
 
-    A longer word, such as a path that is to be copied, has a line of its own.
+    A longer word, such as a path that is to be copied, has a separate line.
     """
     lines, line = [], ""
     for word in text.split():
@@ -111,7 +111,7 @@ LINE_CHARACTERS = 100
 """Characters of a table's font in a line of LaTeX's page, some spared."""
 GAP_CHARACTERS = 2
 CM_A_CHARACTER, CM_BESIDE = 0.19, 0.48
-"""Of Word's tables at 8 points: a character, bold ones too, and the space beside a cell's text."""
+"""Of Word's tables at 8 points: a character, bold ones too, and the space around a cell's text."""
 FEWEST_CM = 2.4
 
 

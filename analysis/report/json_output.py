@@ -22,7 +22,7 @@ def as_data(analysis: Analysis) -> dict[str, Any]:
     Keys: name, title, source, synthetic, rating, factors, levels, n_participants, participants, effects,
     marginal_means, pairwise, dropped, decisions,
     robust (null unless asked for), and exclusions (null for a table without a declaration).
-    Beside `multivariate`, `mauchly` and `univariate` stands `..._reason`: why a test is null, else null.
+    `multivariate`, `mauchly` and `univariate` each have a `..._reason`: why a test is null, else null.
     """
     cells = analysis.cells
     return {
@@ -135,7 +135,7 @@ def study_data(prepared: "PlanRows", people: int) -> dict[str, Any]:
     Parameters
     ----------
     people : int
-        Those who are analysed.
+        Those who are analyzed.
     """
     experiment = prepared.experiment
     return {
@@ -149,7 +149,7 @@ def study_data(prepared: "PlanRows", people: int) -> dict[str, Any]:
 
 
 def exclusions_data(exclusions: "Exclusions") -> dict[str, Any]:
-    """Who and what was left out."""
+    """Exclusions and decisions."""
     return {
         "runs": [asdict(run) for run in exclusions.runs],
         "trials": [asdict(dropped) for dropped in exclusions.trials],
@@ -159,21 +159,21 @@ def exclusions_data(exclusions: "Exclusions") -> dict[str, Any]:
     }
 
 
-# Who and what was left out of an analysis, in words.
+# Exclusions and decisions of an analysis, in words.
 
 
 def left_out(exclusions: "Exclusions") -> tuple[str, ...]:
-    """Who and what was left out and why, a line each; a line that says so where nothing was."""
+    """Exclusions and decisions with their reasons, one line each; a single line if there are none."""
     lines = [
         f"participant {run.participant}{f' (run {run.run})' if run.run != run.participant else ''} excluded: "
         f"{'; '.join(run.reasons)}"
         for run in exclusions.runs
     ]
     lines += [
-        f"{d.trials} trials of {d.participants} participants dropped: {d.rule}" for d in exclusions.trials
+        f"{d.trials} trials of {d.participants} participants excluded: {d.rule}" for d in exclusions.trials
     ]
     lines += [f"set aside: {aside}" for aside in exclusions.set_aside]
     lines += [f"rule not applied: {reason}" for reason in exclusions.not_applied]
     if not exclusions.runs and not exclusions.trials:
-        lines.insert(0, f"no participant and no trial excluded (of {exclusions.n_runs} participants)")
+        lines.insert(0, f"no participant or trial was excluded (of {exclusions.n_runs} participants)")
     return tuple(lines)

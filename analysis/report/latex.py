@@ -62,7 +62,7 @@ def latex_text(text: str) -> str:
 def as_latex(table: Table, position: str = "") -> str:
     """A table by booktabs with caption, label and notes; a long one is broken over pages.
 
-    `position` is the option of a floating table: `[H]` keeps it where it stands.
+    `position` is the option of a floating table: `[H]` keeps it in place.
     """
     caption = f"\\caption{{{latex_text(table.title)}}}\\label{{tab:{table.key}}}"
     heads = " & ".join(_in_italics(head) for head in heading_pieces(table.header))
@@ -98,7 +98,7 @@ def _columns(table: Table) -> str:
 
 
 def as_document(contents: Contents, parts: tuple[DrawnPart, ...], version: str) -> str:
-    """Everything that the page says as a document, figures beside it as PNG.
+    """The whole page as a document, with figures as PNG in the same folder.
 
     Parameters
     ----------
@@ -121,8 +121,8 @@ def as_document(contents: Contents, parts: tuple[DrawnPart, ...], version: str) 
     body.append(latex_text(f"{contents.lead}, from {contents.source}."))
     for part in parts:
         body += _lines(f"In brief: {part.title}" if part.title else "In brief", part.brief)
-    left_out = (*contents.left_out, *contents.decisions) or ("nothing; every row counts",)
-    body += _lines("Who and what was left out", left_out)
+    left_out = (*contents.left_out, *contents.decisions) or ("none; every row was analyzed",)
+    body += _lines("Exclusions and decisions", left_out)
     for part in parts:
         body += _part(part, contents.synthetic)
     if contents.evidence:

@@ -53,11 +53,11 @@ def multiverse_picture(analysis: Analysis, result: "Multiverse") -> Picture:
         for axes in (upper, lower):
             axes.axvline(declared, color="#999999", linewidth=5, alpha=0.25, zorder=0)
         low, high = order[-1].n_participants, order[0].n_participants
-        note = f"A column is a choice of exclusion rules, N from {high} to {low}; shaded: as declared."
+        note = f"Each column is one choice of exclusion rules, N from {high} to {low}; shaded: as declared."
         if len(drawn) < p.shape[1]:
             note += f" The {len(drawn)} effects of {p.shape[1]} with the smallest p as declared."
         write_note(figure, note, analysis.synthetic)
-    what = "p of every effect under each choice among the declared exclusion rules"
+    what = "p of every effect under each choice of the declared exclusion rules"
     return Picture(
         "figure-multiverse",
         "Multiverse of exclusions",

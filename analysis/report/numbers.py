@@ -47,7 +47,7 @@ def p_value(value: float) -> str:
 
 
 def apa_p(value: float) -> str:
-    """p as it stands in a sentence: `p = .020`, `p < .001`."""
+    """p as written in a sentence: `p = .020`, `p < .001`."""
     if not math.isfinite(value):
         return "p undefined"
     text = p_value(value)
@@ -104,7 +104,7 @@ def pieces(text: str) -> list[tuple[str, bool]]:
 def heading_pieces(header: Sequence[str]) -> list[list[tuple[str, bool]]]:
     """The heads of a table's columns in pieces; True where one is the symbol of a statistic.
 
-    A level may be called F or t: alone such a letter is a symbol beside a p or degrees of freedom only, and
+    A level may be called F or t: alone such a letter is a symbol only next to a p or degrees of freedom, and
     what follows a colon is a level.
 
     Examples

@@ -28,7 +28,7 @@ def sentences(findings: Findings, items: Sequence[str]) -> tuple[str, ...]:
     """Whether items differ and in which order, what each factor does, and how well the model holds."""
     result = findings.abilities
     if result is None:
-        return (f"The abilities of {len(items)} cells were not fitted: {findings.abilities_reason}.",)
+        return (f"The abilities of the {len(items)} cells were not fitted: {findings.abilities_reason}.",)
     said = [_equality(findings, result), _ranking(result)]
     if findings.factors is not None:
         said += [_factor(test) for test in findings.factors.factors if test.df > 0]
@@ -40,8 +40,8 @@ def sentences(findings: Findings, items: Sequence[str]) -> tuple[str, ...]:
 def _equality(findings: Findings, result: PairsResult) -> str:
     if findings.equal is None:
         return (
-            "Some cell won or lost every comparison with the others, so that its ability is finite only by "
-            "Firth's penalty; equal abilities were not tested."
+            "At least one cell won or lost every comparison, so its ability is finite only because of "
+            "Firth's penalty. Equal abilities were not tested."
         )
     test = findings.equal
     verdict = "differed" if test.p < SIGNIFICANCE else "did not differ significantly"
@@ -54,31 +54,36 @@ def _equality(findings: Findings, result: PairsResult) -> str:
 def _ranking(result: PairsResult) -> str:
     ranked = sorted(result.items, key=lambda item: (item.rank, item.name))
     named = [f"{item.name} ({fixed(item.centred)}, SE = {fixed(item.se_centred)})" for item in ranked]
-    return f"From most to least chosen, abilities in {result.scale}, against their mean: {'; '.join(named)}."
+    return (
+        f"Abilities relative to their mean ({result.scale}), from most to least chosen: {'; '.join(named)}."
+    )
 
 
 def _factor(test: FactorTest) -> str:
     statistic = f"χ²({test.df}) = {fixed(test.chi2)}, {apa_p(test.p)}"
     if test.factor == LACK_OF_FIT:
-        fits = "do not tell the whole" if test.p < SIGNIFICANCE else "suffice"
-        return f"Effects of single factors {fits} (free abilities against their sum), {statistic}."
+        fits = "do not fully account for the abilities" if test.p < SIGNIFICANCE else "suffice"
+        return (
+            f"The main effects of the factors {fits} (free abilities compared with their sum), {statistic}."
+        )
     verdict = "was significant" if test.p < SIGNIFICANCE else "was not significant"
     levels = [
         f"{level} {fixed(estimate)} (SE = {fixed(se)})"
         for level, estimate, se in zip(test.levels, test.estimates, test.standard_errors, strict=True)
     ]
     return (
-        f"The effect of {test.factor} {verdict}, {statistic}. Against {test.reference}: {', '.join(levels)}."
+        f"The effect of {test.factor} {verdict}, {statistic}. Relative to {test.reference}: "
+        f"{', '.join(levels)}."
     )
 
 
 def _checks(findings: Findings, result: PairsResult) -> list[str]:
     said, fit = [], result.goodness
     if fit.df > 0 and math.isfinite(fit.p) and not result.firth:
-        holds = "departs from" if fit.p < SIGNIFICANCE else "does not depart significantly from"
+        holds = "departed from" if fit.p < SIGNIFICANCE else "did not depart significantly from"
         said.append(
-            f"The share of choices in the pairs {holds} the model, χ²({fit.df}) = {fixed(fit.deviance)}, "
-            f"{apa_p(fit.p)}."
+            f"The proportion of choices in the pairs {holds} the model, χ²({fit.df}) = "
+            f"{fixed(fit.deviance)}, {apa_p(fit.p)}."
         )
     if findings.order is not None:
         side = findings.order
@@ -89,7 +94,7 @@ def _checks(findings: Findings, result: PairsResult) -> list[str]:
         )
     triples = result.transitivity
     if triples.triples:
-        said.append(f"{triples.weak_violations} of {triples.triples} triples break weak transitivity.")
+        said.append(f"{triples.weak_violations} of {triples.triples} triples violated weak transitivity.")
     return said
 
 
@@ -99,17 +104,17 @@ METHODS = {
         "the difference of their abilities. "
     ),
     "davidson": (
-        "Abilities of the cells by Davidson's (1970) model, which has ties as a third outcome: a tie is the "
-        "likelier the closer two abilities lie. "
+        "Abilities of the cells by Davidson's (1970) model, which has ties as a third outcome: the closer "
+        "two abilities are, the more likely is a tie. "
     ),
 }
 FURTHER = (
     "Maximum likelihood; robust SE treat each rater's comparisons as one cluster (Liang and Zeger 1986). "
-    "Tests of factors compare likelihoods with and without the factor, all other factors kept; levels are "
-    "compared with the first declared one. The lack of fit tests free abilities against the sum of the "
-    "factors' effects. Differences between items are corrected by Holm. The advantage of the left (first) "
-    "side is a parameter of its own beside free abilities. Transitivity counts triples of items, ties as "
-    "half a choice for each."
+    "Each factor is tested by the likelihood ratio with and without it, keeping all other factors; levels "
+    "are compared with the first declared one. The lack-of-fit test compares free abilities with the sum of "
+    "the factors' effects. Differences between items are Holm-corrected. The advantage of the left (first) "
+    "side is a separate parameter, fitted together with free abilities. Transitivity is counted over "
+    "triples of items; a tie counts as half a choice for each."
 )
 
 

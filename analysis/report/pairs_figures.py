@@ -11,7 +11,7 @@ from analysis.report.contents import Picture
 from analysis.report.pictures import COLOURS, STYLE, in_both_formats, new_figure, write_note
 
 NUMBERED_MAX = 14
-"""More items than this and the shares are colours without numbers."""
+"""More items than this and the shares are colors without numbers."""
 
 
 def draw_abilities(result: PairsResult, synthetic: bool, people: int) -> Picture:
@@ -34,13 +34,13 @@ def draw_abilities(result: PairsResult, synthetic: bool, people: int) -> Picture
             markersize=5,
         )
         axes.set_yticks(rows, [item.name for item in ranked])
-        axes.set_xlabel(f"Ability against the mean of all, {result.scale}")
+        axes.set_xlabel(f"Ability relative to the mean, {result.scale}")
         axes.grid(axis="x", linewidth=0.4, alpha=0.5)
         axes.set_axisbelow(True)
         note = f"N = {people}, {result.n_comparisons} comparisons. Bars: 95% intervals, sum-to-zero."
         write_note(figure, note, synthetic, "comparisons")
         best = ranked[-1].name
-        alt = f"Abilities of {len(ranked)} cells with 95% intervals, from the most chosen, {best}, down"
+        alt = f"Abilities of {len(ranked)} cells with 95% intervals; {best} was chosen most often"
         return Picture("figure-abilities", "Abilities", alt, *in_both_formats(figure))
 
 
@@ -67,8 +67,8 @@ def draw_choices(pairs: Sequence[PairCount], synthetic: bool, people: int) -> Pi
                 axes.text(column, row, f"{share:.2f}", ha="center", va="center", fontsize=8, color=ink)
         axes.spines[:].set_visible(False)
         figure.colorbar(drawn, ax=axes, label="share chosen")
-        write_note(figure, f"N = {people}. Ties count half for each.", synthetic, "comparisons")
-        alt = "Share of comparisons in which the cell of the row was chosen over the cell of the column"
+        write_note(figure, f"N = {people}. A tie counts as half a choice for each.", synthetic, "comparisons")
+        alt = "Proportion of comparisons in which the row's cell was chosen over the column's cell"
         return Picture(
             "figure-choices",
             "Choices in each pair",

@@ -1,4 +1,4 @@
-"""What all figures share: colours, style, and bytes that do not differ from run to run."""
+"""What all figures share: colors, style, and bytes that do not differ from run to run."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -19,7 +19,7 @@ from matplotlib.ticker import FixedFormatter, FuncFormatter
 FONT = "DejaVu Sans"
 """Comes with matplotlib: Latin, Greek, Cyrillic, Arabic, hardly any Chinese, Japanese or Korean."""
 
-_NOTE = "Letters for which no font was at hand stand as their numbers (U+...)."
+_NOTE = "Letters without an installed font are shown as their code points (U+...)."
 
 
 def _charmap(path: str) -> frozenset[int]:
@@ -67,9 +67,9 @@ def _add_to_note(figure: Figure) -> None:
 def further_letters(figure: Figure) -> Iterator[None]:
     """Within it the figure is drawn with fonts of this machine for the letters that its own font lacks.
 
-    A letter that no font here has stands as its number, and the figure's note says so: two levels of
-    boxes could not be told apart. A figure whose letters its own font has is drawn as it is, whatever
-    is installed.
+    A letter that no font here has is shown as its code point, with a note in the figure: two levels of boxes
+    could not be distinguished. A figure whose letters its own font has is drawn as it is, whatever is
+    installed.
     """
     texts = [text for text in figure.findobj(Text) if isinstance(text, Text)]
     letters = missing_characters([text.get_text() for text in texts])
@@ -93,7 +93,8 @@ def further_letters(figure: Figure) -> Iterator[None]:
 
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F6A00", "#444444")
-"""Okabe and Ito's palette, told apart with every common colour vision; markers tell levels apart as well."""
+"""Okabe and Ito's palette, distinguishable with every common color vision; markers also distinguish
+levels."""
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 STYLE: dict[Any, Any] = {
     "font.family": FONT,
@@ -119,7 +120,7 @@ def new_figure(width: float = 7.2, height: float = 4.4) -> Figure:
 
 
 def wrap_text(text: str, characters: int) -> str:
-    """The text in lines of at most so many characters, each of its own lines by itself."""
+    """The text in lines of at most so many characters; its line breaks are kept."""
     lines = [
         piece
         for line in text.split("\n")

@@ -21,16 +21,15 @@ if TYPE_CHECKING:
     from analysis.thresholds.series import Difference
 
 METHODS = (
-    "P(x, z) = guess + (1 - guess - lapse) F((x - t - b (z - z0)) / s), F the normal distribution "
-    "function, x the {first}, z the {second}, with the declared guess rate {guess:g} and lapse rate "
-    "{lapse:g}, by maximum likelihood: the threshold t at the middle z0 moves by the tilt b along z. "
-    "Intervals are 95% profiles of the likelihood. 'fit p' tests the line and the shape against the "
-    "shares at every stimulus. Over people, thresholds and tilts are normal random variables, fitted by "
-    "marginal maximum likelihood to everybody's answers (profiles with the quantile of F(1, people - 1)); "
-    "means of own fits are random effects by REML, with Hartung-Knapp intervals. Series "
-    "are compared within people by paired t tests, those of groups of people by "
-    "Welch's, corrected by Holm. Stimuli were chosen by the answers before them; the likelihood is the "
-    "same as if they had been fixed. "
+    "P(x, z) = guess + (1 - guess - lapse) F((x - t - b (z - z0)) / s), F the normal distribution function, "
+    "x the {first}, z the {second}, with the declared guess rate {guess:g} and lapse rate {lapse:g}, by "
+    "maximum likelihood: the threshold t at the middle z0 moves by the tilt b along z. Intervals are 95% "
+    "profiles of the likelihood. 'fit p' tests the line and the shape against the proportions at every "
+    "stimulus. Over people, thresholds and tilts are normal random variables. They are fitted to all "
+    "responses by marginal maximum likelihood (profiles with the quantile of F(1, people - 1)). Means of "
+    "individual fits are random-effects means (REML, Hartung-Knapp intervals). Series are compared within "
+    "people by paired t tests and between groups by Welch's t tests, Holm-corrected. Stimuli depended on "
+    "earlier responses; the likelihood is the same as for fixed stimuli. "
 )
 
 
@@ -50,8 +49,10 @@ def contents_of(
     return Contents(
         name=experiment.name,
         title=experiment.title,
-        lead=f"{people} participants, {len(prepared.rows)} trials of {len(fits)} series along "
-        f"{' and '.join(variables)}",
+        lead=(
+            f"{people} participants, {len(prepared.rows)} trials in {len(fits)} series of "
+            f"{' and '.join(variables)}"
+        ),
         source=prepared.source,
         synthetic=prepared.synthetic,
         n_participants=people,
@@ -98,7 +99,7 @@ def merge(fits: "Sequence[SeriesPlane]") -> PlanesResult | None:
 
 def sentences(fits: "Sequence[SeriesPlane]", variables: tuple[str, str]) -> tuple[str, ...]:
     """The threshold and the tilt of each series."""
-    said = [f"{fit.label}: no function was fitted, {fit.reason}." for fit in fits if fit.reason]
+    said = [f"{fit.label}: no function was fitted: {fit.reason}." for fit in fits if fit.reason]
     for series in fits:
         if series.result is None:
             continue
@@ -118,9 +119,9 @@ def _line_in_words(result: PlanesResult, second: str) -> str:
     known = (low is not None and low > 0) or (high is not None and high < 0)
     verdict = f"so that it depends on {second}" if known else "an interval that includes 0"
     return (
-        f"the threshold {of} was {fixed(fit.threshold, 3)}, 95% CI {interval_text(fit.threshold_ci)}, where "
-        f"{second} is {pooled.middle:g}. Its tilt, the change per unit of {second}, was "
-        f"{fixed(fit.tilt, 3)}, 95% CI {interval_text(fit.tilt_ci)}, {verdict}."
+        f"the threshold {of} was {fixed(fit.threshold, 3)}, 95% CI {interval_text(fit.threshold_ci)}, at "
+        f"{second} = {pooled.middle:g}. Its tilt, the change per unit of {second}, was {fixed(fit.tilt, 3)}, "
+        f"95% CI {interval_text(fit.tilt_ci)}, {verdict}."
     )
 
 
@@ -130,7 +131,7 @@ def _shares(fits: "Sequence[SeriesPlane]", variables: tuple[str, str], name: str
         for fit in fits
         for x, z, n, k in zip(*fit.points, strict=True)
     )
-    header = ("Series", *variables, "Trials", "Yes or right", "Share")
+    header = ("Series", *variables, "Trials", "Yes or correct", "Share")
     title = caption("Answers at each stimulus", name, synthetic)
     return Table("threshold-shares", title, header, rows, 1, (), folded=len(rows) > 24)
 
@@ -189,8 +190,11 @@ def draw(fits: "Sequence[SeriesPlane]", variables: tuple[str, str], synthetic: b
             axes.set_xlabel(variables[1])
             axes.margins(x=0.15)
         panels[0].set_ylabel(variables[0])
-        note = f"N = {people}. Size: trials. Dark to light: share of yes, or right, 0 to 1. Line: all trials."
+        note = (
+            f"N = {people}. Size: number of trials. Dark to light: proportion of yes (or correct), 0 to 1. "
+            "Line: all trials."
+        )
         write_note(figure, note, synthetic, "answers")
-        alt = f"Thresholds of {len(fits)} series along {variables[0]} and {variables[1]}"
+        alt = f"Thresholds of {len(fits)} series over {variables[0]} and {variables[1]}"
         made = in_both_formats(figure)
         return Picture("figure-thresholds", "Lines of thresholds", alt, *made)

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from analysis.thresholds.series import Difference, SeriesFit
 
 
-# A script in R that fits the mixed and ordinal models of a report anew, and compares.
+# A script in R that fits the mixed and ordinal models of a report again, and compares.
 
 Rows = list[list[Any]]
 
@@ -131,12 +131,12 @@ def _r_columns(
 
 # Decision 0134: Blinks, not clips, are the items of mixed models.
 def _grouping(name: str) -> str:
-    """The script's column of a grouping: the one that is no participant is its item."""
+    """The script's column of a grouping: the one that is not the participant is its item."""
     return name if name == "participant" else "item"
 
 
 def _spreads(model: "OrdinalResult") -> list[tuple[str, float]]:
-    """Standard deviations as the script calls them: a group's intercept by its name, slopes by number."""
+    """Standard deviations as named in the script: a group's intercept by name, slopes by number."""
     slopes = count(1)
     return [
         (_grouping(c.group) if c.term == "intercept" else str(next(slopes)), c.sd) for c in model.components
@@ -148,7 +148,7 @@ def _ratings(
     factors: Sequence[str],
     names: dict[str, str],
 ) -> str:
-    """Trials with codes for people, items and levels, so that no name stands in code."""
+    """Trials with codes for people, items and levels, so that no name is in the code."""
     from analysis.within.level_codes import level_codes
 
     rows: pd.DataFrame = arguments["rows"]
@@ -158,14 +158,14 @@ def _ratings(
         (items + 1).tolist(),
     ]
     for name in factors:
-        # as the model codes them: the words of an SPSS file stand in the order of its codes
+        # as the model codes them: the labels of an SPSS file are in the order of its codes
         columns.append((level_codes(rows[name], name)[0] + 1).tolist())
     columns.append([r_number(value) for value in rows[arguments["rating"]]])
     header = ["participant", "item", *(names[name] for name in factors), "rating"]
     return as_csv([header, *zip(*columns, strict=True)])
 
 
-# Scripts in R that compute the reports of pairs and of thresholds anew, and compare.
+# Scripts in R that compute the reports of pairs and of thresholds again, and compare.
 
 STEEPEST = 1.0
 """A function that rises faster than this from one stimulus to the next is a step between them."""
@@ -294,7 +294,7 @@ def threshold_files(
 
 
 def _people(answers: "dict[str, Answers]") -> dict[str, str]:
-    """A code for every person, so that no name stands in code."""
+    """A code for every person, so that no name is in the code."""
     names = sorted(
         {str(name) for one in answers.values() if one.participant is not None for name in one.participant}
     )
@@ -367,7 +367,9 @@ def rscript() -> str:
     """The path of Rscript; InputError where no R is installed."""
     path = shutil.which("Rscript")
     if path is None:
-        raise InputError("--verify-with-r: no Rscript on the PATH; install R, or run verify.R elsewhere")
+        raise InputError(
+            "--verify-with-r: Rscript is not on the PATH; install R, or run verify.R on another computer"
+        )
     return path
 
 
@@ -381,12 +383,12 @@ def verify_with_r(files: Sequence[Path], say: Callable[[str], None] = lambda _: 
     files : sequence of Path
         The report's files, of which the scripts are run.
     say : callable
-        Told the name of each script of a model before it begins.
+        Called with the name of each script of a model before it begins.
 
     Raises
     ------
     InputError
-        A number differs, a package is missing, or the report has nothing that R can compute anew.
+        A number differs, a package is missing, or the report has nothing that R can recompute.
     """
     scripts = [path for path in files if path.name.endswith(SCRIPT)]
     if not scripts:
@@ -414,5 +416,5 @@ def _run(script: Path) -> str:
         said = [
             line for line in (told.stdout + told.stderr).splitlines() if "DIFFER" in line or "rror" in line
         ]
-        raise InputError(f"{script}: {' '.join(' | '.join(said).split()) or 'R ended without a word'}")
+        raise InputError(f"{script}: {' '.join(' | '.join(said).split()) or 'R ended without output'}")
     return told.stdout.strip()

@@ -1,4 +1,4 @@
-"""A script in R that computes a report's tables anew with afex, car and emmeans, and compares."""
+"""A script in R that recomputes a report's tables with afex, car and emmeans, and compares."""
 
 import csv
 import io
@@ -39,7 +39,8 @@ def head_of_script(title: str, script: str, data: str) -> dict[str, str]:
     return {"title": " ".join(title.split()), "version": version("palpebra"), "script": script, "data": data}
 
 
-# What the R script computes beside the tests: sizes, intervals, Bayes factors, equal spread, equivalence.
+# What the R script computes in addition to the tests: sizes, intervals, Bayes factors, equal spread,
+# equivalence.
 
 Names = Mapping[str, str]
 
@@ -113,7 +114,8 @@ _TAKEN = frozenset(
 
 
 def r_files(analysis: Analysis, key: str = "") -> dict[str, bytes]:
-    """The script and the cell means that it reads, by file name; `key` tells the parts of a report apart."""
+    """The script and the cell means that it reads, by file name; `key` distinguishes the parts of a
+    report."""
     script, data = (f"{key}-{name}" if key else name for name in (SCRIPT, DATA))
     names = safe_names(analysis)
     text = fill_template(
@@ -208,7 +210,7 @@ def _effects(analysis: Analysis, names: dict[str, str]) -> str:
 
 
 def _margins(analysis: Analysis) -> dict[str, tuple[str, ...]]:
-    """The factors of each margin, by its name."""
+    """The factors of each margin, by name of the margin."""
     return {mean.effect: tuple(mean.levels) for mean in analysis.means}
 
 
@@ -300,13 +302,13 @@ def _simple(analysis: Analysis, names: dict[str, str]) -> str:
     return as_csv(rows).strip()
 
 
-# A script in R that computes the robust companions of a report anew, and compares.
+# A script in R that computes the robust companions of a report again, and compares.
 
 ROBUST_SCRIPT = f"robust-{SCRIPT}"
 
 
 def robust_files(analysis: Analysis, companions: Companions, key: str = "") -> dict[str, bytes]:
-    """The script by its file name; it reads the cell means that lie beside `verify.R`."""
+    """The script by file name; it reads the cell means in the folder of `verify.R`."""
     script, data = (f"{key}-{name}" if key else name for name in (ROBUST_SCRIPT, DATA))
     names = safe_names(analysis)
     design = analysis.anova.between

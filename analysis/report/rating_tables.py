@@ -102,8 +102,8 @@ def ordinal_text(result: OrdinalResult) -> str:
     ]
     if result.slopes == "none":
         said.append(
-            "Random intercepts only: where people differ in the size of an effect its p is too small; "
-            "--slopes all lets them differ."
+            "Random intercepts only: if people differ in the size of an effect, its p is too small. Add "
+            "--slopes all to model these differences."
         )
     return " ".join([*said, *(f"{note}." for note in result.notes)])
 
@@ -128,7 +128,7 @@ def scores_table(result: OpinionResult, name: str, synthetic: bool = False) -> T
     )
     group = ("Group",) if result.n_groups > 1 else ()
     header = ("Item", *group, "MOS", "SD", "n", "95% CI", "Recovered", "SE")
-    notes = ("Recovered: biases taken off, votes weighted by consistency (alternating projection).",)
+    notes = ("Recovered: biases removed and votes weighted by consistency (alternating projection).",)
     title = caption("Mean opinion scores", name, synthetic)
     return Table("opinion", title, header, rows, 1, notes)
 
@@ -159,7 +159,7 @@ def opinion_text(result: OpinionResult, name: str, synthetic: bool = False) -> s
         f"by {len(result.participants)} people; intervals from t with n - 1 degrees of freedom."
     ]
     if rejected:
-        said.append(f"BT.500 would reject {', '.join(rejected)}; nobody was left out.")
+        said.append(f"BT.500 would reject {', '.join(rejected)}; nobody was excluded.")
     return " ".join([*said, *(f"{decision}." for decision in result.decisions)])
 
 
@@ -219,7 +219,7 @@ def intraclass_table(result: Agreement, name: str, synthetic: bool = False) -> T
         for one in result.icc
     )
     header = ("Form", "ICC", "95% CI", "F (df)", "Of what")
-    notes = (f"Over the {result.n_complete_items} items that everybody rated.",)
+    notes = (f"Computed over the {result.n_complete_items} items that everybody rated.",)
     return Table("icc", caption("Intraclass correlations", name, synthetic), header, rows, 1, notes)
 
 
@@ -227,14 +227,15 @@ def _interval_between(low: float, high: float) -> str:
     return f"[{share(low, 3)}, {share(high, 3)}]"
 
 
-# What the robust companions say, beside the ANOVA they accompany.
+# What the robust companions say in addition to the ANOVA.
 
 TEXT = (
-    "The same effects by tests that assume less. Permutation: the univariate F among those of rearranged "
-    "residuals (Freedman and Lane), whole participants kept together; within participants their signs are "
-    "flipped. Ranks: the ANOVA of aligned ranks (Wobbrock and others), p corrected by Greenhouse-Geisser. "
-    "Trimmed: pairs of levels by means without the outer fifth of participants on each side (Yuen), Holm's p "
-    "within a margin. Where these disagree with the ANOVA, look at the figures for single participants."
+    "The same effects, tested with fewer assumptions. Permutation: the univariate F is compared with those "
+    "of rearranged residuals (Freedman and Lane). Participants stay whole; within participants, signs are "
+    "flipped. Ranks: ANOVA of aligned ranks (Wobbrock and others), p with the Greenhouse-Geisser "
+    "correction. Trimmed: pairs of levels compared by means without the outer fifth of participants on each "
+    "side (Yuen), Holm-corrected within a margin. If these disagree with the ANOVA, look at individual "
+    "participants in the figures."
 )
 
 
@@ -282,16 +283,16 @@ def _rank_cells(test: RankTest | None) -> tuple[str, str, str]:
 def _rearranged(tests: tuple[PermutationTest, ...]) -> str:
     kinds = {(test.flips, test.exact, test.n_rearranged) for test in tests if test.n_rearranged}
     said = [
-        f"{'all' if exact else 'a random'} {number:,} {'flips of signs' if flips else 'orders of people'}"
+        f"{'all' if exact else 'random'} {number:,} {'sign flips' if flips else 'orders of people'}"
         for flips, exact, number in sorted(kinds)
     ]
-    return f"Permutation: {' and '.join(said)}." if said else "Nothing to rearrange: nothing varies."
+    return f"Permutation: {' and '.join(said)}." if said else "Not tested: nothing varies."
 
 
 def _pairs(analysis: Analysis, companions: Companions) -> Table:
     rows = tuple(_pair_cells(analysis, pair) for pair in companions.trimmed)
     header = ("Pair", "Difference", "SE", "t", "df", "95% CI", "p (Holm)")
-    title = caption(f"Pairs by means trimmed by {TRIM:.0%}", analysis.name, analysis.synthetic)
+    title = caption(f"Pairs of means trimmed by {TRIM:.0%}", analysis.name, analysis.synthetic)
     return Table("trimmed", title, header, rows, 1)
 
 

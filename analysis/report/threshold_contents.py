@@ -24,16 +24,18 @@ if TYPE_CHECKING:
     from analysis.thresholds.series import Difference, SeriesFit
 
 METHODS = (
-    "P(x) = guess + (1 - guess - lapse) F(x), F {function}, with the declared guess rate {guess:g} and lapse "
-    "rate {lapse:g}, by maximum likelihood; the threshold is where F is one half. Intervals are 95% profiles "
-    "of the likelihood. The first table averages the thresholds of single people (random effects by REML, "
-    "Hartung-Knapp interval); the one over all trials pools them, which flattens the slope where people "
-    "differ. Series are compared within people by paired t tests, those of groups of people by Welch's, "
-    "corrected by Holm. Stimuli were chosen by the answers before them; the likelihood is the same as if "
-    "they had been fixed. {weibull}"
+    "P(x) = guess + (1 - guess - lapse) F(x), F {function}, with the declared guess rate {guess:g} and "
+    "lapse rate {lapse:g}, by maximum likelihood; the threshold is where F is one half. Intervals are 95% "
+    "profiles of the likelihood. The first table averages the individual thresholds (random effects by "
+    "REML, Hartung-Knapp interval). The table over all trials pools them, which flattens the slope if "
+    "people differ. Series are compared within people by paired t tests and between groups by Welch's t "
+    "tests, Holm-corrected. Stimuli depended on earlier responses; the likelihood is the same as for fixed "
+    "stimuli. {weibull}"
 )
 SIGNIFICANCE = 0.05
-WEIBULL = "The declaration's Weibull has its threshold where F is 1 - 1/e; here it is where F is one half. "
+WEIBULL = (
+    "The declared Weibull function has its threshold where F = 1 - 1/e; here the threshold is where F = 1/2. "
+)
 
 
 def contents_of(
@@ -48,7 +50,7 @@ def contents_of(
     return Contents(
         name=name,
         title=experiment.title,
-        lead=f"{people} participants, {number} trials of {len(fits)} series along {axis}",
+        lead=f"{people} participants, {number} trials in {len(fits)} series of {axis}",
         source=prepared.source,
         synthetic=synthetic,
         n_participants=people,
@@ -76,7 +78,7 @@ def contents_of(
 def _r_files(
     prepared: PlanRows, fits: "Sequence[SeriesFit]", differences: "Sequence[Difference]", key: str
 ) -> dict[str, bytes]:
-    """The script that fits every function anew in R, and its trials."""
+    """The script that fits every function again in R, and its trials."""
     return threshold_files(prepared.experiment.title, fits, answers_of(prepared), differences, key)
 
 
@@ -140,7 +142,7 @@ def shares_table(fits: "Sequence[SeriesFit]", name: str, synthetic: bool) -> Tab
         for fit in fits
         for x, n, k in zip(fit.trials.x, fit.trials.n, fit.trials.k, strict=True)
     )
-    header = ("Series", "Stimulus", "Trials", "Yes or right", "Share")
+    header = ("Series", "Stimulus", "Trials", "Yes or correct", "Share")
     title = caption("Answers at each stimulus", name, synthetic)
     return Table("threshold-shares", title, header, rows, 1, (), folded=len(rows) > 24)
 
@@ -149,15 +151,15 @@ def sentences(
     fits: "Sequence[SeriesFit]", merged: ThresholdsResult, differences: "Sequence[Difference]"
 ) -> tuple[str, ...]:
     """The threshold of each series, over people where there are several, and the differences."""
-    said = [f"{fit.label}: no function was fitted, {fit.reason}." for fit in fits if fit.reason]
+    said = [f"{fit.label}: no function was fitted: {fit.reason}." for fit in fits if fit.reason]
     means, digits = {mean.condition: mean for mean in merged.means}, threshold_decimals(merged)
     for label, fit in merged.pooled.items():
         if label in means:
             mean = means[label]
             low, high = fixed(mean.ci_low, digits), fixed(mean.ci_high, digits)
             said.append(
-                f"{label}: the threshold of {mean.people} people was {fixed(mean.mean, digits)} on average, "
-                f"95% CI [{low}, {high}]."
+                f"{label}: the mean threshold of {mean.people} people was {fixed(mean.mean, digits)}, 95% CI "
+                f"[{low}, {high}]."
             )
         else:
             said.append(f"{label}: the threshold over all trials was {fixed(fit.threshold, digits)}.")
@@ -238,11 +240,11 @@ def draw(fits: "Sequence[SeriesFit]", along: str, synthetic: bool, people: int) 
                 axes.axvline(of_all.threshold, color=colour, linewidth=0.8, linestyle=":")
         axes.set_ylim(-0.03, 1.03)
         axes.set_xlabel(along)
-        axes.set_ylabel("Share of yes, or right")
+        axes.set_ylabel("Proportion of yes (or correct)")
         axes.grid(linewidth=0.4, alpha=0.5)
         axes.set_axisbelow(True)
         axes.legend(frameon=False, fontsize=8, **BESIDE)
-        note = f"N = {people}. Size: trials. Dotted: threshold over all trials."
+        note = f"N = {people}. Size: number of trials. Dotted: threshold over all trials."
         write_note(figure, note, synthetic, "answers")
         alt = f"Psychometric functions of {len(fits)} series along {along}"
         made = in_both_formats(figure)

@@ -12,12 +12,12 @@ from analysis.report.numbers import apa_p, fixed, interval, p_value
 from analysis.traces import LagResult, MeanTrace
 
 METHODS = (
-    "Ratings were sampled at frames of the clips. Each person's traces of a cell's clips were averaged, then "
-    "people; intervals are 95% t intervals over people, sample by sample. The lag is where the change of the "
-    "ratings correlates most with the onsets of blinks: circular cross-correlations, averaged over a "
-    "person's clips and then over people, up to the declared longest lag. Its interval is a bootstrap over "
-    "people; p compares the greatest correlation with those of 999 random circular shifts of each clip's "
-    "blinks. In the figure the traces are drawn earlier by this lag."
+    "Ratings were sampled at the clips' frames. Traces were averaged over the clips of a cell within each "
+    "person, and then over people. Intervals are 95% t intervals over people at each sample. The lag is "
+    "where the change in ratings correlates most with blink onsets. It is found by circular "
+    "cross-correlation up to the declared longest lag, averaged over clips and then over people. Its "
+    "interval is a bootstrap over people. The p value compares the greatest correlation with those of 999 "
+    "random circular shifts of each clip's blinks. The figure draws the traces earlier by this lag."
 )
 SIGNIFICANCE = 0.05
 
@@ -79,7 +79,7 @@ def tables(prepared: PlanRows, traces: Sequence[MeanTrace], lag: LagResult | Non
             fixed(lag.r, 3),
             p_value(lag.p),
         )
-        title = caption("Ratings behind blinks", name, synthetic)
+        title = caption("Lag of ratings after blinks", name, synthetic)
         made.append(Table("trace-lag", title, ("People", "Lag in s", "95% CI", "r", "p"), (row,), 0))
     return tuple(made)
 
@@ -87,17 +87,17 @@ def tables(prepared: PlanRows, traces: Sequence[MeanTrace], lag: LagResult | Non
 def sentences(lag: LagResult | None) -> tuple[str, ...]:
     """Whether ratings answer blinks, and after how long."""
     if lag is None:
-        return ("Clips without blinks, or one person: no lag can be told.",)
+        return ("The lag cannot be estimated: the clips have no blinks, or only one person rated them.",)
     if lag.p >= SIGNIFICANCE:
         return (
-            f"Ratings did not follow blinks: the greatest correlation of their change with blinks, "
-            f"{fixed(lag.r, 3)} at {fixed(lag.lag_s)} s, is no greater than among random shifts of them "
+            "Ratings did not follow blinks: the greatest correlation of their change with blinks, "
+            f"{fixed(lag.r, 3)} at {fixed(lag.lag_s)} s, did not exceed that of random shifts "
             f"({apa_p(lag.p)}).",
         )
     return (
         f"Ratings changed {fixed(lag.lag_s)} s after blinks, 95% CI [{fixed(lag.lag_low_s)}, "
-        f"{fixed(lag.lag_high_s)}]; their change then correlates {fixed(lag.r, 3)} with blinks, more than "
-        f"among random shifts of them ({apa_p(lag.p)}).",
+        f"{fixed(lag.lag_high_s)}]; at this lag, their change correlated {fixed(lag.r, 3)} with blinks, "
+        f"more than for random shifts ({apa_p(lag.p)}).",
     )
 
 

@@ -39,9 +39,9 @@ def traces_figure(
     for panel in panels[max(0, len(traces) - columns) : len(traces)]:
         panel.set_xlabel("Time in the clip in s" + (", less the lag" if earlier_s else ""))
         panel.tick_params(labelbottom=True)
-    note = f"Mean over people with 95% intervals, drawn {fixed(earlier_s)} s earlier than given. "
-    write_note(figure, note + "Marks: blinks, a row a clip.", synthetic, "answers")
-    alt = f"Mean rating over time in {len(traces)} cells, with the blinks of their clips"
+    note = f"Mean over people with 95% intervals, drawn {fixed(earlier_s)} s earlier than recorded. "
+    write_note(figure, note + "Marks: blinks, one row per clip.", synthetic, "answers")
+    alt = f"Mean rating over time in {len(traces)} cells, with blinks marked"
     return _picture(figure, "figure-traces", "Mean traces", alt)
 
 

@@ -110,14 +110,17 @@ MAX_LEVELS = 4
 
 
 def brief(analysis: Analysis) -> tuple[str, ...]:
-    """Who was analysed, each effect that was found with its size, and what was not shown."""
+    """Who was analyzed, each effect that was found with its size, and what was not shown."""
     tested = [effect for effect in analysis.anova.effects if math.isfinite(effect_p(analysis, effect))]
     shown = [effect for effect in tested if effect_p(analysis, effect) < SIGNIFICANCE]
-    lines = [f"{analysis.n_participants} participants with data in every cell."]
+    lines = [f"{analysis.n_participants} participants had data in every cell."]
     lines += [_line(analysis, effect) for effect in shown]
     rest = [analysis.labels.effect(effect.factors) for effect in tested if effect not in shown]
     if rest:
-        lines.append(f"No effect was shown, which is no proof of none, of: {', '.join(rest)}.")
+        lines.append(
+            "These effects were not significant (which is not evidence that they are absent): "
+            f"{', '.join(rest)}."
+        )
     return tuple(lines)
 
 
@@ -141,23 +144,23 @@ def _means(analysis: Analysis, effect: Effect) -> str:
 
 BETWEEN_METHODS = (
     " Groups (sum-to-zero contrasts) and covariates enter the multivariate linear model of the cell means; "
-    "sums of squares are of type {kind}. Means weigh groups equally and are those of a participant with the "
-    "mean of every covariate. Error df are participants less coefficients."
+    "sums of squares are type {kind}. Means weight groups equally and are evaluated at the mean of every "
+    "covariate. Error df are the number of participants minus the number of coefficients."
 )
 
 METHODS = (
-    "Cell means are unweighted means of a participant's trials; participants with an empty cell are dropped "
-    "and named. Effects are tested on orthonormal contrasts of the cell means. Multivariate: Hotelling's T², "
-    "exact F on (q, N - q) df. Univariate: corrected by Greenhouse-Geisser and Huynh-Feldt. The F reported "
-    "first is the multivariate one where every effect has an exact one and the plan does not name the "
-    "univariate one; else it is the univariate one with Greenhouse-Geisser's df, for all effects. Marginal "
-    "means and their errors come from participants' own marginal means. Pairs are t tests, paired within "
-    "participants."
+    "Cell means are unweighted means of a participant's trials. Participants with an empty cell are "
+    "excluded and listed. Effects are tested on orthonormal contrasts of the cell means. Multivariate: "
+    "Hotelling's T², exact F on (q, N - q) df. Univariate: corrected by Greenhouse-Geisser and Huynh-Feldt. "
+    "The F reported first is the exact multivariate F if every effect has one and the plan does not request "
+    "the univariate F. Otherwise it is the univariate F with Greenhouse-Geisser df, for all effects. "
+    "Marginal means and their errors are computed from each participant's marginal means. Pairs are "
+    "compared by t tests, paired within participants."
 )
 
-WITHIN_BARS = " Error bars of figures are 95% intervals within participants (Cousineau 2005, Morey 2008)."
+WITHIN_BARS = " Error bars in figures are 95% within-participant intervals (Cousineau 2005, Morey 2008)."
 
-MODEL_BARS = " Figures show the estimated marginal means of the table and their 95% intervals."
+MODEL_BARS = " Figures show the estimated marginal means from the table and their 95% intervals."
 
 
 def contents_of(
@@ -209,7 +212,7 @@ def tables_of(analysis: Analysis) -> tuple[Table, ...]:
 
 
 def scripts_of(analysis: Analysis, key: str) -> dict[str, bytes]:
-    """R scripts that compute the tables anew, and what they read."""
+    """R scripts that recompute the tables, and what they read."""
     files = r_files(analysis, key)
     if analysis.robust is None:
         return files
@@ -234,6 +237,6 @@ def draw_all(analysis: Analysis) -> tuple[Picture, ...]:
     pictures = []
     for spec in figures_of(analysis):
         figure = draw(analysis, spec)
-        shown = f"{spec.title}: mean ratings and every participant's mean. {bars_of(analysis)}"
+        shown = f"{spec.title}: mean ratings and each participant's mean. {bars_of(analysis)}"
         pictures.append(Picture(spec.key, spec.title, shown, *in_both_formats(figure)))
     return tuple(pictures)

@@ -89,7 +89,7 @@ def sphericity_table(analysis: Analysis) -> Table:
     header = ("Effect", "W", "p(W)", "ε GG", "df GG", "p GG", "ε HF", "df HF", "p HF")
     notes = (
         "W: Mauchly's test, textbook form. GG: Greenhouse-Geisser, HF: Huynh-Feldt (printed uncapped, used "
-        "as min(1, ε)). Effects with one contrast cannot violate sphericity and are left out.",
+        "as min(1, ε)). Effects with one contrast cannot violate sphericity and are not shown.",
         *_reasons(analysis, "mauchly_reason", skip="one contrast"),
     )
     return Table("sphericity", title_of(analysis, "Sphericity and corrections"), header, rows, 1, notes)
@@ -101,15 +101,13 @@ def levene_table(analysis: Analysis) -> Table:
     rows = tuple(
         (t.where, f_text(t.f_value), f"{t.df_effect}, {t.df_error}", p_value(t.p_value)) for t in tests
     )
-    notes: tuple[str, ...] = (
-        "Distances from the median of the group (Brown-Forsythe). means: over all cells.",
-    )
+    notes: tuple[str, ...] = ("Distances from the group median (Brown-Forsythe). means: over all cells.",)
     box = box_test(analysis.anova)
     if box is not None and box.chi2 is not None and box.p_value is not None:
         said = f"χ²({box.df}) = {fixed(box.chi2)}, {apa_p(box.p_value)}"
-        notes = (*notes, f"Box's M of the cells' covariance matrices: {said}.")
+        notes = (*notes, f"Box's M test of the cells' covariance matrices: {said}.")
     elif box is not None:
-        notes = (*notes, f"Box's M: none, {box.reason}.")
+        notes = (*notes, f"Box's M was not computed: {box.reason}.")
     title = title_of(analysis, "Levene's test of equal spread")
     return Table("levene", title, ("Scores", "F", "df", "p"), rows, 1, notes, folded=len(rows) > 12)
 
@@ -135,9 +133,9 @@ def multivariate_table(analysis: Analysis) -> Table:
     notes = (
         "H-L: Hotelling-Lawley trace. "
         + (
-            "All four give this one exact F."
+            "All four give the same exact F."
             if all(e.multivariate.exact for e in analysis.anova.effects if e.multivariate)
-            else "F is Pillai's; where an effect has several dimensions it is an approximation."
+            else "F is Pillai's; it is approximate for effects with several dimensions."
         ),
         *_reasons(analysis, "multivariate_reason"),
     )
@@ -145,7 +143,7 @@ def multivariate_table(analysis: Analysis) -> Table:
 
 
 def effect_size_table(analysis: Analysis) -> Table:
-    """Sizes of the univariate effects and, beside them, of the multivariate ones."""
+    """Sizes of the univariate effects and, next to them, of the multivariate ones."""
     rows = tuple(
         (
             analysis.labels.effect(e.factors),
@@ -159,8 +157,8 @@ def effect_size_table(analysis: Analysis) -> Table:
         for e in analysis.anova.effects
     )
     notes = (
-        "ηₚ², ω²ₚ (partial), ηG² (generalised): of the univariate test; its interval uses the df of "
-        "Greenhouse-Geisser. mv: ηₚ² of the multivariate test. Intervals: 95%, noncentral F (Steiger 2004).",
+        "ηₚ², ω²ₚ (partial), ηG² (generalized): univariate test; the interval uses the Greenhouse-Geisser "
+        "df. mv: ηₚ² of the multivariate test. Intervals: 95%, noncentral F (Steiger 2004).",
     )
     header = ("Effect", "ηₚ²", "95% CI", "ηG²", "ω²ₚ", "mv ηₚ²", "95% CI")
     return Table("effects", title_of(analysis, "Effect sizes"), header, rows, 1, notes)
@@ -212,8 +210,8 @@ def pairs_table(analysis: Analysis) -> Table:
     )
     notes = (
         f"t tests on participants' marginal means, df = {analysis.anova.df_error}, paired within people. "
-        "Bonf., Holm: p adjusted for the pairs of the margin. Interval: 95%, unadjusted. dz: mean difference "
-        "over its SD.",
+        "Bonf., Holm: p adjusted for the number of pairs. Interval: 95%, unadjusted. dz: mean difference "
+        "divided by its SD.",
     )
     header = ("Margin: pair", "Diff.", "95% CI", "t", "p", "Bonf.", "Holm", "dz")
     return Table("pairs", title_of(analysis, "Pairs"), header, rows, 1, notes, folded=len(rows) > 24)
@@ -229,8 +227,8 @@ def simple_effects_table(analysis: Analysis) -> Table:
         label = f"{analysis.labels.factor(simple.of)} at {analysis.labels.cell(simple.at)}"
         rows.append((label, f, df, p, p_value(simple.p_holm), share(size)))
     notes = (
-        "Each factor of a significant interaction at each level of the others, with the error of the whole "
-        "model. Holm: adjusted for the levels it is tested at. ηₚ² belongs to the F beside it.",
+        "Each factor of a significant interaction at each level of the others, with the error term of the "
+        "full model. Holm: adjusted for the number of levels tested. ηₚ² belongs to the F in the same row.",
     )
     header = ("Simple effect", "F", "df", "p", "Holm", "ηₚ²")
     title = title_of(analysis, "Simple effects")
@@ -251,8 +249,8 @@ def contrasts_table(analysis: Analysis) -> Table:
         for c in (*analysis.trends, *analysis.contrasts)
     )
     notes = (
-        "Trends: orthonormal polynomials over the levels as they are spaced. Planned contrasts: weights as "
-        "given. Interval: 95%, unadjusted.",
+        "Trends: orthonormal polynomials with the spacing of the levels. Planned contrasts: weights as "
+        "declared. Interval: 95%, unadjusted.",
     )
     header = ("Contrast", "Estimate", "95% CI", "t", "df", "p")
     return Table("contrasts", title_of(analysis, "Trends and contrasts"), header, rows, 1, notes)
@@ -322,10 +320,10 @@ def paper_table(analysis: Analysis) -> Table:
     for factor in analysis.anova.all_factors:
         rows += _factor_rows(analysis, factor, multivariate, spread)
     rows += _interaction_rows(analysis, multivariate)
-    univariate = "univariate, df and p corrected by Greenhouse-Geisser"
+    univariate = "univariate, df and p with the Greenhouse-Geisser correction"
     kind = "multivariate, df (q, N - q)" if multivariate else univariate
     notes = [
-        f"N = {analysis.n_participants}. F: {kind}. SE: standard error over participants.",
+        f"N = {analysis.n_participants}. F: {kind}. SE: standard error across participants.",
         *_pair_notes(analysis),
     ]
     header = ("Factor", "Condition", "Mean (SE)", *(("SD",) if spread else ()), "F", "df", "p")
@@ -370,9 +368,9 @@ def _pair_notes(analysis: Analysis) -> list[str]:
         ]
         name = analysis.labels.factor(factor)
         if not others:
-            notes.append(f"{name}: all {len(pairs)} pairs differ (Bonferroni, at .05).")
+            notes.append(f"{name}: all {len(pairs)} pairs differed (Bonferroni, α = .05).")
         elif len(others) == len(pairs):
-            notes.append(f"{name}: no pair differs (Bonferroni, at .05).")
+            notes.append(f"{name}: no pair differed (Bonferroni, α = .05).")
         else:
-            notes.append(f"{name}: all pairs differ (Bonferroni, at .05) but {', '.join(others)}.")
+            notes.append(f"{name}: all pairs differed (Bonferroni, α = .05) except {', '.join(others)}.")
     return notes

@@ -58,7 +58,7 @@ def as_docx(contents: Contents, parts: tuple[DrawnPart, ...], version: str) -> b
     document.add_paragraph(_sayable(f"{contents.lead}, from {contents.source}."))
     for part in parts:
         _add_lines(document, "In brief", part.brief, part.title)
-    _add_lines(document, "Who and what was left out", (*contents.left_out, *contents.decisions))
+    _add_lines(document, "Exclusions and decisions", (*contents.left_out, *contents.decisions))
     for part in parts:
         _add_part(document, part, contents.synthetic)
     if contents.evidence:
@@ -246,7 +246,7 @@ def _lay_out(grid: "Grid", widths: list[float], noted: bool) -> None:
 
 
 def _mark(row: "_Row", name: str) -> None:
-    """Give a row a property that python-docx has no name for."""
+    """Set a property of a row for which python-docx has no name."""
     from docx.oxml import OxmlElement
 
     row._tr.get_or_add_trPr().append(OxmlElement(f"w:{name}"))

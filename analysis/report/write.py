@@ -63,7 +63,7 @@ def write_report(
     """Write every file of the report into `folder`, each whole or not at all; give back their paths.
 
     Files: report.html, report.md, report.docx, report.tex, tables.tex, results.json, figure-*.png and
-    .svg, and what a part lays beside. `more` adds the sections that take long.
+    .svg, and the further files of a part. `more` adds slow sections.
     """
     make_folder(folder)
     progress("figures")
@@ -107,7 +107,7 @@ def make_folder(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"cannot make the folder {folder}: {error.strerror}") from error
+        raise InputError(f"cannot create the folder {folder}: {error.strerror}") from error
 
 
 def _latex(contents: Contents, parts: tuple[DrawnPart, ...]) -> str:
@@ -125,12 +125,15 @@ def self_check(said: tuple[str, ...]) -> str:
     """What `check-paper` finds in the report's own sentences, in words."""
     result = check_text(plain("\n\n".join(said)))
     if not result.statistics:
-        return "Checked by analysis check-paper: no number here can be recomputed from those beside it."
+        return (
+            "Checked by analysis check-paper: no statistic in these sentences can be recomputed from the "
+            "others."
+        )
     alone = len(result.unread)
-    more = f"; {alone} more cannot be recomputed from what stands beside them" if alone else ""
+    more = f"; {alone} more cannot be recomputed from the sentence" if alone else ""
     return (
         f"Checked by analysis check-paper: {len(result.statistics)} statistics read in these sentences, "
-        f"{result.n_checked} recomputed from their own df, {result.n_wrong} do not fit{more}."
+        f"{result.n_checked} recomputed from their df, {result.n_wrong} inconsistent{more}."
     )
 
 

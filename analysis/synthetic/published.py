@@ -201,7 +201,7 @@ class DesignSpace:
             raise InputError(f"no factor '{factor}'{did_you_mean(factor, self.factors)}")
         names = self.levels[self.factors.index(factor)]
         if level not in names:
-            raise InputError(f"'{level}' is no level of '{factor}'{did_you_mean(level, names)}")
+            raise InputError(f"'{level}' is not a level of '{factor}'{did_you_mean(level, names)}")
 
     def levels_of(self, factor: str) -> tuple[str, ...]:
         """Level names of a factor."""

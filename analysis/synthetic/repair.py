@@ -1,4 +1,4 @@
-"""Round cell means to whole sums of ratings and mend the rounding, one or two rating points at a time."""
+"""Round cell means to whole sums of ratings and correct the rounding, one or two rating points at a time."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field

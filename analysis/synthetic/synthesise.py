@@ -253,7 +253,7 @@ def make_plan(
     _refuse_between(experiment, space)
     if name not in SHIPPED and not effects:
         raise InputError(
-            f"nothing is published of '{name}': name the effects that you expect, for example "
+            f"there are no published figures for '{name}': name the effects that you expect, for example "
             f"--effect {space.factors[0]}=6.5 (F with {experiment.participants} participants)"
         )
     published = load_published(name) if name in SHIPPED else assumed(name, rated)
@@ -305,7 +305,7 @@ def population_of(plan: Plan, rng: np.random.Generator) -> Population:
 
 
 def synthesise(plan: Plan, seed: int, progress: Callable[[int, int], None] | None = None) -> Synthetic:
-    """Draw participants and mend them until every figure holds; the best of some draws where none does.
+    """Draw participants and adjust them until every figure holds; otherwise return the best draw.
 
     The scales of a study are drawn independently: equal seeds give no equal people on two of them.
     `progress` gets (figures missed, rounds done).

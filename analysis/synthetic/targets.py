@@ -219,7 +219,7 @@ class Steps:
 
 @dataclass(frozen=True)
 class GivenWay:
-    """A printed mean that cannot hold beside the others, and the nearest one that can."""
+    """A printed mean that contradicts the others, and the nearest one that does not."""
 
     at: MarginLevels
     printed: str
@@ -250,7 +250,7 @@ def make_feasible(
                 old = published.means[position]
                 given = GivenWay(old.at, old.printed, changed[position].printed, reason)
                 return published.model_copy(update={"means": changed}), (given,)
-    raise InputError(f"the wanted means contradict each other: {reason}; change one of them")
+    raise InputError(f"the target means contradict each other: {reason}; change one of them")
 
 
 def _nudged(means: tuple[PrintedMean, ...], position: int, sign: int) -> tuple[PrintedMean, ...]:
@@ -261,7 +261,7 @@ def _nudged(means: tuple[PrintedMean, ...], position: int, sign: int) -> tuple[P
 
 
 def _possible(means: tuple[PrintedMean, ...], space: DesignSpace) -> bool:
-    """Whether some cell means lie strictly inside every window (linear programme for the largest slack)."""
+    """Whether some cell means lie strictly inside every window (linear program for the largest slack)."""
     if not means:
         return True
     rows = np.stack([space.weights(m.at) for m in means])

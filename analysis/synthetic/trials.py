@@ -222,7 +222,7 @@ def write_ratings(scales: Sequence[Synthetic], out: Path) -> int:
     Returns
     -------
     int
-        Rows: one a trial and scale.
+        Rows: one per trial and scale.
     """
     first = scales[0]
     header = RATINGS.csv_header(first.experiment.factor_names)

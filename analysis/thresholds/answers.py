@@ -67,14 +67,14 @@ def read_answers(
     second: str | None = None,
     levels: Sequence[str] = (),
 ) -> Answers:
-    """Read one row a trial: numbers `x` and `second`, and a `response` of 0/1, yes/no or correct/wrong.
+    """Read one row per trial: numbers `x` and `second`, and a `response` of 0/1, yes/no or correct/wrong.
 
     `levels` may give the order of the levels of `by` (`analysis.within.level_codes.given_orders`).
 
     Raises
     ------
     InputError
-        As `read_text_table`; a response that is neither, a stimulus that is no number.
+        As `read_text_table`; a response that is neither, a stimulus that is not a number.
     """
     named = [name for name in (participant, by) if name]
     roles = [x, response, *named, *([second] if second else [])]
@@ -89,7 +89,7 @@ def read_answers(
         keep &= np.isfinite(across)
     if not keep.all():
         lines = name_lines(table, ~keep)
-        table.decisions.append(f"{int((~keep).sum())} rows without stimulus or answer left out ({lines})")
+        table.decisions.append(f"{int((~keep).sum())} rows without stimulus or answer excluded ({lines})")
     if not keep.any():
         raise InputError(f"{path.name}: no row has both '{x}' and '{response}'")
     names = [
@@ -119,8 +119,9 @@ def _binary(table: TextTable, response: str) -> Array:
     if unknown.any():
         row = int(np.argmax(unknown))
         raise InputError(
-            f"{table.source}: '{response}' is '{table.columns[response].iloc[row]}' in line {table.line(row)}"
-            "; expected 1 or 0 (yes or no, correct or wrong), or an empty cell (or NA) where there is none"
+            f"{table.source}: '{response}' is '{table.columns[response].iloc[row]}' in line "
+            f"{table.line(row)}; expected 1 or 0 (yes or no, correct or wrong), or an empty cell (or NA) if "
+            "it is missing"
         )
     return values
 

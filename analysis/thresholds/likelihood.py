@@ -67,7 +67,7 @@ def function(shape: Shape, x: Array, location: float, log_spread: float) -> Arra
 class Likelihood:
     """The likelihood of one data set; parameters are location, log spread and, if fitted, lapse.
 
-    Where it is not said whether the function is `falling`, the answers tell, without a guess rate alone.
+    If `falling` is not given, the answers decide it, but only without a guess rate.
     """
 
     def __init__(
@@ -92,7 +92,7 @@ class Likelihood:
         return -float(self.trials.k @ np.log(p) + (self.trials.n - self.trials.k) @ np.log1p(-p))
 
     def maximum(self, held: dict[int, float], start: Array | None = None) -> tuple[Array, float]:
-        """Maximise over the parameters that are not `held`; return them all and the log-likelihood."""
+        """Maximize over the parameters that are not `held`; return them all and the log-likelihood."""
         size = 3 if self.lapse is None else 2
         free = [index for index in range(size) if index not in held]
 

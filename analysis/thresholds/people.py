@@ -31,7 +31,7 @@ class Average:
 def average(y: Array, errors: Array) -> Average | None:
     r"""Average estimates y (n,) over people, each weighted by 1 / (se^2 + tau^2); None below two people.
 
-    tau^2 maximises the restricted likelihood of
+    tau^2 maximizes the restricted likelihood of
 
     .. math::
 
@@ -87,7 +87,7 @@ class Population:
     threshold, threshold_se : float
         Mean over people of a_i, in the unit of x.
     threshold_ci : Interval
-        Profile likelihood interval (95%): all else is fitted anew.
+        Profile likelihood interval (95%): everything else is fitted again.
     threshold_sd : float
         SD of a_i between people.
     spread : float
@@ -204,17 +204,17 @@ def _positive(matrices: Array) -> Array:
 def fit_population(
     trials: Sequence[Trials], shape: Shape, guess: float, lapse: float, falling: bool
 ) -> Population:
-    """Maximise the marginal likelihood of people's trials over means and SDs of threshold and log spread.
+    """Maximize the marginal likelihood of people's trials over means and SDs of threshold and log spread.
 
     Raises
     ------
     InputError
-        Fewer than three people, or a Weibull function, whose threshold is no normal variable.
+        Fewer than three people, or a Weibull function, whose threshold is not a normal variable.
     """
     if shape not in SHAPES_WITH_POPULATION:
-        raise InputError("thresholds of a population need --function normal or logistic")
+        raise InputError("--hierarchical needs --function normal or logistic")
     if len(trials) < 3:
-        raise InputError(f"thresholds of a population need three people or more, got {len(trials)}")
+        raise InputError(f"--hierarchical needs at least three people, got {len(trials)}")
     model = PopulationLikelihood(trials, shape, guess, lapse, falling)
     x = np.concatenate([one.x for one in trials])
     width = float(np.ptp(x)) or 1.0
@@ -362,7 +362,7 @@ def with_population(
         No column names the person, a lapse rate to be fitted, or as `fit_population`.
     """
     if answers.participant is None:
-        raise InputError("--hierarchical needs --participant, the column that names the person")
+        raise InputError("--hierarchical needs --participant with the column of the person")
     if lapse is None:
         raise InputError("--hierarchical holds the lapse rate; give it as a number, --lapse 0.02")
     populations, names = {}, answers.participant.astype(str)

@@ -40,7 +40,7 @@ def counted_points(x: Array, z: Array, response: Array) -> Points:
 
 
 class PlaneLikelihood:
-    """The likelihood of eq. (1) in the predictor X beta + offset, maximised by Fisher scoring."""
+    """The likelihood of eq. (1) in the predictor X beta + offset, maximized by Fisher scoring."""
 
     def __init__(self, points: Points, shape: PlaneShape, guess: float, lapse: float) -> None:
         self.n, self.k, self.shape = points.n, points.k, shape
@@ -155,7 +155,7 @@ class PlaneProfiles:
         return self._ends(loss, best, self.width / self.span / 20, 20 * self.width / self.span)
 
     def spread(self, best: float) -> Interval:
-        """x / s is an offset beside b0 + b2 z; searched by the logarithm."""
+        """x / s is an offset in addition to b0 + b2 z; searched by the logarithm."""
 
         def loss(log_s: float) -> float:
             columns = np.column_stack([np.ones_like(self.x), self.z])
@@ -257,7 +257,7 @@ def fit_plane(
 
     with guess rate gamma, lapse rate lambda, threshold t at z_0, tilt b and spread s. With gamma = lambda = 0
     this is a probit (logit) regression on x and z. Intervals are profiles of the likelihood: every other
-    parameter is fitted anew at each value.
+    parameter is fitted again at each value.
 
     Parameters
     ----------
@@ -288,7 +288,9 @@ def fit_plane(
     columns = np.column_stack([np.ones_like(x), x, away])
     beta, value, information = link.best(columns, [link.start(columns), *_broad(x, width)])
     if not beta[1] > 1e-6 / width:
-        raise InputError("the answers do not change with x as they should; there is no threshold to place")
+        raise InputError(
+            "the answers do not change with x in the expected direction, so there is no threshold"
+        )
     if link.steepest(beta, columns) < FLATTEST or np.linalg.cond(information) > MAX_CONDITION:
         raise InputError(
             "the answers switch between stimuli without overlap; tilt and spread have no estimate"
@@ -339,7 +341,7 @@ def _refuse_unfit(points: Points) -> None:
             )
     if points.k.sum() in (0.0, points.n.sum()):
         raise InputError(
-            f"all {int(points.n.sum())} answers are alike; there is no threshold among these stimuli"
+            f"all {int(points.n.sum())} answers are the same; there is no threshold among these stimuli"
         )
 
 

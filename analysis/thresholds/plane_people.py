@@ -66,8 +66,8 @@ def fit_plane_population(people: Sequence[Points], pooled: Plane) -> PopulationP
             \phi(u) \phi(v) \, du \, dv, \quad t_i = \mu + \tau u, \ b_i = \beta + \omega v \tag{1}
 
     with P_i of equation (1) in `analysis.thresholds.plane.fit_plane`, whose threshold t is t_i and whose tilt
-    b is b_i, and one spread s for all. Nobody is left out: answers that place no threshold of their own, as
-    many do that switch without overlap, still tell of the mean.
+    b is b_i, and one spread s for all. Nobody is excluded: answers without an individual threshold, such as
+    those that switch without overlap, still inform the mean.
 
     Parameters
     ----------
@@ -273,7 +273,7 @@ class PlanesResult:
     people : tuple of PersonPlane
         Everybody's own fit.
     means : dict of str to PlaneMeans
-        Over those who have a fit of their own.
+        Over those who have an individual fit.
     population : dict of str to PopulationPlane
         Over everybody, where they are three or more.
     """
@@ -309,7 +309,7 @@ def fit_planes(
 ) -> PlanesResult:
     """Fit every condition over all trials and, where people are named, every person in it and all together.
 
-    Where it is not said whether the function is `falling`, the answers tell, without a guess rate alone.
+    If `falling` is not given, the answers decide it, but only without a guess rate.
 
     Parameters
     ----------

@@ -84,11 +84,11 @@ def fit_threshold(
     lapse : float or None
         Upper asymptote is 1 - lapse; None fits it, between 0 and 0.1.
     intervals : bool
-        Whether to profile the likelihood for intervals: every other parameter is fitted anew at each value.
+        Whether to profile the likelihood for intervals: every other parameter is fitted again at each value.
 
     falling : bool, optional
-        Whether positive answers become rarer with x; where not given the answers tell, if there is no guess
-        rate.
+        Whether positive answers become rarer with x; if not given, the answers decide it, if there is no
+        guess rate.
 
     Raises
     ------
@@ -106,14 +106,14 @@ def fit_threshold(
     notes = _doubts(trials, location, log_spread, shape, lapsed, lapse is None, step) + _below(trials, guess)
     if trials.x.size > len(best) and too_few_repeats(trials.n):
         notes.append(
-            f"no fit p: {int(trials.n.sum())} answers at {trials.x.size} levels repeat too few stimuli for a "
-            "test of the fit"
+            f"no fit p: {int(trials.n.sum())} answers at {trials.x.size} levels are too few per stimulus for "
+            "a test of fit"
         )
     low, high = float(trials.x.min()), float(trials.x.max())
     if not low - 3 * (high - low) <= location <= high + 3 * (high - low):
         raise InputError(
-            f"the threshold lies far outside what was shown ({low:g} to {high:g}); "
-            "the answers hardly change with x"
+            f"the threshold is far outside the levels shown ({low:g} to {high:g}); the answers hardly change "
+            "with x"
         )
     expected = model.probabilities(best)
     deviance, df = _deviance(trials, expected), trials.x.size - len(best)
@@ -152,7 +152,7 @@ def fit_threshold(
 
 
 def _scale(trials: Trials, shape: Shape) -> tuple[float, float]:
-    """Centre and unit in which x is fitted: steps and tolerances are absolute, units of x are anyone's."""
+    """Center and unit in which x is fitted: steps and tolerances are absolute, units of x are anyone's."""
     unit = float(trials.x.max() - trials.x.min())
     return (0.0 if shape == "weibull" else float(np.average(trials.x, weights=trials.n))), unit
 
@@ -178,7 +178,7 @@ def refuse_unfit(trials: Trials, shape: Shape) -> None:
     share = trials.k.sum() / trials.n.sum()
     if share in (0.0, 1.0):
         raise InputError(
-            f"all {int(trials.n.sum())} answers are alike; there is no threshold among these levels"
+            f"all {int(trials.n.sum())} answers are the same; there is no threshold among these levels"
         )
     if shape == "weibull" and trials.x.min() <= 0:
         raise InputError(
@@ -237,7 +237,7 @@ def _doubts(
 ) -> list[str]:
     notes = []
     if not trials.x.min() <= location <= trials.x.max():
-        notes.append(f"the threshold {location:.4g} lies outside the levels shown: extrapolated")
+        notes.append(f"the threshold {location:.4g} is outside the levels shown (extrapolated)")
     if step:
         notes.append("the answers switch between two levels: the slope has no upper limit")
     if fitted and lapse <= BOUND:
@@ -256,6 +256,6 @@ def _below(trials: Trials, guess: float) -> list[str]:
         return []
     at = int(chance.argmin())
     return [
-        f"at {trials.x[at]:g} {trials.k[at]:g} of {trials.n[at]:g} answers are yes, fewer than a guess rate "
-        f"of {guess:g} gives: the threshold holds only if that is the guess rate"
+        f"at {trials.x[at]:g} {trials.k[at]:g} of {trials.n[at]:g} answers are yes, fewer than expected from "
+        f"a guess rate of {guess:g}: the threshold is valid only if this is the guess rate"
     ]

@@ -35,7 +35,7 @@ class SeriesFit:
 class Difference:
     """An estimate of two series compared; p corrected by Holm over all pairs of series.
 
-    Within people by a paired t test; between groups of people by Welch's, whose df are no whole number.
+    Within people by a paired t test; between groups of people by Welch's, whose df are not a whole number.
     """
 
     first: str

@@ -73,7 +73,7 @@ def within_anova(
     Parameters
     ----------
     y : (N, a, b, ...) array
-        Participants' cell means, one axis a factor; complete, finite, N >= 2.
+        Participants' cell means, one axis per factor; complete, finite, N >= 2.
     factors : sequence of str
         Names of the factors, in axis order.
     levels : sequence of sequences of str, optional
@@ -110,7 +110,7 @@ def linear_anova(
     Parameters
     ----------
     y : (N, a, b, ...) array
-        Participants' cell means, one axis a within factor; (N,) where there is none.
+        Participants' cell means, one axis per within factor; (N,) where there is none.
     factors : sequence of str
         Names of the within factors, in axis order.
     levels : sequence of sequences of str, optional
@@ -145,12 +145,12 @@ def linear_anova(
     3. multivariate statistics from the eigenvalues of :math:`E^{-1} H` (see `four_statistics`).
 
     Sources: Maxwell & Delaney (2004), chapters 11-14; Fox & Weisberg (2019), appendix on multivariate linear
-    models; Olejnik & Algina (2003) for generalised eta squared, all factors manipulated.
+    models; Olejnik & Algina (2003) for generalized eta squared, all factors manipulated.
     """
     cells = _checked(y, factors, levels)
     hypotheses, total = _hypotheses(cells, between, sum_of_squares)
     if not hypotheses:
-        raise InputError("expected a factor or a covariate; name one with --within, --between or --covariate")
+        raise InputError("expected a factor or a covariate; add --within, --between or --covariate")
     names = levels or [[str(i + 1) for i in range(size)] for size in cells.shape[1:]]
     return AnovaResult(
         effects=effects_of(hypotheses, factors, sum(total.values()), confidence),
@@ -202,7 +202,7 @@ def _checked(y: ArrayLike, factors: Sequence[str], levels: Sequence[Sequence[str
         )
     for factor, size in zip(factors, cells.shape[1:], strict=True):
         if size < 2:
-            raise InputError(f"expected at least 2 levels of '{factor}', got {size}; leave the factor out")
+            raise InputError(f"expected at least 2 levels of '{factor}', got {size}; remove the factor")
     if levels is not None and tuple(len(group) for group in levels) != cells.shape[1:]:
         raise InputError(
             f"expected level names for the shape {cells.shape[1:]}, got {[len(g) for g in levels]}"

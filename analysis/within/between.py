@@ -60,7 +60,7 @@ class BetweenDesign:
     columns : tuple of tuple of int
         Columns of `matrix` that belong to each term.
     matrix : (N, p) array
-        Intercept, sum-to-zero contrasts of the factors, centred covariates in units of their SD.
+        Intercept, sum-to-zero contrasts of the factors, centered covariates in units of their SD.
     """
 
     factors: tuple[str, ...]
@@ -164,7 +164,7 @@ def between_design(
     }
     for covariate in covariates:
         if np.ptp(covariate.values) == 0:
-            raise InputError(f"the covariate '{covariate.name}' is the same for everyone; leave it out")
+            raise InputError(f"the covariate '{covariate.name}' is the same for everyone; remove it")
         parts[covariate.name] = _standardised(covariate, covariate.values)[:, None]
     blocks = [_product([parts[name] for name in term], len(codes)) for term in terms]
     ends = accumulate(block.shape[1] for block in blocks)
@@ -191,9 +191,7 @@ def _product(parts: Sequence[Floats], n: int = 1) -> Floats:
 def _refuse_empty_groups(factors: Sequence[str], levels: Sequence[Sequence[str]], codes: Integers) -> None:
     for name, group in zip(factors, levels, strict=True):
         if len(group) < 2:
-            raise InputError(
-                f"expected at least 2 levels of '{name}', got {len(group)}; leave the factor out"
-            )
+            raise InputError(f"expected at least 2 levels of '{name}', got {len(group)}; remove the factor")
     met = set(map(tuple, codes.tolist()))
     if len(met) == math.prod(map(len, levels)):
         return
@@ -203,7 +201,7 @@ def _refuse_empty_groups(factors: Sequence[str], levels: Sequence[Sequence[str]]
         for at in empty[:5]
     )
     raise InputError(
-        f"nobody with complete data is in {said}: the groups are not fully crossed; leave a factor out"
+        f"nobody with complete data is in {said}: the groups are not fully crossed; remove a factor"
     )
 
 

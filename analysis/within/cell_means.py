@@ -1,4 +1,4 @@
-"""From long rows, one a trial, to the participants x cells table of means that the ANOVA takes."""
+"""From long rows, one per trial, to the participants x cells table of means that the ANOVA takes."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -67,7 +67,7 @@ def cell_table(
     Parameters
     ----------
     rows : DataFrame
-        One row a trial; `participant` and `within` columns hold text, `rating` finite numbers.
+        One row per trial; `participant` and `within` columns hold text, `rating` finite numbers.
     within : sequence of str
         Factor columns, in the order wanted.
     levels : mapping of str to sequence of str, optional
@@ -82,7 +82,7 @@ def cell_table(
         if name not in rows.columns:
             raise InputError(f"no column is called '{name}'{did_you_mean(name, map(str, rows.columns))}")
     if not len(rows):
-        raise InputError("there are no ratings to analyse; the table has a header but no rows")
+        raise InputError("there are no ratings to analyze; the table has a header but no rows")
     person, people = level_codes(rows[participant], participant)
     coded = [level_codes(rows[name], name, (levels or {}).get(name)) for name in within]
     slot, shape = person, (len(people), *(len(names) for _, names in coded))
@@ -130,15 +130,15 @@ def _complete(
     if not whole.any():
         if counts.reshape(len(counts), -1).sum(axis=1).max() == 1:
             raise InputError(
-                "each participant is in one row only, so nothing varies within participants: is the table "
-                "wide (one row per person, then see analysis reshape), or is this not the participant column?"
+                "each participant is in only one row, so nothing varies within participants. Is the table "
+                "wide (one row per person; see analysis reshape), or is this not the participant column?"
             )
         _refuse_between_factors(factors, counts)
         first = dropped[0]
         raise InputError(
             f"no participant has a rating in every cell (e.g. '{first.participant}' lacks "
-            f"{name_cells(first.missing_cells)}){_case_alone(factors, levels)}; "
-            "leave a factor out or collect the missing cells"
+            f"{name_cells(first.missing_cells)}){_case_alone(factors, levels)}; remove a factor or collect "
+            "the missing cells"
         )
     complete = [people[i] for i in np.flatnonzero(whole)]
     return _table(complete, factors, levels, sums[whole], counts[whole], dropped)
@@ -169,19 +169,19 @@ def _refuse_between_factors(factors: list[str], counts: Integers) -> None:
         seen = (counts > 0).any(axis=others)
         if seen.shape[1] > 1 and (seen.sum(axis=1) <= 1).all():
             raise InputError(
-                f"'{name}' never varies within a participant, so it cannot be a factor within; "
-                f"give it as a factor between participants (--between {name})"
+                f"'{name}' never varies within a participant, so it cannot be a within factor; use --between "
+                f"{name}"
             )
 
 
 def _case_alone(factors: list[str], levels: list[list[str]]) -> str:
-    """Which levels of a factor are told apart by their case alone: the likely cause of missing cells."""
+    """Which levels of a factor differ only in case: the likely cause of missing cells."""
     for name, own in zip(factors, levels, strict=True):
         by_letters: dict[str, str] = {}
         for level in own:
             if by_letters.setdefault(level.casefold(), level) != level:
                 return (
-                    f"; levels '{by_letters[level.casefold()]}' and '{level}' of {name} differ in case alone"
+                    f"; levels '{by_letters[level.casefold()]}' and '{level}' of {name} differ only in case"
                 )
     return ""
 
@@ -190,7 +190,7 @@ def _refuse_empty_cells(factors: list[str], levels: list[list[str]], counts: Int
     empty = _cells_at(factors, levels, counts.sum(axis=0) == 0)
     if empty:
         raise InputError(
-            f"nobody rated {name_cells(empty)}: the design is not fully crossed; leave out a factor or level"
+            f"nobody rated {name_cells(empty)}: the design is not fully crossed; remove a factor or level"
         )
 
 

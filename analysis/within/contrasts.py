@@ -38,7 +38,7 @@ def contrast_scores(y: Floats) -> tuple[Floats, dict[tuple[int, ...], slice]]:
     """Scores (N, K) of cell means (N, a, b, ...) on the contrasts of every effect, side by side.
 
     With them the columns of each set of within factors, by their positions. The one column of `()` are the
-    scores between participants: their means, centred, in units of one cell.
+    scores between participants: their means, centered, in units of one cell.
     """
     n, k = len(y), y[0].size
     cells = y.reshape(n, k)

@@ -71,7 +71,7 @@ def margin_of(result: AnovaResult, names: Sequence[str]) -> Margin:
     Raises
     ------
     InputError
-        A name that is no factor; covariates have no margin.
+        A name that is not a factor; covariates have no margin.
     """
     for name in names:
         if name not in result.all_factors:

@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 class LeveneTest:
     """Levene's test of one column of scores; `where` names the cell, `means` the participants' means.
 
-    F is NaN where nobody differs from the centre of the group, or a group has one participant only.
+    F is NaN where nobody differs from the center of the group, or a group has one participant only.
     """
 
     where: str

@@ -55,7 +55,7 @@ def level_codes(
     position = {text: i for i, text in enumerate(names)}
     for text in texts:
         if text not in position:
-            raise InputError(f"'{text}' is no level of '{name}'{did_you_mean(text, names)}")
+            raise InputError(f"'{text}' is not a level of '{name}'{did_you_mean(text, names)}")
     lookup = np.array([position[text] for text in texts], dtype=np.int64)
     return lookup[codes], names
 

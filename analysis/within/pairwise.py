@@ -130,7 +130,7 @@ def _tested(
 
 
 def size_intervals(t: Floats, scale: Floats, df: int, confidence: float) -> Floats:
-    """Intervals (m, 2) of standardised differences from the noncentral t distribution.
+    """Intervals (m, 2) of standardized differences from the noncentral t distribution.
 
     The noncentralities that put t at the two tails, times `scale`, which is the size over t.
     Source: Steiger & Fouladi (1997).

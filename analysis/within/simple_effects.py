@@ -102,7 +102,7 @@ def simple_effects(
     Raises
     ------
     InputError
-        A name that is no effect, or an effect of one factor or with a covariate.
+        A name that is not an effect, or an effect of one factor or with a covariate.
     """
     multivariate = reports_multivariate(result, planned)
     if interactions is None:
@@ -112,7 +112,9 @@ def simple_effects(
         chosen = [result.effect(name) for name in interactions]
         for effect in chosen:
             if not _is_interaction(result, effect):
-                raise InputError(f"'{effect.effect}' is no interaction of factors; it has no simple effects")
+                raise InputError(
+                    f"'{effect.effect}' is not an interaction of factors; it has no simple effects"
+                )
     return tuple(simple for effect in chosen for simple in _of_interaction(result, effect, multivariate))
 
 

@@ -78,7 +78,7 @@ def studentized_range_tail(q: float, means: int, df: int) -> float:
         f_\nu(s) = \frac{2 (\nu / 2)^{\nu / 2}}{\Gamma(\nu / 2)} s^{\nu - 1} e^{-\nu s^2 / 2} \tag{2}
 
     T of equation (1), f the density of :math:`s = \sqrt{\chi^2_\nu / \nu}`. The integrand falls as
-    :math:`e^{\nu x}` to the left and faster to the right. Where it counts is told by Bonferroni's bound
+    :math:`e^{\nu x}` to the left and faster to the right. Where it counts follows from Bonferroni's bound
     :math:`T(w) \le \min(1, k (k - 1) \Phi(-w / \sqrt 2))`; panels meet at the bound's mode.
     """
     low, mode, high = _extent(q, means, df)

@@ -22,7 +22,7 @@ def python_report(*packages: object) -> str:
 def test_a_known_weakness_is_named_with_the_version_that_mends_it() -> None:
     outcome = python_outcome(python_report(FINE, WEAK, UNKNOWN))
     assert outcome.weak
-    assert "pillow 9.0.0: PYSEC-2023-175, mended in 10.0.1" in outcome.said
+    assert "pillow 9.0.0: PYSEC-2023-175, fixed in 10.0.1" in outcome.said
 
 
 def test_none_known() -> None:

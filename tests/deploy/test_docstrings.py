@@ -52,10 +52,13 @@ def said(source: str, doc: str) -> str:
             "Parameters\n----------\nvalues : list of float\n    weight: of each.",
             "'weight: ...' belongs into",
         ),
-        ("Parameters\n----------\nvalue : float\n    One.", "'value' is no parameter or field"),
-        ("Parameters\n----------\nvalues: list of float\n    Some.", "'values: list of float' is no entry"),
-        ("Parameters\n----------\nvalues : float\n\nProse after it.", "'Prose after it.' is no entry"),
-        ("Raises\n------\nInputError : where empty.", "'InputError' is no error"),
+        ("Parameters\n----------\nvalue : float\n    One.", "'value' is not a parameter or field"),
+        (
+            "Parameters\n----------\nvalues: list of float\n    Some.",
+            "'values: list of float' is not an entry",
+        ),
+        ("Parameters\n----------\nvalues : float\n\nProse after it.", "'Prose after it.' is not an entry"),
+        ("Raises\n------\nInputError : where empty.", "'InputError' is not an error"),
         ("Keys\n----\nname : str", "numpydoc cannot read it: Unknown section Keys"),
         ("Returns\n-------\nint\n\nReturns\n-------\nint", "cannot read it: The section Returns"),
     ],
@@ -74,14 +77,14 @@ def test_numpydoc_passes() -> None:
 def test_a_class_may_speak_of_its_fields_and_of_nothing_else() -> None:
     known = "fps, size, left, name, length_s : float"
     assert said(FIELDS, f"Attributes\n----------\n{known}") == ""
-    assert "'rate' is no parameter or field" in said(FIELDS, "Attributes\n----------\nrate : float")
+    assert "'rate' is not a parameter or field" in said(FIELDS, "Attributes\n----------\nrate : float")
 
 
 def test_inherited_fields_are_known_where_their_class_is() -> None:
     source = FIELDS.replace("{doc}", "    Attributes\n    ----------\n    inherited : int")
     classes = {node.name: node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.ClassDef)}
     assert faults("a.py", source, classes) == []
-    assert "'inherited' is no parameter or field" in "\n".join(faults("a.py", source))
+    assert "'inherited' is not a parameter or field" in "\n".join(faults("a.py", source))
 
 
 def test_a_docstring_needs_a_summary() -> None:

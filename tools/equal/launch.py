@@ -1,6 +1,6 @@
 """Run commands, or a probe, of the program in one tree; started with `python launch.py TREE JOB.json`.
 
-This file imports nothing of its own tree: the process that runs it must import the program from TREE alone.
+This file imports nothing from its tree: the process that runs it must import the program from TREE alone.
 In the environment of both sides the program of the working tree is installed (editable); `use_only` takes
 that out and `check_origin` proves it.
 

@@ -65,7 +65,7 @@ def declaration(tree: Path, out: Path) -> None:
 
 
 def golden_definitions() -> Path:
-    """The stored declarations beside this file's own tree: both sides read the same."""
+    """The stored declarations of this file's tree: both sides read the same."""
     return Path(__file__).resolve().parents[2] / "tests" / "golden" / "definitions"
 
 

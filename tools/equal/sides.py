@@ -31,7 +31,7 @@ STABLE = {
     "OPENBLAS_NUM_THREADS": "1",
     "SOURCE_DATE_EPOCH": "1700000000",
 }
-"""Environment of every process, so that width, colour, zone and order of sums are the same on both sides."""
+"""Environment of every process, so that width, color, zone and order of sums are the same on both sides."""
 
 
 class PartError(Exception):

@@ -8,7 +8,7 @@ FOLDER is another tree, say of `git archive COMMIT | tar x -C FOLDER`. At a41993
 issue's column "today", with one exception: comparisons with a trial kind's name are 17 lines in 12 files as
 `tools.house.sources` defines them, where the issue counts 19 in 11.
 
-Rows that take minutes to measure are read from `recorded.toml` beside this file, with the commit they were
+Rows that take minutes to measure are read from `recorded.toml` in this folder, with the commit they were
 measured at. `tools.house.graphs` and `tools.house.sources` define the rest. `--files` lists, in full, what
 the last lines only count: modules under 80 lines that one neighbor imports, files above 600 lines, Python
 functions above 60 lines (docstring apart) or 12 branches, cycles, the longest chain, lines with kind names.

@@ -15,7 +15,7 @@ STAMP = (2026, 1, 1, 0, 0, 0)
 
 
 def addon_files() -> dict[str, str]:
-    """Text of every file of the zip, imports made relative: Blender gives an extension a name of its own."""
+    """Text of every file of the zip, imports made relative: Blender gives an extension another name."""
     files = {"blender_manifest.toml": _text(ADDON / "blender_manifest.toml")}
     for source in sorted(ADDON.glob("*.py")):
         inside = re.sub(r"\bfrom blender_addon import\b", "from . import", _text(source))

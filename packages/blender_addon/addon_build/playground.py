@@ -27,7 +27,7 @@ PAGE = """<!doctype html>
 </body>
 </html>
 """
-PLAYGROUND = """<p>Blinks as the engine draws them, beside the uniform timer that most programs have.
+PLAYGROUND = """<p>Blinks as the engine draws them, next to the uniform timer that most programs have.
 Everything on this page happens on your computer.</p>
 <div id="playground" class="playground"></div>
 <script type="application/json" id="strips">{strips}</script>"""

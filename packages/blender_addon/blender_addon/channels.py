@@ -14,7 +14,7 @@ INTERPOLATIONS = {
     item.identifier: item.value for item in bpy.types.Keyframe.bl_rna.properties["interpolation"].enum_items
 }
 OURS = KEY_TYPES["GENERATED"]
-"""Keys that a tool made: that is how ours are told from the animator's own."""
+"""Keys that a tool made: this distinguishes ours from the animator's."""
 
 
 @dataclass(frozen=True)

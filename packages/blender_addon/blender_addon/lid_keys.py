@@ -55,7 +55,7 @@ def passage(asked: Passage, events: Sequence[Event] = (), changes: Sequence[Stat
 
 
 def one_blink(fps: float, seed: int) -> Performance:
-    """A single blink that begins at frame 1 of its own time."""
+    """A single blink that begins at frame 1 of its time."""
     started = perform(2.0, fps, seed=seed, events=[Event("blink", 0.0)])
     first = min(started.blinks, key=lambda blink: blink.onset_s)
     frames = max(3, int(np.ceil((first.end_s + 1 / fps) * fps)) + 1)

@@ -90,9 +90,7 @@ def _pairs(kind: Kind, names: Sequence[str]) -> list[Guess]:
         if side is not None and not _NOT_UPPER.search(name):
             by_rest.setdefault(_SIDE.sub("*", _lowered_sides(name)).lower(), {})[side] = name
     return [
-        Guess("by its name", kind, sides["left"], sides["right"])
-        for sides in by_rest.values()
-        if len(sides) == 2
+        Guess("by name", kind, sides["left"], sides["right"]) for sides in by_rest.values() if len(sides) == 2
     ]
 
 

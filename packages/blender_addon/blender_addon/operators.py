@@ -42,7 +42,7 @@ class PALPEBRA_OT_guess(_BlinkOperator):  # noqa: N801 - Blender's rule for name
         """Fill the table and take its first row."""
         table = rig_guesses(rig)
         if not table:
-            raise RigError("no shape key or bone here speaks of lids or blinks; choose them by hand")
+            raise RigError("no shape key or bone has a name for lids or blinks; choose them by hand")
         settings = rig.palpebra
         settings.guesses.clear()
         for guess in table:
@@ -104,7 +104,7 @@ class PALPEBRA_OT_from_speech(_BlinkOperator):  # noqa: N801
     bl_idname, bl_label = "palpebra.from_speech", "Blinks from speech"
 
     def run(self, context: Any, rig: Any) -> str:
-        """Find the speech, tell the engine, write its blinks."""
+        """Find the speech, pass it to the engine, write its blinks."""
         settings, asked = rig.palpebra, _passage(context.scene, rig)
         channels = chosen_channels(rig, settings)
         offset_s = (settings.sound_start - asked.start) / asked.fps
@@ -114,7 +114,9 @@ class PALPEBRA_OT_from_speech(_BlinkOperator):  # noqa: N801
             if one.start_s + offset_s >= 0
         ]
         if not stretches:
-            raise RigError("nobody speaks in that recording within the range; use 'Fill timeline' instead")
+            raise RigError(
+                "there is no speech in that recording within the range; use 'Fill timeline' instead"
+            )
         done = passage(asked, speech_events(stretches), speech_states(stretches, asked.state))
         _write(channels, done, asked.start, asked.end, settings)
         return f"{len(stretches)} stretches of speech, {len(done.blinks)} blinks"
@@ -132,7 +134,7 @@ class PALPEBRA_OT_reroll(_BlinkOperator):  # noqa: N801
         ours = np.unique(np.concatenate([channel.own_keys()[1] for channel in channels]))
         span = blink_at(ours, scene.frame_current, gap=_gap(settings))
         if span is None:
-            raise RigError(f"no blink of ours at frame {scene.frame_current}; move the cursor onto one")
+            raise RigError(f"no generated blink at frame {scene.frame_current}; move the cursor onto one")
         done = one_blink(frames_per_second(scene), _seed(rig, later=1))
         start = round(span[0])
         following = ours[ours > span[1]]
@@ -199,8 +201,8 @@ def _refuse_own(channels: list[Channel], start: int, end: int, settings: Any) ->
         inside = int(((own >= start - 0.5) & (own <= end + 0.5)).sum())
         if inside:
             raise RigError(
-                f"{channel.title} has {inside} keys of your own in frames {start} to {end}; tick "
-                "'Replace my own keys' or choose another range"
+                f"{channel.title} has {inside} manual keys in frames {start} to {end}; select 'Replace my "
+                "own keys' or choose another range"
             )
 
 
@@ -209,7 +211,7 @@ def _as_pair(channels: list[Channel]) -> tuple[Channel, Channel | None]:
 
 
 def _gap(settings: Any) -> float:
-    """How far apart keys of one blink may stand: those of every frame, or few over half a second."""
+    """How far apart keys of one blink may be: those of every frame, or few over half a second."""
     return 1.5 if settings.density == "EVERY_FRAME" else 12.5
 
 

@@ -78,7 +78,7 @@ def _bone_channel(rig: Any, name: str, settings: Any) -> Channel:
     path = f'pose.bones["{_escaped(name)}"].{"rotation_euler" if turns else "location"}'
     closed = settings.bone_closed_rad if turns else settings.bone_closed_m
     if closed == 0.0:
-        raise RigError(f"set how far bone '{name}' goes to shut the eye; it is 0 now")
+        raise RigError(f"set how far bone '{name}' moves to close the eye; it is 0")
     return Channel(rig, path, axis, 0.0, closed, f"bone '{name}'")
 
 

@@ -12,17 +12,17 @@ from bpy.props import (
 )
 
 STATES = [
-    ("rest", "At rest", "17 blinks a minute"),
+    ("rest", "At rest", "17 blinks per minute"),
     ("listening", "Listening", "As at rest"),
-    ("speaking", "Speaking", "26 blinks a minute"),
-    ("reading", "Reading", "4.5 blinks a minute"),
-    ("screen", "At a screen", "7 blinks a minute"),
+    ("speaking", "Speaking", "26 blinks per minute"),
+    ("reading", "Reading", "4.5 blinks per minute"),
+    ("screen", "At a screen", "7 blinks per minute"),
 ]
 MOTIONS = [("ROTATION", "Turns", "The lid's bone turns"), ("LOCATION", "Shifts", "The lid's bone shifts")]
 AXES = [(axis, axis, f"Local {axis} axis") for axis in "XYZ"]
 DENSITIES = [
-    ("EVERY_FRAME", "Every frame", "The exact curve: a key at each frame of a blink, none between blinks"),
-    ("FEW", "Few", "Four smooth keys a blink, easier to edit"),
+    ("EVERY_FRAME", "Every frame", "Exact curve: one key per frame of a blink, none between blinks"),
+    ("FEW", "Few", "Four smooth keys per blink, easier to edit"),
 ]
 
 
@@ -39,19 +39,19 @@ class PalpebraSettings(bpy.types.PropertyGroup):
 
     left: StringProperty(name="Left eye", description="Shape key or bone that closes the left eye")  # type: ignore[valid-type]
     right: StringProperty(  # type: ignore[valid-type]
-        name="Right eye", description="The same name as left where one shape closes both eyes"
+        name="Right eye", description="Use the left eye's name if one shape closes both eyes"
     )
     guesses: CollectionProperty(type=PalpebraGuess)  # type: ignore[valid-type]
     state: EnumProperty(name="State", items=STATES, default="rest")  # type: ignore[valid-type]
-    seed: IntProperty(name="Seed", default=1, min=0, description="Another seed gives other blinks")  # type: ignore[valid-type]
+    seed: IntProperty(name=("Seed"), default=1, min=0, description="A different seed gives different blinks")  # type: ignore[valid-type]
     rate: FloatProperty(  # type: ignore[valid-type]
-        name="Blinks a minute", default=0.0, min=0.0, max=60.0, description="0 takes the state's own rate"
+        name="Blinks a minute", default=0.0, min=0.0, max=60.0, description="0 uses the rate of the state"
     )
     density: EnumProperty(name="Keys", items=DENSITIES, default="EVERY_FRAME")  # type: ignore[valid-type]
     replace: BoolProperty(  # type: ignore[valid-type]
         name="Replace my own keys",
         default=False,
-        description="Without this, keys that you set yourself are never touched",
+        description="If off, keys that you set yourself are never changed",
     )
     sound: StringProperty(name="Speech", subtype="FILE_PATH", description="A recording of the voice")  # type: ignore[valid-type]
     sound_start: IntProperty(name="Starts at frame", default=1)  # type: ignore[valid-type]

@@ -26,7 +26,7 @@ def read_sound(path: str) -> tuple[npt.NDArray[np.float32], float]:
         raise RigError("choose a recording of the voice first")
     file = Path(bpy.path.abspath(path))
     if not file.is_file():
-        raise RigError(f"{file}: no such file; expected a sound file that Blender reads")
+        raise RigError(f"{file}: there is no such file; expected a sound file that Blender can read")
     try:
         return _wav(file) if file.suffix.lower() == ".wav" else _by_blender(file)
     except RigError:

@@ -219,7 +219,7 @@ def half_locked(face, scene):
 
 
 def everything(name):
-    """All keys of an object's eyes and the settings that the buttons change, fetched anew."""
+    """All keys of an object's eyes and the settings that the buttons change, fetched again."""
     face = bpy.data.objects[name]
     keys = face.data.shape_keys
     made = [

@@ -54,13 +54,13 @@ def test_a_rig_without_lids_is_left_alone(used: dict[str, Any]) -> None:
 def test_names_of_no_known_scheme_are_guessed_and_shown(used: dict[str, Any]) -> None:
     assert used["unknown_scheme"] == ["FINISHED"]
     assert used["table"] == [
-        ["by its name", "MyEyesClose_L", "MyEyesClose_R"],
-        ["by its name", "winkL", "winkR"],
+        ["by name", "MyEyesClose_L", "MyEyesClose_R"],
+        ["by name", "winkL", "winkR"],
     ]
 
 
 def test_keys_of_the_animator_are_touched_only_when_asked(used: dict[str, Any]) -> None:
-    assert "has 1 keys of your own in frames 1 to 41000" in used["own"]
+    assert "has 1 manual keys in frames 1 to 41000" in used["own"]
     assert used["untouched"]
     assert used["own_outside"] == ["FINISHED"]
     assert used["own_kept"]
@@ -71,7 +71,7 @@ def test_one_blink_is_rolled_again_alone(used: dict[str, Any]) -> None:
     assert used["reroll"] == ["FINISHED"]
     first, last = used["changed"]
     assert last - first < 60 * 1.5
-    assert "no blink of ours at frame 39000" in used["reroll_nothing"]
+    assert "no generated blink at frame 39000" in used["reroll_nothing"]
 
 
 def test_few_keys_are_fewer(used: dict[str, Any]) -> None:
@@ -84,12 +84,12 @@ def test_few_keys_are_fewer(used: dict[str, Any]) -> None:
         ("locked", "shape key 'eyeBlinkLeft' is locked"),
         ("driven", "is driven by another value"),
         ("mistyped", "has no shape key 'eyeBlnkLeft'"),
-        ("silence", "nobody speaks in that recording"),
+        ("silence", "there is no speech in that recording"),
         ("no_file", "no such file; expected a sound file"),
         ("no_sound", "expected a sound file that Blender reads"),
         ("bone_no_way", "set how far bone 'lid.T.L.002' goes"),
         ("quaternion", "set its rotation mode to XYZ Euler"),
-        ("no_lids", "no shape key or bone here speaks of lids or blinks"),
+        ("no_lids", "no shape key or bone has a name for lids or blinks"),
         ("no_shapes", "choose what closes the left and the right eye"),
     ],
 )

@@ -41,7 +41,7 @@ def test_a_blink_is_found_among_keys() -> None:
     [
         (Passage(10, 10, 24, 1, "rest"), "an end after the start"),
         (Passage(1, 100, 0.5, 1, "rest"), "1 to 1000 frames"),
-        (Passage(1, 100, 24, 1, "rest", 99), "0.1 to 60 a minute"),
+        (Passage(1, 100, 24, 1, "rest", 99), "0.1 to 60 per minute"),
     ],
 )
 def test_what_cannot_be_filled_is_refused(asked: Passage, line: str) -> None:

@@ -35,7 +35,7 @@ STEADY_CODE = 0.03
 STEADY_PX = 1.5
 LEVELS_FILE, POSES_FILE, STILL_FILE = "levels.mkv", "lower_lid.mkv", "open.mkv"
 NOTICE_FILE = Path(__file__).with_name("ICT-FaceKit-LICENSE.txt")
-"""Goes beside every character rendered from the kit's geometry, as its licence asks."""
+"""Is put into the folder of every character rendered from the kit's geometry, as its license requires."""
 Picture = NDArray[np.uint8]
 
 
@@ -113,7 +113,7 @@ class Assembly:
     def _laid(self, still: NDArray[np.float32], shot: Shot) -> NDArray[np.float32]:
         """The still frame with a shot's boxes laid over it, feathered to the still frame on their rims.
 
-        Where lids have boxes with samples of their own, of the others only the change since the open eye
+        Where lids have boxes with separate samples, of the others only the change since the open eye
         counts: one seed gives both the same noise, so that still skin keeps the still frame's many samples.
         """
         laid = still.copy()

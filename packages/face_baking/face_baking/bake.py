@@ -138,7 +138,7 @@ class FaceBake:
         except (OSError, InputError) as error:
             if says_full(error):
                 raise InputError(
-                    f"the disk is full: free some of it and bake again; what is rendered stays in {self.work}"
+                    f"the disk is full: free up space and bake again; rendered levels stay in {self.work}"
                 ) from error
             raise
 
@@ -175,8 +175,8 @@ class FaceBake:
         rendered = self._rendered()
         if not self.frame.file.exists() or not {0.0, 1.0} <= set(rendered):
             raise InputError(
-                f"nothing to write: the still frame, the open and the shut level are not all in {self.work}; "
-                "bake them first"
+                "nothing to write: the still frame, the open and the closed level are not all in "
+                f"{self.work}; bake them first"
             )
         bound = min(self.order.levels, 8 * (self._whole_generation() - 1) + 1)
         count = max(count for count in LEVEL_COUNTS if count <= bound)

@@ -1,4 +1,4 @@
-"""The blink's path: each lid vertex travels on a sphere about its globe's centre, and its edges meet.
+"""The blink's path: each lid vertex travels on a sphere about its globe's center, and its edges meet.
 
 The kit's eyeBlink is linear: halfway it cuts through the globe, and shut its edges do not meet. Here its end
 position is corrected until they meet, the way there is a great circle, and what comes too near the eye is
@@ -132,7 +132,7 @@ class BlinkPath:
         return np.asarray(globe.centre + (start + stroke * (end - start)) * (1 - near) + round_way * near)
 
     def _shut_about_globe(self, side: int) -> Array:
-        """Shut position relative to the globe's centre: the kit's, corrected so that the edges meet."""
+        """Shut position relative to the globe's center: the kit's, corrected so that the edges meet."""
         globe = self.globes[side]
         base = self.rest + self._others[side] - globe.centre
         points = base + self._blink[side]
@@ -196,7 +196,7 @@ class BlinkPath:
         return cartesian(radius, azimuth, elevation - np.interp(turned, at, gap * inside) * share)
 
     def _off_the_eye(self, vertices: Array, side: int, stroke: float) -> Array:
-        """Lift what is too near the eye, and smoothly its neighbours."""
+        """Lift what is too near the eye, and smoothly its neighbors."""
         loops, globe = self.loops[side], self.globes[side]
         index = np.concatenate(loops[1:])
         least = [*_CLEARANCE_CM, *[_OUTER_CLEARANCE_CM] * len(loops)]

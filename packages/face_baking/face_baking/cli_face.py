@@ -26,14 +26,14 @@ def bake_face(
         Path, typer.Option(help="Your copy of ICT-FaceKit: its FaceXModel folder, or the packed .npz.")
     ],
     identity: Annotated[
-        str | None, typer.Option(help="Face to bake: a table of the identities file.")
+        str | None, typer.Option(help="Face to bake: the name of a table in the identities file.")
     ] = None,
-    seed: Annotated[int | None, typer.Option(help="Face that this number draws whole, 0 to 999999.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Random seed of the whole face, 0 to 999999.")] = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the character [out/characters/NAME].")] = None,
     framing: Annotated[str, typer.Option(help="eyes, or face (forehead to chin).")] = "eyes",
     levels: Annotated[int, typer.Option(help="Closure levels of the atlas: 2^k + 1, up to 129.")] = 129,
     rendered: Annotated[
-        int | None, typer.Option(help="How many of them to render; the others are moved in between [all].")
+        int | None, typer.Option(help="Number of levels to render; the others are interpolated [all].")
     ] = None,
     denser_ends: Annotated[
         bool, typer.Option(help="Render twice as many in the first and last eighth of the closure.")
@@ -44,7 +44,7 @@ def bake_face(
     samples: Annotated[
         int,
         typer.Option(
-            min=1, max=4096, help="Cycles samples per pixel of the eyes; hair has four times as many."
+            min=1, max=4096, help="Cycles samples per pixel of the eyes; hair uses four times as many."
         ),
     ] = 24,
     frame_samples: Annotated[
@@ -55,35 +55,36 @@ def bake_face(
         typer.Option(
             min=0,
             max=4096,
-            help="Cycles samples per pixel where lids and lashes pass; the skin round them then keeps the "
-            "still frame's noise [as --samples].",
+            help=(
+                "Cycles samples per pixel where lids and lashes move; the skin around them then keeps the "
+                "still frame's noise [as --samples]."
+            ),
         ),
     ] = 0,
     lower_lid: Annotated[
-        bool, typer.Option(help="--no-lower-lid leaves out the poses that Experiment 3 needs (17 pictures).")
+        bool, typer.Option(help="--no-lower-lid omits the poses that Experiment 3 needs (17 pictures).")
     ] = True,
     version: Annotated[
         int | None,
         typer.Option(
             min=1,
             max=9999,
-            help="Of a face that was given to others other pictures are NAME@VERSION [the next that none of "
-            "this or an earlier release has].",
+            help="Version of a face that was already published, as NAME@VERSION [the next unused version].",
         ),
     ] = None,
     light: Annotated[str, typer.Option(help="Light preset: studio or window.")] = "studio",
     identities: Annotated[
-        Path, typer.Option(help="Identities file, to bake a face of your own.")
+        Path, typer.Option(help="Identities file, to bake your own face.")
     ] = IDENTITIES_FILE,
-    work: Annotated[Path, typer.Option(help="Where rendered levels wait: a stopped bake resumes.")] = Path(
-        "build/bake"
-    ),
+    work: Annotated[
+        Path, typer.Option(help=("Folder of rendered levels, from which a stopped bake resumes."))
+    ] = Path("build/bake"),
     blender: Annotated[
         Path, typer.Option(help="Environment of Blender; made on first use (360 MB to download).")
     ] = Path(".venv-bake"),
     device: Annotated[str, typer.Option(help="auto (a GPU if there is one), cpu or gpu.")] = "auto",
     render: Annotated[
-        bool, typer.Option(help="--no-render writes the atlas from what is rendered so far.")
+        bool, typer.Option(help="--no-render writes the atlas from the levels rendered so far.")
     ] = True,
     threads: Annotated[int, typer.Option(min=1, max=256, help="Render threads on the CPU.")] = 2,
 ) -> None:
@@ -136,7 +137,7 @@ def bake_face(
 
 def _face(name: str | None, seed: int | None, file: Path) -> tuple[str, Identity]:
     if (name is None) == (seed is None):
-        raise InputError("give either --identity NAME or --seed NUMBER; a face has one of them")
+        raise InputError("use either --identity NAME or --seed NUMBER, not both")
     if seed is not None:
         return f"face-{seed}", identity_of_seed(seed)
     return str(name), load_identity(str(name), file)

@@ -16,11 +16,11 @@ def bake_samples(
     facekit: Annotated[
         Path, typer.Option(help="Your copy of ICT-FaceKit: its FaceXModel folder, or the packed .npz.")
     ],
-    count: Annotated[int, typer.Option(min=1, max=1_000_000, help="How many pictures there shall be.")] = 100,
+    count: Annotated[int, typer.Option(min=1, max=1_000_000, help="Number of pictures.")] = 100,
     out: Annotated[Path, typer.Option(help="Folder of the pictures and labels.jsonl.")] = Path("out/samples"),
-    seed: Annotated[int, typer.Option(min=0, max=999_999, help="Another seed draws other samples.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, max=999_999, help="Random seed of the samples.")] = 1,
     width: Annotated[
-        int, typer.Option(min=160, max=1920, help="Width in px; pictures are half as high.")
+        int, typer.Option(min=160, max=1920, help="Width in px; the height is half of it.")
     ] = 480,
     samples: Annotated[int, typer.Option(min=1, max=512, help="Cycles samples per pixel.")] = 6,
     blender: Annotated[
@@ -29,7 +29,7 @@ def bake_samples(
     device: Annotated[str, typer.Option(help="auto (a GPU if there is one), cpu or gpu.")] = "auto",
     threads: Annotated[int, typer.Option(min=1, max=256, help="Render threads on the CPU.")] = 2,
 ) -> None:
-    """Render labelled pictures: identities, gaze and head turn to 30 degrees, closures, frowns, light, rims.
+    """Render labeled pictures: identities, gaze and head turn to 30 degrees, closures, frowns, light, rims.
 
     Every picture has a line in labels.jsonl with the lids' edges, canthi, iris and what of it is visible. A
     stopped run goes on where it was; a greater count adds to what is there.

@@ -1,7 +1,7 @@
 """Intel's Open Image Denoise, the library that Blender brings along, on pictures of our own making.
 
 Blender denoises the whole picture alone; here the light below the skin and what shines above it are cleaned
-apart, so that the skin's colour between them keeps every pore. Runs under bpy: see cycles_face_worker.py.
+apart, so that the skin's color between them keeps every pore. Runs under bpy: see cycles_face_worker.py.
 """
 
 import ctypes
@@ -76,12 +76,12 @@ class Denoiser:
 
 
 def _load() -> Any:
-    """The library beside bpy, in `lib` of its wheel, above the scripts that `import bpy` reads."""
+    """The library shipped with bpy, in `lib` of its wheel, above the scripts that `import bpy` reads."""
     wheel = Path(bpy.__file__).resolve().parents[4]
     files = [folder / name for folder in (wheel / "lib", wheel) for name in NAMES]
     file = next((file for file in files if file.exists()), None)
     if file is None:
-        raise RuntimeError(f"no Open Image Denoise beside bpy in {wheel}")
+        raise RuntimeError(f"no Open Image Denoise next to bpy in {wheel}")
     library = ctypes.CDLL(str(file))
     for name, (result, arguments) in SIGNATURES.items():
         function = getattr(library, name)

@@ -76,7 +76,7 @@ class Layers:
 
         F = D(C - m A E) + m A S(D(E))                                                                     (1)
 
-        Letters: C the render, m share of skin, A colour and E diffuse light of the pixel, S scattered, D
+        Letters: C the render, m share of skin, A color and E diffuse light of the pixel, S scattered, D
         denoised. A has no noise and is not smoothed. Noise is taken away before it is scattered, which would
         make blotches of it that no denoiser takes for noise.
         """

@@ -7,7 +7,7 @@ import numpy as np
 from cycles_face_nodes import Nodes
 from cycles_face_wet import film, tear
 
-# Optical depths of the pigments per channel, over the colour of skin without them.
+# Optical depths of the pigments per channel, over the color of skin without them.
 BASE = (0.86, 0.73, 0.595)
 SKIN_SHARE = "skin"
 """Pass that says which share of a pixel is skin."""
@@ -113,7 +113,7 @@ def spectacles() -> Any:
 
 
 def hair(name: str, colour: list[float], rough: float, lightness: tuple[float, float]) -> Any:
-    """Hairs of one colour, each a little lighter or darker, between two shares of it."""
+    """Hairs of one color, each a little lighter or darker, between two shares of it."""
     n = Nodes(name)
     info = n.add("HairInfo")
     varied = n.add("VectorMath", operation="SCALE")

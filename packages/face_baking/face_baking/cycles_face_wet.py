@@ -61,7 +61,7 @@ def reflected(n: Nodes, normal: Any, lights: dict[str, Any], room: float = ROOM_
 
 
 def _lamp_share(n: Nodes, start: Any, away: Any, lamp: dict[str, Any]) -> Any:
-    """1 where a ray meets the lamp, rounded within its rectangle, 0 beside it, with a soft box's edge."""
+    """1 where a ray meets the lamp, rounded within its rectangle, 0 outside it, with a soft box's edge."""
     centre = Vector(lamp["place"])
     turned = (Vector(lamp["aim"]) - centre).to_track_quat("-Z", "Y")
     across, up, back = (turned @ Vector(axis) for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))

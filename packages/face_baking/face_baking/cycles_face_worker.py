@@ -1,4 +1,5 @@
-"""Render poses of one face with Cycles: runs under bpy in an environment of its own and imports no Palpebra.
+"""Render poses of one face with Cycles: runs under bpy in a separate environment and does not import
+Palpebra.
 
 Usage: python cycles_face_worker.py SETTINGS.json (what renderer.py writes). The scene is built once; jobs
 arrive as JSON lines on stdin:

@@ -10,7 +10,7 @@ SHOULDER_STARTS, CONTRAST = 0.55, 0.2
 LENS_PX = 0.55
 """Spread of a point of light over the picture, standard deviation of a Gaussian.
 
-As of a good lens before a sensor with colour filters: without it every edge is cut out, and hair is dots.
+As of a good lens before a sensor with color filters: without it every edge is cut out, and hair is dots.
 """
 
 
@@ -69,7 +69,7 @@ def error_and_noise(
     shown : uint8 array (h, w, 3)
         The picture that is judged.
     first, second : uint8 arrays (h, w, 3)
-        Renders of the truth, each with noise of its own.
+        Renders of the truth, each with independent noise.
     """
     a, b = first.astype(np.float64), second.astype(np.float64)
     noise = float(np.mean((a - b) ** 2)) / 4

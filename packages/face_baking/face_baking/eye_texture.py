@@ -60,7 +60,7 @@ class White:
     lightness : float
         Share of `WHITE`.
     redness : float
-        Depth of its vessels and of what it reddens towards the corners, over the usual.
+        Depth of its vessels and of what it reddens toward the corners, over the usual.
     """
 
     lightness: float = 1.0
@@ -135,7 +135,7 @@ def _sclera_colour(plane: _Plane, veins: Array, redness: float) -> Array:
 
 
 def _veins(plane: _Plane) -> Array:
-    """(size, size) depth of vessels that wander from the corners towards the iris and branch."""
+    """(size, size) depth of vessels that wander from the corners toward the iris and branch."""
     ink = np.zeros((plane.size, plane.size))
     for _ in range(VEINS):
         turn = plane.rng.choice([0, np.pi]) + plane.rng.normal(0, 0.55)

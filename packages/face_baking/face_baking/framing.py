@@ -45,7 +45,7 @@ class View:
     centre_y_cm: float
     size_px: tuple[int, int]
     mm_per_cm: float
-    """Declared millimetres per centimetre of the kit: 10 if the eyes were 60 mm apart."""
+    """Declared millimeters per centimetre of the kit: 10 if the eyes were 60 mm apart."""
 
     @classmethod
     def of(cls, framing: Framing, size_px: tuple[int, int], left_eye: Array, right_eye: Array) -> "View":

@@ -90,7 +90,7 @@ class Lashes:
 
 
 def _turned(radial: Array, tangent: Array, degrees: float) -> tuple[Array, Array]:
-    """Both axes of each root turned towards the tangent."""
+    """Both axes of each root turned toward the tangent."""
     cos, sin = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     return cos * radial + sin * tangent, cos * tangent - sin * radial
 
@@ -106,7 +106,7 @@ def _grown(first: Array, radial: Array, tangent: Array, row: _LashRow, side: int
 
 
 def _clumped(points: Array, leader: Index) -> Array:
-    """Tips drawn towards the longest lash of their clump."""
+    """Tips drawn toward the longest lash of their clump."""
     reach = np.linalg.norm(points[:, -1] - points[:, 0], axis=1)
     share = np.clip(reach / reach[leader], 0, 1)
     at = np.round(np.linspace(0, 1, LASH_POINTS)[None] * share[:, None] * (LASH_POINTS - 1)).astype(np.int64)
@@ -158,7 +158,7 @@ def _draw_row(hair: Hair, upper: bool, rng: np.random.Generator) -> _LashRow:
 
 
 def _roots(count: int, upper: bool, rng: np.random.Generator) -> Array:
-    """Sorted shares of the lid's length (0 nose, 1 temple) where a row's lashes stand, count or fewer."""
+    """Sorted shares of the lid's length (0 nose, 1 temple) where a row's lashes are, count or fewer."""
     low, high = (0.13, 0.985) if upper else (0.22, 0.97)
     along_lid = np.sort(rng.uniform(low, high, count))
     return along_lid[rng.random(count) < smooth(TEMPLE[1], TEMPLE[0], along_lid)] if upper else along_lid
@@ -196,7 +196,7 @@ class Brow:
         n = int(1900 * hair.brow)
         fine = rng.random(n) < 0.6
         along = rng.uniform(-0.06, 1.06, n) + rng.normal(0, 0.03, n)
-        # Thin at both ends: hairs grow sparser towards the temple, they do not run together to a point.
+        # Thin at both ends: hairs grow sparser toward the temple, they do not run together to a point.
         keep = rng.random(n) > np.interp(
             along, [-0.1, 0.0, 0.16, 0.66, 0.85, 1.0, 1.1], [0.97, 0.75, 0, 0, 0.45, 0.85, 0.97]
         )

@@ -4,7 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 DOT, SPARSE = 0.5, 0.25
-"""A pixel covered so far, with all but one about it below SPARSE, is no hair: hair goes on to both sides."""
+"""A pixel covered so far, with all but one about it below SPARSE, is not a hair: hair continues to both
+sides."""
 GLINT = 3.0
 """A pixel this many times as bright as the hair about it is one ray that met a lamp by chance."""
 ALONE = 1e-3
@@ -13,7 +14,7 @@ Light = NDArray[np.float32]
 
 
 def without_specks(hair: Light) -> Light:
-    """A hair layer whose broken and glaring pixels have their neighbours' light.
+    """A hair layer whose broken and glaring pixels have their neighbors' light.
 
     Cycles leaves a pixel black and whole (0, 0, 0, 1) where the scattering of one of its rays in a thin hair
     came out as no number; among brown hairs that is a dot of ink.
@@ -44,8 +45,8 @@ def without_dots(picture: Light, cover: Light) -> Light:
     """A picture of hair before skin without single dark pixels.
 
     Now and then Cycles calls a pixel wholly covered of which a hair covers a tenth: a dot of ink again, with
-    some of the hair's light, that comes and goes from one closure to the next. Coverage tells it from hair:
-    judged by its light, every other pixel of a thin lash was a dot, and lashes were rows of specks.
+    some of the hair's light, that comes and goes from one closure to the next. Coverage distinguishes it from
+    hair: judged by its light, every other pixel of a thin lash was a dot, and lashes were rows of specks.
 
     Parameters
     ----------
@@ -58,7 +59,7 @@ def without_dots(picture: Light, cover: Light) -> Light:
     -------
     float32 array (h, w, 3)
         A dot has the median light of the eight pixels about it; all others stay. The end of a hair that is
-        covered to its last pixel, which has one covered neighbour too, loses that pixel.
+        covered to its last pixel, which has one covered neighbor too, loses that pixel.
     """
     about = np.stack(_shifted(np.pad(cover, 1, mode="reflect"), cover.shape))
     dots = (cover > DOT) & (np.partition(about, -2, axis=0)[-2] < SPARSE)

@@ -41,7 +41,7 @@ class Lids(_Declared):
 
 
 class Iris(_Declared):
-    """Linear-light colours of the iris from limbus to pupil."""
+    """Linear-light colors of the iris from limbus to pupil."""
 
     outer: Colour
     middle: Colour
@@ -50,7 +50,7 @@ class Iris(_Declared):
 
 
 class Hair(_Declared):
-    """Linear-light colour of brows, lashes being darker; amounts relative to the first identity."""
+    """Linear-light color of brows, lashes being darker; amounts relative to the first identity."""
 
     colour: Colour
     brow: float = Field(1.0, ge=0, le=2)
@@ -63,7 +63,7 @@ class Movement(_Declared):
     """What moves besides the upper lid, at full closure. 0 holds it still."""
 
     lower_lid_rise: float = Field(1.0, ge=0, le=1, description="share of the kit's rise of the lower lid")
-    lower_lid_slide: float = Field(0.0, ge=0, le=1, description="share of the kit's slide towards the nose")
+    lower_lid_slide: float = Field(0.0, ge=0, le=1, description="share of the kit's slide toward the nose")
     cheek: float = Field(0.0, ge=0, le=0.3, description="weight of cheekSquint")
     squint: float = Field(0.0, ge=0, le=0.3, description="weight of eyeSquint")
     brow: float = Field(0.0, ge=0, le=0.3, description="weight of browDown")
@@ -153,7 +153,7 @@ BROWN = Iris(outer=(0.022, 0.010, 0.004), middle=(0.065, 0.028, 0.010), inner=(0
 
 
 def _iris(rng: np.random.Generator, melanin: float) -> Iris:
-    """Brown eyes with dark skin; any colour with light skin."""
+    """Brown eyes with dark skin; any color with light skin."""
     drawn = rng.random()
     if melanin > 0.45 or drawn < 0.35:
         return BROWN

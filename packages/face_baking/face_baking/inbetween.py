@@ -1,6 +1,6 @@
 """Levels between rendered ones, moved rather than cross-faded: skin and lashes follow the optical flow.
 
-Dense inverse search between the two rendered neighbours (Kroeger et al. 2016,
+Dense inverse search between the two rendered neighbors (Kroeger et al. 2016,
 doi:10.1007/978-3-319-46493-0_29).
 """
 

@@ -1,7 +1,7 @@
 """ICT-FaceKit as arrays: a head's vertices, faces, identity modes and the expressions that a blink uses.
 
 The geometry never ships with Palpebra: users name their own copy, the kit's OBJ files or a packed .npz.
-Source: Li et al. 2020, "Learning Formation of Physically-Based Face Attributes", CVPR; MIT licence.
+Source: Li et al. 2020, "Learning Formation of Physically-Based Face Attributes", CVPR; MIT license.
 """
 
 import hashlib
@@ -115,7 +115,7 @@ def _read_packed(file: Path) -> FaceKit:
             f"{file}: the packed face kit lacks an array ({error.args[0]}); pack it again"
         ) from error
     except (OSError, ValueError, zipfile.BadZipFile) as error:
-        raise InputError(f"{file}: expected a packed face kit (.npz), got a file that is none") from error
+        raise InputError(f"{file}: expected a packed face kit (.npz), got another kind of file") from error
     expressions = {}
     for name in EXPRESSIONS:
         if name not in names:
@@ -148,5 +148,5 @@ def _kit(
     if len(landmarks) != 68 or not (landmarks.min() >= 0 and landmarks.max() < VERTICES):
         raise InputError(f"{folder}: expected 68 landmark vertices, got {len(landmarks)}; use the whole kit")
     if not np.isfinite(neutral).all():
-        raise InputError(f"{folder}: the kit's mesh holds numbers that are not finite; use the kit unchanged")
+        raise InputError(f"{folder}: the kit's mesh has non-finite numbers; use the unchanged kit")
     return FaceKit(neutral, faces, modes, expressions, landmarks)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from experiments.errors import InputError
 
 MISSING = (
-    "no face kit there: expected ict_facekit.npz or ICT-FaceKit's FaceXModel folder "
+    "there is no face kit: expected ict_facekit.npz or ICT-FaceKit's FaceXModel folder "
     "(generic_neutral_mesh.obj and its shapes, see docs/explanation/characters.md)"
 )
 NEUTRAL_FILE, INDEX_FILE = "generic_neutral_mesh.obj", "vertex_indices.json"
@@ -73,5 +73,5 @@ def _content(file: Path) -> bytes:
         return file.read_bytes()
     except OSError as error:
         raise InputError(
-            f"{file}: the face kit is not whole, this file cannot be read; copy the whole kit"
+            f"{file}: the face kit is incomplete because this file cannot be read; copy the whole kit"
         ) from error

@@ -26,7 +26,7 @@ class LidCoordinates:
     upper : float64 array (n,)
         1 above the line through the eye's corners, 0 below.
     azimuth : float64 array (n,)
-        About the globe of its side, towards the temple, radians.
+        About the globe of its side, toward the temple, radians.
     side : float64 array (n,)
         1 on the person's left, -1 on the right.
     """

@@ -15,7 +15,7 @@ EDGE_LOOP, LASH_LOOP = 2, 4
 
 @dataclass(frozen=True, eq=False)
 class Globe:
-    """An eyeball: centre (3,) and radius without the cornea, cm."""
+    """An eyeball: center (3,) and radius without the cornea, cm."""
 
     centre: Array
     radius: float

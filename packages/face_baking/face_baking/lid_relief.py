@@ -16,10 +16,10 @@ from stimuli_builder.characters.colour import smooth
 
 FLESH_LOOPS, FLESH_ENDS, FLESH_CM = (0, 1, 2, 3, 4, 5), (2, 5), (0.03, 0.09)
 """Loops whose nasal ends are flesh, vertices of it on each one's upper and lower half, and how far it reaches
-beside them.
+next to them.
 
 The lids' edges end blunt and short of the fold between them: what lies there is the kit's own caruncle, and
-with a skin's colour it was a pale hook about the white. The lower half's margin begins at its sixth vertex.
+with a skin's color it was a pale hook about the white. The lower half's margin begins at its sixth vertex.
 """
 FOLD_UNROLLS, FOLD_STRETCHED = (0.68, 1.0), (0.0, 0.35)
 """Strokes in which the upper lid's fold unrolls, and in which the skin below it is drawn out of it.
@@ -116,7 +116,7 @@ class CornerFlesh:
     Attributes
     ----------
     share : float64 array (n,)
-        1 on it, 0 from `FLESH_CM[1]` beside it.
+        1 on it, 0 from `FLESH_CM[1]` away from it.
     mound : float64 array (n,)
         Share (0-1) of `MOUND_RISE_CM` that the caruncle has, before the skin's grain.
     """

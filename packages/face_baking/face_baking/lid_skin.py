@@ -68,7 +68,7 @@ class FaceSkin:
         return self.at_strokes(self.strokes.of(closure))
 
     def at_strokes(self, strokes: dict[int, float], lower_cm: tuple[float, float] = (0.0, 0.0)) -> Array:
-        """(n, 3) vertices with each side's lid at a stroke, the lower lids moved (up, towards the nose)."""
+        """(n, 3) vertices with each side's lid at a stroke, the lower lids moved (up, toward the nose)."""
         posed = self.fine(self.path.at(strokes, lower_cm))
         stroke = np.where(self.coordinates.side > 0, strokes[1], strokes[-1])
         posed = posed + normals(posed, self.fine.quads) * self.relief.displacement(stroke)[:, None]
@@ -97,7 +97,7 @@ class FaceSkin:
         return LidRelief(self.coordinates, self.flat, flesh, self.identity)
 
     def opening(self, posed: Array, side: int, offset_cm: float = 0.0) -> float:
-        """Height in cm of what is seen of the eye in a column `offset_cm` from the globe's centre.
+        """Height in cm of what is seen of the eye in a column `offset_cm` from the globe's center.
 
         The column is a plane through the mesh along the line of sight; skin in front of the globe covers it.
         """

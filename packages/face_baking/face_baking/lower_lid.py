@@ -1,4 +1,4 @@
-"""The lower lid's own movement: turned about the globe's centre, whole at its middle, none at the corners."""
+"""The lower lid's own movement: turned about the globe's center, whole at its middle, none at the corners."""
 
 import numpy as np
 
@@ -38,7 +38,7 @@ def moved_lower_lid(
 
 
 def turned_about(points: Array, chosen: Index, globe: Globe, up: Array) -> Array:
-    """(n, 3) points, those chosen turned upwards about the globe by radians of their own."""
+    """(n, 3) points, those chosen turned upward about the globe by individual radians."""
     out = points.copy()
     radius, azimuth, elevation = spherical(points[chosen] - globe.centre)
     out[chosen] = globe.centre + cartesian(radius, azimuth, elevation + up)

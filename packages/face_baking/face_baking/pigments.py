@@ -49,7 +49,7 @@ class Pigments:
         self.landmarks = skin.path.rest[skin.path.kit.landmarks]
         self.front = smooth(2.0, 5.0, self.rest[:, 2])
         self.dark = self.look.melanin > 0.4
-        # Foreshortened towards the temples, fine noise becomes upright streaks. Told of the shut lids: of the
+        # Foreshortened toward the temples, fine noise becomes upright streaks. About the closed lids: of the
         # open ones, skin that lies in their fold would have too little of it when it comes out.
         self.facing = smooth(0.25, 0.75, normals(skin.flat, skin.fine.quads)[:, 2])
         # Fine speckle is per vertex: as noise in the shader it doubled the time of a render. It is fainter on
@@ -101,7 +101,7 @@ class Pigments:
         return np.asarray(out * np.clip(1 + self.calm * 0.18 * self._noise(15.0, 23, 2), 0.5, 1.6))
 
     def _rim_blood(self) -> Array:
-        """(n,) blood of the lids' wet margins, more towards the corners: even, it is a drawn line."""
+        """(n,) blood of the lids' wet margins, more toward the corners: even, it is a drawn line."""
         outer = np.abs(self.skin.coordinates.azimuth - LID_MIDDLE)
         shaded = 1 - 0.6 * self.skin.coordinates.upper
         return np.asarray(
@@ -116,7 +116,7 @@ class Pigments:
         return np.asarray(np.exp(-((x / width) ** 2 + (y / height) ** 2) / 2) * self.front)
 
     def _near_eye(self, side: int, x: float, y: float, width: float, height: float) -> Array:
-        """A spot at (x towards the temple, y up) from an eye's centre, cm."""
+        """A spot at (x toward the temple, y up) from an eye's center, cm."""
         return self._spot(self.centres[side] + np.array([side * x, y, 0]), width, height)
 
     def _lips(self) -> Array:

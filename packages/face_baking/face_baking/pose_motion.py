@@ -45,7 +45,7 @@ class PoseMotion:
         size = box[2], box[3]
         share = cv2.resize(lower, size, interpolation=cv2.INTER_AREA)[..., None]
         shift = cv2.resize(painted[..., :2] * lower, size, interpolation=cv2.INTER_AREA)
-        # Lashes stand over the lid's edge: what is no skin there follows the skin nearby.
+        # Lashes are over the lid's edge: what is not skin there follows the skin nearby.
         near, far = (_normalised(shift, share, sigma) for sigma in (_NEAR_PX, _FAR_PX))
         soft = cv2.GaussianBlur(share, (0, 0), _EDGE_PX)[..., None]
         return cls(np.where(share > _INSIDE, near, far).astype(np.float32), soft.astype(np.float32))
@@ -60,7 +60,7 @@ class PoseMotion:
 
 
 def pose_between(scene: FaceScene, pose: LidPose, ends: dict[LidPose, Light], box: Box) -> Light:
-    """(h, w, 3) picture of a pose: the mean of its neighbours, each moved to it, the nearer counting more."""
+    """(h, w, 3) picture of a pose: the mean of its neighbors, each moved to it, the nearer counting more."""
     far = {end: _distance(pose, end) for end in ends}
     total = sum(far.values())
     mixed = np.zeros((box[3], box[2], 3), np.float32)

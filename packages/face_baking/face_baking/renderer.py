@@ -123,7 +123,7 @@ class Renderer:
 
     def _answer(self, doing: str) -> dict[str, Any]:
         line = self._process.stdout.readline() if self._process.stdout is not None else ""
-        answer: dict[str, Any] = json.loads(line) if line else {"error": "it ended without a word"}
+        answer: dict[str, Any] = json.loads(line) if line else {"error": "it ended without output"}
         if "error" in answer:
             raise InputError(
                 f"Blender stopped while {doing}: {answer['error']}; what is rendered stays: bake again"

@@ -1,6 +1,6 @@
 """One face's scene as plain arrays: what stays, and the positions of each closure.
 
-The renderer (cycles_face_worker.py) runs in an environment of its own with Blender's numpy, so it gets .npz
+The renderer (cycles_face_worker.py) runs in a separate environment with Blender's numpy, so it gets .npz
 files: `header` (JSON: parts with kind, name, material and fields) and each part's arrays under
 `<index>_<field>`.
 """
@@ -29,7 +29,7 @@ from face_baking.subdivision import subdivide
 SIDE_NAMES = {1: "left", -1: "right"}
 MOVES_CM = 0.004
 LIDS_MOVE_CM = 0.10
-"""What moves farther is lid or lash: there noise is not the open eye's, and takes samples of its own."""
+"""What moves farther is lid or lash: there noise is not the open eye's, and needs separate samples."""
 MOVING = ("points", "vertices", "value_shade", "value_flush")
 SMALL_WIDTH_PX = 480
 """Below this width a pixel is larger than the quads of one subdivision less."""
@@ -90,13 +90,13 @@ class FaceScene:
         return Pigments(self.skin).values()
 
     def parts(self, pose: LidPose) -> list[Part]:
-        """Every part in a pose, always in the same order, with what colours it."""
+        """Every part in a pose, always in the same order, with what colors it."""
         first, *others = self.shapes(pose)
         skin = replace(first.shape, values=self._values) if isinstance(first.shape, Mesh) else first.shape
         return [replace(first, shape=skin), *others]
 
     def shapes(self, pose: LidPose) -> list[Part]:
-        """The parts without the skin's colours."""
+        """The parts without the skin's colors."""
         strokes, coarse, posed = self.strokes_of(pose), self._coarse(pose), self.posed_skin(pose)
         parts = [Part("skin", "skin", Mesh(posed, self.skin.fine.quads))]
         for side, name in SIDE_NAMES.items():

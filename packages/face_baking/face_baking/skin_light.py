@@ -1,7 +1,7 @@
 """Light that scatters below the skin, worked out in the picture; numpy alone, as Blender's Python runs it.
 
 A renderer follows such light by chance and needs seven to fourteen times the samples. Seen from the front it
-is a blur of the light that falls on the skin, before the skin's colour takes its share.
+is a blur of the light that falls on the skin, before the skin's color takes its share.
 """
 
 import numpy as np
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 REACH_CM = (0.030, 0.0104, 0.0044)
 """Letter d of eq. (1) for red, green and blue on a head of the kit's size: green and blue 0.22 and 0.11 mm
-over s = 1.9 - A + 3.5 (A - 0.8)^2 of the same paper, A the mean colour of light skin, 0.39 and 0.29. Red is
+over s = 1.9 - A + 3.5 (A - 0.8)^2 of the same paper, A the mean color of light skin, 0.39 and 0.29. Red is
 0.048 by that formula (0.65 mm, A 0.64), for even skin: narrow folds, filled with red light, were orange.
 """
 TAIL = 8.0
@@ -49,7 +49,7 @@ def diffusion_kernel(reach_px: float) -> NDArray[np.float64]:
 
 
 def scattered(light: Light, skin: Light, reach_px: tuple[float, ...]) -> Light:
-    """Light on the skin after it went below it; none of it comes from what is no skin.
+    """Light on the skin after it went below it; none of it comes from what is not skin.
 
         S = (K * (m E)) / (K * m)                                                                          (2)
 
@@ -58,7 +58,7 @@ def scattered(light: Light, skin: Light, reach_px: tuple[float, ...]) -> Light:
     Parameters
     ----------
     light : float32 array (h, w, channels)
-        Light that falls on each pixel, without the skin's colour.
+        Light that falls on each pixel, without the skin's color.
     skin : float32 array (h, w)
         Share of each pixel that is skin, 0 to 1.
     reach_px : tuple of float
@@ -67,7 +67,7 @@ def scattered(light: Light, skin: Light, reach_px: tuple[float, ...]) -> Light:
     Returns
     -------
     float32 array (h, w, channels)
-        What is no skin has light that means nothing near skin (m is 0 there), and its own farther away.
+        What is not skin has light that means nothing near skin (m is 0 there), and its own farther away.
     """
     out = light.copy()
     for k, reach in enumerate(reach_px):

@@ -1,4 +1,4 @@
-"""Directions about a globe's centre, and the eye's surface with its cornea; cm and radians."""
+"""Directions about a globe's center, and the eye's surface with its cornea; cm and radians."""
 
 import numpy as np
 
@@ -32,7 +32,7 @@ def slerp(start: Array, end: Array, share: float) -> Array:
 
 
 def surface_radius(angle: Array, globe_cm: float) -> Array:
-    """Distance of the eye's surface from the globe's centre at an angle from the gaze axis.
+    """Distance of the eye's surface from the globe's center at an angle from the gaze axis.
 
     The cornea is a sphere of radius 0.83 cm through the limbus (0.60 cm off axis), blended over 0.02 cm.
     """

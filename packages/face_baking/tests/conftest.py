@@ -1,4 +1,4 @@
-"""The face kit that lies beside the checkout, read once."""
+"""The face kit next to the checkout, read once."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from tests.conftest import shared_data  # noqa: F401 - pytest finds the fixture 
 def packed_kit(shared_data: Path) -> Path:
     file = shared_data / "facekit" / "ict_facekit.npz"
     if not file.is_file():
-        pytest.skip("the face kit is not here (looked for ../shared/data/facekit beside the checkout)")
+        pytest.skip("the face kit was not found (looked for ../shared/data/facekit next to the checkout)")
     return file
 
 

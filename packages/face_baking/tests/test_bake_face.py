@@ -67,7 +67,7 @@ def bake_of(kit: FaceKit, scene: FaceScene, wanted: FaceOrder) -> FaceBake:
 
 
 def pretend_rendered(bake: FaceBake, count: int) -> None:
-    """Put grey shots, darker with closure, where a bake of that many shots would have left its renders."""
+    """Put gray shots, darker with closure, where a bake of that many shots would have left its renders."""
     bake.work.mkdir(parents=True, exist_ok=True)
     for shot in bake.shots[:count]:
         grey = 0.3 - 0.1 * shot.pose.closure
@@ -260,7 +260,7 @@ def test_an_interrupted_bake_says_what_lacks_and_keeps_what_is_there(
 ) -> None:
     bake = bake_of(kit, scene, order(tmp_path))
     pretend_rendered(bake, 2)
-    with pytest.raises(InputError, match="nothing to write: the still frame, the open and the shut level"):
+    with pytest.raises(InputError, match="nothing to write: the still frame, the open and the closed level"):
         bake.write()
     assert len(list(bake.work.glob("*.npz"))) == 2
     assert not (tmp_path / "out").exists()
@@ -308,14 +308,12 @@ def test_a_full_disk_is_said_in_one_line(
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(Path, "write_bytes", full)
-    with pytest.raises(
-        InputError, match="the disk is full: free some of it and bake again; what is rendered"
-    ):
+    with pytest.raises(InputError, match="the disk is full: free up space and bake again; rendered levels"):
         bake.run(lambda *_: None)
 
 
 def program(tmp_path: Path, body: str) -> Path:
-    """A program that stands where Blender's Python would."""
+    """A program in the place where Blender's Python would."""
     file = tmp_path / "python"
     file.write_text(f"#!{sys.executable}\nimport json, sys\n{body}\n")
     file.chmod(0o755)
@@ -329,7 +327,7 @@ def program(tmp_path: Path, body: str) -> Path:
             "print(json.dumps({'error': 'CUDA error: device lost'}))",
             "CUDA error: device lost; what is rendered",
         ),
-        ("sys.exit(3)", "it ended without a word; what is rendered stays"),
+        ("sys.exit(3)", "it ended without output; what is rendered stays"),
     ],
 )
 def test_a_gpu_that_vanishes_is_said_in_one_line(
@@ -425,12 +423,12 @@ def test_sizes_and_lights_are_checked() -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--identity", "alder", "--seed", "4"], "give either --identity NAME or --seed NUMBER"),
+        (["--identity", "alder", "--seed", "4"], "use either --identity NAME or --seed NUMBER"),
         (["--seed", "-1"], "seed must lie between 0 and 999999; it is -1"),
         (["--identity", "alder", "--levels", "10"], "levels must be one of"),
         (["--identity", "alder", "--levels", "9", "--rendered", "17"], "cannot render 17 levels of an atlas"),
         (["--identity", "alder", "--device", "tpu"], "device must be one of auto, cpu, gpu; it is 'tpu'"),
-        (["--identity", "alder"], "no face kit there"),
+        (["--identity", "alder"], "there is no face kit"),
     ],
 )
 def test_the_command_says_faults_in_one_line(tmp_path: Path, arguments: list[str], said: str) -> None:

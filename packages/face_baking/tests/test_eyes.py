@@ -1,4 +1,4 @@
-"""What is told to the eye's shader: where it is shaded, and where its white turns into flesh."""
+"""Inputs of the eye's shader: where it is shaded, and where its white turns into flesh."""
 
 import numpy as np
 import pytest

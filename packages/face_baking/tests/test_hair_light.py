@@ -1,4 +1,4 @@
-"""Single wrong pixels of a layer of hair have their neighbours' light; all others stay."""
+"""Single wrong pixels of a layer of hair have their neighbors' light; all others stay."""
 
 import numpy as np
 import pytest

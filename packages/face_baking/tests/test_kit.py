@@ -53,14 +53,14 @@ def test_obj_files_give_displacements_and_triangles(tmp_path: Path) -> None:
 
 def test_no_kit_is_said_in_one_line(tmp_path: Path) -> None:
     for place in (tmp_path, tmp_path / "nowhere", tmp_path / "none.npz"):
-        with pytest.raises(InputError, match=r"no face kit there: expected ict_facekit.npz or") as fault:
+        with pytest.raises(InputError, match=r"there is no face kit: expected ict_facekit.npz or") as fault:
             load_facekit(place)
         assert "\n" not in str(fault.value)
 
 
 def test_a_part_of_the_obj_files_names_the_first_that_lacks(tmp_path: Path) -> None:
     write_obj(tmp_path / "generic_neutral_mesh.obj", np.zeros((4, 3)), [[0, 1, 2, 3]])
-    with pytest.raises(InputError, match=r"identity000.obj: the face kit is not whole"):
+    with pytest.raises(InputError, match=r"identity000.obj: the face kit is incomplete"):
         load_facekit(tmp_path)
 
 

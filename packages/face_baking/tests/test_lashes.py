@@ -1,4 +1,4 @@
-"""Lashes as the camera sees them: on a shut lid they hang as long as they stand on an open one."""
+"""Lashes as the camera sees them: on a closed lid they hang as long as they are on an open one."""
 
 import numpy as np
 import pytest

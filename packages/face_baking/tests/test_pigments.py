@@ -1,4 +1,4 @@
-"""What the skin's shader is told of the upper lids: where its texture lies, and how they shine."""
+"""Inputs of the skin's shader about the upper lids: where its texture is, and how they shine."""
 
 import numpy as np
 import pytest
@@ -131,7 +131,7 @@ def test_the_skin_beside_a_nasal_corner_is_redder_and_duller_than_the_skin_beyon
 
 
 def test_the_fold_of_the_nasal_corner_is_moist_flesh(skin: FaceSkin, values: dict[str, Array]) -> None:
-    """Of the colour of skin it was a pit behind a corner that ended blunt."""
+    """Of the color of skin it was a pit behind a corner that ended blunt."""
     flesh, beside = skin.relief.flesh > 0.9, (skin.relief.flesh == 0) & (Pigments(skin)._nasal_corner() > 0.5)
     assert flesh.sum() > 20
     assert np.abs(skin.coordinates.azimuth[flesh] - skin.coordinates.azimuth[flesh].mean()).max() < 0.5
@@ -150,7 +150,7 @@ def test_that_flesh_stands_out_of_its_fold_only_while_the_eye_is_open(skin: Face
 
 
 def test_flesh_reaches_to_the_lids_edges(skin: FaceSkin) -> None:
-    """They end blunt at the nose, and of the colour of skin that end was a pale hook about the white."""
+    """They end blunt at the nose, and of the color of skin that end was a pale hook about the white."""
     for side in (1, -1):
         for edge in (0, 2):
             at = nasal_tip(skin.path, skin.path.rest, side, edge)

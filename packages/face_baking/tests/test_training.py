@@ -112,10 +112,10 @@ def test_a_whole_run_renders_nothing_and_another_one_is_refused(kit: FaceKit, tm
     make_samples(order(tmp_path), kit, lambda *now: said.append(now))
     assert said == [(2, 2, "begin")]
     assert file.read_text() == "\n".join(lines) + "\n"
-    with pytest.raises(InputError, match="holds samples with seed 1, asked for is 2; give another --out"):
+    with pytest.raises(InputError, match="has samples with seed 1, but 2 was requested; use another --out"):
         make_samples(order(tmp_path, seed=2), kit, print)
     (tmp_path / "samples.json").write_text("{")
-    with pytest.raises(InputError, match=r"samples\.json is damaged; give another --out"):
+    with pytest.raises(InputError, match=r"samples\.json is damaged; use another --out"):
         make_samples(order(tmp_path), kit, print)
 
 

@@ -1,7 +1,7 @@
-"""The bar code of a frame: upright bars over the whole picture, so that any row tells its number.
+"""The bar code of a frame: upright bars over the whole picture, so that any row shows its number.
 
 Ten bars: white, black, six bits (least significant first), their parity and its opposite. A row that shows
-parts of two frames, or the grey surround, does not decode.
+parts of two frames, or the gray surround, does not decode.
 """
 
 from collections.abc import Sequence
@@ -38,7 +38,7 @@ def planes(number: int, height_px: int = HEIGHT_PX) -> NDArray[np.uint8]:
 
 
 def read(values: Sequence[int]) -> int:
-    """The frame's number from one grey value a bar; SURROUND where all are grey, else UNREADABLE."""
+    """The frame's number from one gray value a bar; SURROUND where all are gray, else UNREADABLE."""
     if all(DARK_BELOW <= value <= LIGHT_ABOVE for value in values):
         return SURROUND
     if any(DARK_BELOW <= value <= LIGHT_ABOVE for value in values):

@@ -25,7 +25,7 @@ def program(browser: str) -> str | None:
 
 
 class Browser:
-    """One browser with a profile of its own, for the time of a `with`.
+    """One browser with a separate profile, for the time of a `with`.
 
     Attributes
     ----------

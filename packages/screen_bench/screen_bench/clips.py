@@ -81,7 +81,7 @@ def make_clip_folder(
 
 
 def _clip(folder: Path, spec: ClipSpec, fps: int, height_px: int, seconds: float) -> Clip:
-    # A box that players skip makes each file one of its own.
+    # A box that players skip makes each file different.
     own = f"{spec.cell}/{spec.exemplar}".encode()
     data = bar_video(fps, height_px, seconds) + (len(own) + BOX_HEAD_BYTES).to_bytes(4, "big") + b"free" + own
     sha256 = hashlib.sha256(data).hexdigest()
@@ -104,7 +104,7 @@ def _clip(folder: Path, spec: ClipSpec, fps: int, height_px: int, seconds: float
 
 @cache
 def bar_video(fps: int, height_px: int, seconds: float) -> bytes:
-    """The bars as H.264 in MP4; their numbers begin anew every 64 frames."""
+    """The bars as H.264 in MP4; their numbers restart every 64 frames."""
     numbers = (number % bars.MAX_FRAMES for number in range(frames_at(fps, seconds)))
     pictures = (bars.planes(number, height_px) for number in numbers)
     return encode_clip(pictures, (bars.WIDTH_PX, height_px), fps)

@@ -63,12 +63,12 @@ class Play:
 
     @property
     def is_measured(self) -> bool:
-        """False where the poller itself was held up for too long to tell."""
+        """False if the poller itself was delayed for too long to know."""
         return self.blind_ms <= REFRESH_MS / 2
 
     @property
     def is_off(self) -> bool:
-        """True where the record does not tell what was on the screen."""
+        """True if the record does not show what was on the screen."""
         return self.missing > 0 or self.worst_off_ms > REFRESH_MS + POLL_MS
 
     @property

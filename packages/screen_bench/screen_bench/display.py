@@ -76,7 +76,7 @@ class Display:
 
 
 class Keyboard:
-    """The XTEST extension: what it sends, programs cannot tell from a keyboard."""
+    """The XTEST extension: programs cannot distinguish what it sends from a keyboard."""
 
     def __init__(self, display: str) -> None:
         self._x11 = ctypes.CDLL(ctypes.util.find_library("X11"))

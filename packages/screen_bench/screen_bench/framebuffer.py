@@ -8,7 +8,7 @@ from pathlib import Path
 
 from screen_bench import bars
 
-# Words of the XWD header (X11/XWDFile.h), big-endian; each colour map entry takes 12 bytes.
+# Words of the XWD header (X11/XWDFile.h), big-endian; each color map entry takes 12 bytes.
 HEADER_SIZE, WIDTH, HEIGHT, BITS_PER_PIXEL, BYTES_PER_LINE, COLOURS = 0, 4, 5, 11, 12, 19
 HEADER_WORDS, COLOUR_BYTES = 25, 12
 GREEN = 1
@@ -46,5 +46,5 @@ class FrameBuffer:
         return [self._start + y * self._line + 4 * x + GREEN for x in xs]
 
     def values(self, row: Sequence[int]) -> tuple[int, ...]:
-        """The grey values at the offsets."""
+        """The gray values at the offsets."""
         return tuple(self._map[offset] for offset in row)

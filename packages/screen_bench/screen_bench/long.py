@@ -130,7 +130,7 @@ def long_play(
 
 
 def unwrapped(numbers: Sequence[int]) -> list[int]:
-    """Frame numbers of a clip whose bars begin anew every 64 frames; fewer than 64 may be lost at a time."""
+    """Frame numbers of a clip whose bars restart every 64 frames; fewer than 64 may be lost at a time."""
     indices: list[int] = []
     for number in numbers:
         before = indices[-1] if indices else -1

@@ -28,7 +28,7 @@ WHERE r.id = (SELECT max(id) FROM study_runs) ORDER BY t.time_elapsed
 SETTLE_S = 0.3
 AFTER_CLIP_S = 0.25
 NUMBERS = itertools.count(1)
-"""Each piece of a row is a study of its own."""
+"""Each piece of a row is a separate study."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def measure(
     with Browser(browser, display.name, before_others and not condition.busy) as driver:
         driver.ask("open", address=f"{server.address}/run/{study.link_token}")
         driver.wait_for("ready")
-        # Beside the clip and the button: until then the browser's own bar may have the keys.
+        # Next to the clip and the button: until then the browser's own bar may have the keys.
         display.click(WIDTH_PX - 40, HEIGHT_PX - 40)
         log_file = folder / f"{name}.json"
         with poller(display.framebuffer, driver.clip_area(), log_file), condition.during(driver):

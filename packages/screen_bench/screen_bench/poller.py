@@ -1,9 +1,9 @@
-"""The 'photodiode': a process of its own that reads the bars at 1 to 2 kHz until its input closes.
+"""The 'photodiode': a separate process that reads the bars at 1 to 2 kHz until its input closes.
 
     python -m screen_bench.poller FRAMEBUFFER LEFT TOP WIDTH HEIGHT OUTPUT
 
 It writes each change with the time it was seen at, and each time it was held up itself: what happened then is
-not known. Times are CLOCK_MONOTONIC in ms, the clock that browsers count by too.
+unknown. Times are CLOCK_MONOTONIC in ms, the clock that browsers count by too.
 """
 
 import ctypes

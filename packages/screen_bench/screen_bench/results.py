@@ -193,7 +193,7 @@ def measure_in_pieces(
             lost += 1
             if lost == MAX_LOST_PIECES:
                 raise
-            print(f"    a piece was not measured, and is begun anew: {error}", flush=True)
+            print(f"    a piece was not measured, and starts again: {error}", flush=True)
             continue
         results.add(key, count, cells(row), asdict(row))
         print(f"    {results.count(key)} of {plays} plays", flush=True)

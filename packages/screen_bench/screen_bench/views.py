@@ -117,7 +117,7 @@ def count_views(display: Display, server: ServerProcess, folder: Path, browser: 
 
 
 def _one_try(display: Display, driver: Browser, way: Way, address: str, shows: Callable[[], bool]) -> None:
-    # Beside the clip: a window that has just been opened may not have the keys yet.
+    # Next to the clip: a window that has just been opened may not have the keys yet.
     display.click(WIDTH_PX - 40, HEIGHT_PX - 40)
     time.sleep(SETTLE_S)
     display.press("space")

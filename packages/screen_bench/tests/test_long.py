@@ -1,4 +1,4 @@
-"""Frames of long clips are told apart although their bars begin anew."""
+"""Frames of long clips are distinguished although their bars restart."""
 
 from hypothesis import given
 from hypothesis import strategies as st

@@ -16,7 +16,7 @@ AREA = ClipArea(20, 30, bars.WIDTH_PX, bars.HEIGHT_PX)
 
 
 def write_display(path: Path, bits: int = 32) -> np.memmap:
-    """An empty grey display; what is written into the array is on it."""
+    """An empty gray display; what is written into the array is on it."""
     words = [0] * 25
     words[0], words[4], words[5], words[11], words[12] = HEAD_BYTES, WIDTH, HEIGHT, bits, 4 * WIDTH
     path.write_bytes(struct.pack(">25I", *words).ljust(HEAD_BYTES, b"\0") + b"\x80" * (4 * WIDTH * HEIGHT))

@@ -53,7 +53,7 @@ def test_scale_scores_are_means_with_reverse_keyed_items_turned(tmp_path) -> Non
     assert result.scores == (("x", 1.0), ("y", 4.0), ("z", 6.5))
     assert result.omega is None
     assert "needs 3 items" in result.omega_reason
-    assert data.decisions == ("1 case without an answer to every item left out (line 5)",)
+    assert data.decisions == ("1 case without an answer to every item excluded (line 5)",)
 
 
 def test_intraclass_correlations_equal_r() -> None:
@@ -78,7 +78,7 @@ def test_krippendorffs_own_example(tmp_path, level, alpha) -> None:
     result = agreement(read_votes(votes_file(tmp_path, lines), "clip", "id", "score"), level)
     assert round(result.krippendorff_alpha, 3) == alpha
     # the unit that one observer rated tells nothing of agreement
-    assert any("1 items rated by one person" in decision for decision in result.decisions)
+    assert any("1 items were rated by only one person" in decision for decision in result.decisions)
 
 
 def test_who_rated_what_nobody_else_did_is_no_rater(tmp_path) -> None:
@@ -104,8 +104,8 @@ def test_what_tells_nothing_of_agreement_is_refused(tmp_path, lines, said) -> No
     ("items", "reverse", "scale", "said"),
     [
         (["calm"], [], None, "two items or more"),
-        (["calm", "glad"], ["warm"], (1, 7), "none of the items calm, glad"),
-        (["calm", "glad"], ["glad"], None, "add e.g. --scale 1:7"),
+        (["calm", "glad"], ["warm"], (1, 7), "not one of the items calm, glad"),
+        (["calm", "glad"], ["glad"], None, "scale: add, for example, --scale 1:7"),
         (["calm", "glad"], [], (1, 5), "outside the scale 1 to 5"),
         (["calm", "happy"], [], None, "no column 'happy'"),
     ],
@@ -122,7 +122,7 @@ def test_an_item_that_follows_from_another_has_no_omega(tmp_path) -> None:
     path.write_text("\n".join(["a,b,c", *lines]), encoding="utf-8")
     result = reliability(read_items(path, ["a", "b", "c"]))
     assert result.omega is None
-    assert "follows from the others" in result.omega_reason
+    assert "is determined by the others" in result.omega_reason
 
 
 def test_the_commands_print_and_write(tmp_path) -> None:
@@ -155,7 +155,7 @@ def test_codes_for_missing_among_the_answers_are_named(tmp_path) -> None:
     rows = [f"{1 + i % 5},{-99 if i == 4 else 1 + i * i % 5},{1 + i % 4}" for i in range(20)]
     path.write_text("\n".join(["q1,q2,q3", *rows]))
     (said,) = read_items(path, ["q1", "q2", "q3"]).decisions
-    assert "'q2' holds -99 (line 6), by which missing values are often marked; they count" in said
+    assert "'q2' has -99 (line 6), often a code for missing values; they were counted" in said
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -5,9 +5,18 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
-from analysis.capsule import INTENDED, FileComparison, compare_reports, intended_change
+from analysis.capsule import (
+    INTENDED,
+    RENAMED,
+    REWORDED,
+    FileComparison,
+    compare_reports,
+    intended_change,
+    is_reworded,
+)
 
 OLD, NEW = date(2026, 11, 27), date(2026, 12, 24)
+BETWEEN = date(2026, 11, 29)
 WAS = {
     "effects": [{"f": 5.25}],
     "pairwise": [{"p": 0.01}, {"p": 0.02}],
@@ -67,3 +76,45 @@ def test_no_change_excuses_the_main_tests() -> None:
     for change in INTENDED:
         for place in ("effects[0].f", "effects[0].p", "marginal_means[0].mean", "Results", "Every test"):
             assert intended_change(place, change.since) is None
+
+
+LEFT_OUT = "## Who and what was left out\n\n- nothing; every row counts\n\n## Results\n\nF = 5.25\n"
+EXCLUDED = "## Exclusions and decisions\n\n- none; every row was analyzed\n\n## Results\n\nF = 5.25\n"
+
+
+def test_a_sentence_with_equal_numbers_is_named_as_new_wording(tmp_path: Path) -> None:
+    one = compared(tmp_path, "report.md", LEFT_OUT, EXCLUDED, BETWEEN)
+    assert one.kind == "table"
+    assert one.said == (
+        "'Exclusions and decisions', line 3: '- nothing; every row counts' became '- none; every row was "
+        "analyzed', changed on purpose on 2026-11-29: the wording is in plainer English; all numbers are "
+        "equal"
+    )
+
+
+def test_a_later_capsule_has_the_new_wording(tmp_path: Path) -> None:
+    one = compared(tmp_path, "report.md", LEFT_OUT, EXCLUDED, NEW)
+    assert "changed on purpose" not in one.said
+
+
+def test_new_wording_explains_no_number_no_table_and_no_name(tmp_path: Path) -> None:
+    was = "Effects of the blur were F = 5.25 today\n| a | human face of the four |\n"
+    assert is_reworded(was, was.replace("today", "now and here"))
+    assert not is_reworded(was, was.replace("5.25", "5.26"))
+    assert not is_reworded(was, was.replace("human face", "doll face"))
+    assert not is_reworded("human", "doll")
+
+
+def test_renamed_terms_count_as_wording() -> None:
+    for old, new in RENAMED.items():
+        assert is_reworded(f"| {old} | 3 |", f"| {new} | 3 |")
+
+
+def test_new_wording_of_a_decision_in_the_numbers_is_named(tmp_path: Path) -> None:
+    was, now = "3 rows without a rating left out", "3 rows without a rating excluded"
+    one = compared(
+        tmp_path, "results.json", json.dumps({"decisions": [was]}), json.dumps({"decisions": [now]}), BETWEEN
+    )
+    assert "decisions[0]" in one.said
+    assert f"changed on purpose on {REWORDED}" in one.said
+    assert "Numbers changed" not in one.said

@@ -50,7 +50,7 @@ def test_run_finds_the_default_database(tmp_path, monkeypatch) -> None:
     monkeypatch.setenv("PALPEBRA_DATA_FOLDER", str(tmp_path))
     empty = call("run", "exp3", "--no-report")
     assert empty.exit_code == 1
-    assert "nothing to analyse: there is no database" in empty.stderr
+    assert "nothing to analyze: there is no database" in empty.stderr
     make_database(tmp_path / "palpebra.sqlite", EXP3, simulate(EXP3, 6), participants=list("abcdef"))
     found = call("run", "exp3", "--no-report")
     assert found.exit_code == 0
@@ -76,8 +76,8 @@ def test_a_study_of_a_server_is_analysed_by_its_file(monkeypatch, capsys) -> Non
     assert end.value.code == 2
     told = capsys.readouterr().err
     assert told.startswith("error: no experiment 'motion'")
-    assert "; a study of a server is analysed by its TOML file, which is under" in told
-    assert "materials/ in the zip of `server export NAME --format psych-ds --out NAME.zip`" in told
+    assert ". To analyze a study on a server, use its TOML file: run" in told
+    assert "file: run `server export NAME --format psych-ds --out NAME.zip`" in told
 
 
 def test_a_seed_below_zero_is_a_usage_error() -> None:
@@ -91,11 +91,11 @@ def test_a_seed_below_zero_is_a_usage_error() -> None:
     [
         (("run", "exp4"), "did you mean"),
         (("run", "exp3", "--csv", "nowhere.csv"), "no file nowhere.csv"),
-        (("run", "exp3", "--csv", "a.csv", "--database", "sqlite:///b"), "exclude each other"),
-        (("run", "exp3", "--database", "what"), "is no database URL"),
+        (("run", "exp3", "--csv", "a.csv", "--database", "sqlite:///b"), "cannot be combined; use"),
+        (("run", "exp3", "--database", "what"), "is not a database URL"),
         (("check-paper", "nowhere.toml"), "no file"),
         (("anova", "nowhere.csv", "--participant", "a", "--rating", "b", "--within", "c"), "no file"),
-        (("anova", "x.csv", "--participant", "a", "--rating", "b", "--within", ","), "no factor named"),
+        (("anova", "x.csv", "--participant", "a", "--rating", "b", "--within", ","), "no factor is named"),
         (
             ("anova", "x.csv", "--participant", "a", "--rating", "b", "--within", "c", "--scale", "7"),
             "like 1:7",
@@ -130,7 +130,7 @@ def test_anova_of_anyones_table(tmp_path) -> None:
     assert len(data["dropped"][0]["missing_cells"]) == 5
     assert {pair["effect"] for pair in data["pairwise"]} == {"blur", "face", "blur:face"}
     assert len(data["marginal_means"]) == 2 + 3 + 6
-    assert "participant 8 dropped" in result.stdout
+    assert "participant 8 excluded" in result.stdout
 
 
 @pytest.mark.parametrize(
@@ -181,7 +181,7 @@ def test_constant_ratings_are_analysed_with_reasons(tmp_path) -> None:
     result = call("anova", tmp_path / "t.csv", "--participant", "id", "--rating", "y", "--within", "f")
     assert result.exit_code == 0, result.output
     assert "nothing varies" in " ".join(result.stdout.split())
-    assert "gave one and the same rating" in " ".join(result.stdout.split())
+    assert "gave the same rating" in " ".join(result.stdout.split())
 
 
 def test_check_paper_ships_with_the_papers_figures(tmp_path) -> None:

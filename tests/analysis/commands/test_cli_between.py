@@ -34,7 +34,7 @@ def test_a_whole_mixed_design_to_json(tmp_path) -> None:
     assert data["covariates"][0]["name"] == "age"
     assert data["type"] == 3
     assert len(data["effects"]) == 19
-    assert "covariate 'age' centred at its mean" in " ".join(result.output.split())
+    assert "covariate 'age' was centered at its mean" in " ".join(result.output.split())
     assert "groups differ in size" in result.output
 
 
@@ -103,7 +103,7 @@ def test_a_group_of_which_nobody_rated_every_cell_is_named(tmp_path) -> None:
     rows = [f"{i},{'gh'[i % 2]},{t},{i + t}\n" for i in range(8) for t in range(3) if (i % 2, t) != (1, 2)]
     file.write_text("id,group,time,y\n" + "".join(rows))
     said = str(anova(file, "--within", "time", "--between", "group").exception)
-    assert "nobody in group=h has a rating in every cell within participants, so that all 4 were" in said
+    assert "nobody in group=h has a rating in every cell within participants, so all 4 were" in said
 
 
 def test_a_participant_without_a_covariate_is_left_out_and_named(tmp_path) -> None:
@@ -111,7 +111,7 @@ def test_a_participant_without_a_covariate_is_left_out_and_named(tmp_path) -> No
     file.write_text(FULL.replace("3,g,29,", "3,g,,"))
     result = anova(file, "--within", "face", "--covariate", "age")
     assert result.exit_code == 0, result.exception
-    assert "left out for want of 'age': participant 3" in result.output
+    assert "excluded because 'age' is missing: participant 3" in result.output
     assert "7 participants" in result.output
 
 
@@ -125,7 +125,7 @@ def test_a_code_for_missing_in_a_covariate_is_named(tmp_path) -> None:
     file.write_text("\n".join(["id,face,age,y", *rows]), encoding="utf-8")
     result = anova(file, "--within", "face", "--covariate", "age")
     assert result.exit_code == 0, result.output
-    assert "'age' holds -99 (lines 4, 5), by which missing values" in " ".join(result.output.split())
+    assert "'age' has -99 (lines 4, 5), often a code for missing values" in " ".join(result.output.split())
 
 
 def test_a_covariate_that_the_groups_determine_is_refused(tmp_path) -> None:
@@ -177,8 +177,8 @@ def test_a_group_of_one_participant_is_named(tmp_path) -> None:
     result = anova(path, "--within", "face", "--between", "group")
     assert result.exit_code == 0, result.output
     said = " ".join(result.output.split())
-    assert "group alone is one participant: its own spread is unknown" in said
-    assert "group g is one" not in said
+    assert "group alone has one participant: its variance is unknown" in said
+    assert "group g has one" not in said
 
 
 def test_slopes_that_a_group_of_one_does_not_tell_are_named(tmp_path) -> None:

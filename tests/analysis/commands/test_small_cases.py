@@ -62,7 +62,7 @@ def test_distinct_stimuli(tmp_path: Path) -> None:
 
 def test_ids_that_occur_once() -> None:
     said, _ = run("anova", "c08_id_not_repeated.csv", "--participant id --rating y --within time")
-    assert "is the table wide" in said
+    assert "Is the table wide" in said
     assert "is this not the participant column" in said
     wide, _ = run("anova", "c26_wide.csv", "--participant subject --rating near_NB --within near_MB")
     assert "--columns '{factor1}_{factor2}'" in wide

@@ -93,7 +93,7 @@ def test_two_ratings_of_each_participant_leave_no_room_for_a_slope() -> None:
 
 
 def test_bad_interactions_are_one_clear_line() -> None:
-    for named, said in ((["cond:group"], "names factors alone"), (["dose:dose"], "different columns")):
+    for named, said in ((["cond:group"], "names only factors"), (["dose:dose"], "different columns")):
         with pytest.raises(InputError, match=said):
             fit_mixed(ROWS, "participant", "rating", ["cond"], between=["group"], covariates=named)
 

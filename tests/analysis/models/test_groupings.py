@@ -64,7 +64,7 @@ def test_estimates_agree_with_lme4(fitted: MixedResult) -> None:
 def test_a_factor_of_one_level_a_person_goes_between(fitted: MixedResult) -> None:
     moved = fit_mixed(ROWS, "participant", "rating", ["blur", "group"], "clip", "none")
     declared = fit_mixed(ROWS, "participant", "rating", ["blur"], "clip", "none", between=["group"])
-    assert "group: one level for each participant" in moved.notes[0]
+    assert "group: one level per participant" in moved.notes[0]
     assert moved.reml_criterion == pytest.approx(declared.reml_criterion, abs=1e-9)
 
 
@@ -84,9 +84,9 @@ def test_swapping_what_is_taken_out_first_changes_nothing(monkeypatch: pytest.Mo
     ("given", "said"),
     [
         ({"between": ["face"]}, "'face' differs within participant"),
-        ({"random": ["face/clip"]}, "'face:clip' groups the rows as 'clip' does"),
+        ({"random": ["face/clip"]}, "'face:clip' groups the rows exactly as 'clip' does"),
         ({"covariates": ["rank"]}, "determined by the factors"),
-        ({"random": ["row"]}, "every row has levels of 'row' of its own"),
+        ({"random": ["row"]}, "every row has a different value for levels of 'row'"),
         ({"random": ["sage"]}, "no column is called 'sage'"),
     ],
 )

@@ -157,7 +157,7 @@ def test_balanced_data_have_exact_df() -> None:
 
 def test_too_many_coefficients_are_refused_in_one_line() -> None:
     rows = few(2100, 1)
-    with pytest.raises(InputError, match="at most 4000 random coefficients, this model has 4200"):
+    with pytest.raises(InputError, match="at most 4000 random coefficients, but this model has 4200"):
         fit_mixed(rows, "who", "y", ["A"], slopes="main", df_method="kenward-roger")
 
 
@@ -201,7 +201,7 @@ def test_an_end_that_the_likelihood_lacks_is_said(monkeypatch) -> None:
     monkeypatch.setattr("analysis.models.profile.MAX_DOUBLINGS", 0)
     result = fit_mixed(few(), "who", "y", ["A"], slopes="none", intervals=True)
     assert np.isnan(result.components[-1].ci).all()
-    assert "bounds no profile interval of intercept, A[a0], who intercept, residual" in result.notes[-1]
+    assert "the profile interval of intercept, A[a0], who intercept, residual is open" in result.notes[-1]
 
 
 def test_ratings_without_residual_variance_are_refused_in_one_line() -> None:

@@ -188,7 +188,7 @@ def test_separated_ratings_are_refused(shared):
         ],
         columns=["who", "level", "y"],
     )
-    with pytest.raises(InputError, match="no rating at level=m lies above any other"):
+    with pytest.raises(InputError, match="no rating at level=m is above any other"):
         fit_ordinal(rows, "who", "y", ["level"])
     overlapping = pd.concat([rows, pd.DataFrame([("p0", "m", 5)], columns=rows.columns)])
     assert np.isfinite(fit_ordinal(overlapping, "who", "y", ["level"]).log_likelihood)
@@ -244,7 +244,7 @@ def test_a_separated_cell_is_refused():
     rows = drawn(1)
     rows.loc[(rows["A"] == "m") & (rows["B"] == "x"), "rating"] = 4
     rows.loc[rows.index[-1], "rating"] = 4
-    with pytest.raises(InputError, match=r"the likelihood rises without end as A.* grow"):
+    with pytest.raises(InputError, match=r"the likelihood rises without limit as A.* grow"):
         fit_ordinal(rows, "participant", "rating", ["A", "B"])
     rows.loc[rows.index[0], "rating"] = 3
     assert max(c.se for c in fit_ordinal(rows, "participant", "rating", ["A", "B"]).coefficients) < 2

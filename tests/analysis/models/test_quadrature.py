@@ -84,8 +84,8 @@ def test_the_gradient_is_that_of_the_sum(small) -> None:
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        ({"item": "clip"}, "the item clip too"),
-        ({"slopes": "main"}, "slopes too"),
+        ({"item": "clip"}, "also has the item clip"),
+        ({"slopes": "main"}, "also has slopes"),
         ({"quadrature": 101}, "1 to 100 nodes"),
     ],
 )

@@ -94,8 +94,8 @@ def test_codes_for_missing_are_named(tmp_path: Path) -> None:
     path.write_text("\n".join(["id,clip,score", *rows]))
     call = ["opinion", str(path), "--item", "clip", "--participant", "id", "--rating", "score"]
     told = " ".join(CliRunner().invoke(app, call).output.split())
-    assert "'score' holds -99" in told
-    assert "they count: correct them or leave them empty" in told
+    assert "'score' has -99" in told
+    assert "they were counted: correct them or leave them empty" in told
 
 
 def test_repeated_votes_reach_the_recovered_scores() -> None:

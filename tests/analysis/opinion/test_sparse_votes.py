@@ -46,7 +46,10 @@ def test_a_person_of_one_vote_changes_no_recovered_score(tmp_path: Path) -> None
     assert after.items[3].mos == pytest.approx((10 * before.items[3].mos + 5) / 11)
     last = next(person for person in after.participants if person.name == "p10")
     assert (last.bias, last.inconsistency, last.group) == (None, None, None)
-    assert "one vote tells no bias: p10 counts in MOS, but not in recovered scores" in after.decisions
+    assert (
+        "bias cannot be estimated from one vote: p10 counts in MOS, but not in recovered scores"
+        in after.decisions
+    )
 
 
 def test_nobody_decides_alone() -> None:
@@ -88,7 +91,7 @@ def test_two_groups_without_a_common_person_are_named(tmp_path: Path) -> None:
         app, ["opinion", str(tmp_path / "a.csv"), *CALL, "--json", str(tmp_path / "o.json")]
     )
     said = " ".join(done.output.split())
-    assert "2 groups that no person rated across (c0, c1, c2, c3 | c4, c5, c6, c7)" in said
+    assert "2 groups with no person in common (c0, c1, c2, c3 | c4, c5, c6, c7)" in said
     assert "Group" in said
     told = json.loads((tmp_path / "o.json").read_text())
     assert [item["group"] for item in told["items"]] == [1] * 4 + [2] * 4
@@ -118,7 +121,7 @@ def test_people_of_one_vote_each_have_means_and_no_model(tmp_path: Path) -> None
     result = fit_opinion(read_votes(tmp_path / "a.csv", "clip", "id", "score"))
     assert all(np.isnan(item.recovered) and item.group is None for item in result.items)
     assert all(np.isfinite(item.ci_low) for item in result.items)
-    assert "only people of one vote rated c0, c1, c2: no recovered score" in result.decisions
+    assert "only people with one vote rated c0, c1, c2: no recovered score" in result.decisions
 
 
 def test_votes_that_agree_exactly_have_no_error() -> None:

@@ -185,7 +185,7 @@ def test_contrasts_are_printed_with_both_errors_and_which_to_read(tmp_path: Path
         assert f"{t:.2f}" in cells
     ordered = sorted(contrasts, key=lambda one: one["p_robust"])
     assert ordered[0]["p_robust_holm"] == pytest.approx(min(1.0, 3 * ordered[0]["p_robust"]))
-    assert "the robust p are those to report" in " ".join(done.output.split())
+    assert "Report the robust p if raters gave several comparisons" in " ".join(done.output.split())
     assert max(map(len, done.output.replace(str(tmp_path), "").splitlines())) <= 80
 
 
@@ -193,7 +193,7 @@ def test_without_raters_the_table_says_whose_errors_it_has(tmp_path: Path) -> No
     rows = [("a", "b", "left"), ("b", "a", "left"), ("a", "b", "left")]
     done = CliRunner().invoke(app, ["pairs", str(table(tmp_path, rows))])
     assert "robust SE" not in done.output
-    assert "with raters named there are robust ones too" in " ".join(done.output.split())
+    assert "raters to add robust errors" in " ".join(done.output.split())
 
 
 @pytest.mark.parametrize(
@@ -202,7 +202,7 @@ def test_without_raters_the_table_says_whose_errors_it_has(tmp_path: Path) -> No
         ([("a", "a", "left")], "line 2 compares 'a' with itself"),
         ([("a", "b", "c")], r"'winner' is 'c' in line 2; expected left, right or one of the row's two items"),
         ([("left", "b", "left")], "an item is called 'left'"),
-        ([("a", "b", "")], "names a winner in no row"),
+        ([("a", "b", "")], "names no winner in any row"),
         ([("a", "", "left")], "'right' is empty in line 2"),
         ([("a", "b", "tie"), ("a", "b", "left"), ("a", "b", "right")], "1 comparisons are ties"),
     ],
@@ -226,8 +226,8 @@ def test_of_an_export_only_answers_that_count_are_compared(tmp_path: Path) -> No
     table.write_text("\n".join(",".join(row) for row in (names, *rows)) + "\n")
     comparisons = read_comparisons(table, "left_cell", "right_cell", "winner")
     assert comparisons.outcome.tolist() == [0, 1, 0]
-    assert "1 practice and attention trials left out" in comparisons.decisions
-    assert "1 failed plays left out" in comparisons.decisions
+    assert "1 practice and attention trials excluded" in comparisons.decisions
+    assert "1 failed plays excluded" in comparisons.decisions
     # The same columns in somebody else's table mean nothing to us.
     table.write_text(table.read_text().replace("left_cell", "one").replace("right_cell", "two"))
     assert len(read_comparisons(table, "one", "two", "winner").outcome) == 6
@@ -237,6 +237,6 @@ def test_of_an_export_only_answers_that_count_are_compared(tmp_path: Path) -> No
 def test_a_word_for_ties_that_names_a_winner_is_refused(tmp_path: Path, tie: str, what: str) -> None:
     path = table(tmp_path, [("a", "b", "a"), ("b", "a", "Left"), ("a", "b", "b")])
     with pytest.raises(
-        InputError, match=rf"--tie {tie} is {what} too; expected a word for ties that names no"
+        InputError, match=f"--tie {tie} is also {what}; expected a word for ties that does not name a"
     ):
         read_comparisons(path, "left", "right", "winner", tie)

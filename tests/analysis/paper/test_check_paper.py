@@ -128,7 +128,7 @@ HEAD = 'title = "t"\n[[study]]\nname = "a"\nparticipants = 3\nfactors = { A = ["
         ('title = "t"', "study"),
         (HEAD + "[[study.meen]]", "unknown key; did you mean 'mean'"),
         (HEAD + 'mean = [{ at = { B = "x" }, mean = "1" }]', "no factor is called 'B'"),
-        (HEAD + 'mean = [{ at = { A = "q" }, mean = "1" }]', "'q' is no level of 'A'"),
+        (HEAD + 'mean = [{ at = { A = "q" }, mean = "1" }]', "'q' is not a level of 'A'"),
         (HEAD + 'test = [{ effect = "A:C", f = "1" }]', "no factor is called 'C'"),
         (HEAD + 'test = [{ effect = "A", f = "big" }]', "expected a number as printed, in quotes"),
     ],
@@ -142,5 +142,5 @@ def test_a_wrong_figures_file_is_refused_in_one_line(tmp_path, text, message) ->
 
 
 def test_a_missing_figures_file_is_refused(tmp_path) -> None:
-    with pytest.raises(InputError, match="leave the name out"):
+    with pytest.raises(InputError, match="omit the name"):
         load_figures(tmp_path / "none.toml")

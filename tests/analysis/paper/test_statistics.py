@@ -55,10 +55,14 @@ def test_what_fits_is_consistent(text) -> None:
         ("t(28) = 1.20, p < .05", "decision", "the statistic gives"),
         ("F(12, 31) = 4.21, p < .001, partial η² = .12", "inconsistent", "partial η² of .62"),
         ("F(1, 30) = 4.56, p = .041, η² = .40", "inconsistent", "partial η² of .13"),
-        ("F(1, 30) = 4.56, p = .041, partial η² = .13, 95% CI [.20, .40]", "inconsistent", "does not hold"),
+        (
+            "F(1, 30) = 4.56, p = .041, partial η² = .13, 95% CI [.20, .40]",
+            "inconsistent",
+            "does not include",
+        ),
         ("F(1, 30) = 4.56, p = .041, partial η² = .13, 95% CI [.10, .14]", "inconsistent", "noncentral F"),
         ("F(1, 18) = 0.00, p = .90", "inconsistent", "gives p = .9"),
-        ("r(48) = .31, p = 1.2", "inconsistent", "no probability"),
+        ("r(48) = .31, p = 1.2", "inconsistent", "not a probability"),
         ("F(1, 20) = 1,234.56, p = .33", "decision", "gives p = 1.9e-19"),
         ("t(30) = 5.37, p = 8.2e-05", "inconsistent", "gives p = 8.1e-06 to 8.3e-06"),
         ("t(20) = 1.80, one-tailed p = .087", "decision", "gives p = .04"),
@@ -101,7 +105,7 @@ def test_docx_and_pdf(tmp_path) -> None:
     document.add_paragraph("F(1, 30) = 4.56, p = .41")
     document.save(tmp_path / "m.docx")
     result = CliRunner().invoke(app, ["check-paper", str(tmp_path / "m.docx")])
-    assert "1 statistics read, 1 checked, 1 do not fit, 0 could not be read" in result.output
+    assert "1 statistics read, 1 checked, 1 inconsistent, 0 could not be read" in result.output
     assert result.exit_code == 1
     (tmp_path / "broken.docx").write_bytes(b"no zip")
     with pytest.raises(InputError, match="not a readable DOCX"):

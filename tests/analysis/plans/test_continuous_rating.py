@@ -41,7 +41,7 @@ def test_every_trial_of_one_file_counts() -> None:
 
 def test_traces_of_several_rates_are_refused() -> None:
     row = ("x", "a", "f00", "[1, 2]", "[0.1]")
-    with pytest.raises(InputError, match="of one sampling rate"):
+    with pytest.raises(InputError, match="with one sampling rate"):
         clips_of(prepared(row, row, rates=(3, 4)))
 
 

@@ -87,8 +87,8 @@ def test_answers_on_a_reversed_scale_are_turned(tmp_path: Path) -> None:
     assert [one["dmos"] for one in reversed_] == [4.75, 3.5, 1.75]
     assert [one["differential"] for one in reversed_] == [None, 3.75, 2.0]
     assert [one | {"turned": True} for one in plain] == reversed_
-    assert "The least impaired cell is Moves in both directions" in report
-    assert "reverse-keyed scale are turned" in report
+    assert "The least impaired cell was Moves in both directions" in report
+    assert "reverse-keyed scale are reversed" in report
 
 
 def test_cells_are_compared_on_one_scale_at_a_time(tmp_path: Path) -> None:
@@ -115,5 +115,5 @@ def test_cells_are_compared_on_one_scale_at_a_time(tmp_path: Path) -> None:
         for person in range(4)
     ]
     _, report = scores(tmp_path / "several", DEMO.replace(scale, several + slider), answers)
-    assert "The least impaired cell on impairment is Moves in both directions (DMOS 5.00" in report
-    assert "The least impaired cell on sharpness is Vertical only (DMOS 90.00" in report
+    assert "The least impaired cell on impairment was Moves in both directions (DMOS 5.00" in report
+    assert "The least impaired cell on sharpness was Vertical only (DMOS 90.00" in report

@@ -93,9 +93,10 @@ def test_the_least_impaired_cell_is_found_on_each_scale() -> None:
         cell("motion", "b", 2.0),
     )
     assert extremes(every) == (
-        "The least impaired cell on sharpness is b (DMOS 80.00, n = 9), "
-        "the most impaired a (DMOS 20.00, n = 9).",
-        "The least impaired cell on motion is a (DMOS 4.50, n = 9), the most impaired b (DMOS 2.00, n = 9).",
+        "The least impaired cell on sharpness was b (DMOS 80.00, n = 9); "
+        "the most impaired was a (DMOS 20.00, n = 9).",
+        "The least impaired cell on motion was a (DMOS 4.50, n = 9); "
+        "the most impaired was b (DMOS 2.00, n = 9).",
     )
 
 

@@ -39,7 +39,7 @@ def test_terms_have_labels_and_words_like_a_factor_have_none() -> None:
     assert ", Fit quality × Left over " in sds
     assert "; residual " in sds
     assert singular.startswith("singular fit: the variance of participant intercept, ")
-    assert singular.endswith("which leaves the tests of other effects as they are")
+    assert singular.endswith("which does not affect the tests of other effects")
 
 
 def test_terms_named_in_a_doubt_have_labels() -> None:
@@ -54,7 +54,7 @@ def test_a_factor_that_moves_between_people_has_its_label() -> None:
     rows = ratings()
     rows["residual"] = rows["participant"].isin(["p0", "p1", "p2"]).map({True: "c", False: "d"})
     result = fit_mixed(rows, "participant", "rating", ["fit", "residual"], None, "all")
-    moved = "Left over: one level for each participant, taken as between participants"
+    moved = "Left over: one level per participant, treated as a factor between participants"
     assert moved in notes_of(result, LABELS)
 
 

@@ -125,10 +125,12 @@ def test_a_declaration_chooses_the_series_that_was_made_with_it(tmp_path, rows) 
     own = definition_sha256(DEMO)
     for first, second, series in ((own, "f" * 64, 1), ("f" * 64, own, 2), ("e" * 64, "f" * 64, 2)):
         said = report(tmp_path, in_two_series(rows, first, second)).decisions
-        assert said[0] == f"answers of data series {series}, origin simulated"
-        assert f"data series {series}: {len(rows)} rows of others left aside" in said
-        assert not any("analysed together" in line for line in said)
-        foreign = [line for line in said if "another declaration than the one given" in line]
+        assert said[0] == f"simulated responses, data series {series}"
+        assert f"data series {series}: {len(rows)} other rows were ignored" in said
+        assert not any("used and analyzed together" in line for line in said)
+        foreign = [
+            line for line in said if "a different declaration than the one used here; find theirs on" in line
+        ]
         assert bool(foreign) == (own not in (first, second))
 
 
@@ -136,14 +138,16 @@ def test_versions_of_one_series_are_counted_without_those_left_aside(tmp_path, r
     rows = in_two_series(rows, "e" * 64, definition_sha256(DEMO))
     rows = change(rows, lambda row: row["run"] == "r3-2", definition_sha256="d" * 64)
     said = report(tmp_path, rows).decisions
-    assert "2 versions of the experiment's declaration were used; analysed together" in said
+    assert "2 versions of the experiment's declaration were used and analyzed together" in said
 
 
 def test_origins_are_not_pooled(tmp_path, rows) -> None:
     mixed = change(rows, lambda row: row["run"] == "r1", run_origin="participant", synthetic=0)
     found = report(tmp_path, mixed)
     assert (found.n_participants, found.synthetic) == (1, False)
-    assert any("origin participant: 132 rows of other origins left aside" in said for said in found.decisions)
+    assert any(
+        "origin participant: 132 rows of other origins were ignored" in said for said in found.decisions
+    )
     assert report(tmp_path, mixed, pool=Pool(Origin.ALL)).n_participants == 12
 
 
@@ -159,21 +163,21 @@ def test_a_version_is_the_answers_given_under_it_alone(tmp_path, rows) -> None:
     found = report(tmp_path, in_three_versions(rows), pool=Pool(version=2))
     assert found.n_participants == 12
     assert found.decisions[:2] == (
-        "answers of data series 2, version 2 alone, origin simulated",
-        f"study version 2: {2 * len(rows)} rows of others left aside",
+        "simulated responses, data series 2, only version 2",
+        f"study version 2: {2 * len(rows)} other rows were ignored",
     )
     # The first origin there is would be participant: of this version there is another.
     assert not report(tmp_path, in_three_versions(rows), pool=Pool(version=3)).synthetic
     said = report(tmp_path, in_three_versions(rows), pool=Pool(series=2)).decisions
-    assert said[0] == "answers of data series 2, origin participant"
+    assert said[0] == "participant responses, data series 2"
 
 
 @pytest.mark.parametrize(
     ("pool", "words"),
     [
-        (Pool(version=4), "no answers of study version 4; there are those of data series 1 (version 1), "),
-        (Pool(series=3), "no answers of data series 3; there are those of data series 1 (version 1), "),
-        (Pool(version=3, series=1), "no answers of data series 1; there are those of data series 2 (version"),
+        (Pool(version=4), "no responses of study version 4; it has data series 1 (version 1), "),
+        (Pool(series=3), "no responses of data series 3; it has data series 1 (version 1), "),
+        (Pool(version=3, series=1), "no responses of data series 1; it has data series 2 (version"),
         (Pool(Origin.PILOT, version=3), "has no ratings of origin 'pilot' under version 3 yet"),
     ],
 )  # fmt: skip
@@ -186,7 +190,7 @@ def test_an_unknown_version_or_series_is_told_those_there_are(tmp_path, rows, po
 
 def test_rows_without_versions_are_told_so(tmp_path, rows) -> None:
     bare = [{key: value for key, value in row.items() if key != "study_version"} for row in rows]
-    with pytest.raises(InputError, match="does not say the study version of its rows; leave the choice"):
+    with pytest.raises(InputError, match="does not record the study version of its rows; do not choose"):
         report(tmp_path, bare, pool=Pool(version=1))
 
 
@@ -227,8 +231,14 @@ def test_two_clips_of_one_cell_are_left_out_and_said(tmp_path, rows) -> None:
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"winner": "lefft"}, "participant P00, trial 2: 'lefft' is no answer .*did you mean 'left'"),
-        ({"left_cell": "cartoon/modl"}, "'cartoon/modl' is no cell of this experiment; did you mean"),
+        (
+            {"winner": "lefft"},
+            "participant P00, trial 2: 'lefft' is not a valid answer .*did you mean 'left'",
+        ),
+        (
+            {"left_cell": "cartoon/modl"},
+            "'cartoon/modl' is not a valid cell of this experiment; did you mean",
+        ),
         ({"participant": ""}, "'participant' is empty"),
     ],
 )
@@ -241,7 +251,7 @@ def test_wrong_rows_are_refused_by_participant_and_trial(tmp_path, rows, values,
 
 def test_a_tie_that_is_not_declared_is_refused(tmp_path, rows) -> None:
     strict = DEMO.model_copy(update={"trial": DEMO.trial.model_copy(update={"ties": None})})
-    with pytest.raises(InputError, match="'tie' is no answer"):
+    with pytest.raises(InputError, match="'tie' is not a valid answer"):
         report(tmp_path, [rows[0] | {"winner": "tie"}, *rows[1:]], strict)
 
 
@@ -257,7 +267,7 @@ def test_every_table_sentence_and_figure_of_simulated_data_says_so(tmp_path, row
     found = report(tmp_path, rows)
     assert all("[SYNTHETIC DATA]" in table.title for table in found.parts[0].tables)
     assert "Synthetic data" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert "0 do not fit" in (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
+    assert "0 inconsistent" in (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
 
 
 def test_the_same_comparisons_give_the_same_report(tmp_path, rows) -> None:

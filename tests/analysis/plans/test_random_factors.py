@@ -126,7 +126,7 @@ def test_what_is_not_fitted_holds_for_the_faces_shown() -> None:
     assert "(1 + A + B || face)" in fitted.formula
     assert holds_for("A", ["face"], slopes) == "others of face"
     assert holds_for("A:B", ["face"], slopes) == "the face shown"
-    assert "tests of interactions hold for those shown" in said_of_random(["face"], slopes)
+    assert "tests of interactions hold only for the levels shown" in said_of_random(["face"], slopes)
     assert holds_for("A", ["face"], "none") == "the face shown"
 
 

@@ -41,7 +41,7 @@ def test_means_are_the_ratings_own(tmp_path, rows) -> None:
     assert analysis.anova.y == pytest.approx(ratings.mean(axis=-1))
     assert analysis.anova.factors == ("lower_lid",)
     assert analysis.synthetic
-    assert left_out(analysis.exclusions) == ("no participant and no trial excluded (of 8 participants)",)
+    assert left_out(analysis.exclusions) == ("no participant or trial was excluded (of 8 participants)",)
 
 
 def test_export_and_database_give_the_same_numbers(tmp_path, rows) -> None:
@@ -137,10 +137,10 @@ def test_practice_pilot_and_unrated_rows_are_set_aside_and_said(tmp_path, rows) 
     ]
     extra += [rows[2] | {"response": "", "trial_index": 92}]
     analysis = analyse(tmp_path, rows + extra, pool=Pool(Origin.SIMULATED))
-    assert "origin simulated: 1 rows of other origins left aside" in analysis.decisions
+    assert "origin simulated: 1 rows of other origins were ignored" in analysis.decisions
     assert set(analysis.exclusions.set_aside) == {
         "1 practice trials",
-        "1 plays without a rating",
+        "1 presentations without a rating",
     }
 
 
@@ -159,7 +159,7 @@ def test_a_rule_whose_column_is_missing_is_said_not_skipped(tmp_path, rows) -> N
         ({"response": 9}, "participant P00, trial 0: expected a whole rating from 1 to 7, got 9"),
         ({"response": 2.5}, "expected a whole rating from 1 to 7, got 2.5"),
         ({"response": "five"}, "'response' should be a number, got 'five'"),
-        ({"lower_lid": "bothh"}, "'bothh' is no level of 'lower_lid'; did you mean 'both'"),
+        ({"lower_lid": "bothh"}, "'bothh' is not a valid level of 'lower_lid'; did you mean 'both'"),
         ({"participant": ""}, "'participant' is empty"),
     ],
 )
@@ -171,8 +171,8 @@ def test_wrong_rows_are_refused_by_participant_and_trial(tmp_path, rows, values,
 
 def test_repeated_rows_count_once_and_contradictions_are_refused(tmp_path, rows) -> None:
     analysis = analyse(tmp_path, [*rows, rows[0]])
-    assert "1 repeated rows of trials already there, counted once" in analysis.decisions
-    with pytest.raises(InputError, match="participant P00, trial 0 stands there twice"):
+    assert "1 repeated rows of the same trials were counted once" in analysis.decisions
+    with pytest.raises(InputError, match="participant P00, trial 0 occurs twice"):
         analyse(
             tmp_path, [*rows, rows[0] | {"response": 8 - int(rows[0]["response"])}, rows[0] | {"response": 1}]
         )
@@ -185,7 +185,7 @@ def test_other_studies_and_experiments_are_told_apart(tmp_path, rows) -> None:
         load_csv(path, EXP3, READING)
     ratings = load_csv(path, EXP3, READING, "s")
     assert len(ratings.rows) == len(rows)
-    assert "left aside" in ratings.decisions[0]
+    assert "were ignored" in ratings.decisions[0]
     other = write_export(tmp_path / "o.csv", EXP3, change(rows, lambda row: True, experiment="exp1"))
     with pytest.raises(InputError, match="holds experiment exp1, not 'exp3'"):
         load_csv(other, EXP3, READING)
@@ -211,7 +211,7 @@ def test_nothing_to_analyse_is_told_from_bad_input(tmp_path, rows) -> None:
 
 @pytest.mark.parametrize("url", ["nonsense", "mysterysql://x/y"])
 def test_an_unusable_database_address_is_refused(url) -> None:
-    with pytest.raises(InputError, match="is no database URL"):
+    with pytest.raises(InputError, match="is not a database URL"):
         load_database(url, EXP3, READING)
 
 

@@ -108,7 +108,7 @@ def test_the_report_leads_with_the_answer_for_people(tmp_path, rows) -> None:
     assert {row[0]: row[2] for row in part.tables[0].rows} == {
         label: f"{mean['mean']:.3f}" for label, mean in means.items()
     }
-    assert all(any(label in line and "on average" in line for line in part.brief) for label in means)
+    assert all(any(label in line and "the mean threshold" in line for line in part.brief) for label in means)
 
 
 def test_of_one_person_the_fit_over_all_trials_leads(tmp_path, rows) -> None:
@@ -148,16 +148,16 @@ def test_a_series_that_cannot_be_fitted_is_said(tmp_path, rows) -> None:
         for row in rows
     ]
     found = report(tmp_path, changed)
-    assert "answers are alike" in found.numbers["reasons"][name]
+    assert "answers are the same" in found.numbers["reasons"][name]
     assert any("no function was fitted" in sentence for sentence in found.parts[0].sentences)
 
 
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"response": "maybe"}, "participant P0, trial 1: 'maybe' is no answer"),
-        ({"series": "other"}, "'other' is no series"),
-        ({"value": ""}, "expected the stimulus's number in 'value'"),
+        ({"response": "maybe"}, "participant P0, trial 1: 'maybe' is not a valid answer"),
+        ({"series": "other"}, "'other' is not a valid series"),
+        ({"value": ""}, "expected the stimulus value in 'value'"),
     ],
 )
 def test_wrong_rows_are_refused_by_participant_and_trial(tmp_path, rows, values, message) -> None:
@@ -175,7 +175,7 @@ def test_the_report_is_whole_and_marked(tmp_path, rows) -> None:
     assert max(map(len, done.stdout.replace(str(tmp_path), "").splitlines())) <= 80
     assert "SYNTHETIC DATA" in done.stdout
     text = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
-    assert "0 do not fit." in text
+    assert "0 inconsistent." in text
     assert (tmp_path / "out" / "figure-thresholds.svg").stat().st_size > 1000
     found = report(tmp_path, rows)
     assert all("[SYNTHETIC DATA]" in table.title for table in found.parts[0].tables)

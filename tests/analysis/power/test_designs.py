@@ -49,7 +49,7 @@ def test_a_covariate_has_the_power_of_the_noncentral_f() -> None:
         assert power == pytest.approx(exact, abs=0.07)
     without = simulate_design(FactorialDesign({"blur": 2}, {"group": 2}, sizes, 0.5), "x", [n], 200, seed=3)
     assert result.power[1, 0] > without.power[1, 0] + 0.15
-    assert "a covariate correlates by 0.7" in design.population
+    assert "a covariate correlates 0.7" in design.population
 
 
 def test_groups_alone_are_told_no_correlation() -> None:
@@ -104,7 +104,7 @@ def test_an_ordinal_model_has_the_power_of_whiteheads_formula() -> None:
 
 @pytest.mark.parametrize(
     ("shares", "clips", "message"),
-    [((1.0,), 4, "shares of 2 to 20"), ((1.0, 0.0), 4, "all above 0"), ((1.0, 1.0), 5, "shared evenly")],
+    [((1.0,), 4, "shares of 2 to 20"), ((1.0, 0.0), 4, "all above 0"), ((1.0, 1.0), 5, "divided evenly")],
 )
 def test_an_ordinal_design_that_cannot_be_is_refused(shares, clips, message) -> None:
     with pytest.raises(InputError, match=message):
@@ -241,7 +241,7 @@ def test_the_text_names_population_seed_and_numbers() -> None:
     result = simulate_design(design, "x", [4, 30], 40, seed=9)
     text = sample_size_text(result, design, 0.8, "1.2")
     assert "face (2 levels, within)" in text
-    assert "40 data sets were drawn (seed 9)" in text
+    assert "40 data sets were simulated (seed 9)" in text
     assert "face: N = 30" in text
     assert "not reached" in sample_size_text(simulate_design(design, "x", [4], 40), design, 0.99, "1.2")
 
@@ -298,14 +298,14 @@ def test_the_commands_write_table_text_figure_and_json(call, tmp_path, monkeypat
         ("anova --within face:3", "no effect has a size"),
         ("anova --within face:3 --effect fase=0.2", "no factor 'fase'; did you mean 'face'?"),
         ("anova --within face:3 --effect face=big", "--effect should be like"),
-        ("anova --within face:3 --effect face=0.2 --correlation 1.5", "can all correlate by 1.5"),
-        ("mixed --difference 0.5 --clips 2", "2 clips are one a condition"),
+        ("anova --within face:3 --effect face=0.2 --correlation 1.5", "cannot all correlate 1.5"),
+        ("mixed --difference 0.5 --clips 2", "2 clips are one per condition"),
         ("mixed --difference 0.5 --clips 5", "expected a multiple of 2"),
         ("mixed --difference 0.5 --faces 1", "at least two faces"),
         ("mixed --difference 0.2,0.4 --clips 8", "in 3 conditions; expected a multiple of 3"),
-        ("ordinal --difference 0.2,0.4 --shares 1,1 --clips 8", "by 3 conditions; expected a multiple of 3"),
-        ("mixed --difference ,", "how far each further condition lies"),
-        ("mixed --difference nan", "how far each further condition lies"),
+        ("ordinal --difference 0.2,0.4 --shares 1,1 --clips 8", "between 3 conditions; use a multiple of 3"),
+        ("mixed --difference ,", "power cannot be computed: no condition is compared; add --difference"),
+        ("mixed --difference nan", "power cannot be computed: no condition is compared; add --difference"),
         ("ordinal --difference 0.5 --shares 1,a", "numbers separated by commas"),
         ("anova --within face:3 --effect face=0.2 --covariate 1", "between -1 and 1"),
         ("pairs --abilities 0,1 --tie 1", "probability of ties"),

@@ -76,7 +76,7 @@ def test_every_sort_of_file_holds_the_same_ratings(tmp_path, make, name) -> None
 def test_what_was_understood_of_an_export_is_said_first(tmp_path) -> None:
     data = read_long_table(jspsych(tmp_path / "b.json"), "id", "score", ["face"])
     assert data.decisions[0] == (
-        "read as data of jsPsych: 8 rows without 'id' and 'score' and 'face' left out "
+        "read as data of jsPsych: 8 rows without 'id' and 'score' and 'face' excluded "
         "(html-keyboard-response 8)"
     )
 

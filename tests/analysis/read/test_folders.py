@@ -53,8 +53,8 @@ def test_broken_runs_and_copies_in_a_folder_are_named(tmp_path) -> None:
     (folder / "p3 (1).csv").write_bytes((folder / "p3.csv").read_bytes())
     data = read_long_table(folder, "file", "score", ["face"])
     assert list(data.decisions[1:3]) == [
-        "files without rows left out: p8.csv, p9.csv",
-        "files that are like another, byte for byte, count too: p3.csv",
+        "files without rows ignored: p8.csv, p9.csv",
+        "files that are identical to another file were also counted: p3.csv",
     ]
 
 
@@ -63,7 +63,7 @@ def test_a_file_into_which_the_others_were_joined_is_refused(tmp_path) -> None:
     rows = [line for path in sorted(folder.iterdir()) for line in path.read_text().splitlines()[1:]]
     (folder / "all.csv").write_text("\n".join(["face,score", *rows]) + "\n", encoding="utf-8")
     with pytest.raises(
-        InputError, match=r"every row of 3 files \(p1.csv, p2.csv, p3.csv\) stands in all.csv"
+        InputError, match=r"every row of 3 files \(p1.csv, p2.csv, p3.csv\) is also in all.csv"
     ):
         read_long_table(folder, "file", "score", ["face"])
 
@@ -106,7 +106,7 @@ def test_a_joined_file_is_known_by_its_cells(tmp_path, join, beside) -> None:
         people_file(folder, "p9", 9, 60)
     if beside == "the joined file twice":
         (folder / "all2.csv").write_bytes((folder / "all.csv").read_bytes())
-    with pytest.raises(InputError, match=r"every row of 3 files .* stands in all2?.csv too"):
+    with pytest.raises(InputError, match=r"every row of 3 files .* is also in all2?.csv"):
         read_long_table(folder, "file", "score", ["face"])
 
 
@@ -118,7 +118,7 @@ def test_rows_of_few_kinds_that_are_those_of_others_are_said_and_count(tmp_path)
     data = read_long_table(tmp_path / "f", "file", "score", ["face"])
     assert len(data.rows) == 16
     assert any(
-        said.startswith("every row of 2 files (p0.csv, p1.csv) stands in p2.csv too, by chance")
+        said.startswith("every row of 2 files (p0.csv, p1.csv) is also in p2.csv, by chance")
         for said in data.decisions
     )
 
@@ -129,10 +129,10 @@ def test_generated_rows_are_told_though_only_some_files_say_so(tmp_path) -> None
     data = read_long_table(folder, "file", "score", ["face"])
     assert data.synthetic
     assert (
-        "'synthetic' stands in some files alone; rows of the others are taken as given by people"
+        "only some files have a column 'synthetic'; rows of the others are treated as given by people"
         in data.decisions
     )
-    assert "columns that only some files have left out: age" in data.decisions
+    assert "columns that only some files have were ignored: age" in data.decisions
 
 
 def test_hidden_files_and_folders_with_the_name_of_a_table_are_none(tmp_path) -> None:
@@ -152,7 +152,7 @@ def test_a_header_alone_is_no_row_however_it_is_written(tmp_path, text) -> None:
     folder = folder_of(tmp_path / "f")
     (folder / "p9.csv").write_bytes(text)
     data = read_long_table(folder, "file", "score", ["face"])
-    assert data.decisions[1] == "files without rows left out: p9.csv"
+    assert data.decisions[1] == "files without rows ignored: p9.csv"
 
 
 def psych_ds_of(folder: Path, named: str) -> None:
@@ -176,7 +176,7 @@ def test_messages_name_the_file_beside_the_line(tmp_path) -> None:
     with (folder / "p2.csv").open("a", encoding="utf-8") as file:
         file.write("calm,\n")
     data = read_long_table(folder, "file", "score", ["face"])
-    assert "1 rows without a rating left out (line 4 of p2.csv)" in data.decisions
+    assert "1 rows without a rating excluded (line 4 of p2.csv)" in data.decisions
     (folder / "p3.csv").write_text("face,score\ncalm,1\nwild,many\n", encoding="utf-8")
     with pytest.raises(InputError, match=r"line 3 of p3\.csv"):
         read_long_table(folder, "file", "score", ["face"])
@@ -191,7 +191,7 @@ def test_answers_of_few_kinds_that_are_alike_by_chance_are_no_joined_file(tmp_pa
 
 
 def test_a_folder_without_tables_ends_in_one_line(tmp_path) -> None:
-    with pytest.raises(InputError, match=r"folder without data files; expected files .csv, one a person"):
+    with pytest.raises(InputError, match=r"folder without data files; expected .csv files, one per person"):
         read_long_table(tmp_path, "file", "score", ["face"])
 
 
@@ -199,7 +199,7 @@ def test_a_column_counts_and_not_the_name_of_the_file(tmp_path) -> None:
     psych_ds_of(tmp_path, "id-x{}_data.csv")
     data = read_long_table(tmp_path, "id", "score", ["face"])
     assert set(data.rows["id"].astype(str)) == set(PEOPLE)
-    assert data.decisions[1] == ("'id' is p1 in id-xp1_data.csv; the column counts, not the name of the file")
+    assert data.decisions[1] == ("'id' is p1 in id-xp1_data.csv; the column was used, not the file name")
 
 
 @pytest.mark.parametrize(("name", "lists"), [("jatos.json", True), ("lines.jsonl", False)])

@@ -39,23 +39,26 @@ def test_semicolons_and_decimal_commas_are_read_and_said(tmp_path) -> None:
 def test_missing_ratings_are_left_out_and_said(tmp_path, mark) -> None:
     data = read(tmp_path, f"id,y,f\n1,4,a\n1,{mark},b\n2,1,a\n2,2,b\n")
     assert len(data.rows) == 3
-    assert data.decisions == ("1 rows without a rating left out (line 3)",)
+    assert data.decisions == ("1 rows without a rating excluded (line 3)",)
 
 
 def test_repeated_trials_count_once_where_they_agree(tmp_path) -> None:
     data = read(tmp_path, "id,y,f,t\n1,4,a,1\n1,4,a,1\n1,2,b,2\n", trial="t")
     assert len(data.rows) == 2
-    assert data.decisions == ("1 repeated rows of one trial counted once (line 3)",)
+    assert data.decisions == ("1 repeated rows of one trial were counted once (line 3)",)
 
 
 def test_repeats_without_trial_numbers_are_kept_and_said(tmp_path) -> None:
     data = read(tmp_path, "id,y,f\n1,4,a\n1,4,a\n1,2,b\n2,3,a\n2,3,b\n")
     assert len(data.rows) == 5
-    assert "1 hold more" in data.decisions[0]
+    assert "1 have more" in data.decisions[0]
 
 
 def test_levels_that_differ_in_case_are_said(tmp_path) -> None:
-    assert "differ in case" in read(tmp_path, "id,y,f\n1,4,a\n1,4,A\n").decisions[0]
+    assert (
+        "differ only in case; they are separate levels"
+        in read(tmp_path, "id,y,f\n1,4,a\n1,4,A\n").decisions[0]
+    )
 
 
 def test_blank_lines_and_blanks_around_cells_do_not_matter(tmp_path) -> None:
@@ -92,7 +95,7 @@ def test_what_cannot_be_used_is_refused_in_one_line(tmp_path, text, message) -> 
 
 
 def test_one_trial_with_two_ratings_and_ratings_off_the_scale_are_refused(tmp_path) -> None:
-    with pytest.raises(InputError, match="id 1, t 1 stands twice with different data, again in line 3"):
+    with pytest.raises(InputError, match="id 1, t 1 occurs twice with different data, again in line 3"):
         read(tmp_path, "id,y,f,t\n1,4,a,1\n1,5,a,1\n", trial="t")
     with pytest.raises(InputError, match="'y' is 8 in line 2, outside the scale 1 to 7"):
         read(tmp_path, "id,y,f\n1,8,a\n", scale=(1, 7))
@@ -122,5 +125,5 @@ def test_lines_that_end_in_a_carriage_return_alone_are_read(tmp_path, encoding) 
 def test_an_unknown_mark_for_missing_is_refused_with_what_to_do(tmp_path, mark) -> None:
     path = tmp_path / "a.csv"
     path.write_text(f"id,y,f\n1,4,a\n1,{mark},b\n", encoding="utf-8")
-    with pytest.raises(InputError, match=r"leave the cell empty \(or write NA\) where there is none"):
+    with pytest.raises(InputError, match=r"leave the cell empty \(or write NA\) if it is missing"):
         read_long_table(path, "id", "y", ["f"])

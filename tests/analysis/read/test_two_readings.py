@@ -29,7 +29,7 @@ def test_a_comma_that_may_part_thousands_is_refused_with_both_readings(tmp_path,
         read(file_of(tmp_path, ratings))
     said = str(caught.value)
     assert "'1,003' of 'y' in line 2 can be read as 1.003 or as 1003" in said
-    assert (f"beside it stands {beside}" in said) == bool(beside)
+    assert (f"also found: {beside}" in said) == bool(beside)
 
 
 @pytest.mark.parametrize(
@@ -49,7 +49,7 @@ def test_a_rating_far_from_the_others_is_named(tmp_path) -> None:
     ratings = [str(1 + i % 7) for i in range(60)]
     assert not read(file_of(tmp_path, ratings)).decisions
     (said,) = read(file_of(tmp_path, [*ratings, "77", "3"])).decisions
-    assert "'y' holds 77 (line 62), far from the others (1 to 7)" in said
+    assert "'y' has 77 (line 62), far from the others (1 to 7)" in said
 
 
 def test_numbers_that_are_no_scale_are_left_alone(tmp_path) -> None:
@@ -61,7 +61,7 @@ def test_numbers_that_are_no_scale_are_left_alone(tmp_path) -> None:
     ("item", "message"),
     [
         (["id"], "named as participant and as item"),
-        (["person"], "the participants again"),
+        (["person"], "items and participants are the same"),
         (["y"], "two roles"),
     ],
 )
@@ -92,8 +92,8 @@ def test_codes_for_missing_are_named_however_many_they_are(tmp_path, code, other
     ratings = [str(value) for value in others] * 6
     assert not read(file_of(tmp_path, ratings)).decisions
     (said,) = read(file_of(tmp_path, [*ratings, *[code] * 12])).decisions
-    assert f"'y' holds {code} (lines " in said
-    assert "leave them empty, or refuse them with --scale" in said
+    assert f"'y' has {code} (lines " in said
+    assert "leave them empty, or reject them with --scale" in said
 
 
 @pytest.mark.parametrize("ratings", [["90", "95", "99"] * 9, ["-9", "-8", "3"] * 9])
@@ -106,7 +106,9 @@ def test_empty_rows_below_a_table_are_left_out(tmp_path) -> None:
     path.write_text(f"{path.read_text()}\n,,\n,,\n")
     table = read(path)
     assert table.rows["y"].tolist() == [1, 2, 3, 4]
-    assert list(table.decisions) == ["rows without a value in any column read left out (lines 6, 7)"]
+    assert list(table.decisions) == [
+        "rows without a value in any column that is used were excluded (lines 6, 7)"
+    ]
     path.write_text("id,a,y\n,,\n")
     with pytest.raises(InputError, match="has a header but no rows"):
         read(path)
@@ -116,7 +118,7 @@ def test_empty_rows_below_a_table_are_left_out(tmp_path) -> None:
 def test_a_first_line_that_is_no_header_is_shown_with_what_to_do(tmp_path, first) -> None:
     path = file_of(tmp_path, ["1", "2"])
     path.write_text(f"{first}\n{path.read_text()}")
-    with pytest.raises(InputError, match=r"its first line is .*; it should name the columns"):
+    with pytest.raises(InputError, match=r"its first line is .*; it should have the column names"):
         read(path)
 
 
@@ -132,7 +134,7 @@ def test_points_beside_another_columns_decimal_comma_are_refused_with_both_readi
     with pytest.raises(InputError) as caught:
         read(path)
     said = str(caught.value)
-    assert "'1.003' of 'y' in line 2 can be read as 1.003 or as 1003 (beside it stands 2,5 of 'x')" in said
+    assert "'1.003' of 'y' in line 2 can be read as 1.003 or as 1003 (also found: 2,5 of 'x')" in said
 
 
 @pytest.mark.parametrize(

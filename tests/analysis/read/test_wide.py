@@ -62,7 +62,7 @@ def test_wide_headers_are_told_from_long_ones(header, pattern) -> None:
         ("{a}{b}", "must have something between them"),
         ("{a}_{a}", "names a factor twice"),
         ("{x}-{y}", "no column of wide.csv fits"),
-        ("{age}_{blur}", "has a column 'age' already"),
+        ("{age}_{blur}", "has a column 'age'"),
     ],
 )
 def test_patterns_that_cannot_be_used_end_in_one_line(tmp_path, pattern, said) -> None:
@@ -100,6 +100,6 @@ def test_ids_that_occur_once_are_asked_about_and_not_taken_for_groups(command: s
         done = CliRunner().invoke(app, [command, str(file), *options.split()])
         output = str(done.exception)
         assert isinstance(done.exception, InputError)
-        assert "is in one row only" in output
+        assert "is in only one row" in output
         assert said in output
         assert "--between" not in output

@@ -90,7 +90,7 @@ def spss(path, words, **more):
 def test_codes_of_one_word_are_kept_apart(tmp_path) -> None:
     data = spss(tmp_path / "a.sav", {1: "same", 2: "same", 3: "other"})
     assert sorted(data.rows["cond"].unique()) == ["other", "same (1)", "same (2)"]
-    assert any("several codes of 'cond' have one word (same)" in one for one in data.decisions)
+    assert any("several codes of 'cond' have the same label (same)" in one for one in data.decisions)
     assert sorted(spss(tmp_path / "b.sav", {1: "2", 3: "x"}).rows["cond"].unique()) == ["2 (1)", "2 (2)", "x"]
 
 

@@ -23,7 +23,7 @@ def test_a_long_word_behind_a_short_one_is_cut() -> None:
 
 
 def test_wide_columns_that_are_not_the_first_are_broken_at_spaces() -> None:
-    said = "mean of all ratings, people differ from item to item"
+    said = "mean of all ratings, different people for each item"
     lines = lines_of(
         ("Form", "ICC", "95% CI", "F (df)", "Of what"),
         ("ICC(1,1)", ".172", "[.060, .500]", "5.97 (7, 184)", said),

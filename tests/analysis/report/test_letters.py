@@ -55,7 +55,7 @@ def test_letters_without_a_font_are_told_apart_by_their_numbers() -> None:
     with mpl.rc_context({**STYLE, "svg.fonttype": "none"}):
         shown = in_svg_text(figure)
     assert {"[U+7728][U+773C]", "مرحبا", "[U+D55C]", "b", "$f$_x", "\\blur"} <= shown
-    assert any("stand as their numbers (U+...)" in line for line in shown)
+    assert any("are shown as their code points (U+...)." in line for line in shown)
     assert len(svg) > 10_000
 
 

@@ -232,7 +232,7 @@ def test_without_a_report_there_is_nothing_to_verify() -> None:
     call = ["anova", str(GOLDEN / "within/complete_1.csv"), *CALL, "--within", "A", "--verify-with-r"]
     told = CliRunner().invoke(app, call)
     assert isinstance(told.exception, InputError)
-    assert "add e.g. --out results" in str(told.exception)
+    assert "report folder: add, for example, --out results" in str(told.exception)
 
 
 def test_a_size_that_r_has_not_differs(tmp_path) -> None:

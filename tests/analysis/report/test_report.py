@@ -87,9 +87,9 @@ def test_the_report_finds_no_fault_with_its_own_sentences(analysis) -> None:
 
 def test_what_stands_alone_is_told_apart_from_what_was_recomputed() -> None:
     assert self_check(("r(20) = .50, p = .018.", "It is more (p = .001).")).endswith(
-        "0 do not fit; 1 more cannot be recomputed from what stands beside them."
+        "0 inconsistent; 1 more cannot be recomputed from the sentence."
     )
-    assert self_check(("It is more (p = .001).",)).endswith("recomputed from those beside it.")
+    assert self_check(("It is more (p = .001).",)).endswith("recomputed from the others.")
 
 
 def test_json_has_the_promised_keys_and_no_nan(analysis) -> None:
@@ -170,7 +170,7 @@ def test_undefined_tests_are_dashes_with_a_reason(tmp_path) -> None:
     analysis = analysis_of("exp2", tmp_path, 5)
     text = " ".join(" ".join(as_text(table).split()) for table in all_tables(analysis))
     assert "needs more participants than contrasts: error df = 4" in text
-    assert "univariate, df and p corrected by Greenhouse-Geisser" in text
+    assert "univariate, df and p with the Greenhouse-Geisser correction" in text
 
 
 def test_bayes_factors_stand_beside_the_planned_pairs(tmp_path) -> None:

@@ -136,6 +136,6 @@ def test_the_report_prints_dashes_for_a_group_of_one(tmp_path: Path) -> None:
     roles = "--participant id --rating score --within A --between group --robust"
     ran = CliRunner().invoke(app, ["anova", str(tmp_path / "one.csv"), *roles.split()])
     assert ran.exit_code == 0, ran.output
-    trimmed = ran.output.split("Pairs by means trimmed")[1]
+    trimmed = ran.output.split("Pairs of means trimmed")[1]
     row = next(line for line in trimmed.splitlines() if line.startswith("group: g - h"))
     assert row.split()[-5:] == ["–"] * 5

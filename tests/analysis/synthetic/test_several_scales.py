@@ -88,7 +88,7 @@ def test_the_command_names_every_scale_and_those_left_to_chance(tmp_path):
     )
     assert told.exit_code == 0, told.output
     assert "scale eeriness, seed 1: 1 of 1 figures reached" in told.output
-    assert told.output.count("no effect was named for this scale; what it shows is chance") == 2
+    assert told.output.count("no effect was specified for this scale; differences are due to chance") == 2
     with out.open(newline="", encoding="utf-8") as handle:
         assert {row["scale"] for row in csv.DictReader(handle)} == {"naturalness", "eeriness", "tiredness"}
 

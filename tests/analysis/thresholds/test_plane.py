@@ -75,10 +75,10 @@ def test_data_that_place_no_threshold_are_refused() -> None:
     x, z = (axis.ravel() for axis in np.meshgrid([1.0, 2.0, 3.0, 4.0], [0.0, 1.0]))
     n, some = np.full(8, 4.0), np.tile([0.0, 1.0, 3.0, 4.0], 2)
     for one, said in (
-        (Points(x, z, n, n), "all 32 answers are alike"),
+        (Points(x, z, n, n), "all 32 answers are the same"),
         (Points(x, np.zeros(8), n, some), "two numbers of the second variable or more, got 1"),
         (Points(np.ones(8), z, n, some), "two numbers of x or more, got 1"),
-        (Points(x, z, n, 4.0 - some), "do not change with x as they should"),
+        (Points(x, z, n, 4.0 - some), "do not change with x in the expected direction, so"),
         (Points(x, z, n, np.where(x > 2.5, 4.0, 0.0)), "switch between stimuli without overlap"),
     ):
         with pytest.raises(InputError, match=re.escape(said)):
@@ -109,7 +109,7 @@ def test_the_command_fits_people_and_their_means(tmp_path: Path) -> None:
     assert means["threshold"]["people"] == 5
     assert means["threshold"]["ci_low"] < 320 < means["threshold"]["ci_high"]
     assert means["tilt"]["ci_low"] < 150 < means["tilt"]["ci_high"]
-    assert "straight line over asymmetry" in " ".join(done.output.split())
+    assert "varies linearly with asymmetry" in " ".join(done.output.split())
     assert "Threshold along asymmetry" in done.output
 
 
@@ -117,8 +117,8 @@ def test_the_command_fits_people_and_their_means(tmp_path: Path) -> None:
     ("options", "said"),
     [
         (["--second", "nothing"], "nothing"),
-        (["--second", "asymmetry", "--function", "weibull"], "expected --function normal or logistic"),
-        (["--second", "asymmetry", "--lapse", "fit"], "expected --lapse as a number"),
+        (["--second", "asymmetry", "--function", "weibull"], "--second needs --function normal or logistic"),
+        (["--second", "asymmetry", "--lapse", "fit"], "--second needs --lapse as a number"),
         (["--second", "duration"], "duration"),
     ],
 )

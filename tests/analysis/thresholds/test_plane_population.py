@@ -144,5 +144,9 @@ def test_answers_that_place_no_threshold_of_their_own_count_and_are_told() -> No
     assert [one.fit is None for one in result.people] == [False] * 3 + [True]
     assert result.population["all"].people == 4
     table = plane_tables(result, ("Duration", "Asymmetry"), "study")[0]
-    assert [row[0] for row in table.rows] == ["all, 4 people", "all, all trials", "all, mean of 3 own fits"]
-    assert "too sure where people differ" in " ".join(table.notes)
+    assert [row[0] for row in table.rows] == [
+        "all, 4 people",
+        "all, all trials",
+        "all, mean of 3 individual fits",
+    ]
+    assert "too narrow if people differ" in " ".join(table.notes)

@@ -120,7 +120,7 @@ def test_the_command_writes_pooled_people_and_means(tmp_path: Path) -> None:
     ("text", "options", "told"),
     [
         ("x,response\n1,1\n1,0\n", [], "two levels of x or more, got 1"),
-        ("x,response\n1,1\n2,1\n", [], "all 2 answers are alike"),
+        ("x,response\n1,1\n2,1\n", [], "all 2 answers are the same"),
         ("x,response\n1,maybe\n2,1\n", [], "'response' is 'maybe' in line 2; expected 1 or 0"),
         ("x,response\nlong,0\n2,1\n", [], "'x' should be a number, got 'long'"),
         ("x,response\n0,0\n2,1\n", ["--function", "weibull"], "Weibull function needs x above 0"),
@@ -145,16 +145,16 @@ def test_people_without_a_threshold_of_their_own_are_counted_beside_the_mean(tmp
     call = ["thresholds", str(path), "--x", "x", "--response", "r", "--participant", "id"]
     done = CliRunner().invoke(app, call)
     said = " ".join(done.output.split())
-    assert "all: 1 of 5 people have no threshold of their own and are not in the mean" in said
+    assert "all: 1 of 5 people have no individual threshold and are not in the mean. The mean" in said
     path.write_text("\n".join(["id,x,r", *rows[:160]]))
-    assert "no threshold of their own" not in CliRunner().invoke(app, call).output
+    assert "no individual threshold" not in CliRunner().invoke(app, call).output
 
 
 def test_answers_rarer_than_guessing_gives_are_named() -> None:
     x, n = np.array([20.0, 40, 60, 80]), np.full(4, 32.0)
     trials = Trials(x, n, np.array([2.0, 10, 24, 31]))
     (said,) = fit_threshold(trials, "normal", 0.5, 0.0).notes
-    assert said.startswith("at 20 2 of 32 answers are yes, fewer than a guess rate of 0.5 gives")
+    assert said.startswith("at 20 2 of 32 answers are yes, fewer than expected from a guess rate of 0.5")
     assert not fit_threshold(trials, "normal", 0.05, 0.0).notes
     assert not fit_threshold(Trials(x, n, np.array([12.0, 18, 27, 31])), "normal", 0.5, 0.0).notes
 

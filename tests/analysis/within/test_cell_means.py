@@ -31,7 +31,7 @@ def test_trials_of_a_cell_are_averaged_without_weights_and_uneven_counts_are_sai
     table = cell_table(rows(FULL + "\np1 a x 4"), "who", "y", ["A"])
     assert table.y[0, 0] == pytest.approx((1 + 2 + 4) / 3)
     assert table.counts[0].tolist() == [3, 2]
-    assert "cells hold 2 to 3 ratings; every cell mean weighs the same" in cell_decisions(table)
+    assert "cells have 2 to 3 ratings; all cell means have equal weight" in cell_decisions(table)
 
 
 def test_a_participant_with_an_empty_cell_is_dropped_by_name() -> None:
@@ -39,13 +39,13 @@ def test_a_participant_with_an_empty_cell_is_dropped_by_name() -> None:
     assert table.participants == ("p1", "p2")
     assert table.dropped[0].participant == "p3"
     assert table.dropped[0].missing_cells == ({"A": "a", "B": "y"}, {"A": "b", "B": "x"})
-    assert "participant p3 dropped: no rating in A=a B=y; A=b B=x" in cell_decisions(table)
+    assert "participant p3 excluded: no rating in A=a B=y; A=b B=x" in cell_decisions(table)
 
 
 def test_constant_ratings_are_kept_and_flagged() -> None:
     table = cell_table(rows(FULL), "who", "y", ["A", "B"])
     assert table.constant == ("p2",)
-    assert any("p2 gave one and the same rating" in text for text in cell_decisions(table))
+    assert any("p2 gave the same rating" in text for text in cell_decisions(table))
 
 
 def test_the_order_of_rows_changes_nothing() -> None:
@@ -59,7 +59,7 @@ def test_the_order_of_rows_changes_nothing() -> None:
 def test_declared_levels_give_the_order_and_unknown_ones_are_refused() -> None:
     table = cell_table(rows(FULL), "who", "y", ["A"], {"A": ["b", "a"]})
     assert table.levels == (("b", "a"),)
-    with pytest.raises(InputError, match="'b' is no level of 'A'; did you mean 'bb'"):
+    with pytest.raises(InputError, match="'b' is not a level of 'A'; did you mean 'bb'"):
         cell_table(rows(FULL), "who", "y", ["A"], {"A": ["a", "bb"]})
 
 
@@ -82,7 +82,7 @@ def test_a_cell_nobody_rated_and_a_table_without_complete_participants_are_refus
     half = "p1 a x 1\np1 b y 1\np2 a y 1\np2 b x 1"
     with pytest.raises(InputError, match="no participant has a rating in every cell"):
         cell_table(rows(half), "who", "y", ["A", "B"])
-    with pytest.raises(InputError, match="levels 'X' and 'x' of B differ in case alone; leave a factor out"):
+    with pytest.raises(InputError, match="levels 'X' and 'x' of B differ only in case; remove a factor"):
         cell_table(rows(half.replace("b x", "b X").replace("b y", "a X")), "who", "y", ["B"])
 
 

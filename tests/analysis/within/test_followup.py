@@ -87,7 +87,7 @@ def test_significant_interactions_are_taken_apart_both_ways_with_holm() -> None:
     assert [(s.of, tuple(s.at.values())) for s in found][:3] == [("duration", (f,)) for f in "abc"]
     assert len(found) == 3 + 4
     assert [s.p_holm for s in found[:3]] == pytest.approx(holm(np.array([s.p_value for s in found[:3]])))
-    with pytest.raises(InputError, match="no interaction"):
+    with pytest.raises(InputError, match="not an interaction"):
         simple_effects(RESULT, ("face",))
 
 

@@ -106,8 +106,8 @@ def test_it_is_verified_in_another_folder(capsule: Path, tmp_path: Path) -> None
     elsewhere = shutil.copy(capsule, tmp_path / "from a friend.zip")
     code, said = verify(Path(elsewhere))
     assert code == 0, said
-    assert "every one as listed" in said
-    assert "verified: every table as printed, every figure byte for byte" in said
+    assert "all as listed" in said
+    assert "verified: every table is as printed, every figure is the same byte for byte" in said
 
 
 def test_it_holds_what_the_study_is_made_of(unpacked: Path) -> None:
@@ -250,7 +250,7 @@ def test_other_versions_are_named_where_a_figure_differs(unpacked: Path) -> None
     assert code == 0, said
     assert f"{figure.name}: " in said
     assert "matplotlib 3.0.0 became " in said
-    assert "verified: every table as printed" in said
+    assert "verified: every table is as printed" in said
 
 
 def test_versions_changed_in_the_list_alone_are_refused(unpacked: Path) -> None:

@@ -75,7 +75,7 @@ def make_samples(order: SamplesOrder, kit: FaceKit, report: Callable[[int, int, 
     except (OSError, InputError) as error:
         if says_full(error):
             raise InputError(
-                f"the disk is full: free some of it and run again; what is made stays in {order.out}"
+                f"the disk is full: free up space and run again; finished samples stay in {order.out}"
             ) from error
         raise
 
@@ -88,12 +88,12 @@ def _check_settings(order: SamplesOrder, kit: FaceKit) -> None:
     try:
         theirs = json.loads(file.read_text(encoding="utf-8"))
     except ValueError as error:
-        raise InputError(f"{file} is damaged; give another --out") from error
+        raise InputError(f"{file} is damaged; use another --out") from error
     for key, value in ours.items():
         if not isinstance(theirs, dict) or theirs.get(key) != value:
             was = theirs.get(key) if isinstance(theirs, dict) else theirs
             raise InputError(
-                f"{order.out} holds samples with {key} {was}, asked for is {value}; give another --out"
+                f"{order.out} has samples with {key} {was}, but {value} was requested; use another --out"
             )
 
 

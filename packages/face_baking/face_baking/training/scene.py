@@ -35,7 +35,7 @@ class SampleScene(FaceScene):
         return [replace(part, shape=self._turned(part.shape, sample)) for part in parts]
 
     def strokes_of(self, pose: LidPose) -> dict[int, float]:
-        """Each eye's stroke, of a closure of its own."""
+        """Each eye's stroke, with a separate closure."""
         if not isinstance(pose, SamplePose):
             return super().strokes_of(pose)
         closures = {1: pose.closure, -1: pose.closure_right}
