@@ -1,4 +1,4 @@
-"""docs/explanation/security.md names tests that there are."""
+"""docs/explanation/security-tests.md names tests that there are."""
 
 import ast
 import re
@@ -9,7 +9,7 @@ NAMED = re.compile(r"`([a-z_/]+\.py)::(\w+)`")
 
 
 def test_each_test_that_the_page_names_is_there() -> None:
-    named = NAMED.findall((REPOSITORY / "docs" / "explanation" / "security.md").read_text(encoding="utf-8"))
+    named = NAMED.findall((REPOSITORY / "docs" / "explanation" / "security-tests.md").read_text(encoding="utf-8"))
     assert len(named) > 30
     for file, name in named:
         path = (
@@ -26,6 +26,6 @@ def test_each_test_that_the_page_names_is_there() -> None:
 
 
 def test_each_of_the_thirteen_items_has_its_row() -> None:
-    page = (REPOSITORY / "docs" / "explanation" / "security.md").read_text(encoding="utf-8")
+    page = (REPOSITORY / "docs" / "explanation" / "security-tests.md").read_text(encoding="utf-8")
     items = {int(item) for item in re.findall(r"^\| (\d+) \|", page, re.MULTILINE)}
     assert items == set(range(1, 14))

@@ -1,4 +1,4 @@
-"""Attacks from outside, one file an item of docs/explanation/security.md."""
+"""Attacks from outside, one file per item of docs/explanation/security-tests.md."""
 
 import pytest
 
