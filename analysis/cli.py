@@ -16,11 +16,13 @@ def _gather() -> None:
     from analysis.commands.choices import register_pairs, register_thresholds
     from analysis.commands.models import register_models
     from analysis.commands.plan import register_plan
+    from analysis.commands.ranks import register_ranks
     from analysis.commands.run import register_run
     from analysis.commands.tables import register_convert, register_reshape
 
     register_run(app)
     register_anova(app)
+    register_ranks(app)
     register_check_paper(app)
     register_models(app)
     register_pairs(app)

@@ -1,0 +1,314 @@
+"""Rank tests of one factor: Friedman, Wilcoxon, Kruskal-Wallis, Mann-Whitney and Dunn."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from analysis.within.adjustments import bonferroni, holm
+from experiments.errors import InputError
+
+Floats = NDArray[np.float64]
+DRAWS = 2000
+"""Draws of participants for the interval of an effect size."""
+SEED = 53
+EXACT_MAX = 50
+"""Without ties the exact distribution is used below this many participants, as in R."""
+
+
+@dataclass(frozen=True)
+class RankTest:
+    """The test of all levels together.
+
+    Attributes
+    ----------
+    name : str
+        `Friedman` or `Kruskal-Wallis`.
+    chi2, df, p_value : float
+        The statistic, corrected for ties.
+    effect : float
+        Kendall's W (Friedman) or epsilon squared, H / (N - 1) (Kruskal-Wallis).
+    effect_low, effect_high : float
+        95% percentile interval over resampled participants.
+    """
+
+    name: Literal["Friedman", "Kruskal-Wallis"]
+    chi2: float
+    df: int
+    p_value: float
+    effect: float
+    effect_low: float
+    effect_high: float
+
+
+@dataclass(frozen=True)
+class RankPair:
+    """Two levels compared.
+
+    Attributes
+    ----------
+    statistic : float
+        Wilcoxon's V or Mann-Whitney's U of the first level.
+    exact : bool
+        Whether p is from the exact distribution; with ties it is the normal approximation with continuity
+        correction.
+    p_value, p_holm, p_bonferroni : float
+        Uncorrected, and corrected over all pairs.
+    r : float
+        Rank-biserial correlation, positive where the first level is higher.
+    r_low, r_high : float
+        95% percentile interval over resampled participants.
+    dunn_z, dunn_p_holm : float or None
+        Dunn's z on the ranks of all levels, and its p; None within participants.
+    """
+
+    first: str
+    second: str
+    n: int
+    statistic: float
+    exact: bool
+    p_value: float
+    p_holm: float
+    p_bonferroni: float
+    r: float
+    r_low: float
+    r_high: float
+    dunn_z: float | None = None
+    dunn_p_holm: float | None = None
+
+
+@dataclass(frozen=True)
+class RankAnalysis:
+    """Everything `analysis ranks` knows of a table."""
+
+    factor: str
+    design: Literal["within", "between"]
+    levels: tuple[str, ...]
+    medians: tuple[float, ...]
+    mean_ranks: tuple[float, ...]
+    n: tuple[int, ...]
+    test: RankTest
+    pairs: tuple[RankPair, ...]
+    dropped: tuple[str, ...] = field(default=())
+    decisions: tuple[str, ...] = field(default=())
+
+
+def rank_within(factor: str, levels: Sequence[str], values: Floats) -> RankAnalysis:
+    """Friedman's test and Wilcoxon's signed-rank test of each pair.
+
+    Parameters
+    ----------
+    factor : str
+    levels : sequence of str
+        Names of the columns of `values`.
+    values : ndarray
+        (participants, levels).
+
+    Raises
+    ------
+    InputError
+        Fewer than two levels or participants, or nobody who rates two levels differently.
+    """
+    people, count = values.shape
+    if count < 2 or people < 2:
+        raise InputError(f"'{factor}': expected two levels and two participants, got {count} and {people}")
+    if np.all(values == values[:, :1]):
+        raise InputError(f"'{factor}': every participant rates all levels alike; there is nothing to rank")
+    ranks = np.apply_along_axis(stats.rankdata, 1, values)
+    test = RankTest("Friedman", *_friedman(ranks), *_kendall_w(ranks))
+    pairs = [
+        _signed_ranks(levels[a], levels[b], values[:, a] - values[:, b])
+        for a, b in combinations(range(count), 2)
+    ]
+    return RankAnalysis(
+        factor,
+        "within",
+        tuple(levels),
+        _plain(np.median(values, axis=0)),
+        _plain(ranks.mean(axis=0)),
+        (people,) * count,
+        test,
+        _corrected(pairs),
+    )
+
+
+def rank_between(factor: str, levels: Sequence[str], groups: Sequence[Floats]) -> RankAnalysis:
+    """Kruskal and Wallis's test, Mann and Whitney's test and Dunn's test of each pair.
+
+    Parameters
+    ----------
+    factor : str
+    levels : sequence of str
+        Names of the groups.
+    groups : sequence of ndarray
+        One value per participant of each group.
+
+    Raises
+    ------
+    InputError
+        Fewer than two groups, an empty group, or values that are all alike.
+    """
+    if len(groups) < 2 or min(map(len, groups)) < 1:
+        raise InputError(f"'{factor}': expected at least two groups with a participant each")
+    together = np.concatenate(list(groups))
+    if np.all(together == together[0]):
+        raise InputError(f"'{factor}': all values are alike; there is nothing to rank")
+    ranks = _split(stats.rankdata(together), [len(group) for group in groups])
+    chi2 = float(stats.kruskal(*groups).statistic)
+    df = len(groups) - 1
+    low, high = _interval(groups, lambda drawn: _epsilon(drawn))
+    test = RankTest("Kruskal-Wallis", chi2, df, float(stats.chi2.sf(chi2, df)), _epsilon(groups), low, high)
+    dunn = _dunn(ranks, together)
+    p_dunn = holm(np.array([p for _, p in dunn]))
+    pairs = []
+    for number, (a, b) in enumerate(combinations(range(len(groups)), 2)):
+        pair = _rank_sum(levels[a], levels[b], groups[a], groups[b])
+        pairs.append(_with(pair, dunn_z=dunn[number][0], dunn_p_holm=float(p_dunn[number])))
+    return RankAnalysis(
+        factor,
+        "between",
+        tuple(levels),
+        tuple(float(np.median(group)) for group in groups),
+        tuple(float(rank.mean()) for rank in ranks),
+        tuple(len(group) for group in groups),
+        test,
+        _corrected(pairs),
+    )
+
+
+def _friedman(ranks: Floats) -> tuple[float, int, float]:
+    # Conover (1999), equation 5.8.5: the form that is corrected for ties.
+    people, count = ranks.shape
+    deviations = float(((ranks.sum(axis=0) - people * (count + 1) / 2) ** 2).sum())
+    ties = float((ranks**2).sum()) - people * count * (count + 1) ** 2 / 4
+    chi2 = (count - 1) * deviations / ties
+    return chi2, count - 1, float(stats.chi2.sf(chi2, count - 1))
+
+
+def _kendall_w(ranks: Floats) -> tuple[float, float, float]:
+    people, count = ranks.shape
+
+    def concordance(drawn: Floats) -> float:
+        # Nobody in the draw may tell two levels apart: then there is no concordance to speak of.
+        if np.all(drawn == drawn[:, :1]):
+            return 0.0
+        return float(_friedman(drawn)[0] / (len(drawn) * (count - 1)))
+
+    random = np.random.default_rng(SEED)
+    draws = [concordance(ranks[random.integers(0, people, people)]) for _ in range(DRAWS)]
+    low, high = np.quantile(draws, (0.025, 0.975))
+    return concordance(ranks), float(low), float(high)
+
+
+def _signed_ranks(first: str, second: str, differences: Floats) -> RankPair:
+    changed = differences[differences != 0]
+    random = np.random.default_rng(SEED)
+    draws = [_signed_biserial(random.choice(differences, len(differences))) for _ in range(DRAWS)]
+    low, high = np.quantile(draws, (0.025, 0.975))
+    if len(changed) == 0:
+        return RankPair(
+            first, second, len(differences), 0.0, False, 1.0, 1.0, 1.0, 0.0, float(low), float(high)
+        )
+    ranks = stats.rankdata(np.abs(changed))
+    v = float(ranks[changed > 0].sum())
+    # R's rule: exact only without ties and without zero differences.
+    exact = len(changed) == len(differences) < EXACT_MAX and len(set(ranks)) == len(ranks)
+    done = stats.wilcoxon(changed, correction=not exact, method="exact" if exact else "approx")
+    return RankPair(
+        first,
+        second,
+        len(differences),
+        v,
+        exact,
+        float(done.pvalue),
+        np.nan,
+        np.nan,
+        _signed_biserial(differences),
+        float(low),
+        float(high),
+    )
+
+
+def _signed_biserial(differences: Floats) -> float:
+    changed = differences[differences != 0]
+    if len(changed) == 0:
+        return 0.0
+    ranks = stats.rankdata(np.abs(changed))
+    return float((ranks[changed > 0].sum() - ranks[changed < 0].sum()) / ranks.sum())
+
+
+def _rank_sum(first: str, second: str, a: Floats, b: Floats) -> RankPair:
+    tied = len(np.unique(np.concatenate([a, b]))) < len(a) + len(b)
+    exact = not tied and len(a) < EXACT_MAX and len(b) < EXACT_MAX
+    done = stats.mannwhitneyu(a, b, method="exact" if exact else "asymptotic")
+    low, high = _interval([a, b], lambda drawn: _biserial(drawn[0], drawn[1]))
+    return RankPair(
+        first,
+        second,
+        len(a) + len(b),
+        float(done.statistic),
+        exact,
+        float(done.pvalue),
+        np.nan,
+        np.nan,
+        _biserial(a, b),
+        low,
+        high,
+    )
+
+
+def _biserial(a: Floats, b: Floats) -> float:
+    higher = np.sign(a[:, None] - b[None, :])
+    return float(higher.mean())
+
+
+def _epsilon(groups: Sequence[Floats]) -> float:
+    together = np.concatenate(list(groups))
+    if np.all(together == together[0]):
+        return 0.0
+    return float(stats.kruskal(*groups).statistic) / (len(together) - 1)
+
+
+def _dunn(ranks: Sequence[Floats], together: Floats) -> list[tuple[float, float]]:
+    # Dunn (1964), equation 1, with the correction for ties.
+    total = len(together)
+    _, sizes = np.unique(together, return_counts=True)
+    ties = float((sizes**3 - sizes).sum()) / (12 * (total - 1))
+    spread = total * (total + 1) / 12 - ties
+    tested = []
+    for a, b in combinations(range(len(ranks)), 2):
+        error = np.sqrt(spread * (1 / len(ranks[a]) + 1 / len(ranks[b])))
+        z = float((ranks[a].mean() - ranks[b].mean()) / error)
+        tested.append((z, 2 * float(stats.norm.sf(abs(z)))))
+    return tested
+
+
+def _interval(groups: Sequence[Floats], size: Callable[[list[Floats]], float]) -> tuple[float, float]:
+    random = np.random.default_rng(SEED)
+    draws = [size([random.choice(group, len(group)) for group in groups]) for _ in range(DRAWS)]
+    low, high = np.quantile(draws, (0.025, 0.975))
+    return float(low), float(high)
+
+
+def _split(values: Floats, sizes: Sequence[int]) -> list[Floats]:
+    return np.split(values, np.cumsum(sizes)[:-1])
+
+
+def _plain(values: Floats) -> tuple[float, ...]:
+    return tuple(float(value) for value in values)
+
+
+def _with(pair: RankPair, **changed: float) -> RankPair:
+    return RankPair(**{**pair.__dict__, **changed})
+
+
+def _corrected(pairs: Sequence[RankPair]) -> tuple[RankPair, ...]:
+    p = np.array([pair.p_value for pair in pairs])
+    return tuple(
+        _with(pair, p_holm=float(by_holm), p_bonferroni=float(by_bonferroni))
+        for pair, by_holm, by_bonferroni in zip(pairs, holm(p), bonferroni(p), strict=True)
+    )
