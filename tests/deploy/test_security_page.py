@@ -9,7 +9,9 @@ NAMED = re.compile(r"`([a-z_/]+\.py)::(\w+)`")
 
 
 def test_each_test_that_the_page_names_is_there() -> None:
-    named = NAMED.findall((REPOSITORY / "docs" / "explanation" / "security-tests.md").read_text(encoding="utf-8"))
+    named = NAMED.findall(
+        (REPOSITORY / "docs" / "explanation" / "security-tests.md").read_text(encoding="utf-8")
+    )
     assert len(named) > 30
     for file, name in named:
         path = (
