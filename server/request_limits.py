@@ -89,7 +89,7 @@ class _ClientGone(Exception):
 def too_large(limit: int) -> BodyTooLarge:
     """The refusal of a body over `limit` bytes."""
     shown = f"{limit >> 20} MiB" if limit >= 1 << 20 else f"{limit >> 10} KiB"
-    return BodyTooLarge(f"The request is too large: at most {shown} are accepted.")
+    return BodyTooLarge(f"The request is too large: the maximum is {shown}.")
 
 
 def kind_of(method: str, path: str) -> Kind:
@@ -178,7 +178,7 @@ class RequestLimits:
             self._held += over - body.held
             body.held = over
             if self._held > HELD_BYTES:
-                raise Busy("The server is busy; please try again in 2 s.", headers={"retry-after": "2"})
+                raise Busy("The server is busy. Please try again in 2 s.", headers={"retry-after": "2"})
 
     async def _raise_limit(self, scope: Scope, kind: Kind, body: _Body, size: int) -> None:
         """Let an account send more than a stranger; BodyTooLarge where that is not enough or nobody's."""
@@ -194,15 +194,13 @@ class RequestLimits:
 def _check_head(scope: Scope) -> None:
     """Refuse what is slow to read before anything reads it."""
     if len(scope["query_string"]) > QUERY_BYTES:
-        raise AddressTooLong(
-            f"The address is too long: at most {QUERY_BYTES >> 10} KiB after its ? are read."
-        )
+        raise AddressTooLong(f"The URL is too long: the maximum is {QUERY_BYTES >> 10} KiB after the ?.")
     if "\0" in scope["path"] or _NUL.search(scope["query_string"]):
         raise TextNotStorable(
-            "The request was refused: its address holds a NUL, which no text here can hold."
+            "The request was refused: its URL contains a NUL character, which cannot be stored."
         )
     if len(scope["headers"]) > MAX_HEADERS:
-        raise TooManyHeaders(f"The request has too many headers: at most {MAX_HEADERS} are read.")
+        raise TooManyHeaders(f"The request has too many headers: the maximum is {MAX_HEADERS}.")
 
 
 def _declared_length(scope: Scope) -> int:
@@ -248,7 +246,7 @@ def _count_body(receive: Receive, limit: int) -> Receive:
 
 
 def _too_slow() -> HTTPException:
-    return HTTPException(408, "The upload came to a standstill; please try again.", {"connection": "close"})
+    return HTTPException(408, "The upload stalled. Please try again.", {"connection": "close"})
 
 
 # Experimenters' pages wait for one another, and raters for none of them.

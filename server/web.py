@@ -128,7 +128,7 @@ def home() -> RedirectResponse:
 def security_txt(settings: SettingsDep) -> PlainTextResponse:
     """Where weaknesses of this server are reported (RFC 9116); 404 where nobody is named."""
     if not settings.security_contact:
-        raise NotFound("Nobody is named for reports of weaknesses; set PALPEBRA_SECURITY_CONTACT.")
+        raise NotFound("No contact for security reports is set. Set PALPEBRA_SECURITY_CONTACT.")
     expires = (datetime.now(UTC) + SECURITY_TXT_LASTS).replace(microsecond=0, tzinfo=None)
     return PlainTextResponse(
         f"Contact: {settings.security_contact}\n"
@@ -150,7 +150,7 @@ def service_worker(settings: SettingsDep) -> Response:
     """What keeps the participant's page for a reload without a connection; it serves /run/ alone."""
     path = settings.frontend_folder / "participant" / "service-worker.js"
     if not path.is_file():
-        raise NotFound("There is no service worker; the participant's page is not built.")
+        raise NotFound("There is no service worker, because the participant's page is not built.")
     headers = {"cache-control": "no-cache"}
     return Response(_read(path, path.stat().st_mtime_ns), media_type="text/javascript", headers=headers)
 
@@ -257,7 +257,7 @@ def no_room(settings: Settings) -> str | None:
     if free >= needed:
         return None
     room = f"{free / 1e6:.0f} MB free, {needed / 1e6:.0f} MB needed"
-    return f"The disk of the data folder is full: {room}; make room."
+    return f"The disk of the data folder is full: {room}. Free disk space."
 
 
 def is_locked(database: Database) -> bool:
@@ -302,5 +302,5 @@ def readyz(services: ServicesDep) -> Health:
     with services.database.read() as session:
         clip = newest_clip(session)
     if problem := services.clips.problem(clip):
-        raise NotReady(f"Clips cannot be read: {problem}; `server doctor` says what to do.")
+        raise NotReady(f"Clips cannot be read: {problem}; Run `server doctor` for advice.")
     return Health(status="ready")

@@ -517,7 +517,7 @@ class Settings(BaseSettings):
 
     @property
     def is_local(self) -> bool:
-        """True where this machine alone reaches the server, so that no link leads here from elsewhere."""
+        """True where only this machine reaches the server, so that no link leads here from elsewhere."""
         return urlsplit(self.public_url).hostname in LOCAL_HOSTS
 
     @property

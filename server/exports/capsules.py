@@ -60,14 +60,14 @@ from server.studies.series import version_of_series
 CRATE_FILE = "ro-crate-metadata.json"
 CRATE_VERSION = "1.2"
 _FOLDERS = {
-    "": "What the dataset is, for people and programs",
-    "analysis": "Script that analyses the answers, or the declared plan of the analysis",
+    "": "Description of the dataset, for people and programs",
+    "analysis": "Script that analyzes the answers, or the declared analysis plan",
     "data": "Table of data, de-identified",
     "documentation": "Documentation of the data and the software",
-    "materials": "What was shown and asked",
+    "materials": "Materials: clips and questions",
     "results": "Report of the analysis",
 }
-_NO_LICENCE = "No licence is declared: ask the creators before you use these data."
+_NO_LICENCE = "No license is declared. Ask the creators before you use these data."
 
 
 def crate_metadata(
@@ -125,7 +125,7 @@ def _licence(crate: ROCrate, page: str | None) -> Any:
     properties = {
         "@type": "CreativeWork",
         "name": page or "No licence",
-        "description": f"The licence at {page}." if page else _NO_LICENCE,
+        "description": f"The license at {page}." if page else _NO_LICENCE,
     }
     return crate.add(ContextEntity(crate, page or "#no-licence", properties=properties))
 
@@ -306,7 +306,7 @@ def _report(known: MethodsFigures, source: ReportSource, folder: Path, work: Pat
         manifest=folder / MANIFEST,
     )
     if message:
-        raise InputError(f"a capsule holds the report, which could not be made: {message}")
+        raise InputError(f"the capsule could not be made, because its report failed: {message}")
     rebuilt = tuple(sorted(path.name for path in results.iterdir()))
     write_beside(results, paragraph_of(known, read_results(results)))
     return source.model_copy(update={"rebuilt": rebuilt})
@@ -349,7 +349,7 @@ def start(
             "capsule",
             order.model_dump(),
             identity,
-            "A capsule of this study is being made already; wait for it.",
+            "A capsule of this study is already being made. Please wait.",
         )
         record(session, identity, "data downloaded", "study", name, what="capsule", origin=order.origin)
         session.flush()
@@ -381,7 +381,9 @@ def capsule_file(settings: Settings, session: Session, name: str, identity: Iden
     job = job_repository.find_job(session, study, "capsule", public_id)
     path = _zip_of(settings, public_id)
     if job is None or job.status != "done" or not path.is_file():
-        raise NotFound("There is no such capsule, or it is not done; reload the page to see how far it is.")
+        raise NotFound(
+            "There is no such capsule, or it is not finished. Reload the page to see its progress."
+        )
     return path
 
 
@@ -393,9 +395,9 @@ def remove(
         study = find_study(session, name, identity, "run")
         job = job_repository.find_job(session, study, "capsule", public_id)
         if job is None:
-            raise NotFound("There is no such capsule; reload the page to see which there are.")
+            raise NotFound("There is no such capsule. Reload the page to see the current list.")
         if is_under_way(locks, job):
-            raise Conflict("This capsule is being made; delete it when it is done.")
+            raise Conflict("This capsule is still being made. You can delete it when it is finished.")
         job_repository.remove_job(session, study, "capsule", public_id)
         record(session, identity, "capsule removed", "study", name, capsule=public_id)
     _zip_of(settings, public_id).unlink(missing_ok=True)
@@ -428,7 +430,7 @@ def _capsule_out(settings: Settings, locks: Locks, job: Job) -> CapsuleOut:
     is_there = job.status == "done" and path.is_file()
     return CapsuleOut.model_validate(
         {
-            **job_state(locks, job, "the server was stopped while it was made"),
+            **job_state(locks, job, "the server stopped before it was finished"),
             "origin": job.parameters.get("origin", "participant"),
             "series": job.parameters.get("series"),
             "clips": job.parameters.get("clips", True),

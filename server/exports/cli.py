@@ -47,44 +47,49 @@ def _register_export(parent: typer.Typer) -> None:
 
 def export(
     study: Annotated[str, typer.Argument(help="Name of the study.")],
-    out_file: Annotated[Path, typer.Option("--out", help="File to write, or - for the standard output.")],
+    out_file: Annotated[Path, typer.Option("--out", help="File to write, or - for standard output.")],
     form: Annotated[
         Format,
         typer.Option(
             "--format",
-            help="csv: one row a play; wide: one row a visit and a column a cell; runs: one row a visit with "
-            "its answers to forms; spss, parquet: the table of csv; spss-wide, parquet-wide: that of wide; "
-            "raw: JSON lines with every drawn frame; codebook: Markdown; columns: those of csv as JSON; "
-            "psych-ds: a zip of the de-identified dataset folder; identities: recruiters' ids beside the "
-            "pseudonyms, noted in the audit log.",
+            help=(
+                "csv: one row per presentation; wide: one row per visit and one column per cell; runs: "
+                "one row per visit with its form answers; spss, parquet: the table of csv; spss-wide, "
+                "parquet-wide: the table of wide; raw: JSON lines with every drawn frame; codebook: "
+                "Markdown; columns: the columns of csv as JSON; psych-ds: a zip of the de-identified "
+                "dataset folder; identities: recruiters' IDs with the pseudonyms, recorded in the audit "
+                "log."
+            ),
         ),
     ] = "csv",
     origin: Annotated[
-        ExportOrigin, typer.Option(help="Whose data: of one origin, or all together.")
+        ExportOrigin, typer.Option(help="Data of one origin, or all together.")
     ] = "participant",
     series: Annotated[
         int | None,
-        typer.Option(min=1, help="Data of one data series; without it of all, told apart by a column."),
+        typer.Option(min=1, help="Export one data series; by default all, distinguished by a column."),
     ] = None,
     bom: Annotated[
-        bool, typer.Option("--bom", help="Begin a CSV with a byte order mark, by which Excel knows UTF-8.")
+        bool, typer.Option("--bom", help="Begin a CSV with a byte order mark, so that Excel detects UTF-8.")
     ] = False,
     guard: Annotated[
         bool,
         typer.Option(
             "--guard/--no-guard",
             help="Put ' before each cell of a CSV that a spreadsheet would run as a formula (= + - @, not "
-            "numbers). --no-guard writes every text exactly as it was given: for programs alone.",
+            "numbers). --no-guard writes every text exactly as given; use it only for programs.",
         ),
     ] = True,
     old_order: Annotated[
         bool,
         typer.Option(
-            "--old-order", help="Columns as they stood until 0.2; else logically ordered, response by scale."
+            "--old-order",
+            help=("Use the column order of versions up to 0.2; by default, columns are in logical order."),
         ),
     ] = False,
     scripts: Annotated[
-        bool, typer.Option(help="Beside the long CSV, write scripts that analyse it with R and Python.")
+        bool,
+        typer.Option(help="In addition to the long CSV, write scripts that analyze it with R and Python."),
     ] = True,
 ) -> None:
     """Export a study's data, for example as CSV with one column per factor.
@@ -127,21 +132,22 @@ def export(
                 beside = _write_scripts(out_file, definition_of_series(session, known, extract.series))
         except (ValueError, SQLAlchemyError) as error:
             raise InputError(
-                f"the export broke off ({str(error).splitlines()[0]}) and was not kept; run: server doctor"
+                f"the export failed ({str(error).splitlines()[0]}) and was discarded; run: server doctor"
             ) from error
         there = runs_by_origin(session, known)
         rows = None if form == "codebook" else row_count(form, session, known, extract)
     if str(out_file) != "-":
         counted = "" if rows is None else f"{rows:,} row{'' if rows == 1 else 's'}, "
-        out.print(f"{out_file}: {counted}{size:,} bytes" + (f"; analyse it with {beside}" if beside else ""))
+        out.print(f"{out_file}: {counted}{size:,} bytes" + (f"; analyze it with {beside}" if beside else ""))
         if form == "psych-ds":
             out.print(
-                f"the dataset is the folder {study}/ in the zip: unpack it and give that to a validator"
+                f"the dataset is the folder {study}/ in the zip; to validate it, unpack the zip and check "
+                f"this folder"
             )
     others = {name: number for name, number in sorted(there.items()) if name != origin}
     if rows == 0 and form != "identities" and origin != "all" and others:
         named = ", ".join(f"{number} of origin {name}" for name, number in others.items())
-        typer.echo(f"nothing of origin {origin} to export; there are runs: {named} (--origin)", err=True)
+        typer.echo(f"no data of origin {origin} to export; there are runs: {named} (--origin)", err=True)
 
 
 def _write_scripts(out_file: Path, experiment: Experiment) -> str:
@@ -176,15 +182,17 @@ def capsule(
         int | None,
         typer.Option(
             min=1,
-            help="One data series alone: its data, definition, clips and report. Without it the data of "
-            "every series, and all else of the active version.",
+            help=(
+                "Include only one data series: its data, definition, clips and report. By default, the "
+                "data of every series, and everything else of the active version."
+            ),
         ),
     ] = None,
     clips: Annotated[
-        bool, typer.Option(help="Put the clips in; without them the manifest has their hashes.")
+        bool, typer.Option(help="Include the clips; otherwise only the manifest with their hashes.")
     ] = True,
     sensitivity: Annotated[
-        bool, typer.Option(help="Put in what takes long: mixed and ordinal models, Bayes factors.")
+        bool, typer.Option(help="Include slow analyses: mixed and ordinal models, Bayes factors.")
     ] = True,
 ) -> None:
     """Write the capsule of a study: a Psych-DS dataset and an RO-Crate with data, materials and report.
@@ -220,7 +228,7 @@ def capsule(
         name for name, value in (("creators", about.creators), ("licence", about.licence)) if not value
     ]
     if missing:
-        typer.echo(f"no {' and no '.join(missing)} declared: say them in the table [dataset]", err=True)
+        typer.echo(f"no {' and no '.join(missing)} declared; add them to the table [dataset]", err=True)
 
 
 # `server seal`: fix the plan of a study before its first participant.
@@ -234,10 +242,10 @@ def _register_seal(parent: typer.Typer) -> None:
 def seal(
     study: Annotated[str, typer.Argument(help="Name of the study.")],
     out_file: Annotated[
-        Path, typer.Option("--out", help="JSON file to write; a page to print stands beside.")
+        Path, typer.Option("--out", help="JSON file to write; a printable page is written next to it.")
     ],
     power: Annotated[
-        Path | None, typer.Option(help="JSON of `analysis power --json`, to be sealed with the plan.")
+        Path | None, typer.Option(help="JSON of `analysis power --json`, to seal with the plan.")
     ] = None,
 ) -> None:
     """Seal design, exclusions, analysis plan and power before the first participant, or write the seal again.
@@ -254,7 +262,7 @@ def seal(
         sealed = seal_of(session, known) or seal_plan(session, known, None, planned)
     if planned is not None and sealed.power != planned:
         raise InputError(
-            f"the plan was sealed {sealed.sealed_at} with another power; a seal is never replaced"
+            f"the plan was sealed {sealed.sealed_at} with a different power; a seal cannot be replaced"
         )
     for path, text in ((out_file, sealed.text()), (out_file.with_suffix(".html"), page(sealed))):
         with whole_text(path) as stream:
@@ -302,10 +310,12 @@ def methods(
     study: Annotated[str, typer.Argument(help="Name of the study.")],
     form: Annotated[Form, typer.Option("--format", help="text, latex, or json for programs.")] = Form.TEXT,
     origin: Annotated[Origin, typer.Option(help="Whose runs are counted.")] = Origin.PARTICIPANT,
-    series: Annotated[int | None, typer.Option(help="Data series; that of the version in use.")] = None,
+    series: Annotated[
+        int | None, typer.Option(help="Data series; by default, that of the current version.")
+    ] = None,
     report: Annotated[
         Path | None,
-        typer.Option(help="Folder of `analysis run --out`, for what each declared rule left out."),
+        typer.Option(help="Folder of `analysis run --out`, for the number of exclusions per declared rule."),
     ] = None,
 ) -> None:
     """Write a study's Methods paragraph with the query behind each number.

@@ -181,7 +181,7 @@ def check_whole(rows: Iterable[Row], expected: int, extra: int = 0) -> Iterator[
         number += 1
         yield row
     if number != expected:
-        raise ExportBrokenOff(f"the export broke off: expected {expected} rows, got {number}; try it again")
+        raise ExportBrokenOff(f"the export failed: expected {expected} rows, got {number}; try again")
 
 
 def csv_pieces(rows: Iterable[Sequence[Any]]) -> Iterator[bytes]:

@@ -60,19 +60,22 @@ ROWS_HEADER = "palpebra-rows"
 """How many rows (CSV: below the header; zip: of ratings; JSON lines: runs) a whole download holds."""
 
 
-Excel = Annotated[bool, Query(description="Begin with a byte order mark, by which Excel knows UTF-8.")]
+Excel = Annotated[bool, Query(description="Begin with a byte order mark, so that Excel detects UTF-8.")]
 Guard = Annotated[
     bool,
     Query(
         description="Put an apostrophe before each cell that a spreadsheet would run as a formula. "
-        "False gives every text exactly as it was given: for programs alone."
+        "With false, every text is exactly as given; use it only for programs."
     ),
 ]
 Series = Annotated[
-    Number | None, Query(description="Data of one data series; without it of all, told apart by a column.")
+    Number | None, Query(description="Export one data series; by default all, distinguished by a column.")
 ]
 OldOrder = Annotated[
-    bool, Query(description="Columns as they stood until 0.2; else in logical order, response beside scale.")
+    bool,
+    Query(
+        description="Use the column order of versions up to 0.2; by default, columns are in logical order."
+    ),
 ]
 
 
@@ -231,7 +234,7 @@ def download_converted(
     # The last route of this file: its path would stand in for those of the other downloads.
     form = CONVERTED[table, ending]
     if not _converting.acquire(blocking=False):
-        raise Conflict("Another file for SPSS or as Parquet is being made; try again in a moment.")
+        raise Conflict("Another SPSS or Parquet file is being made. Try again in a moment.")
     folder = Path(tempfile.mkdtemp(prefix="export-"))
     try:
         asked.note(form)
@@ -333,7 +336,7 @@ class NewSeal(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
     power: Annotated[dict[str, Any], Field(max_length=1000)] | None = Field(
-        default=None, description="What `analysis power --json` wrote."
+        default=None, description="Output of `analysis power --json`."
     )
 
 
@@ -343,8 +346,10 @@ class SealOut(BaseModel):
     sealed_at: str | None
     sha256: str | None
     version: int | None
-    power: bool = Field(description="Whether power was sealed with it.")
-    participants: int = Field(description="Who has begun in this series: after the first nothing is sealed.")
+    power: bool = Field(description="Whether power was sealed with the plan.")
+    participants: int = Field(
+        description="Number of participants in this series; a plan cannot be sealed after the first."
+    )
 
 
 @seal_router.get("")

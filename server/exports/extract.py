@@ -39,7 +39,7 @@ class Extract:
 
     def __str__(self) -> str:
         """In words, as READMEs have it."""
-        one, every = f"the origin `{self.origin}` alone", "all origins, told apart by `run_origin`"
+        one, every = f"the origin `{self.origin}` alone", "all origins, distinguished by `run_origin`"
         series = "" if self.series is None else f", data series {self.series} alone"
         return (every if self.origin == "all" else one) + series
 

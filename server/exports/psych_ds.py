@@ -41,7 +41,9 @@ from table_files.formulas import guarded_csv
 # intervals.
 
 EPOCH = datetime(2000, 1, 1, tzinfo=UTC)
-MOVED = "All times of the dataset are moved alike, so that its first run starts with the year 2000."
+MOVED = (
+    "All times in the dataset are shifted by the same amount, so that the first run starts in the year 2000."
+)
 
 
 # Decision 0641: Shared datasets contain no personal data.
@@ -115,8 +117,10 @@ def script(
         "scales": scales_of(experiment),
         "applied": [rule for rule in experiment.exclusions if isinstance(rule, APPLIED)],
         "rules": rules,
-        "unapplied": f"note: nobody is left out by these declared exclusions ({'; '.join(rules)}): "
-        "list the runs that `analysis run` names, in this script",
+        "unapplied": (
+            f"note: this script does not apply these declared exclusions ({'; '.join(rules)}): "
+            f"add the runs that `analysis run` reports to this script"
+        ),
         "view": KINDS[experiment.trial.kind].view.name,
     }
     templates = [f"{values['view']}.{language}.j2", f"answers.{language}.j2"]
@@ -239,8 +243,8 @@ def _texts(
 
 def _title(table: ExportTable, definition: Experiment) -> str:
     titles = {
-        "runs": "Runs: one row a visit",
-        "wide": "Wide: one row a visit, a column a cell of the design",
+        "runs": "Runs: one row per visit",
+        "wide": "Wide: one row per visit, one column per cell of the design",
     }
     return titles.get(table.name, KINDS[definition.trial.kind].view.title)
 
@@ -280,16 +284,17 @@ def _creator(creator: Creator) -> dict[str, Any]:
 
 def _readme(study: Study, definition: Experiment, made: str, extract: Extract, tables: list[str]) -> str:
     licence = definition.dataset.licence_page
-    terms = f"Licence: {licence}." if licence else "No licence is declared: ask before you use the data."
-    wide = " `data/*wide_data.csv` has one row a visit and a column a cell." if "wide" in tables else ""
+    terms = f"Licence: {licence}." if licence else "No license is declared. Ask before you use the data."
+    wide = " `data/*wide_data.csv` has one row per visit and one column per cell." if "wide" in tables else ""
     return (
-        f"# {definition.title}\n\nStudy `{study.name}`, exported {made}; data of {extract}. One row a "
-        f"play in `data/*{tables[0]}_data.csv`, one row a visit in `data/*runs_data.csv`;{wide} every column "
+        f"# {definition.title}\n\nStudy `{study.name}`, exported {made}; data of {extract}. One row per "
+        f"presentation in `data/*{tables[0]}_data.csv`, one row per visit in `data/*runs_data.csv`;{wide} "
+        f"every column "
         "is explained in `documentation/codebook.md`; the declared experiment is in `materials/`; scripts "
         f"for R and Python are in `analysis/`.\n\n{terms}\n\n"
-        "De-identified: participants have pseudonyms, answers in their own words and what their browsers "
-        f"said are left out. {MOVED} Rare combinations of answers may still point to a person: look at them "
-        "before you publish.\n\n"
-        "Rows with `synthetic` = 1 were not given by people. Rows with `excluded` = 1 were excluded by an "
+        "De-identified: participants have pseudonyms, answers in their own words and browser data are "
+        "removed. {MOVED} Rare combinations of answers may still identify a person: check them before you "
+        "publish.\n\n"
+        "Rows with `synthetic` = 1 are simulated. Rows with `excluded` = 1 were excluded by an "
         "experimenter.\n"
     )

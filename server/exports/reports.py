@@ -48,7 +48,7 @@ def start(
             "report",
             order.model_dump(),
             identity,
-            "A report of this study is being built already; wait for it.",
+            "A report of this study is already being made. Please wait.",
         )
         record(session, identity, "report asked for", "study", name, **order.model_dump())
         session.flush()
@@ -71,7 +71,7 @@ def report_out(settings: Settings, locks: Locks, job: Job) -> ReportOut:
     done = job.status == "done" and folder.is_dir()
     return ReportOut.model_validate(
         {
-            **job_state(locks, job, "the server was stopped while it was built"),
+            **job_state(locks, job, "the server stopped before it was finished"),
             "origin": job.parameters.get("origin") or _origin_of_older(job.parameters),
             "series": job.parameters.get("series"),
             "finished_at": job.finished_at,
@@ -106,7 +106,7 @@ def report_file(
     study = find_study(session, name, identity, "export")
     job = job_repository.find_job(session, study, "report", public_id)
     if job is None or file not in report_out(settings, locks, job).files:
-        raise NotFound("There is no such report, or it has no such file.")
+        raise NotFound("There is no such report, or it does not contain this file.")
     return report_folder(settings, public_id) / file
 
 

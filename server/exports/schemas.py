@@ -17,11 +17,13 @@ class NewCapsule(BaseModel):
     origin: Literal["participant", "pilot", "simulated"] = "participant"
     series: Number | None = Field(
         default=None,
-        description="Its data, definition, clips and report alone. Where none is given it holds the data of "
-        "every series, and all else of the active version.",
+        description=(
+            "Include only this data series: its data, definition, clips and report. By default, "
+            "the data of every series, and everything else of the active version."
+        ),
     )
-    clips: bool = Field(default=True, description="Put the clips in; their hashes are in it always.")
-    sensitivity: bool = Field(default=True, description="With the models of the report that take long.")
+    clips: bool = Field(default=True, description="Include the clips; their hashes are always included.")
+    sensitivity: bool = Field(default=True, description="Include the slow models of the report.")
 
 
 class CapsuleOut(BaseModel):
@@ -35,8 +37,8 @@ class CapsuleOut(BaseModel):
     series: int | None
     clips: bool
     created_at: datetime
-    bytes: int | None = Field(description="Length of the zip; null until it is there.")
-    sha256: str | None = Field(description="What `analysis verify` prints of it.")
+    bytes: int | None = Field(description="Size of the zip in bytes; null until it is finished.")
+    sha256: str | None = Field(description="Its hash, as `analysis verify` prints it.")
 
 
 # Analysis reports built on request.
@@ -48,7 +50,7 @@ class NewReport(BaseModel):
     model_config = ConfigDict(extra="forbid")
     origin: Literal["participant", "pilot", "simulated"] = "participant"
     series: Number | None = Field(
-        default=None, description="Data series; that of the active version where none is given."
+        default=None, description="Data series; by default, that of the active version."
     )
     sensitivity: bool = True
 

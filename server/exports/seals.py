@@ -45,11 +45,11 @@ def seal_plan(
     must_not_be_archived(study)
     version = active_version(session, study)
     if sealed := seal_of(session, study):
-        raise Conflict(f"The plan was sealed {sealed.sealed_at} already; a seal is never replaced.")
+        raise Conflict(f"The plan was already sealed {sealed.sealed_at}. A seal cannot be replaced.")
     if people := people_of_series(session, study, version.series):
         raise Conflict(
-            f"Begun already by {counted(people, 'participant')}: a plan is sealed before the first. "
-            "A report without a seal says nothing of deviations."
+            f"{counted(people, 'participant')} already started. A plan can only be sealed before the "
+            f"first. Without a seal, the report cannot list deviations."
         )
     experiment, manifest = definition_of(version), Manifest.model_validate(version.manifest)
     seal = Seal(

@@ -161,8 +161,8 @@ def cells_of(experiment: Experiment) -> list[Cell]:
     scales = scales_of(experiment)
     if not scales:
         raise InputError(
-            f"the wide table holds mean ratings; '{experiment.name}' has trials of the kind "
-            f"{experiment.trial.kind}: take the long table (answers)"
+            f"the wide table contains mean ratings, but '{experiment.name}' has trials of the kind "
+            f"{experiment.trial.kind}; use the long table (answers)"
         )
     within = [factor for factor in experiment.factors if not factor.between]
     rated = [
@@ -184,7 +184,7 @@ def cells_of(experiment: Experiment) -> list[Cell]:
 
 def _mean_of(scale: RatedScale, cell: str) -> str:
     of = f" of {cell}" if cell else ""
-    return f"Mean answer on the scale {scale.name}{of}: main trials, the last play with an answer of each."
+    return f"Mean answer on the scale {scale.name}{of}: main trials, the last answered presentation of each."
 
 
 def wide_columns(
@@ -197,14 +197,16 @@ def wide_columns(
         Column(
             beside_runs(factor.name),
             "text",
-            f"Level of the factor {factor.label}, between participants.",
+            f"Level of the between-participant factor {factor.label}.",
             values=tuple(level.name for level in factor.levels),
             labels=tuple((level.name, level.label) for level in factor.levels),
         )
         for factor in experiment.factors
         if factor.between
     ]
-    number = Column("answers", "integer", "Answers of main trials that the means are of.", minimum=0)
+    number = Column(
+        "answers", "integer", "Number of answers in main trials that the means are based on.", minimum=0
+    )
     return [*kept, *between, number, *(cell.column for cell in cells_of(experiment))]
 
 
@@ -239,7 +241,7 @@ def wide_rows(
             *(mine.means.get((cell.scale, cell.levels), "") for cell in cells),
         ]
     if coming is not None:
-        raise ExportBrokenOff(f"the export broke off: answers of the run {coming.run} are left; try it again")
+        raise ExportBrokenOff(f"the export failed: answers of the run {coming.run} remain; try again")
 
 
 @dataclass(frozen=True)
@@ -332,11 +334,11 @@ def explained_tables(
     active, forms = definitions[-1], form_columns(definitions)
     tables = [
         (KINDS[active.trial.kind].view.title, rating_columns(definitions, old_order)),
-        ("Runs: one row a visit", run_columns(forms, old_order)),
+        ("Runs: one row per visit", run_columns(forms, old_order)),
     ]
     if scales_of(active):
         cells = [column for column in wide_columns(active, forms, old_order) if column not in tables[1][1]]
-        title = "Wide: one row a visit; beside columns of the runs, a column a cell of the design"
+        title = "Wide: one row per visit; the columns of the runs, plus one column per cell of the design"
         tables.append((title, cells))
     return tables
 

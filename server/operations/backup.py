@@ -128,7 +128,7 @@ def _describe(connection: Connection, clips: ClipStore, folder: Path, with_clips
     revision = MigrationContext.configure(connection).get_current_revision()  # the snapshot begins
     moment = iso(now())
     if revision is None:
-        raise InputError("the database has no tables yet; there is nothing to back up")
+        raise InputError("the database has no tables yet, so there is nothing to back up")
     dumped = [table for table in tables_of(connection) if table.name != key_escrow.APART]
     tables = {table.name: _dump(connection, table, folder / table.name) for table in dumped}
     hashes = clip_hashes(connection)
@@ -155,7 +155,7 @@ def _dump(connection: Connection, table: Table, path: Path) -> Content:
 def _add_clip(tar: tarfile.TarFile, clips: ClipStore, sha256: str) -> None:
     size = clips.size(sha256)
     if size is None:
-        raise InputError(f"clip {sha256[:12]}... went away during the backup; run it again")
+        raise InputError(f"clip {sha256[:12]}... was removed during the backup; run the backup again")
     with tempfile.SpooledTemporaryFile(max_size=SPOOL_BYTES) as spool:
         for piece in clips.read(sha256, 0, size):
             spool.write(piece)
@@ -205,7 +205,7 @@ def recipient_of(text: str) -> x25519.Recipient:
         return x25519.Recipient.from_str(text.strip())
     except pyrage.RecipientError as error:
         raise InputError(
-            f"expected a public key age1..., as server backup-key makes one, got '{text[:20]}'"
+            f"expected a public key age1... from `server backup-key`, got '{text[:20]}'"
         ) from error
 
 
@@ -220,13 +220,13 @@ def identity_in(path: Path) -> x25519.Identity:
         [key] = keys
         return x25519.Identity.from_str(key)
     except (ValueError, pyrage.IdentityError) as error:
-        raise InputError(f"{path}: expected one line AGE-SECRET-KEY-..., as of server backup-key") from error
+        raise InputError(f"{path}: expected one line AGE-SECRET-KEY-... from `server backup-key`") from error
 
 
 def make_identity(path: Path) -> str:
     """Write a new private key, mode 600, and give its public key; a file that is there is never replaced."""
     if path.exists():
-        raise InputError(f"{path} is there already; a private key is never replaced, name another file")
+        raise InputError(f"{path} already exists; private keys are never replaced, so choose another file")
     identity = x25519.Identity.generate()
     public = str(identity.to_public())
     with whole_private_file(path) as stream:

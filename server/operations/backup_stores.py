@@ -194,7 +194,9 @@ class BucketOfBackups:
             yield
         except (Boto3Error, BotoCoreError, ClientError) as error:
             said = str(error).splitlines()[0]
-            raise InputError(f"{self.address}: the object store refused or did not answer: {said}") from error
+            raise InputError(
+                f"{self.address}: the object store refused the request or did not respond: {said}"
+            ) from error
 
 
 # Backups encrypted into a store of another host, and brought here again.
@@ -352,7 +354,8 @@ def _bring_file(store: BackupStore, name: str, target: Path, identity: x25519.Id
                 stream.write(piece)
         elif identity is None:
             raise InputError(
-                f"{name} is encrypted; name its private key's file by --identity or PALPEBRA_BACKUP_IDENTITY"
+                f"{name} is encrypted; specify the file of its private key with --identity or "
+                f"PALPEBRA_BACKUP_IDENTITY"
             )
         else:
             decrypt(source, stream, identity, name)

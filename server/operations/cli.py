@@ -82,8 +82,8 @@ def doctor(
 
 
 def copy(
-    source: Annotated[str, typer.Argument(help="Address to copy from.", show_default=False)],
-    target: Annotated[str, typer.Argument(help="Address of an empty database.", show_default=False)],
+    source: Annotated[str, typer.Argument(help="Database URL to copy from.", show_default=False)],
+    target: Annotated[str, typer.Argument(help="Database URL of an empty database.", show_default=False)],
 ) -> None:
     """Copy every row from one database to another and compare counts and hashes.
 
@@ -143,7 +143,7 @@ def back(
     moment: Annotated[
         str,
         typer.Argument(
-            help="The last snapshot up to this moment (UTC) is taken, as 2026-11-24T10:15:00Z; or newest.",
+            help="Use the last snapshot up to this time (UTC), such as 2026-11-24T10:15:00Z; or newest.",
             show_default=False,
         ),
     ],
@@ -164,8 +164,8 @@ def back(
     chosen = snapshot_at(settings, _moment(moment))
     before = go_back(settings, chosen, out.print)
     runs = counted(runs_in(settings), "run")
-    out.print(f"the database is as it was at {iso(chosen.taken_at)}, with {runs}")
-    out.print(f"what was there before: {before}")
+    out.print(f"restored the database as of {iso(chosen.taken_at)}, with {runs}")
+    out.print(f"the previous database is kept at {before}")
 
 
 def _moment(given: str) -> datetime:
@@ -174,7 +174,7 @@ def _moment(given: str) -> datetime:
     try:
         moment = datetime.fromisoformat(given)
     except ValueError:
-        raise InputError(f"expected a moment as 2026-11-24T10:15:00Z, or newest; got '{given}'") from None
+        raise InputError(f"expected a time such as 2026-11-24T10:15:00Z, or newest; got '{given}'") from None
     return moment.astimezone(UTC) if moment.tzinfo else moment.replace(tzinfo=UTC)
 
 
@@ -225,13 +225,16 @@ def recount() -> None:
     """
     with stored_services() as services:
         mended, runs = repair(services.database, services.versions)
-    out.print(f"{counted(runs, 'run')} counted, {mended} mended")
+    out.print(f"{counted(runs, 'run')} counted, {mended} corrected")
 
 
 @app.command("rewrap")
 def rewrap(
     old_key_file: Annotated[
-        Path, typer.Argument(help="The secret key of before, as data/secret_key was.", show_default=False)
+        Path,
+        typer.Argument(
+            help="File with the previous secret key (the old data/secret_key).", show_default=False
+        ),
     ],
 ) -> None:
     """Carry over what was kept under the old key, after the secret key was changed.
@@ -247,11 +250,13 @@ def rewrap(
         raise InputError(f"{old_key_file} cannot be read: {error.strerror or error}") from error
     with stored_services() as services, services.database.write() as session:
         carried = carry_over(session, old, services.settings.key)
-    out.print(f"{carried.identities} keys wrapped anew; {carried.unreadable} are not under that key")
-    out.print(f"{counted(carried.second_factors, 'second factor')} carried over")
     out.print(
-        "move palpebra-keys.json away and keep it with the backups made so far, which open with it alone "
-        "(server restore FILE --keys); then back up anew"
+        f"{carried.identities} keys re-encrypted; {carried.unreadable} were not encrypted with the old key"
+    )
+    out.print(f"{counted(carried.second_factors, 'second factor')} re-encrypted")
+    out.print(
+        "move palpebra-keys.json to the existing backups, which can only be restored with it (server "
+        "restore FILE --keys); then make a new backup"
     )
     if carried.broken is not None:
         raise InputError(
@@ -260,7 +265,8 @@ def rewrap(
             "one between, carry over the first to it, then that one to the last"
         )
     out.print(
-        "the audit log's chain is made anew; note its head (server audit verify), older ones fit no more"
+        "the chain of the audit log was rebuilt; save its new head (server audit verify), because older "
+        "heads no longer match"
     )
 
 

@@ -44,41 +44,44 @@ def register(parent: typer.Typer) -> None:
 
 def backup(
     file: Annotated[
-        Path | None, typer.Argument(help="The file to write; palpebra-DATE.tar where not given.")
+        Path | None, typer.Argument(help="The file to write; by default, palpebra-DATE.tar.")
     ] = None,
     without_clips: Annotated[
         bool,
-        typer.Option(
-            "--without-clips", help="Leave the clips out, where their store is backed up by itself."
-        ),
+        typer.Option("--without-clips", help="Omit the clips, if their store is backed up separately."),
     ] = False,
     keep: Annotated[
         int,
         typer.Option(
             min=0,
-            help="Keep, of the newest DAYS days with a backup, the last one each (all of the newest day); "
-            "remove earlier palpebra-DATE.tar of that folder. 0: remove none.",
+            help=(
+                "Keep the last backup of each of the newest DAYS days (and all of the newest day); remove "
+                "older palpebra-DATE.tar files in this folder. 0: remove none."
+            ),
             metavar="DAYS",
         ),
     ] = 0,
     keys: Annotated[
         Path | None,
         typer.Option(
-            help="Where to write the key file; PALPEBRA_BACKUP_KEYS, or palpebra-keys.json beside the "
-            "backup, if not given."
+            help=(
+                "Where to write the key file; by default PALPEBRA_BACKUP_KEYS, or palpebra-keys.json next "
+                "to the backup."
+            )
         ),
     ] = None,
     to: Annotated[
         str,
         typer.Option(
-            help="Encrypt, and write to this folder or s3://BUCKET/PREFIX instead.", metavar="ADDRESS"
+            help=("Encrypt the backup, and write it to this folder or s3://BUCKET/PREFIX instead."),
+            metavar="ADDRESS",
         ),
     ] = "",
     recipient: Annotated[
         str,
-        typer.Option(help="Public key to encrypt for; PALPEBRA_BACKUP_RECIPIENT where not given."),
+        typer.Option(help="Public key to encrypt for; by default PALPEBRA_BACKUP_RECIPIENT."),
     ] = "",
-    replace: Annotated[bool, typer.Option("--replace", help="Write over a FILE that is there.")] = False,
+    replace: Annotated[bool, typer.Option("--replace", help="Overwrite an existing FILE.")] = False,
 ) -> None:
     """Back up database, clips and secret key in one file while the server runs.
 
@@ -97,14 +100,14 @@ def backup(
       server backup --to s3://lab-backups/palpebra --recipient age1... --keep 14
     """
     if to and (file is not None or keys is not None):
-        raise InputError("expected either a FILE (and --keys) or --to, where the key file goes along")
+        raise InputError("expected either a FILE (and --keys) or --to, which includes the key file")
     name = f"palpebra-{now():%Y-%m-%dT%H%M%S}.tar"
     if to:
         _back_up_to(to, recipient, name, with_clips=not without_clips, keep=keep)
         return
     path = file or Path(name)
     if path.exists() and not replace:
-        raise InputError(f"{path} is there already; name another file, or add --replace to write over it")
+        raise InputError(f"{path} already exists; choose another file, or add --replace to overwrite it")
     with stored_services() as services:
         described = backups.back_up(
             services.database,
@@ -130,8 +133,8 @@ def _back_up_to(to: str, recipient: str, name: str, *, with_clips: bool, keep: i
     public = recipient or settings.backup_recipient
     if not public:
         raise InputError(
-            "expected the public key to encrypt for (--recipient or PALPEBRA_BACKUP_RECIPIENT); "
-            "make one by: server backup-key FILE"
+            "expected a public key to encrypt for (--recipient or PALPEBRA_BACKUP_RECIPIENT); create one "
+            "with: server backup-key FILE"
         )
     key = recipient_of(public)
     store = backup_store(to, settings)
@@ -162,18 +165,20 @@ def backup_key(
 
 File = Annotated[
     str,
-    typer.Argument(help="A file of `server backup`, or s3://BUCKET/PREFIX/NAME.", show_default=False),
+    typer.Argument(help="A file from `server backup`, or s3://BUCKET/PREFIX/NAME.", show_default=False),
 ]
 IdentityFile = Annotated[
     Path | None,
-    typer.Option("--identity", help="File of the private key; PALPEBRA_BACKUP_IDENTITY if not given."),
+    typer.Option("--identity", help="File of the private key; by default PALPEBRA_BACKUP_IDENTITY."),
 ]
 KeyFile = Annotated[
     Path | None,
     typer.Option(
         "--keys",
-        help="The key file; PALPEBRA_BACKUP_KEYS (of a backup that is not encrypted), or palpebra-keys.json "
-        "beside the backup, if not given.",
+        help=(
+            "The key file; by default PALPEBRA_BACKUP_KEYS (for unencrypted backups), or "
+            "palpebra-keys.json next to the backup."
+        ),
     ),
 ]
 
@@ -186,14 +191,17 @@ def restore(
         bool,
         typer.Option(
             "--stale-keys",
-            help="Take a key file that is older than the backup: recruiters' ids of later visits are lost.",
+            help="Use a key file that is older than the backup: recruiters' IDs of later visits are lost.",
         ),
     ] = False,
     despite_erasures: Annotated[
         bool,
         typer.Option(
             "--despite-erasures",
-            help="Restore without a ledger of erasures newer than the backup: people erased since come back.",
+            help=(
+                "Restore without a ledger of erasures newer than the backup: data erased since then come "
+                "back."
+            ),
         ),
     ] = False,
 ) -> None:
@@ -228,7 +236,7 @@ def restore(
             )
     finally:
         services.database.close()
-    out.print(f"restored what was backed up on {described.created_at}")
+    out.print(f"restored the backup of {described.created_at}")
 
 
 def _in_the_open(file: str, settings: Settings, identity: x25519.Identity | None, held: ExitStack) -> Path:
@@ -249,10 +257,13 @@ def _private_key(settings: Settings, identity: Path | None) -> x25519.Identity |
 def drill(
     file: Annotated[
         str,
-        typer.Argument(help="A backup, a folder or s3://BUCKET/PREFIX; PALPEBRA_BACKUP_FOLDER if not given."),
+        typer.Argument(help="A backup, a folder or s3://BUCKET/PREFIX; by default PALPEBRA_BACKUP_FOLDER."),
     ] = "",
     when_due: Annotated[
-        bool, typer.Option("--when-due", help="Only where the last drill is a week old (a day if it failed).")
+        bool,
+        typer.Option(
+            "--when-due", help="Only if the last drill is at least a week old (a day if it failed)."
+        ),
     ] = False,
     identity: IdentityFile = None,
     keys: KeyFile = None,
@@ -286,7 +297,7 @@ def drill(
         out.print(f"{result.backup}: the drill failed: {result.said}")
         raise typer.Exit(1)
     out.print(
-        f"{result.backup} came back whole: {result.rows} rows, {result.clips} clips of "
+        f"{result.backup} was restored completely: {result.rows} rows, {result.clips} clips of "
         f"{result.backed_up_at}, in {result.seconds:.0f} s"
     )
 
@@ -294,7 +305,9 @@ def drill(
 def _backup_of(address: str, settings: Settings) -> Path | StoredBackup:
     """The file itself, or the newest of a folder or bucket."""
     if not address:
-        raise InputError("expected a backup or a folder of backups; name one, or set PALPEBRA_BACKUP_FOLDER")
+        raise InputError(
+            "expected a backup or a folder of backups; specify one, or set PALPEBRA_BACKUP_FOLDER"
+        )
     if Path(address).is_file() and not address.endswith(ENDING):
         return Path(address)
     if address.endswith((".tar", ENDING)):

@@ -48,7 +48,7 @@ def copy_database(
     source, target = _open_by_url(source_url), _open_by_url(target_url)
     try:
         if source.url == target.url:
-            raise InputError("source and target are the same database; give two addresses")
+            raise InputError("source and target are the same database; use two different URLs")
         _check_revision(source)
         upgrade(target)
         return _copy(source, target, told)
@@ -60,15 +60,15 @@ def copy_database(
 def _copy(source: Database, target: Database, told: Callable[[str, Content], None]) -> dict[str, Content]:
     copied: dict[str, Content] = {}
     with snapshot(source) as reading, target.write_connection() as writing:
-        refuse_unless_empty(writing, address(target.url.render_as_string()), "give an empty database")
+        refuse_unless_empty(writing, address(target.url.render_as_string()), "use an empty database")
         into = {table.name: table for table in tables_of(writing)}
         for table in tables_of(reading):
             written = write_rows(writing, into[table.name], read_rows(reading, table))
             content = content_of(writing, into[table.name])
             if content != written:
                 raise InputError(
-                    f"table {table.name}: {written.rows} rows were written, {content.rows} were read back or "
-                    "their values differ; nothing was kept, please report this"
+                    f"table {table.name}: {written.rows} rows were written, but {content.rows} were read "
+                    f"back or their values differ; nothing was kept, please report this"
                 )
             copied[table.name] = content
             told(table.name, content)
@@ -85,7 +85,7 @@ def _open_by_url(url: str) -> Database:
         return Database(Settings(database_url=url).resolved_database_url, pool=2)
     except Exception as error:
         raise InputError(
-            f"expected an address such as sqlite:///palpebra.sqlite or postgresql://me@host/name, got '{url}'"
+            f"expected a URL such as sqlite:///palpebra.sqlite or postgresql://me@host/name, got '{url}'"
         ) from error
 
 
@@ -143,8 +143,8 @@ def carry_over(session: Session, old: bytes, secret: bytes) -> RekeyedSecrets:
     done, left = rewrap_all(session, old)
     if not done and not any(entries_under_key(session, old)):
         raise InputError(
-            "nothing on this server is under that key: it was never the key here, or all was carried over "
-            "before"
+            "nothing on this server is encrypted with this key: it was never used here, or everything is "
+            "already re-encrypted"
         )
     if before.broken is not None:
         return RekeyedSecrets(done, left, 0, before.broken)

@@ -60,18 +60,18 @@ def backups(services: Services) -> Iterator[Finding]:
     try:
         watched = watched_backups(services.settings)
     except InputError as error:
-        yield Finding("backups", "failed", str(error), "see why their store cannot be reached")
+        yield Finding("backups", "failed", str(error), "check why the backup store cannot be reached")
         return
     if watched is None:
-        yield Finding("backups", "ok", "not watched: PALPEBRA_BACKUP_FOLDER is not set")
+        yield Finding("backups", "ok", "not monitored: PALPEBRA_BACKUP_FOLDER is not set")
         return
     if watched.age_s is None:
-        yield Finding("backups", "warning", "there is none", "run: server backup, each day")
+        yield Finding("backups", "warning", "there is none", "run `server backup` every day")
         return
     said = f"the newest is {watched.age_s / 3600:.0f} h old"
     fine = watched.age_s <= OLD_AFTER_S
     yield Finding(
-        "backups", "ok" if fine else "warning", said, "" if fine else "see why no newer one is made"
+        "backups", "ok" if fine else "warning", said, "" if fine else "check why there is no newer backup"
     )
     yield _drill_finding(watched)
 
@@ -83,12 +83,12 @@ def _drill_finding(watched: WatchedBackups) -> Finding:
             "restore drill",
             "warning",
             "not here",
-            "run where the private key is: server drill --identity FILE",
+            "on the machine with the private key, run: server drill --identity FILE",
         )
     if drill is None:
         return Finding("restore drill", "warning", "none was made", "run: server drill")
     if not drill.passed:
-        advice = "make a backup anew and run: server drill"
+        advice = "make a new backup and run: server drill"
         return Finding("restore drill", "failed", f"{drill.backup}: {drill.said}", advice)
     return Finding(
         "restore drill", "ok", f"{drill.backup} came back whole on {drill.at:%Y-%m-%d}, {drill.rows} rows"
@@ -101,26 +101,26 @@ def snapshots(services: Services) -> Iterator[Finding]:
     if not services.database.is_sqlite:
         if settings.snapshot_minutes:
             advice = "unset PALPEBRA_SNAPSHOT_MINUTES; PostgreSQL has deploy/point-in-time.sh"
-            yield Finding("snapshots", "warning", "asked for, but they are of SQLite alone", advice)
+            yield Finding("snapshots", "warning", "enabled, but they only exist for SQLite", advice)
         return
     if settings.snapshot_minutes:
         yield _snapshot_finding(settings)
     for path in set_aside(settings):
-        advice = f"it holds everybody's answers, erased ones too: once all is well, remove {path}"
+        advice = f"it contains all answers, including erased ones; when everything works, remove {path}"
         yield Finding("database of before", "warning", path.name, advice)
 
 
 def _snapshot_finding(settings: Settings) -> Finding:
     there = snapshots_of(settings)
     if not there:
-        return Finding("snapshots", "warning", "there is none", "start the server, which takes them")
+        return Finding("snapshots", "warning", "there is none", "start the server, which takes snapshots")
     newest = there[-1].taken_at
     age_min = (now() - newest).total_seconds() / 60
     said = f"{counted(len(there), 'snapshot')}, the newest {age_min:.0f} min old"
     late = changed_at(database_file(settings)) - newest > timedelta(
         minutes=LATE_AFTER * settings.snapshot_minutes
     )
-    advice = "see why the server takes no newer one, in its log" if late else ""
+    advice = "check the server log for why there is no newer snapshot" if late else ""
     return Finding("snapshots", "warning" if late else "ok", said, advice)
 
 
@@ -141,12 +141,12 @@ def ledger(services: Services) -> Iterator[Finding]:
         # Added at the end, so that what the new one gains meanwhile stays; `echo` ends a line cut off.
         one, other = (shlex.quote(str(path)) for path in (before, ledger_path(settings)))
         advice = (
-            "a restore would bring these people back; as the server's user, run: "
+            "a restore would bring back erased data; as the server's user, run: "
             f"(umask 077; {{ echo; cat {one}; }} >> {other})"
         )
         yield Finding("ledger of erasures", "failed", said, advice)
     else:
-        yield Finding("ledger of erasures", "ok", f"{ledger_path(settings)} has all that was kept before")
+        yield Finding("ledger of erasures", "ok", f"{ledger_path(settings)} contains all earlier entries")
 
 
 def connection_pool(services: Services) -> Iterator[Finding]:
@@ -154,13 +154,13 @@ def connection_pool(services: Services) -> Iterator[Finding]:
     if services.database.is_sqlite:
         return
     if repository.session_is_kept(services.database.engine):
-        yield Finding("sessions", "ok", "each keeps its connection to PostgreSQL")
+        yield Finding("sessions", "ok", "sessions keep their connection to PostgreSQL")
         return
     advice = (
-        "locks and LISTEN belong to a session: set pool_mode = session for this database "
-        "(PgBouncer), or let DATABASE_URL lead to PostgreSQL itself"
+        "locks and LISTEN need a session: set pool_mode = session for this database (PgBouncer), or point "
+        "DATABASE_URL directly to PostgreSQL"
     )
-    said = "a pool in transaction mode stands before PostgreSQL"
+    said = "a connection pool in transaction mode is in front of PostgreSQL"
     yield Finding("sessions", "failed", said, advice)
 
 
@@ -171,11 +171,11 @@ def return_addresses(services: Services) -> Iterator[Finding]:
     refused = [(study, of_link) for study, of_link, declared in stored if refused_addresses(declared)]
     named = [f"{study} (links of it)" if of_link else study for study, of_link in dict.fromkeys(refused)]
     if named:
-        said = f"refused today, so participants are sent nowhere: {', '.join(named[:5])}"
-        advice = "on the study's page, under Running, write the host of the address out; make such links anew"
+        said = f"no longer accepted, so participants are not redirected: {', '.join(named[:5])}"
+        advice = "on the study's page, under Running, write out the host of the URL; create these links again"
         yield Finding("return addresses", "warning", said + (", ..." if len(named) > 5 else ""), advice)
     else:
-        yield Finding("return addresses", "ok", "each has a host that is written out")
+        yield Finding("return addresses", "ok", "all have a host that is written out")
 
 
 # What `server doctor` looks at; each check says what it found and, where it is wrong, what to do.
@@ -216,12 +216,12 @@ def _folder(subject: str, folder: Path, setting: str) -> Iterator[Finding]:
         probe.write_bytes(b"")
         probe.unlink()
     except OSError as error:
-        advice = "give the user that runs the server the right to write there, or set " + setting
+        advice = "give the user that runs the server write permission, or set " + setting
         yield Finding(subject, "failed", f"{folder}: {error.strerror}", advice)
         return
     free = shutil.disk_usage(folder).free
     fine = free >= LEAST_FREE_BYTES
-    advice = "" if fine else "make room: a full disk stops every rating"
+    advice = "" if fine else "free disk space: a full disk stops all ratings"
     yield Finding(subject, "ok" if fine else "warning", f"{folder}, {free / 1e9:.1f} GB free", advice)
 
 
@@ -230,7 +230,7 @@ def file_modes(services: Services) -> Iterator[Finding]:
     folders = own_folders(services.settings)
     open_files = list(islice((path for folder in folders for path in open_to_others(folder)), 1000))
     if not open_files:
-        yield Finding("file modes", "ok", "for this user alone")
+        yield Finding("file modes", "ok", "for this user only")
         return
     more = "or more " if len(open_files) == 1000 else ""
     said = f"{len(open_files)} {more}open to other users, such as {open_files[0]}"
@@ -246,7 +246,7 @@ def secret_key(services: Services) -> Iterator[Finding]:
         advice = "" if fine else LONGER_KEY
         yield Finding("secret key", "ok" if fine else "warning", "from the environment", advice)
     elif not path.is_file():
-        yield Finding("secret key", "ok", "will be made at the first start")
+        yield Finding("secret key", "ok", "will be created at the first start")
     else:
         mode = stat.S_IMODE(path.stat().st_mode)
         fine = mode & 0o077 == 0
@@ -263,7 +263,8 @@ def database(services: Services) -> Iterator[Finding]:
     advice = "" if fine else "run: server database upgrade"
     if revision is None:
         advice = (
-            "it is empty: is this the folder of the study's data (PALPEBRA_DATA_FOLDER)? if so, " + advice
+            "it is empty; check that this is the data folder of your studies (PALPEBRA_DATA_FOLDER); if "
+            "so, " + advice
         )
     yield Finding("database", "ok" if fine else "failed", said, advice)
     yield from _sqlite(services) if opened.is_sqlite else _postgres(services)
@@ -289,15 +290,19 @@ def _postgres(services: Services) -> Iterator[Finding]:
     advice = "" if fine else "use PostgreSQL 13 or newer"
     yield Finding("PostgreSQL", "ok" if fine else "failed", f"version {number // 10000}", advice)
     off = [name for name, value in durable.items() if value == "off"]
-    advice = f"set {' and '.join(off)} on: a power cut could lose acknowledged ratings" if off else ""
+    advice = (
+        (f"set {' and '.join(off)} on; otherwise, a power failure could lose acknowledged ratings")
+        if off
+        else ""
+    )
     said = ", ".join(f"{name} {value}" for name, value in durable.items())
     yield Finding("durability", "warning" if off else "ok", said, advice)
     apart = services.database.keeps_rows_apart
     advice = "" if apart else RAISE_THE_WALL
-    said = "kept apart by PostgreSQL too" if apart else "kept apart by the server alone"
+    said = "separated by the server and by PostgreSQL" if apart else "separated by the server only"
     yield Finding("laboratories' rows", "ok" if apart else "warning", said, advice)
     needed = 2 * (services.settings.database_pool + COUNTING_POOL) + 2  # locks, changes
-    advice = f"a worker may use {needed}: raise max_connections or lower PALPEBRA_DATABASE_POOL"
+    advice = f"a worker may use {needed}; increase max_connections or decrease PALPEBRA_DATABASE_POOL"
     tight = needed + 5 > allowed
     yield Finding("connections", "warning" if tight else "ok", f"{allowed} allowed", advice if tight else "")
 
@@ -328,7 +333,7 @@ def identities(services: Services) -> Iterator[Finding]:
         advice = "the secret key was changed; run: server database rewrap OLD_KEY_FILE"
         yield Finding("recruiters' ids", "failed", said, advice)
     else:
-        yield Finding("recruiters' ids", "ok", f"{counted.total()}, each under a key of its own")
+        yield Finding("recruiters' ids", "ok", f"{counted.total()}, each encrypted with a separate key")
 
 
 def clips(services: Services) -> Iterator[Finding]:
@@ -338,9 +343,9 @@ def clips(services: Services) -> Iterator[Finding]:
     wrong = [sha256 for sha256, size in named if services.clips.size(sha256) != size]
     if wrong:
         advice = "add the study again from its clips (server study add), or restore a backup"
-        yield Finding("clips", "failed", f"{len(wrong)} of {len(named)} missing or cut short", advice)
+        yield Finding("clips", "failed", f"{len(wrong)} of {len(named)} missing or incomplete", advice)
     else:
-        yield Finding("clips", "ok", f"{len(named)}, all there")
+        yield Finding("clips", "ok", f"{len(named)}, all present")
 
 
 def pages(services: Services) -> Iterator[Finding]:
@@ -364,23 +369,24 @@ def public_address(services: Services) -> Iterator[Finding]:
     )
     yield Finding("public address", "ok" if fine else "failed", settings.public_url, advice)
     if local:
-        advice = "set PALPEBRA_PUBLIC_URL before sending links to anybody on another machine"
-        yield Finding("who can reach it", "warning", "this machine alone", advice)
+        advice = "set PALPEBRA_PUBLIC_URL before you send links to people on other machines"
+        yield Finding("who can reach it", "warning", "only this machine", advice)
 
 
 def proxy(services: Services) -> Iterator[Finding]:
     """Sign-in limits count addresses of people, not that of a proxy."""
     seen = seen_proxy(services.settings.data_folder)
     if seen is None:
-        yield Finding("proxy", "ok", "none that FORWARDED_ALLOW_IPS does not name, within a day")
+        yield Finding("proxy", "ok", "none missing in FORWARDED_ALLOW_IPS within the last day")
         return
     said = (
-        f"{seen.address} forwards requests and is not named: sign-in limits count everybody as that address "
+        f"{seen.address} forwards requests but is not in FORWARDED_ALLOW_IPS: sign-in limits treat "
+        f"everyone as this address "
         f"(last seen {seen.seen_at:%Y-%m-%d %H:%M} UTC)"
     )
     advice = (
-        f"if that is your proxy, set FORWARDED_ALLOW_IPS={seen.address}, let it send X-Forwarded-For, and "
-        "start the server again"
+        f"if this is your proxy, set FORWARDED_ALLOW_IPS={seen.address}, make it send X-Forwarded-For, and "
+        f"restart the server"
     )
     yield Finding("proxy", "warning", said, advice)
 
@@ -391,11 +397,11 @@ def people(services: Services) -> Iterator[Finding]:
         owners = repository.owner_count(session)
         without = repository.count_without_second_factor(session)
         studies = repository.study_count(session)
-    advice = "" if owners else "run: server admin link, and open the address it prints"
+    advice = "" if owners else "run `server admin link`, and open the URL that it prints"
     counted = "1 owner" if owners == 1 else f"{owners} owners"
     yield Finding("accounts", "ok" if owners else "warning", counted, advice)
     if without:
-        advice = "ask them to set it up under their account"
+        advice = "ask them to set one up under My account"
         yield Finding("second factor", "warning", f"{without} account{'s' * (without > 1)} without", advice)
     advice = "" if studies else "run: server study add exp3 --clips FOLDER"
     yield Finding("studies", "ok" if studies else "warning", str(studies), advice)
@@ -407,11 +413,11 @@ def tokens(services: Services) -> Iterator[Finding]:
         named = repository.tokens_ending_after(session, now() + timedelta(days=TOKEN_DAYS_MAX))
     if named:
         shown = ", ".join(f"{token} ({account})" for token, account in named[:5])
-        said = f"{counted(len(named), 'API token')} without an end or with one years ahead: {shown}"
-        advice = "ask their people to revoke them (My account) and make new ones"
+        said = f"{counted(len(named), 'API token')} without expiry, or valid for years: {shown}"
+        advice = "ask their owners to revoke them (My account) and create new ones"
         yield Finding("API tokens", "warning", said + (", ..." if len(named) > 5 else ""), advice)
     else:
-        yield Finding("API tokens", "ok", "each ends within a year")
+        yield Finding("API tokens", "ok", "all expire within a year")
 
 
 CHECKS: tuple[Callable[[Services], Iterator[Finding]], ...] = (

@@ -148,8 +148,8 @@ def _needs_key_file(described: Description) -> bool:
 
 def _key_file_missing(backup: Path) -> str:
     return (
-        f"no key file {key_file_of(backup)}: recruiters' ids would be lost; name it by --keys or "
-        "PALPEBRA_BACKUP_KEYS, or run: server backup"
+        f"no key file {key_file_of(backup)}: recruiters' IDs would be lost; specify it with --keys or "
+        f"PALPEBRA_BACKUP_KEYS, or run: server backup"
     )
 
 
@@ -167,8 +167,8 @@ def _need_room(settings: Settings, needed: float) -> None:
     free = shutil.disk_usage(settings.data_folder).free
     if free < needed:
         raise InputError(
-            f"not brought back: it may need {needed / 1e9:.1f} GB in {settings.data_folder}, there are "
-            f"{free / 1e9:.1f} GB free; make room"
+            f"not restored: it may need {needed / 1e9:.1f} GB in {settings.data_folder}, there are "
+            f"{free / 1e9:.1f} GB free; free disk space"
         )
 
 
@@ -243,7 +243,7 @@ def _alone_of_all_hosts(settings: Settings) -> Iterator[None]:
         with open_locks(settings, opened).held("restore drill"):
             yield
     except LockTaken:
-        raise DrillUnderWayError("another host makes the drill") from None
+        raise DrillUnderWayError("another host is running the drill") from None
     finally:
         opened.close()
 
@@ -255,7 +255,7 @@ def _drill_lock(settings: Settings) -> Iterator[None]:
         try:
             held.enter_context(file_lock(settings.data_folder / "restore-drill.lock", wait=False))
         except BlockingIOError:
-            raise DrillUnderWayError("another restore drill is under way; wait until it has ended") from None
+            raise DrillUnderWayError("another restore drill is running; wait until it has finished") from None
         for copy in settings.data_folder.glob(f"{COPIES}*"):
             shutil.rmtree(copy, ignore_errors=True)
         yield

@@ -1,4 +1,4 @@
-"""`/metrics` for Prometheus: with a token, or from this machine alone; how the backups are, for owners."""
+"""`/metrics` for Prometheus: with a token, or from only this machine; how the backups are, for owners."""
 
 import hmac
 
@@ -26,16 +26,16 @@ from server.operations.watched_backups import (
 class BackupsOut(BaseModel):
     """How the backups are."""
 
-    watched: bool = Field(description="Whether the settings name where they are (PALPEBRA_BACKUP_FOLDER).")
+    watched: bool = Field(description="Whether the settings specify their location (PALPEBRA_BACKUP_FOLDER).")
     address: str
-    problem: str = Field(description="Why their store could not be asked; empty where it could.")
+    problem: str = Field(description="Why their store could not be reached; empty if it could.")
     number: int
     newest: str | None
     age_hours: float | None = Field(description="Of the newest.")
-    old: bool = Field(description="There is none, or none of the last two days.")
+    old: bool = Field(description="There is no backup, or none from the last two days.")
     drill: DrillResult | None
     drilled_elsewhere: bool = Field(
-        description="They are encrypted, and this server has no private key to drill them."
+        description="They are encrypted, and this server does not have the private key to test them."
     )
 
 
@@ -78,7 +78,7 @@ def metrics(request: Request, database: DatabaseDep, settings: SettingsDep) -> R
     if not _may_read_metrics(request, settings.metrics_token):
         raise MetricsNotForYou(
             "Metrics need `Authorization: Bearer` with PALPEBRA_METRICS_TOKEN; "
-            "without that setting they are given to this machine alone."
+            "without that setting they are given to only this machine."
         )
     return Response(exposition(database, settings), media_type=CONTENT_TYPE_LATEST)
 

@@ -126,8 +126,8 @@ def check_replaceable(path: Path, secret: bytes) -> None:
     """Refuse to write over the keys of another installation."""
     if path.exists() and key_file(path).installation != installation(secret):
         raise InputError(
-            f"{path} holds the keys of another installation or secret key; back up to another folder, name "
-            "another file by --keys, or move it away, to where the backups of the former secret key are"
+            f"{path} contains the keys of another installation or secret key; back up to another folder, "
+            f"choose another file with --keys, or move it to the backups of the previous secret key"
         )
 
 
@@ -148,13 +148,14 @@ def check_fits(keys: KeyFile, secret: bytes, backed_up_at: str, name: str, *, st
     """
     if keys.installation != installation(secret):
         raise InputError(
-            f"{name} holds the keys of another installation or secret key than the backup; name the backup's "
-            "own by --keys, or move it away to do without recruiters' ids"
+            f"{name} belongs to another installation or secret key than the backup; specify the key file "
+            f"of the backup with --keys, or move the file away to restore without recruiters' IDs"
         )
     if keys.written_at < backed_up_at and not stale:
         raise InputError(
-            f"{name} of {keys.written_at} is older than the backup of {backed_up_at}: ids of later visits "
-            "would be lost; back up anew, name a newer one by --keys, or restore with --stale-keys"
+            f"{name} of {keys.written_at} is older than the backup of {backed_up_at}: IDs of later visits "
+            f"would be lost; make a new backup, specify a newer file with --keys, or restore with "
+            f"--stale-keys"
         )
 
 
@@ -187,9 +188,13 @@ def parse_key_file(content: bytes, name: str) -> KeyFile:
     try:
         keys = KeyFile.model_validate_json(content)
     except ValidationError as error:
-        raise InputError(f"{name}: expected a key file of `server backup` ({NAME}), got another") from error
+        raise InputError(
+            f"{name}: expected a key file of `server backup` ({NAME}), got another file"
+        ) from error
     if keys.format != FORMAT:
-        raise InputError(f"{name} was written by a newer version (format {keys.format}); install that one")
+        raise InputError(
+            f"{name} was written by a newer version (format {keys.format}); install that version"
+        )
     return keys
 
 

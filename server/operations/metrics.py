@@ -38,20 +38,20 @@ BUCKETS_S = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 10.0)
 REGISTRY = CollectorRegistry()
 ANSWERS = Counter(
     "palpebra_answers",
-    "Answers given, by route and status.",
+    "Responses, by route and status.",
     ("method", "route", "status"),
     registry=REGISTRY,
 )
 SECONDS = Histogram(
     "palpebra_answer_seconds",
-    "Time from the request to the beginning of its answer.",
+    "Time from the request to the start of the response.",
     ("route",),
     buckets=BUCKETS_S,
     registry=REGISTRY,
 )
 UNDER_WAY = Gauge(
     "palpebra_requests_under_way",
-    "Requests that are being answered.",
+    "Requests in progress.",
     multiprocess_mode="livesum",
     registry=REGISTRY,
 )
@@ -67,13 +67,13 @@ class StoredCounts(Collector):
     def collect(self) -> Iterable[GaugeMetricFamily]:
         """Runs by study and status; the version of the program."""
         runs = GaugeMetricFamily(
-            "palpebra_runs", "Runs stored, previews left out.", labels=("study", "phase", "origin", "status")
+            "palpebra_runs", "Stored runs, without previews.", labels=("study", "phase", "origin", "status")
         )
         with self.database.read() as session:
             for *labels, count in run_counts(session):
                 runs.add_metric(list(map(str, labels)), count)
         yield runs
-        build = GaugeMetricFamily("palpebra_build_info", "The program that runs.", labels=("version",))
+        build = GaugeMetricFamily("palpebra_build_info", "The running program.", labels=("version",))
         build.add_metric((version("palpebra"),), 1)
         yield build
         yield from _backups(self.settings)
@@ -85,17 +85,17 @@ def _backups(settings: Settings) -> Iterable[GaugeMetricFamily]:
     try:
         watched = watched_backups(settings)
     except InputError:
-        yield GaugeMetricFamily("palpebra_backups_reachable", "0 where their store does not answer.", 0)
+        yield GaugeMetricFamily("palpebra_backups_reachable", "0 if their store does not respond.", 0)
         return
     if watched is None:
         return
-    yield GaugeMetricFamily("palpebra_backups_reachable", "0 where their store does not answer.", 1)
-    yield GaugeMetricFamily("palpebra_backups", "Backups there are.", watched.number)
+    yield GaugeMetricFamily("palpebra_backups_reachable", "0 if their store does not respond.", 1)
+    yield GaugeMetricFamily("palpebra_backups", "Number of backups.", watched.number)
     if watched.age_s is not None:
         yield GaugeMetricFamily("palpebra_backup_age_seconds", "Age of the newest backup.", watched.age_s)
     if watched.drill is not None:
         passed, ended = float(watched.drill.passed), watched.drill.at
-        yield GaugeMetricFamily("palpebra_restore_drill_passed", "1 where the last drill passed.", passed)
+        yield GaugeMetricFamily("palpebra_restore_drill_passed", "1 if the last drill passed.", passed)
         age_s = (now() - ended).total_seconds()
         yield GaugeMetricFamily("palpebra_restore_drill_age_seconds", "Time since the last drill.", age_s)
 
@@ -105,7 +105,7 @@ def _snapshots(settings: Settings) -> Iterable[GaugeMetricFamily]:
     taken = snapshots_of(settings) if settings.snapshot_minutes else []
     if taken:
         age_s = (now() - taken[-1].taken_at).total_seconds()
-        yield GaugeMetricFamily("palpebra_snapshots", "Snapshots of the database there are.", len(taken))
+        yield GaugeMetricFamily("palpebra_snapshots", "Number of snapshots of the database.", len(taken))
         yield GaugeMetricFamily("palpebra_snapshot_age_seconds", "Age of the newest snapshot.", age_s)
 
 

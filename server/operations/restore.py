@@ -36,8 +36,8 @@ from server.privacy.rows import Content, Row, refuse_unless_empty, tables_of, wr
 FORMAT = 1
 
 ELSEWHERE = (
-    "a backup comes back into an empty one: name a new folder in PALPEBRA_DATA_FOLDER, or an empty "
-    "PostgreSQL database in DATABASE_URL, restore there and start the server with the same settings"
+    "a backup can only be restored into an empty database: set PALPEBRA_DATA_FOLDER to a new folder, or "
+    "DATABASE_URL to an empty PostgreSQL database. Restore there, and start the server with the same settings"
 )
 """What to do where the database of the settings is in use."""
 
@@ -94,7 +94,9 @@ def restore(
         raise InputError(f"{path} is damaged or no backup of `server backup`{_reason(error)}") from error
     except OSError as error:
         if error.errno == errno.ENOSPC:
-            raise InputError(f"no room left for what {path} holds; make room and restore again") from error
+            raise InputError(
+                f"not enough disk space for the content of {path}; free disk space and restore again"
+            ) from error
         raise InputError(f"{path} cannot be read: {error.strerror or error}") from error
     _keep_key(settings, key)
     _take_over_ledger(settings, copied_ledger)
@@ -106,7 +108,7 @@ def restore(
 def _reason(error: Exception) -> str:
     """What the library says; where that is only that no format fits, and a list of them, what to do."""
     (reason, *_) = str(error).splitlines() or [type(error).__name__]
-    return "; name a file that it wrote" if reason.endswith(":") else f": {reason}"
+    return "; choose a file that it wrote" if reason.endswith(":") else f": {reason}"
 
 
 def _is_covered(settings: Settings, copy: Path, described: Description) -> bool:
@@ -119,9 +121,9 @@ def _is_covered(settings: Settings, copy: Path, described: Description) -> bool:
 def _not_covered(settings: Settings, copy: Path, described: Description) -> InputError:
     return InputError(
         f"expected a ledger of erasures that is newer than the backup of {described.created_at}, in the data "
-        f"folder ({ledger_path(settings)}) or next to the backup ({copy}), got none: people erased since "
-        f"would come back. Put the newest {LEDGER_NAME} there; if nobody was erased since, restore with "
-        "--despite-erasures"
+        f"folder ({ledger_path(settings)}) or next to the backup ({copy}), got none. Data erased since "
+        f"then would come back. Put the newest {LEDGER_NAME} there; if nothing was erased since then, "
+        f"restore with --despite-erasures"
     )
 
 
@@ -141,8 +143,8 @@ def _erase_again(
         told(f"{counted(erased, 'run')} erased again, by {path}")
     if not covered:
         told(
-            f"WARNING: no ledger of erasures at {path} is newer than this backup. People who were erased "
-            "since are back. If you find the ledger, put it there and run: server database erase-again"
+            f"WARNING: no ledger of erasures at {path} is newer than this backup. Data erased since then "
+            f"are back. If you find the ledger, put it there and run: server database erase-again"
         )
 
 
@@ -150,11 +152,11 @@ def _description(tar: tarfile.TarFile, path: Path) -> Description:
     try:
         described = Description.model_validate_json(_content(tar, DESCRIPTION))
     except ValidationError as error:
-        raise InputError(f"{path}: {DESCRIPTION} is not that of a backup") from error
+        raise InputError(f"{path}: {DESCRIPTION} does not belong to a backup") from error
     if described.format != FORMAT or not known_revision(described.revision):
         raise InputError(
             f"{path} was written by version {described.program_version} (revision {described.revision}), "
-            "which this program does not know; install that version or a newer one"
+            "which this program does not support; install that version or a newer one"
         )
     return described
 
@@ -204,8 +206,8 @@ def _write_tables(
         written = _write_table(connection, known[name], tar)
         if (written.rows, written.sha256) != (expected.rows, expected.sha256):
             raise InputError(
-                f"table {name}: expected {expected.rows} rows, the file holds {written.rows} or other "
-                "values; the backup is damaged, nothing was restored"
+                f"table {name}: expected {expected.rows} rows, but the file contains {written.rows} or "
+                f"different values; the backup is damaged, nothing was restored"
             )
         told(f"{name}: {written.rows} rows")
 
@@ -214,11 +216,11 @@ def _put_keys_back(connection: Connection, keys: _Keys, told: Callable[[str], No
     readable, lost = put_back(connection, keys.secret, keys.apart)
     if keys.apart is None:
         told(
-            f"no key file ({NAME}): {lost} recruiters' ids cannot be read and were left out, and who comes "
-            "back by such an id counts as somebody new; if you have the file, restore again with --keys FILE"
+            f"no key file ({NAME}): {lost} recruiters' IDs cannot be read and were omitted. Returning "
+            f"participants with such an ID count as new. If you have the file, restore again with --keys FILE"
         )
     elif readable or lost:
-        told(f"{readable} recruiters' ids; of {lost} there is no key any more")
+        told(f"{readable} recruiters' ids; the keys of {lost} no longer exist")
 
 
 def _write_table(connection: Connection, table: Table, tar: tarfile.TarFile) -> Content:
@@ -236,7 +238,7 @@ def _write_table(connection: Connection, table: Table, tar: tarfile.TarFile) -> 
 
 def _in_order(known: dict[str, Table], described: Description) -> list[str]:
     if unknown := sorted(set(described.tables) - set(known)):
-        raise InputError(f"the backup holds a table '{unknown[0]}' that its revision does not have")
+        raise InputError(f"the backup contains a table '{unknown[0]}' that its revision does not have")
     return [name for name in known if name in described.tables]
 
 
@@ -260,7 +262,7 @@ def _member(tar: tarfile.TarFile, name: str) -> BinaryIO:
     except KeyError:
         member = None
     if member is None:
-        raise InputError(f"the backup lacks {name}; it is damaged or no backup of `server backup`")
+        raise InputError(f"{name} is missing from the backup; it is damaged or not from `server backup`")
     return cast(BinaryIO, member)
 
 
@@ -276,9 +278,8 @@ def _check_key(settings: Settings, key: bytes) -> None:
         there = path.read_bytes().strip()
     if there and there != key:
         raise InputError(
-            "this installation has another secret key than the backup, so that links already handed out "
-            f"could not be shown again; remove {path} (or unset PALPEBRA_SECRET_KEY) "
-            "where it is not in use"
+            "this installation has a different secret key than the backup, so existing links could not be "
+            "shown again; if the key here is not in use, remove {path} (or unset PALPEBRA_SECRET_KEY)"
         )
 
 

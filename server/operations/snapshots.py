@@ -60,7 +60,7 @@ def closed_to_others(path: Path) -> Iterator[None]:
             connection.execute("BEGIN EXCLUSIVE")
         except sqlite3.OperationalError as error:
             raise InputError(
-                f"another program has {path} open ({error}); stop the server first, nothing was changed"
+                f"another program has {path} open ({error}); stop the server first. Nothing was changed"
             ) from error
         except sqlite3.DatabaseError:
             pass
@@ -102,8 +102,8 @@ def database_file(settings: Settings) -> Path:
     url = checked_url(settings.resolved_database_url)
     if url.get_backend_name() != "sqlite" or not url.database or url.database == ":memory:":
         raise InputError(
-            "snapshots are of a database that is a SQLite file; PostgreSQL goes back to a moment by "
-            "deploy/point-in-time.sh (docs/how-to/go-back-in-time.md)"
+            "snapshots need a SQLite file; for PostgreSQL, use deploy/point-in-time.sh "
+            "(docs/how-to/go-back-in-time.md)"
         )
     return Path(url.database)
 
@@ -142,7 +142,9 @@ def take_snapshot(settings: Settings) -> Snapshot:
     """
     source = database_file(settings)
     if not source.is_file():
-        raise InputError(f"{source} is not there yet; start the server once, or run: server database upgrade")
+        raise InputError(
+            f"{source} does not exist yet; start the server once, or run: server database upgrade"
+        )
     folder = settings.data_folder / FOLDER
     try:
         with file_lock(folder / LOCK, wait=False):
@@ -151,7 +153,7 @@ def take_snapshot(settings: Settings) -> Snapshot:
             snapshot = Snapshot(moment, folder / moment.strftime(_NAME))
             _copy(source, folder / f".{snapshot.path.name}", snapshot.path)
     except BlockingIOError:
-        raise SnapshotUnderWayError("another snapshot is being taken; wait until it has ended") from None
+        raise SnapshotUnderWayError("another snapshot is being taken; wait until it has finished") from None
     except (OSError, sqlite3.Error) as error:
         said = getattr(error, "strerror", None) or error
         raise InputError(f"{source} cannot be copied into {folder}: {said}") from error
@@ -162,7 +164,7 @@ def _copy(source: Path, temporary: Path, target: Path) -> None:
     os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600))
     try:
         if (said := copy_database_file(source, temporary)) != "ok":
-            raise InputError(f"{source} is not sound: {said.splitlines()[-1]}; run: server doctor")
+            raise InputError(f"{source} is damaged: {said.splitlines()[-1]}; run: server doctor")
         with temporary.open("rb") as written:
             os.fsync(written.fileno())
         temporary.replace(target)
@@ -270,13 +272,13 @@ def snapshot_at(settings: Settings, moment: datetime) -> Snapshot:
     earlier = [one for one in there if one.taken_at <= moment]
     if not there:
         raise InputError(
-            "there are no snapshots; set PALPEBRA_SNAPSHOT_MINUTES and let the server run, or go back to a "
-            "backup: server restore FILE"
+            "there are no snapshots; set PALPEBRA_SNAPSHOT_MINUTES and keep the server running, or restore "
+            "a backup: server restore FILE"
         )
     if not earlier:
         raise InputError(
-            f"no snapshot was taken up to {iso(moment)}; the first is of {iso(there[0].taken_at)}, the last "
-            f"of {iso(there[-1].taken_at)}"
+            f"there is no snapshot up to {iso(moment)}; the first is from {iso(there[0].taken_at)}, the "
+            f"last from {iso(there[-1].taken_at)}"
         )
     return earlier[-1]
 

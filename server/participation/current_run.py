@@ -25,7 +25,7 @@ def find_run(session: Session, token: str, *, lock: bool = False) -> StudyRun:
     run = run_repository.run_by_token(session, token, lock=lock)
     if run is None:
         raise RunUnknown(
-            "This visit is not known; please open the link you were given again.",
+            "This visit is unknown. Please open your link again.",
             headers={"www-authenticate": "Bearer"},
         )
     return run

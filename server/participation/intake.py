@@ -264,7 +264,7 @@ class Intake:
 
     def _batch(self, answer: Answer, given: RatingEvidence | None) -> tuple[Batch, RatingEvidence]:
         if given is None:
-            raise TicketMissing("Expected a ticket with the answer, got none; please load the page again.")
+            raise TicketMissing("Expected a ticket with the answer, got none; please reload the page.")
         where = (answer.run_id, answer.trial_index, answer.play)
         # By the client's word, which only tells a late delivery: so old a ticket leaves time for any clip.
         given_at = min(answer.received_at, answer.answered_at or answer.received_at)

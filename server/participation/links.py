@@ -48,9 +48,9 @@ Also: how long after the first run whose views bring tickets a page without them
 SEED_BITS = 53  # so that a seed survives JSON in every program
 _REFUSALS = {
     "expired": (LinkExpired, "This link has expired; please ask the person who invited you for a new one."),
-    "closed": (StudyClosed, "This study takes no more participants."),
-    "paused": (StudyPaused, "This study is paused; please come back later."),
-    "full": (StudyFull, "Every place of this study is taken; please come back later."),
+    "closed": (StudyClosed, "This study does not accept more participants."),
+    "paused": (StudyPaused, "This study is paused. Please come back later."),
+    "full": (StudyFull, "All slots of this study are taken. Please come back later."),
 }
 
 
@@ -64,7 +64,7 @@ def find_link(session: Session, token: str) -> Link:
     """The link with this token, or LinkUnknown."""
     link = run_repository.link_by_token(session, token)
     if link is None:
-        raise LinkUnknown("This link is not known; please check that the address is complete.")
+        raise LinkUnknown("This link is unknown. Please check that the address is complete.")
     return link
 
 

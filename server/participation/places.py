@@ -29,8 +29,8 @@ def check_parameter(experiment: Experiment, link: Link, query: Mapping[str, str]
     if asked is None or len(names(experiment)) < 2 or asked == link.group_name:
         return
     raise GroupRefused(
-        f"Expected an address without `{PARAMETER}`, got `{PARAMETER}={asked[:60]}`: nobody chooses their "
-        "group; please open the link as you were given it."
+        f"Expected an address without `{PARAMETER}`, got `{PARAMETER}={asked[:60]}`: participants cannot "
+        f"choose their group. Please open the link exactly as you received it."
     )
 
 

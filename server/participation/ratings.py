@@ -81,7 +81,7 @@ def delivery_of(
     """Look up what a rating is for; RunUnknown or TrialNotInRun where there is no such thing."""
     run = rating_repository.run_for_rating(connection, hash_token(token))
     if run is None:
-        raise RunUnknown("This visit is not known; please open the link you were given again.")
+        raise RunUnknown("This visit is unknown. Please open your link again.")
     trial = rating_repository.trial(connection, run.id, rating.trial_index)
     if trial is None:
         raise TrialNotInRun(

@@ -98,8 +98,8 @@ class Recruiter(BaseModel):
         pattern, in_words = ID_FORMS[self.kind]
         if not re.fullmatch(pattern, canonical.casefold()):
             raise IdentifierInvalid(
-                f"{self.id_name}: expected {in_words}, got '{identifier[:40]}'. Please open the study again "
-                "with the whole link that you were given."
+                f"{self.id_name}: expected {in_words}, got '{identifier[:40]}'. Please open the study "
+                f"again with the complete link that you received."
             )
         return canonical
 
@@ -226,15 +226,15 @@ def is_signed(key: bytes, study_key: str, recruiter: Recruiter, parameters: Mapp
     given = parameters.get(recruiter.signature_parameter, "")
     if not given:
         raise SignatureMissing(
-            f"Expected an address with a signature ({recruiter.signature_parameter}=...), got one without; "
-            "please open the whole address that you were given."
+            f"Expected an address with a signature ({recruiter.signature_parameter}=...), got one without. "
+            f"Please open the complete link that you received."
         )
     right = signature_of(signing_secret(key, study_key, recruiter.secret_name), identifier)
     # Bytes, since text beyond ASCII cannot be compared in constant time.
     if not hmac.compare_digest(right.encode(), given.lower().encode("utf-8", "surrogatepass")):
         raise SignatureWrong(
-            f"The signature in the address ({recruiter.signature_parameter}=...) is not that of this "
-            "participant and study; please open the whole address that you were given."
+            f"The signature in the address ({recruiter.signature_parameter}=...) does not match this "
+            f"participant and study. Please open the complete link that you received."
         )
     return True
 

@@ -51,7 +51,7 @@ def keep_refused(
     """Keep a record as refused, once; it must bring the evidence that an accepted one would need."""
     run = rating_repository.run_for_rating(connection, hash_token(token))
     if run is None:
-        raise RunUnknown("This visit is not known; please open the link you were given again.")
+        raise RunUnknown("This visit is unknown. Please open your link again.")
     if rating_repository.is_refused(connection, run.id, str(record.id)):
         return
     if run.consented_at is None:

@@ -186,22 +186,22 @@ def _run_of_code(settings: Settings, session: Session, link: Link, typed: str) -
     runs = run_repository.runs_beginning(session, link, prefix) if prefix else ()
     run = next((run for run in runs if code_fits(settings.key, run.public_id, typed)), None)
     if run is None:
-        raise ResumeCodeWrong(
-            "This is the resume code of no visit by this link; please compare it once more."
-        )
+        raise ResumeCodeWrong("This link has no visit with this resume code. Please check the code.")
     return run
 
 
 def _refuse_by_id_alone(experiment: Experiment, run: StudyRun, start: RunStart) -> None:
     """Refuse who has only the recruiter's id of `run`, unless a visit beside it may begin."""
     if run.status != "active":
-        raise TakenPartAlready("A visit under this sign-up is over; its resume code shows its end again.")
+        raise TakenPartAlready(
+            "The visit with this sign-up is complete. Its resume code shows the last page again."
+        )
     refusal = refusal_to_resume(experiment, run)
     if refusal is not None:
         raise refusal
     if not start.anew and experiment.session.resume != "restart":
         raise ResumeCodeNeeded(
-            "A visit under this sign-up has begun in another browser; its resume code is needed."
+            "A visit with this sign-up was started in another browser. Its resume code is required."
         )
 
 
@@ -216,9 +216,11 @@ def refusal_to_resume(experiment: Experiment, run: StudyRun) -> RunLeft | RunToo
         return None
     if now() > _too_old_at(experiment, run):
         hours = f"{experiment.session.maximum_age_hours:g}"
-        return RunTooOld(f"This visit began more than {hours} hours ago and cannot be taken up again.")
+        return RunTooOld(f"This visit began more than {hours} hours ago and cannot be continued.")
     if experiment.session.resume == "block" and run.consented_at is not None:
-        return RunLeft("This study must be done in one go; a visit that was left cannot be taken up again.")
+        return RunLeft(
+            "This study must be completed without interruption. A visit that was left cannot be continued."
+        )
     return None
 
 

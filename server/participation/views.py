@@ -172,7 +172,7 @@ def _issued_at(
     given = view.evidence
     if given is None:
         if arrival.needs_tickets:
-            raise TicketMissing("Expected a ticket with the view, got none; please load the page again.")
+            raise TicketMissing("Expected a ticket with the view, got none; please reload the page.")
         return None
     where = (arrival.run_id, view.trial_index, view.play, min(arrival.received_at, view.given_at))
     issued_at = check_ticket(intake.key, given.batch, given.ticket, *where).issued_at

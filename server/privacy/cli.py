@@ -23,7 +23,7 @@ from server.studies.lookup import find_study
 app = command_group("One participant: subject access and erasure.")
 StudyName = Annotated[str, typer.Argument(help="Name of the study.", show_default=False)]
 Run = Annotated[str, typer.Option("--run", help="Identifier of one of the person's runs.")]
-RecruitersId = Annotated[str, typer.Option("--id", help="What the recruiter calls the person.")]
+RecruitersId = Annotated[str, typer.Option("--id", help="ID of the person at the recruiter.")]
 
 
 def register(parent: typer.Typer) -> None:
@@ -70,7 +70,7 @@ def erase_person(
     study: StudyName,
     run: Run = "",
     identifier: RecruitersId = "",
-    confirmed: Annotated[bool, typer.Option("--yes", help="Erase without asking.")] = False,
+    confirmed: Annotated[bool, typer.Option("--yes", help="Erase without confirmation.")] = False,
 ) -> None:
     """Erase everything that is stored of one person, in all visits known to be hers; for good.
 
@@ -92,7 +92,7 @@ def erase_person(
             erased = erase(session, services.settings, known, visits[0], visits[0], OPERATOR)
     out.print(f"erased: {', '.join(erased.runs)}; keep the ledger {erased.ledger}")
     for report in erased.reports:
-        out.print(f"made before and still with her data under the pseudonym: report {report.report}")
+        out.print(f"made earlier and still contains these data under the pseudonym: report {report.report}")
 
 
 def _one_of_both(run: str, identifier: str) -> None:
@@ -110,10 +110,10 @@ def _register_retention(parent: typer.Typer) -> None:
 
 def retention(
     study: Annotated[
-        str | None, typer.Argument(help="Name of the study; every study that declares a period if not given.")
+        str | None, typer.Argument(help="Name of the study; by default, every study that declares a period.")
     ] = None,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Show what is due and when more will be; erase nothing.")
+        bool, typer.Option("--dry-run", help="Show what is due now and next; erase nothing.")
     ] = False,
 ) -> None:
     """Erase data that are due by the retention rules of studies; the server does so every hour.
@@ -129,7 +129,7 @@ def retention(
     with stored_services() as services:
         shown = _previews(services.database, study)
         if not shown:
-            out.print("no study declares a period; see [retention] of the declaration")
+            out.print("no study declares a retention period; see [retention] in the declaration")
         elif dry_run:
             for preview in shown:
                 out.print(_line(preview), soft_wrap=True)
@@ -150,6 +150,6 @@ def _line(preview: RetentionPreview) -> str:
     periods = ", ".join(f"{period.what} {period.days} days" for period in preview.periods) or "no periods"
     following = f"{preview.next_at:%Y-%m-%d %H:%M} UTC" if preview.next_at else "none"
     due = (
-        f"due are identifiers of {preview.identifiers} visits and {preview.visits} visits; next: {following}"
+        f"due now: identifiers of {preview.identifiers} visits and {preview.visits} visits; next: {following}"
     )
     return f"{preview.study}: {periods}; {due}"

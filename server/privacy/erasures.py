@@ -35,9 +35,9 @@ def erase(
     """
     run = visit_repository.find_run(session, study, public_id, lock=True)
     if confirm != public_id:
-        raise Invalid(f"To erase this run, confirm with its identifier {public_id}; got '{confirm}'.")
+        raise Invalid(f"To erase this run, enter its identifier {public_id}; got '{confirm}'.")
     if run.erased_at is not None:
-        raise Conflict("This run's data were erased already.")
+        raise Conflict("The data of this run were already erased.")
     every = visit_repository.every_visit(session, [run], lock=True)
     reports = [
         HeldReport(report=public, finished_at=finished)

@@ -84,7 +84,7 @@ def _end_of_torn_line(stream: IO[bytes], path: Path) -> bytes:
     stream.seek(-1, os.SEEK_END)
     if stream.read(1) == b"\n":
         return b""
-    LOG.warning("%s: its last line was cut off; whether its run was erased the database tells", path)
+    LOG.warning("%s: its last line is incomplete; the database shows whether this run was erased", path)
     return b"\n"
 
 

@@ -18,10 +18,9 @@ from server.participation.visit_repository import every_visit, find_run
 from server.privacy import repository
 
 ABOUT = (
-    "Everything that this server stores of one person in this study, table by table and column by column "
-    "(docs/reference/columns.md tells what each column is). Left out are the secrets that open a visit, "
-    "and the codes that pay for one until it is complete. "
-    "Downloads and reports that were made before are not part of it."
+    "All data that this server stores about one person in this study, by table and column "
+    "(docs/reference/columns.md explains the columns). It does not include secrets that open a visit, or "
+    "completion codes of unfinished visits. Earlier downloads and reports are not included."
 )
 
 
@@ -38,11 +37,11 @@ def visits_of(session: Session, study: Study, run: str, identifier: str) -> list
     if not run:
         visits = repository.runs_known_as(session, study, identifier) if identifier else []
         if not visits:
-            raise NotFound(f"The study '{study.name}' has no visit under this recruiter's id.")
+            raise NotFound(f"The study '{study.name}' has no visit with this recruiter's ID.")
         return every_visit(session, visits)
     first = find_run(session, study, run)
     if first.erased_at is not None:
-        raise Conflict("This run's data were erased; nothing of its person is left.")
+        raise Conflict("The data of this run were erased; nothing about the person remains.")
     return every_visit(session, [first])
 
 

@@ -133,7 +133,7 @@ def refuse_unless_empty(connection: Connection, what: str, way_out: str) -> None
     """InputError, with what to do instead, where any table holds a row."""
     for table in tables_of(connection):
         if connection.scalar(select(func.count()).select_from(table)):
-            raise InputError(f"{what} already holds rows (table {table.name}); {way_out}")
+            raise InputError(f"{what} already contains rows (table {table.name}); {way_out}")
 
 
 def _next_ids(connection: Connection, table: Table) -> None:

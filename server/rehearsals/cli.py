@@ -26,27 +26,30 @@ def register(parent: typer.Typer) -> None:
 
 
 def simulate(
-    study: Annotated[str, typer.Argument(help="Name of a study, a draft or a closed one too.")],
+    study: Annotated[str, typer.Argument(help="Name of a study, including drafts and closed studies.")],
     participants: Annotated[int, typer.Option(min=1, max=100_000, help="How many.")] = 3,
-    seed: Annotated[int, typer.Option(help="Seed of the people and of the effects in their answers.")] = 1,
-    at_once: Annotated[int, typer.Option(min=1, max=200, help="How many take part at the same time.")] = 2,
-    url: Annotated[
-        str, typer.Option(help="Address of a running server; one is started where not given.")
-    ] = "",
+    seed: Annotated[
+        int, typer.Option(help="Random seed of the simulated people and the effects in their answers.")
+    ] = 1,
+    at_once: Annotated[
+        int, typer.Option(min=1, max=200, help="Number of people who take part at the same time.")
+    ] = 2,
+    url: Annotated[str, typer.Option(help="URL of a running server; by default, one is started.")] = "",
     manner: Annotated[
         str,
-        typer.Option("--as", help=f"Manner of taking part, to try the evidence by: {', '.join(MANNERS)}."),
+        typer.Option("--as", help=f"Simulated behavior, to test the evidence checks: {', '.join(MANNERS)}."),
     ] = "",
     observer: Annotated[
         str,
         typer.Option(
             help="In a study of thresholds, the true function: threshold=200,spread=30,sd=10,guess=0.02,"
-            "lapse=0.02 (sd is that of people's thresholds), with a second factor tilt=50 too. What is left "
-            "out is usual for the stimuli."
+            "lapse=0.02 (sd is that of people's thresholds), with a second factor tilt=50 too. Omitted "
+            "values are typical for the stimuli."
         ),
     ] = "",
     json_file: Annotated[
-        Path | None, typer.Option("--json", help="With --as: file for the verdict and signals of each run.")
+        Path | None,
+        typer.Option("--json", help="With --as: output file for the verdict and signals of each run."),
     ] = None,
 ) -> None:
     """Run simulated participants through the HTTP API; their runs have the origin `simulated`.
@@ -68,7 +71,7 @@ def simulate(
     settings = Settings()
     if manner:
         if url:
-            raise InputError("--as starts a server of its own, whose time it can tell; leave --url out")
+            raise InputError("--as starts a separate server whose clock it controls; remove --url")
         _simulate_manner(
             settings,
             study,
@@ -79,7 +82,7 @@ def simulate(
         )
         return
     if json_file is not None:
-        raise InputError("--json goes with --as, which gives the verdicts to write")
+        raise InputError("--json requires --as, which produces the verdicts")
     with stored_services(settings) as services:
         token, raters = link_and_raters(
             services.database, services.settings, services.versions, study, observer

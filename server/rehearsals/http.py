@@ -54,7 +54,7 @@ class JsonClient:
         parts = urlsplit(url)
         kind = http.client.HTTPSConnection if parts.scheme == "https" else http.client.HTTPConnection
         if not parts.hostname or parts.scheme not in ("http", "https"):
-            raise InputError(f"expected an address such as http://localhost:8000, got '{url}'")
+            raise InputError(f"expected a URL such as http://localhost:8000, got '{url}'")
         self._connection = kind(parts.hostname, parts.port, timeout=TIMEOUT_S)
         self.token: str | None = None
         self.headers: dict[str, str] = {}

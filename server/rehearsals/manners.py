@@ -403,7 +403,7 @@ class Actor(Person):
 def manner_called(name: str) -> Manner:
     """The manner of this name; InputError where there is none."""
     if name not in MANNERS:
-        raise InputError(f"--as: no manner '{name}'{did_you_mean(name, MANNERS)}")
+        raise InputError(f"--as: there is no behavior '{name}'{did_you_mean(name, MANNERS)}")
     return MANNERS[name]
 
 
@@ -436,7 +436,7 @@ def _record(database: Database, actor: Actor) -> dict[str, Any]:
     with database.read() as session:
         run = run_called(session, actor.run_id)
         if run is None:
-            raise InputError(f"a run was not begun: {', '.join(actor.refused) or 'no answer'}")
+            raise InputError(f"a run did not start: {', '.join(actor.refused) or 'no answer'}")
         judged = judge_run(session, run)
     return {
         "run": actor.run_id,

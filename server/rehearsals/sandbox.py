@@ -107,7 +107,7 @@ def rehearse(folder: Path, say: Say) -> None:
         runs=folder / "runs.csv",
     )
     result.report = sorted(path.name for path in report.iterdir()) if report.is_dir() else []
-    say(0.85, "reckoning the power")
+    say(0.85, "computing the power")
     result.power, result.power_problem = _power(experiment, folder, order.seed)
     (folder / RESULT).write_text(result.model_dump_json(indent=1), encoding="utf-8")
 
@@ -212,7 +212,7 @@ def _power(experiment: Experiment, folder: Path, seed: int) -> tuple[Power | Non
     )
     if done.returncode:
         lines = [line for line in (done.stderr or done.stdout).splitlines() if line.strip()]
-        return None, lines[-1][:500] if lines else "the power could not be reckoned"
+        return None, lines[-1][:500] if lines else "the power could not be computed"
     said = json.loads(out.read_text(encoding="utf-8"))
     command = " ".join(["analysis", *arguments, *further])
     known = {name: said[name] for name in ("n", "effects", "power", "text")}

@@ -67,7 +67,7 @@ class Power(BaseModel):
     command: str
     n: list[int]
     effects: list[str]
-    power: list[list[float]] = Field(description="A list an effect, a value each number of participants.")
+    power: list[list[float]] = Field(description="One list per effect, one value per number of participants.")
     text: str
 
 
@@ -77,10 +77,10 @@ class RehearsalResult(BaseModel):
     participants: int
     complete: int
     answers: int
-    expected_minutes: float = Field(description="Declared seconds a trial times trials.")
+    expected_minutes: float = Field(description="Declared seconds per trial times the number of trials.")
     people: list[RehearsedPerson] = Field(description="The first few.")
     columns: list[RehearsedColumn]
-    report: list[str] = Field(description="Files of the report; empty where `report_problem` says why.")
+    report: list[str] = Field(description="Files of the report; empty if there is a `report_problem`.")
     report_problem: str
     power: Power | None
     power_problem: str

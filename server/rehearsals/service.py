@@ -58,7 +58,7 @@ def start(
         study = find_study(session, name, identity, "run")
         version = active_version(session, study)
         parameters = {**order.model_dump(), "version": version.number}
-        in_the_way = "A rehearsal of this study goes on already; wait for it."
+        in_the_way = "A rehearsal of this study is already running. Please wait."
         job = begin_job(locks, session, study, "rehearsal", parameters, identity, in_the_way)
         record(session, identity, "rehearsal asked for", "study", name, **order.model_dump())
         session.flush()
@@ -86,7 +86,9 @@ def result(
     study = find_study(session, name, identity, "view")
     path = _folder(settings, public_id) / RESULT
     if job_repository.find_job(session, study, "rehearsal", public_id) is None or not path.is_file():
-        raise NotFound("There is no such rehearsal, or it is not done; reload the page to see how far it is.")
+        raise NotFound(
+            "There is no such rehearsal, or it is not finished. Reload the page to see its progress."
+        )
     return RehearsalResult.model_validate_json(path.read_text(encoding="utf-8"))
 
 
@@ -95,7 +97,7 @@ def report_file(
 ) -> Path:
     """A file of the report that simulated people would give."""
     if file not in result(settings, session, name, identity, public_id).report:
-        raise NotFound("There is no such rehearsal, or its report has no such file.")
+        raise NotFound("There is no such rehearsal, or its report does not contain this file.")
     return _folder(settings, public_id) / REPORT / file
 
 
@@ -106,7 +108,7 @@ def _folder(settings: Settings, public_id: str) -> Path:
 def _out(locks: Locks, job: Job) -> RehearsalOut:
     return RehearsalOut.model_validate(
         {
-            **job_state(locks, job, "the server was stopped while it went on"),
+            **job_state(locks, job, "the server stopped before it was finished"),
             "version": job.parameters.get("version", 0),
             "participants": job.parameters.get("participants", 0),
         }
@@ -121,7 +123,7 @@ def cancel(
         study = find_study(session, name, identity, "run")
         job = job_repository.find_job(session, study, "rehearsal", public_id)
         if job is None:
-            raise NotFound("There is no such rehearsal; reload the page.")
+            raise NotFound("There is no such rehearsal. Reload the page.")
         if not is_under_way(locks, job):
             return
         # The file first: a rehearsal whose turn comes in between would be shown as running again.
@@ -191,7 +193,7 @@ def _write_inputs(database: Database, name: str, folder: Path, order: NewRehears
 def _in_sandbox(database: Database, public_id: str, folder: Path) -> str:
     """Rehearse in a process that knows no database but its own; return why it failed, or ''."""
     environment = {name: os.environ[name] for name in _KEPT_VARIABLES if name in os.environ}
-    problem = "the rehearsal ended before it was done"
+    problem = "the rehearsal ended before it was finished"
     with subprocess.Popen(  # noqa: S603 - this interpreter, a folder of ours
         _program(folder),
         stdout=subprocess.PIPE,

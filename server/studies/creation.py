@@ -85,8 +85,8 @@ def for_edit(
     study = find_study(session, name, identity, right)
     if study.revision != revision:
         raise EditedMeanwhile(
-            f"Somebody else changed this study meanwhile (revision {study.revision}, yours was {revision}); "
-            "load it again and repeat your edit.",
+            f"Not saved: someone else edited this study (revision {study.revision}, yours was {revision}). "
+            f"Review their change and re-apply yours.",
             revision=study.revision,
         )
     if not archived:
@@ -198,7 +198,7 @@ def create_study(
     with every_row(session):
         is_taken = repository.study_called(session, name) is not None
     if is_taken:
-        raise NameTaken(f"There is already a study called '{name}' on this server; choose another name.")
+        raise NameTaken(f"A study called '{name}' already exists on this server. Choose another name.")
     study = Study(
         name=name,
         title=experiment.title,
@@ -364,12 +364,13 @@ def _materials(
         folder = settings.stimuli_folder / order.shipped
         return text, planned_experiment(text), read_manifest(folder), folder
     if order.upload is None:
-        raise Invalid("A study needs clips: choose a shipped experiment or upload clips first.")
+        raise Invalid("A study needs clips. Choose a shipped experiment or upload clips first.")
     folder = upload_folder(settings.upload_folder, order.upload, identity.account_id)
     if (folder / MANIFEST_NAME).is_file():
         if order.toml is None:
             raise Invalid(
-                "The upload has a manifest; give the definition (TOML) its clips were built from too."
+                "The upload has a manifest. Also provide the definition (TOML) from which its clips were "
+                "built."
             )
         return order.toml, planned_experiment(order.toml), read_manifest(folder), folder
     return _own_study(order, folder)
@@ -379,7 +380,7 @@ def _own_study(order: NewStudy, folder: Path) -> tuple[str, Experiment, Manifest
     placed = _placed_levels(order.levels, folder)
     check_factorial(placed)
     if order.toml is None and order.own_clips is None:
-        raise Invalid("Give the study a title and a question, or a definition.")
+        raise Invalid("Enter a title and a question for the study, or a definition.")
     text = order.toml
     if text is None and order.own_clips is not None:
         text = own_clips.definition_text(order.name, placed, order.own_clips)
@@ -390,7 +391,7 @@ def _own_study(order: NewStudy, folder: Path) -> tuple[str, Experiment, Manifest
 def _placed_levels(levels: LevelsTable | LevelsPattern | None, folder: Path) -> Placed:
     files = [path.name for path in videos_of(folder)]
     if levels is None:
-        raise Invalid("Say which levels each clip has: by a CSV table or a file-name pattern.")
+        raise Invalid("Specify the levels of each clip, with a CSV table or a file-name pattern.")
     if isinstance(levels, LevelsTable):
         return levels_from_table(levels.csv, files)
     return levels_from_names(levels.pattern, files)

@@ -110,8 +110,8 @@ def _completion_codes(launch: LaunchState) -> Iterator[LaunchCheck]:
 
 
 _CODE_NEEDED = (
-    "Recruiting through Prolific needs the completion code of the Prolific study, and none is set: "
-    "participants would get a random code that Prolific does not accept. Enter it under {page}."
+    "Recruiting through Prolific needs the completion code of the Prolific study, but none is set. "
+    "Participants would get a random code that Prolific does not accept. Enter it under {page}."
 )
 
 
@@ -149,15 +149,20 @@ def _recruiter(launch: LaunchState) -> Iterator[LaunchCheck]:
         yield LaunchCheck(
             kind="recruiter",
             blocks=False,
-            text="No recruiter is set, so one person can take part twice. To recruit through Prolific, SONA "
-            "or MTurk, choose it under Settings first: links of these services are refused until then.",
+            text=(
+                "No recruiter is set, so one person can take part twice. To recruit through Prolific, "
+                "SONA or MTurk, choose it under Settings first. Until then, links from these services are "
+                "refused."
+            ),
         )
     if launch.recruiter is not None and launch.recruiter.kind == "sona" and not launch.recruiter.redirect_url:
         yield LaunchCheck(
             kind="recruiter",
             blocks=False,
-            text="SONA grants credit by an address to go to at the end, and none is set. Enter SONA's "
-            "completion URL under Settings, or grant credit by hand.",
+            text=(
+                "SONA grants credit through its completion URL, but none is set. Enter SONA's completion "
+                "URL under Settings, or grant credit manually."
+            ),
         )
 
 
@@ -167,8 +172,8 @@ def _flicker(launch: LaunchState) -> Iterator[LaunchCheck]:
         yield LaunchCheck(
             kind="flicker",
             blocks=False,
-            text="Motion checks show flickering dots, and the consent does not mention flicker "
-            f"({', '.join(languages)}). Some people are sensitive to it: add a sentence such as "
+            text="Motion checks show flickering dots, but the consent text does not mention flicker "
+            f"({', '.join(languages)}). Some people are sensitive to flicker. Add a sentence such as "
             f'"{suggested_sentence(languages[0])}"',
         )
 
@@ -179,10 +184,12 @@ def _person_checks(launch: LaunchState) -> Iterator[LaunchCheck]:
         yield LaunchCheck(
             kind="person_checks",
             blocks=False,
-            text="Participants are recruited online, and the study has too few attention and motion checks "
-            "to separate people from programs: no run can be rated likely a person's. Turn on online "
-            "recruitment under Build, Checks and exclusions: it adds two motion checks and one attention "
-            "question.",
+            text=(
+                "Participants are recruited online, but the study has too few attention and motion checks "
+                "to distinguish people from programs. No run can be rated likely to be a person. Turn on "
+                "online recruitment under Build, Checks and exclusions. It adds two motion checks and one "
+                "attention question."
+            ),
         )
 
 

@@ -79,7 +79,9 @@ def check_group(experiment: Experiment, kind: LinkKind, group: str) -> None:
     """Invalid unless a link for this group (empty: for none) leads into the study."""
     known, by_link = names(experiment), experiment.groups.by == "link"
     if group and not by_link:
-        raise Invalid(f"Expected a link without a group, got '{group[:60]}': links decide no groups here.")
+        raise Invalid(
+            f"Expected a link without a group, got '{group[:60]}'; links do not decide groups in this study."
+        )
     if group and group not in known:
         raise Invalid(
             f"There is no group '{group[:60]}'{did_you_mean(group, known)}; there are: {', '.join(known)}."

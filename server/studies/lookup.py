@@ -56,12 +56,12 @@ def _check(
 ) -> None:
     if right not in rights:
         held = " and ".join(ordered_rights(rights))
-        raise NotAllowed(f"This needs the right '{right}' on the study '{study.name}'; you have {held}.")
+        raise NotAllowed(f"This requires the right '{right}' on the study '{study.name}'; you have {held}.")
     workspace = workspaces.workspace_of(session, study)
     if workspace is not None and workspace.second_factor_required and not identity.second_factor:
         raise SecondFactorNeeded(
-            f"The workspace '{workspace.title}' asks for a second factor; set one up under My account, "
-            "or sign in again with it."
+            f"The workspace '{workspace.title}' requires a second factor. Set one up under My account, or "
+            f"sign in again with it."
         )
 
 
@@ -74,7 +74,8 @@ def must_not_be_archived(study: Study) -> None:
     """
     if study.archived_at is not None:
         raise Conflict(
-            f"The study '{study.name}' is in the archive; take it out again (Settings) before it is changed."
+            f"The study '{study.name}' is archived. Remove it from the archive (Settings) before you "
+            f"change it."
         )
 
 

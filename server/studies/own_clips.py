@@ -115,8 +115,8 @@ def _just_noticeable(asked: OwnClips, levels: Levels) -> dict[str, Any]:
     factor = next((name for name in levels if _numbers(levels[name])), None)
     if factor is None:
         raise InputError(
-            f"a just-noticeable difference needs a factor with {MIN_STIMULI + 1} levels or more that are all "
-            f"numbers, such as {{duration}} in blink_100_1.mp4; the factors are: {', '.join(levels)}"
+            f"a just-noticeable difference needs a factor with at least {MIN_STIMULI + 1} levels that are "
+            f"all numbers, such as {{duration}} in blink_100_1.mp4; the factors are: {', '.join(levels)}"
         )
     standard = min(levels[factor], key=float)
     return {
@@ -182,7 +182,7 @@ _WATCHING = {
     "acr": f"{_START} a clip. You see it **once**. Then choose from *Bad* to *Excellent*: ",
     "dcr": f"{_START}. You see the reference and then, after a pause, a second clip, **once** each. Then "
     "choose from *Very annoying* to *Imperceptible*: ",
-    "pairs": f"{_START} two clips beside one another. You see them **once**. Then answer: ",
+    "pairs": f"{_START} two clips side by side. You see them **once**. Then answer: ",
     "just_noticeable": f"{_START} two clips, one after the other. You see them **once**. Then answer: ",
 }
 
@@ -220,7 +220,8 @@ def check_declared(added: Manifest, experiment: Experiment) -> None:
     if stray is not None:
         raise InputError(
             f"'{stray.file}' is exemplar {stray.exemplar} of the cell {stray.cell}, which the definition "
-            "does not declare; add its level, or more clips a cell, in the builder: both are saved together"
+            f"does not declare. Add its level, or more clips per cell, in the builder. Both are saved "
+            f"together"
         )
 
 
@@ -244,13 +245,13 @@ def manifest_of(experiment: Experiment, placed: Placed, folder: Path) -> Manifes
     order, records = experiment.factor_names, records_of(folder)
     if waiting := [name for name in placed if name not in records]:
         raise StillPreparing(
-            f"{len(waiting)} of {len(placed)} clips are still being looked into or converted; try again in a "
-            "moment."
+            f"{len(waiting)} of {len(placed)} clips are still being checked or converted. Try again in a "
+            f"moment."
         )
     clips = []
     for name, (levels, exemplar) in sorted(placed.items()):
         if missing := [factor for factor in order if factor not in levels]:
-            raise InputError(f"the clips have no levels of '{missing[0]}', a factor of the definition")
+            raise InputError(f"the clips have no levels for '{missing[0]}', a factor of the definition")
         if (problem := records[name].problem) is not None:
             raise InputError(f"'{name}' cannot be used: {problem}")
         clips.append(_clip(records[name], {factor: levels[factor] for factor in order}, exemplar))

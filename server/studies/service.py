@@ -92,7 +92,7 @@ def delete(session: Session, name: str, identity: Identity) -> None:
     study = find_study(session, name, identity, "edit")
     must_not_be_archived(study)
     if study.status != "draft" or repository.run_count(session, study):
-        raise Conflict("Only a draft without runs can be deleted; close this study instead.")
+        raise Conflict("Only drafts without runs can be deleted. Close this study instead.")
     repository.delete_study(session, study)
     record(session, identity, "study deleted", "study", name)
 
@@ -215,7 +215,7 @@ def archive_study(session: Session, name: str, order: ArchiveStudy, identity: Id
     if order.archived == (study.archived_at is not None):
         return
     if order.archived and study.status in ("pilot", "live"):
-        raise Conflict(f"A study that is {study.status} cannot go into the archive; close it first.")
+        raise Conflict(f"A study that is {study.status} cannot be archived. Close it first.")
     study.archived_at = now() if order.archived else None
     study.revision += 1
     record(

@@ -40,11 +40,11 @@ def with_data(text: str, data: Mapping[str, Any]) -> str:
     if is_deeper(data, MAX_DEPTH):
         raise InputError(TOO_DEEP)
     if text.count("\n") > MAX_LINES:
-        raise InputError(f"expected at most {MAX_LINES} lines; edit such a text by hand")
+        raise InputError(f"expected at most {MAX_LINES} lines; edit such a text manually")
     edited = _without_none(data)
     _refuse_too_many(_said_by(text), edited)
     if sum_of_cubes(text) > MAX_CUBES:
-        raise InputError("too many dotted keys of many parts; edit such a text by hand")
+        raise InputError("too many dotted keys of many parts; edit such a text manually")
     try:
         document = tomlkit.parse(text)
         _merge(document, edited)
@@ -54,7 +54,7 @@ def with_data(text: str, data: Mapping[str, Any]) -> str:
     except (TOMLKitError, tomllib.TOMLDecodeError):
         pass
     except (TypeError, ValueError) as error:
-        raise InputError(f"the declaration holds what TOML cannot say: {error}") from error
+        raise InputError(f"the declaration contains a value that TOML cannot represent: {error}") from error
     except RecursionError as error:
         raise InputError(TOO_DEEP) from error
     # Tables written out of order are beyond tomlkit's editing: the whole is then written afresh.
@@ -66,7 +66,7 @@ def _refuse_too_many(*said: Any) -> None:
     if elements > MAX_ELEMENTS:
         raise InputError(
             f"expected at most {MAX_ELEMENTS} elements in all lists together, got {elements}; "
-            "edit such a text by hand"
+            "edit such a text manually"
         )
 
 

@@ -56,16 +56,16 @@ def safe_name(path: str) -> str:
     """The file's own name; Invalid where the path climbs out or is not a clip or table."""
     pure = PurePosixPath(path.replace("\\", "/"))
     if pure.is_absolute() or ".." in pure.parts or not pure.name or pure.name.startswith("."):
-        raise Invalid(f"The file '{path[:100]}' has a path that is not allowed; expected plain file names.")
+        raise Invalid(f"The file '{path[:100]}' has an invalid path; expected plain file names.")
     if pure.suffix.lower() not in VIDEO_ENDINGS + TABLES:
         raise Invalid(
             f"The file '{pure.name[:100]}' is neither a video ({', '.join(VIDEO_ENDINGS)}) nor a CSV table."
         )
     if len(pure.name) > 150:
-        raise Invalid(f"The file name '{pure.name[:100]}...' is too long; 150 characters are the most.")
+        raise Invalid(f"The file name '{pure.name[:100]}...' is too long; the maximum is 150 characters.")
     name = one_form(pure.name)
     if not NAME.fullmatch(name):
-        raise Invalid(f"The file name '{name[:100]}' should begin with a letter or digit; rename the file.")
+        raise Invalid(f"The file name '{name[:100]}' must begin with a letter or digit. Rename the file.")
     return name
 
 
@@ -99,7 +99,7 @@ def copy(source: IO[bytes], target: Path, limit: int, called: str = "", within: 
             written += len(piece)
             if written > limit:
                 raise UploadTooLarge(
-                    f"'{called or target.name}' is larger than the {limit >> 20} MiB accepted."
+                    f"'{called or target.name}' is larger than the maximum of {limit >> 20} MiB."
                 )
             if within is not None and room is not None and written > room:
                 raise within.full()
@@ -167,9 +167,10 @@ class Quota:
 
     def _full(self, held: int) -> UploadTooLarge:
         return UploadTooLarge(
-            f"Your uploads of the last day hold {held / 1e9:.1f} GB in {len(self._own())} folders; at most "
+            f"Your uploads of the last day contain {held / 1e9:.1f} GB in {len(self._own())} folders; at "
+            f"most "
             f"{self.bytes / 1e9:.1f} GB in {MAX_UPLOADS} are kept. "
-            "Each is removed after a day; studies that were made of them stay."
+            "Each upload is removed after a day; studies made from it stay."
         )
 
 
@@ -218,7 +219,7 @@ def unpack(packed: Path, folder: Path, within: Room | None = None) -> None:
     except ZipListError as error:
         raise UploadTooLarge(f"Nothing was unpacked: {error}; {MAX_FILES} files need less.") from error
     except _DAMAGED as error:
-        raise Invalid("The zip file is damaged or encrypted; please pack it again.") from error
+        raise Invalid("The zip file is damaged or encrypted. Please create it again.") from error
 
 
 def _take_out(
@@ -240,15 +241,17 @@ def _is_litter(path: str) -> bool:
 
 def _check_members(members: list[zipfile.ZipInfo]) -> None:
     if len(members) > MAX_FILES:
-        raise UploadTooLarge(f"The zip holds {len(members)} files; {MAX_FILES} is the most.")
+        raise UploadTooLarge(f"The zip holds {len(members)} files; the maximum is {MAX_FILES}.")
     unpacked = sum(member.file_size for member in members)
     if unpacked > MAX_UNPACKED_BYTES:
         raise UploadTooLarge(
-            f"The zip unpacks to {unpacked >> 20} MiB; {MAX_UNPACKED_BYTES >> 20} is the most."
+            f"The zip unpacks to {unpacked >> 20} MiB; the maximum is {MAX_UNPACKED_BYTES >> 20} MiB."
         )
     for member in members:
         if member.file_size > MAX_RATIO * max(member.compress_size, 1024):
-            raise Invalid(f"The zip's file '{member.filename[:100]}' unpacks to far more than a clip would.")
+            raise Invalid(
+                f"The zip's file '{member.filename[:100]}' unpacks to far more than a clip can have."
+            )
     names = [safe_name(member.filename) for member in members]
     if repeated := sorted(name for name, number in Counter(names).items() if number > 1):
         raise Invalid(f"The zip holds '{repeated[0]}' more than once; file names must differ.")
@@ -286,11 +289,11 @@ def leave_out(folder: Path, name: str) -> None:
         return
     if (folder / MANIFEST_NAME).exists():
         raise Invalid(
-            "The clips of a built set are taken as a whole; leave out what its definition leaves out."
+            "The clips of a built set can only be used together. Exclude clips in its definition instead."
         )
     record = records_of(folder).get(file.name)
     if record is None:
-        raise Invalid(f"'{file.name}' is still being looked into; leave it out once it has been.")
+        raise Invalid(f"'{file.name}' is still being checked. You can remove it afterwards.")
     aside.mkdir(mode=0o700, exist_ok=True)
     write_record(aside, record)
     write_record(folder, Prepared(name=file.name, asked_fps=None, replaced=True))
@@ -316,7 +319,7 @@ def put_back(folder: Path, name: str) -> None:
         return
     target = folder / file.name
     if target.exists():
-        raise Invalid(f"Another '{file.name}' has come since; leave that one out first.")
+        raise Invalid(f"Another '{file.name}' was uploaded since. Remove that file first.")
     check_names(clip_name(path.name) for path in (*there, file))
     record = records_of(file.parent).get(file.name)
     file.replace(target)
@@ -371,7 +374,7 @@ def upload_folder(folder: Path, identifier: str, account: int) -> Path:
     upload = folder / identifier
     known = len(identifier) == 32 and set(identifier) <= set("0123456789abcdef") and upload.is_dir()
     if not known or sender(upload) != str(account):
-        raise NotFound("There is no such upload, or it is older than a day; please upload the clips again.")
+        raise NotFound("There is no such upload, or it is older than a day. Please upload the clips again.")
     return upload
 
 
@@ -387,7 +390,7 @@ def receive(folder: Path, name: str, source: IO[bytes], limit: int, quota: Quota
     else:
         target = folder / safe_name(name)
         if target.exists():
-            raise Invalid(f"'{target.name}' came more than once; file names must differ.")
+            raise Invalid(f"'{target.name}' was uploaded more than once; file names must differ.")
         copy(source, target, limit, within=quota)
 
 
@@ -398,8 +401,8 @@ def check_room(folder: Path) -> None:
     kept += files_aside(folder)
     if len(kept) > MAX_FILES or sum(map(_size, kept)) > MAX_KEPT_BYTES:
         raise UploadTooLarge(
-            f"An upload holds at most {MAX_FILES} files and {MAX_KEPT_BYTES >> 30} GiB; add the others "
-            "to the study as a new version."
+            f"An upload holds at most {MAX_FILES} files and {MAX_KEPT_BYTES >> 30} GiB; Add the others to "
+            f"the study as a new version."
         )
 
 
@@ -446,9 +449,9 @@ def replace(folder: Path, old: str, name: str, source: IO[bytes], limit: int, qu
     if known is None:
         raise NotFound(f"This upload has no file '{old[:100]}' to replace.")
     if not (folder / MANIFEST_NAME).exists() and known.name not in records_of(folder):
-        raise Invalid(f"'{known.name}' is still being looked into; replace it once it has been.")
+        raise Invalid(f"'{known.name}' is still being checked. You can replace it afterwards.")
     if target != known and target.exists():
-        raise Invalid(f"'{target.name}' has come already; file names must differ.")
+        raise Invalid(f"'{target.name}' was already uploaded; file names must differ.")
     others = [path.name for path in videos_of(folder) if path not in (known, target)]
     check_names(clip_name(one) for one in (*others, target.name))
     staged = folder / f".{secrets.token_hex(8)}{target.suffix}"

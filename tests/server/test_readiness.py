@@ -58,7 +58,7 @@ def test_a_disk_that_fills_is_told_before_a_rating_fails(small_disk: Path) -> No
 
 def test_the_limit_is_a_setting(settings: Settings) -> None:
     with TestClient(create_app(settings.model_copy(update={"free_megabytes_min": 1e12}))) as client:
-        assert "make room" in told(client)
+        assert "Free disk space" in told(client)
         assert_told_to_monitors(client, {"/healthz": 200, "/readyz": 503})
 
 

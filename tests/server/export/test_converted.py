@@ -59,4 +59,4 @@ def test_one_file_is_converted_at_a_time(viewer: Admin, participant: Participant
     participant.agree()
     with _converting:
         busy = viewer.get("/studies/short/data/wide.parquet")
-    assert (busy.status_code, "try again in a moment" in busy.json()["error"]["message"]) == (409, True)
+    assert (busy.status_code, "Try again in a moment" in busy.json()["error"]["message"]) == (409, True)

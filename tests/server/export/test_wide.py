@@ -100,7 +100,7 @@ def test_trials_without_a_scale_are_refused_before_the_download(
     add_study(services, tmp_path / "clips", PAIRS)
     answer = viewer.get("/studies/short/data/wide.csv")
     assert answer.status_code == 422
-    assert "take the long table" in answer.json()["error"]["message"]
+    assert "use the long table" in answer.json()["error"]["message"]
 
 
 def test_a_spreadsheet_gets_a_mark_and_nothing_it_could_run(

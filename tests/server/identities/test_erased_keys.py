@@ -73,7 +73,7 @@ def test_an_erased_person_is_gone_from_older_backups_too(
     back_up(services.database, services.settings, services.clips, tmp_path / "newer.tar", with_clips=False)
     again, lines = restored(older, empty_database_url, tmp_path / "new")
     assert ids(again) == {other: CODES[1]}
-    assert "1 recruiters' ids; of 1 there is no key any more" in lines
+    assert "1 recruiters' ids; the keys of 1 no longer exist" in lines
     with again.database.read() as session:
         assert list(readable_identities(session)) == [True]
     again.database.close()
@@ -142,7 +142,7 @@ def test_with_the_key_file_ids_and_pseudonyms_are_as_before(
     done = run_server_command(
         settings, "restore", "--despite-erasures", str(tmp_path / "a" / "b.tar"), "--keys", str(keys)
     )
-    assert "2 recruiters' ids; of 0 there is no key any more" in done.stdout, done.stderr
+    assert "2 recruiters' ids; the keys of 0 no longer exist any more" in done.stdout, done.stderr
     again = open_services(settings)
     assert sorted(ids(again).values()) == list(CODES)
     with again.database.read() as one, services.database.read() as other:

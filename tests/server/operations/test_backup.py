@@ -144,7 +144,7 @@ class TestRefusals:
         with pytest.raises(InputError):
             restore(target.database, target.settings, target.clips, cut, despite_erasures=True)
         (tmp_path / "text.tar").write_text("hello")
-        with pytest.raises(InputError, match=r"no backup of `server backup`; name a file that it wrote$"):
+        with pytest.raises(InputError, match=r"no backup of `server backup`; choose a file that it wrote$"):
             restore(
                 target.database, target.settings, target.clips, tmp_path / "text.tar", despite_erasures=True
             )

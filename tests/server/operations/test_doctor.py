@@ -30,7 +30,7 @@ def test_an_installation_in_order(services: Services, study: StudyInDatabase) ->
     close_to_others(services.settings)
     found = by_subject(services)
     assert [finding for finding in found.values() if finding.verdict == "failed"] == []
-    assert found["clips"].state == "8, all there"
+    assert found["clips"].state == "8, all present"
     assert found["studies"].state == "1"
 
 
@@ -46,7 +46,7 @@ class TestTroubles:
         wrong = open_services(services.settings.model_copy(update=changes))
         found = by_subject(wrong)
         wrong.database.close()
-        assert found["clips"].state == "1 of 8 missing or cut short"
+        assert found["clips"].state == "1 of 8 missing or incomplete"
         assert found["secret key"].advice == f"run: chmod 600 {key}"
         assert "https" in found["public address"].advice
         assert found["admin page"].verdict == "failed"

@@ -111,7 +111,7 @@ def test_only_one_at_a_time(watched: Settings) -> None:
     with lock.open("a") as held:
         fcntl.flock(held, fcntl.LOCK_EX)
         assert drill_when_due(watched) is None
-        with pytest.raises(DrillUnderWayError, match="under way"):
+        with pytest.raises(DrillUnderWayError, match="is running"):
             drill(watched, backup_of(watched))
     result = drill_when_due(watched)
     assert result is not None
@@ -142,7 +142,7 @@ def test_without_room_nothing_is_brought_back(watched: Settings) -> None:
     crowded = watched.model_copy(update={"free_megabytes_min": 1e9})
     result = drill(crowded, backup_of(watched))
     assert not result.passed
-    assert "make room" in result.said
+    assert "free disk space" in result.said
 
 
 def test_a_full_disk_is_not_called_damage(watched: Settings, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -203,7 +203,7 @@ def test_doctor_and_metrics_tell_age_and_outcome(watched: Settings, services: Se
 def test_the_command_names_the_newest_and_refuses_an_empty_folder(watched: Settings, tmp_path: Path) -> None:
     called = run_server_command(watched, "drill", str(watched.backup_folder))
     assert called.returncode == 0
-    assert "palpebra-2026-03-01.tar came back whole" in called.stdout
+    assert "palpebra-2026-03-01.tar was restored completely" in called.stdout
     (tmp_path / "none").mkdir()
     called = run_server_command(watched, "drill", str(tmp_path / "none"))
     assert called.returncode == 2

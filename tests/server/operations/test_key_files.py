@@ -117,7 +117,7 @@ def test_a_key_file_older_than_the_backup_fails_drill_and_restore(
     assert len(refused.stderr.strip().splitlines()) == 1, "nothing was written before"
     assert "--stale-keys" in refused.stderr
     done = run_server_command(target.settings, *arguments, "--stale-keys")
-    assert "1 recruiters' ids; of 1 there is no key any more" in done.stdout, done.stderr
+    assert "1 recruiters' ids; the keys of 1 no longer exist" in done.stdout, done.stderr
 
 
 @pytest.mark.parametrize("kind", ["here", "off the host"])
@@ -250,7 +250,7 @@ def test_a_restore_takes_no_keys_of_another_installation(
     back_up(other.database, other.settings, other.clips, tmp_path / "b" / TAR, with_clips=False)
     other.database.close()
     target = empty(tmp_path / "new")
-    with pytest.raises(InputError, match="keys of another installation or secret key than the backup"):
+    with pytest.raises(InputError, match="belongs to another installation or secret key than the backup"):
         restore(
             target.database,
             target.settings,
@@ -268,7 +268,7 @@ def test_a_restore_takes_no_keys_of_another_installation(
         "--keys",
         str(tmp_path / "a" / NAME),
     )
-    assert "1 recruiters' ids; of 0 there is no key" in again.stdout, again.stderr
+    assert "1 recruiters' ids; the keys of 0 no longer exist" in again.stdout, again.stderr
 
 
 def test_after_a_change_of_the_secret_key_older_backups_keep_their_keys(
@@ -280,7 +280,7 @@ def test_after_a_change_of_the_secret_key_older_backups_keep_their_keys(
     old.write_bytes(services.settings.key)
     changed = with_secret(services, "another key of this installation")
     done = run_server_command(changed.settings, "database", "rewrap", str(old))
-    assert "keep it with the backups made so far" in done.stdout, done.stderr
+    assert "to the existing backups" in done.stdout, done.stderr
     shutil.move(folder / NAME, folder / "keys-of-before.json")
     back_up(changed.database, changed.settings, changed.clips, folder / "newer.tar", with_clips=False)
     target = empty(tmp_path / "new")
@@ -329,7 +329,7 @@ def test_two_installations_share_a_store_without_the_private_key(
     done = run_server_command(
         target.settings, "restore", "--despite-erasures", str(folder / backup), "--identity", str(safe[1])
     )
-    assert "1 recruiters' ids; of 0 there is no key" in done.stdout, done.stderr
+    assert "1 recruiters' ids; the keys of 0 no longer exist" in done.stdout, done.stderr
     target.database.close()
 
 

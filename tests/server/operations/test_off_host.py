@@ -112,10 +112,10 @@ def test_a_bucket_gets_it_encrypted_and_it_comes_back(
     address = f"{bucket}/{entry.name}"
     refused = run_server_command(new, "restore", address)
     assert refused.returncode == 2
-    assert "is encrypted; name its private key's file" in refused.stderr
+    assert "is encrypted; specify the file of its private key" in refused.stderr
     done = run_server_command(new, "restore", address, "--identity", str(private), "--despite-erasures")
     assert done.returncode == 0, done.stderr
-    assert "1 recruiters' ids; of 0 there is no key any more" in done.stdout
+    assert "1 recruiters' ids; the keys of 0 no longer exist any more" in done.stdout
     again = open_services(new)
     with again.database.read() as one, rated.database.read() as other:
         count = "SELECT count(*) FROM trial_ratings"
@@ -137,7 +137,7 @@ def test_who_is_erased_since_is_erased_again_from_an_older_one(
     address = str(tmp_path / "elsewhere" / older.name)
     done = run_server_command(new, "restore", address, "--identity", str(keys[1]), "--despite-erasures")
     assert "1 run erased again" in done.stdout, done.stderr
-    assert "0 recruiters' ids; of 1 there is no key any more" in done.stdout
+    assert "0 recruiters' ids; the keys of 1 no longer exist" in done.stdout
 
 
 def test_a_drill_of_a_bucket(
@@ -295,7 +295,7 @@ def test_the_plain_folder_of_before_is_drilled_as_before(rated: Services, tmp_pa
     (tmp_path / "b").mkdir()
     back_up(rated.database, rated.settings, rated.clips, tmp_path / "b" / "palpebra-2026-03-01.tar")
     called = run_server_command(rated.settings, "drill", str(tmp_path / "b"))
-    assert "came back whole" in called.stdout, called.stderr
+    assert "was restored completely" in called.stdout, called.stderr
 
 
 class TestInOneLine:
@@ -309,7 +309,7 @@ class TestInOneLine:
     @pytest.mark.parametrize(
         ("arguments", "said"),
         [
-            (("--to", "x"), "expected the public key to encrypt for"),
+            (("--to", "x"), "expected a public key to encrypt for"),
             (("--to", "x", "--recipient", "age1no"), "expected a public key age1..."),
             (
                 ("--to", "ftp://x", "--recipient", "KEY"),
@@ -336,11 +336,11 @@ class TestInOneLine:
         self, rated: Services, bucket: str, keys: tuple[str, Path]
     ) -> None:
         said = self.called(rated.settings, "backup", "--to", "s3://there-is-none", "--recipient", keys[0])
-        assert "the object store refused or did not answer" in said.stderr
+        assert "the object store refused the request or did not respond" in said.stderr
 
     def test_of_keys(self, rated: Services, keys: tuple[str, Path], tmp_path: Path) -> None:
         again = self.called(rated.settings, "backup-key", str(keys[1]))
-        assert "is there already" in again.stderr
+        assert "already exists" in again.stderr
         made = run_server_command(rated.settings, "backup-key", str(tmp_path / "second.key"))
         assert made.stdout.startswith("age1")
         assert stat.S_IMODE((tmp_path / "second.key").stat().st_mode) == 0o600

@@ -36,7 +36,7 @@ def test_two_backups_a_minute_apart_leave_the_one_of_twenty_days_ago(
     assert len(list(tmp_path.glob("*.tar"))) == 4
     again = run_server_command(settings, "backup", str(own))
     assert again.returncode == 2
-    assert again.stderr.startswith(f"error: {own} is there already; name another file")
+    assert again.stderr.startswith(f"error: {own} already exists; choose another file")
     assert own.stat().st_size == 0
     assert run_server_command(settings, "backup", str(own), "--replace").returncode == 0
     assert own.stat().st_size > 0

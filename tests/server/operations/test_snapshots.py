@@ -219,7 +219,7 @@ class TestGoingBack:
         (aside,) = set_aside(services.settings)
         assert said[0] == "0 runs erased again, by the ledger of erasures"
         assert said[1].endswith("with 1 run")
-        assert said[2] == f"what was there before: {aside}"
+        assert said[2] == f"the previous database is kept at {aside}"
         assert stored(services) == before
         assert ratings_in(aside) == 0
         with services.database.read() as session:
@@ -246,7 +246,7 @@ class TestGoingBack:
             done = run_server_command(services.settings, "database", "go-back", "newest")
             other.communicate()
         assert done.returncode == 2
-        assert "stop the server first, nothing was changed" in done.stderr
+        assert "stop the server first. Nothing was changed" in done.stderr
         assert set_aside(services.settings) == []
 
     def test_a_database_that_is_none_any_more_is_set_aside(
@@ -266,7 +266,10 @@ class TestGoingBack:
 
     @pytest.mark.parametrize(
         ("moment", "said"),
-        [("yesterday", "expected a moment as"), ("2020-01-01T00:00:00Z", "no snapshot was taken up to 2020")],
+        [
+            ("yesterday", "expected a time such as"),
+            ("2020-01-01T00:00:00Z", "there is no snapshot up to 2020"),
+        ],
     )
     def test_other_moments_are_refused(
         self, services: Services, study: StudyInDatabase, moment: str, said: str

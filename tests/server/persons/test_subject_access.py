@@ -134,7 +134,7 @@ def test_the_command_erases_by_the_recruiters_id(services: Services, person: Par
     [
         ((), "expected either --run"),
         (("--run", "a", "--id", "b"), "expected either --run"),
-        (("--id", "4"), "no visit under this recruiter's id"),
+        (("--id", "4"), "no visit with this recruiter's ID"),
         (("--run", "4"), "There is no run '4'"),
     ],
 )

@@ -108,7 +108,7 @@ def test_a_job_whose_process_was_killed_is_over_at_once(
         assert experimenter.send("POST", "/studies/short/reports", {}).status_code == 409
         other.kill()
     [shown] = experimenter.get("/studies/short/reports").json()
-    assert (shown["status"], "server was stopped" in shown["message"]) == ("failed", True)
+    assert (shown["status"], "server stopped" in shown["message"]) == ("failed", True)
     again = experimenter.send("POST", "/studies/short/reports", {})
     assert again.status_code == 202
     ended(services, again.json()["id"])

@@ -45,7 +45,7 @@ def test_a_report_is_built_by_a_process_of_its_own(
     # Verdicts and signals by the analysis; the Methods by the server, its numbers linked to their queries.
     assert "Evidence that responses are from a person" in shown.text
     assert re.search(r"tickets: Share of answers with a valid server ticket.*?<td", shown.text, re.S)
-    assert 'completed visits hold <a href="#methods-' in shown.text
+    assert 'completed visits contained <a href="#methods-' in shown.text
     for mark in re.findall(r'href="#methods-(\d+)"', shown.text):
         source = re.search(rf'<li id="methods-{mark}">(\w+): <code>([^<]+)', shown.text)
         assert source is not None

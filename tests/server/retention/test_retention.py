@@ -201,7 +201,7 @@ class TestOnSqlite:
         self, services: Services, study: StudyInDatabase
     ) -> None:
         said = run_server_command(services.settings, "retention").stdout
-        assert said == "no study declares a period; see [retention] of the declaration\n"
+        assert said == "no study declares a retention period; see [retention] in the declaration\n"
 
     def test_the_server_does_it_by_itself(
         self, client: TestClient, services: Services, kept: StudyInDatabase
@@ -228,7 +228,7 @@ class TestOnSqlite:
 
 
 def test_periods_that_contradict_one_another_are_refused() -> None:
-    with pytest.raises(ValidationError, match=r"unfinished_days is 30, but after answers_days \(10\)"):
+    with pytest.raises(ValidationError, match=r"unfinished_days: expected at most answers_days \(10\)"):
         Retention(unfinished_days=30, answers_days=10)
     with pytest.raises(ValidationError, match="greater than or equal to 1"):
         Retention(identifiers_days=0)

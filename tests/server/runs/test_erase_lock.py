@@ -50,7 +50,7 @@ def test_the_second_waits_for_the_first_and_erases_nothing_again(
         assert waits(services), "the second one does not wait for the row"
         assert refusals == []
     other.join(PATIENCE_S)
-    assert [refusal.message for refusal in refusals] == ["This run's data were erased already."]
+    assert [refusal.message for refusal in refusals] == ["The data of this run were already erased."]
     assert erasures_in_ledger(services.settings) == [person.run_id]
     with services.database.read() as session:
         assert session.query(AuditEntry).filter(AuditEntry.action == "run erased").count() == 1

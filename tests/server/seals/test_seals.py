@@ -33,13 +33,13 @@ def test_a_plan_is_sealed_once_before_the_first_participant(
     assert sealed.experiment == study.experiment
     with services.database.write() as session:
         assert seal_of(session, find_study(session, "short", OPERATOR, "view")) == sealed
-        with pytest.raises(Conflict, match="a seal is never replaced"):
+        with pytest.raises(Conflict, match="A seal cannot be replaced"):
             seal_plan(session, find_study(session, "short", OPERATOR, "view"), None, None)
 
 
 def test_after_the_first_participant_nothing_is_sealed(services: Services, participant: Participant) -> None:
     participant.agree()
-    with services.database.write() as session, pytest.raises(Conflict, match="already by 1 participant:"):
+    with services.database.write() as session, pytest.raises(Conflict, match="1 participant already started"):
         seal_plan(session, find_study(session, "short", OPERATOR, "view"), None, None)
 
 
@@ -81,7 +81,7 @@ def test_a_plan_is_sealed_once_though_two_seal_it_together(
         waited = wait([other], timeout=0.5).not_done
         go_on.set()
         one.result(30)
-        with pytest.raises(Conflict, match="a seal is never replaced"):
+        with pytest.raises(Conflict, match="A seal cannot be replaced"):
             other.result(30)
     assert waited
 
@@ -98,7 +98,7 @@ def test_what_differs_from_the_plan_is_named(services: Services, tmp_path: Path)
     assert "exclusions" in found[0]
     assert deviations(sealed, parse_experiment(SHORT), 20) == []
     assert deviations(sealed, parse_experiment(SHORT), 12) == [
-        "20 participants were planned, 12 are analysed"
+        "20 participants were planned, 12 are analyzed"
     ]
     shown = page(sealed)
     assert sealed.sha256 in shown
@@ -129,7 +129,7 @@ def test_a_report_lists_each_deviation_from_the_seal(sealed_exp3: Path, tmp_path
     assert result.exit_code == 0, result.output
     report = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
     assert "deviation from the plan sealed" in report
-    assert f"{experiment.participants} participants were planned, 8 are analysed" in report
+    assert f"{experiment.participants} participants were planned, 8 are analyzed" in report
 
 
 def test_a_broken_seal_is_refused(sealed_exp3: Path) -> None:
