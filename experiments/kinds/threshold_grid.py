@@ -100,8 +100,8 @@ def _second_faults(experiment: Experiment, trial: Threshold) -> Iterator[str]:
         yield from _level_faults("trial.task.standard_second", second.factor, [beside], levels)
     if trial.function != "normal":
         yield (
-            "trial.function: expected normal with a second factor, because its thresholds may cross 0; got "
-            "{trial.function}"
+            f"trial.function: expected normal with a second factor, because its thresholds may cross 0; got "
+            f"{trial.function}"
         )
 
 

@@ -142,7 +142,7 @@ def test_with_the_key_file_ids_and_pseudonyms_are_as_before(
     done = run_server_command(
         settings, "restore", "--despite-erasures", str(tmp_path / "a" / "b.tar"), "--keys", str(keys)
     )
-    assert "2 recruiters' ids; the keys of 0 no longer exist any more" in done.stdout, done.stderr
+    assert "2 recruiters' ids; the keys of 0 no longer exist" in done.stdout, done.stderr
     again = open_services(settings)
     assert sorted(ids(again).values()) == list(CODES)
     with again.database.read() as one, services.database.read() as other:

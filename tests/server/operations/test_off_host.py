@@ -115,7 +115,7 @@ def test_a_bucket_gets_it_encrypted_and_it_comes_back(
     assert "is encrypted; specify the file of its private key" in refused.stderr
     done = run_server_command(new, "restore", address, "--identity", str(private), "--despite-erasures")
     assert done.returncode == 0, done.stderr
-    assert "1 recruiters' ids; the keys of 0 no longer exist any more" in done.stdout
+    assert "1 recruiters' ids; the keys of 0 no longer exist" in done.stdout
     again = open_services(new)
     with again.database.read() as one, rated.database.read() as other:
         count = "SELECT count(*) FROM trial_ratings"
