@@ -29,7 +29,7 @@ PACKAGES = ("server", "analysis", "experiments", "stimuli_builder", "blink_engin
 RESULTS = ROOT / "out" / "mutation.jsonl"
 SECONDS = 300
 """Longest run of the tests of one expression; a change that makes them hang counts as noticed."""
-MAX_FILES = 8
+MAX_FILES = 16
 SLOW = re.compile(r"tests/(browser|experiments_e2e|docs|bench|scope|equal|house|server/attacks)")
 SWAPS: dict[type[ast.AST], type[ast.AST]] = {
     ast.Lt: ast.LtE,
@@ -111,20 +111,22 @@ def changed_source(site: Site) -> str:
     return ast.unparse(tree)
 
 
-def tests_of(file: Path, tree: Path) -> list[str]:
-    """The test files that import a module, else those of the folder named like its own."""
+def tests_of(site: Site, tree: Path) -> list[str]:
+    """The test files that import a module, those that name its function first; else those near it."""
+    file = site.file
     module = ".".join(file.relative_to(tree).with_suffix("").parts)
     parent, name = module.rpartition(".")[::2]
     imports = re.compile(rf"(from|import) {re.escape(module)}\b|from {re.escape(parent)} import .*\b{name}\b")
     tests = [path for path in sorted((tree / "tests").rglob("test_*.py")) if not SLOW.search(str(path))]
     direct = [path for path in tests if imports.search(path.read_text(encoding="utf-8"))]
     near = [path for path in tests if path.parent.name == file.parent.name]
-    return [str(path.relative_to(tree)) for path in (direct or near)[:MAX_FILES]]
+    named = sorted(direct or near, key=lambda path: site.function not in path.read_text(encoding="utf-8"))
+    return [str(path.relative_to(tree)) for path in named[:MAX_FILES]]
 
 
 def outcome(site: Site, tree: Path) -> str:
     """`killed`, `survived`, or `untested` where no test imports the module or its tests fail anyway."""
-    tests = tests_of(site.file, tree)
+    tests = tests_of(site, tree)
     if not tests or not _passes(tests, tree):
         return "untested"
     original = site.file.read_text(encoding="utf-8")
