@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 from blink_engine.laws import Law
 
-# What the caller tells the engine: moments at which people tend to blink.
+# What the caller passes to the engine: moments at which people tend to blink.
 
 EventKind = Literal[
     "utterance_start", "utterance_end", "pause", "turn_end", "gaze_shift", "head_turn", "blink"
@@ -192,7 +192,7 @@ class Parameters:
             Where the rate is not between 0.1 and 60 a minute.
         """
         if not 0.1 <= per_minute <= 60.0:
-            raise ValueError(f"expected a blink rate of 0.1 to 60 a minute, got {per_minute}")
+            raise ValueError(f"expected a blink rate of 0.1 to 60 per minute, got {per_minute}")
         law = self.intervals[state]
         ratio = 60.0 / per_minute / self.mean_interval_s(state)
         return self.with_intervals({state: law.with_mean(law.mean * ratio)})

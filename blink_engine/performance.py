@@ -25,7 +25,7 @@ class LidFrame:
     left_lower_up, right_lower_up : float
         The lower lid's way upwards, 0 to 1 of its full travel.
     left_lower_in, right_lower_in : float
-        The lower lid's way towards the nose, 0 to 1 of its full travel.
+        The lower lid's way toward the nose, 0 to 1 of its full travel.
     """
 
     left: float
@@ -68,7 +68,7 @@ class BlinkEngine:
         self._plan.set_state(state, self._reach(time_s))
 
     def notify(self, event: Event) -> None:
-        """Tell of an event, in the order of time; one in the past counts as happening at the last frame."""
+        """Report an event, in order of time; an event in the past counts as happening at the last frame."""
         time_s = self._reach(event.time_s)
         self._plan.notify(Event(event.kind, time_s, event.amplitude_deg))
 
@@ -243,7 +243,7 @@ def plan_blinks(
 
 
 def _lay(blinks: Sequence[Blink], count: int, fps: float, *, right: bool) -> Array:
-    """Lay the blinks of one eye (count,) over one another: the greater closure stands.
+    """Lay the blinks of one eye (count,) over one another: the greater closure is kept.
 
     All blinks' frames are computed in one pass: blink b has the frames first[b] to last[b], one after the
     other in `frame`, and `owner` says whose each is.

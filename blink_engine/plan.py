@@ -147,7 +147,7 @@ class BlinkPlan:
         self._state = state
 
     def notify(self, event: Event) -> None:
-        """Take an event, which a blink may answer; of two answers still to come the sooner stands."""
+        """Take an event, which a blink may answer; of two pending answers the sooner is kept."""
         if event.kind == "blink":
             self._answer(event.time_s, "blink")
             return

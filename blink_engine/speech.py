@@ -1,4 +1,4 @@
-"""Speech as stretches of time, and what the blink engine is told of them."""
+"""Speech as stretches of time, and the events that the blink engine gets from them."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ class Speech:
 
 
 def join_speech(stretches: Iterable[Speech], gap_s: float = PAUSE_MIN_S) -> list[Speech]:
-    """Return the stretches in order, those that overlap or are parted by less than `gap_s` as one."""
+    """Return the stretches in order; those that overlap or are less than `gap_s` apart are merged."""
     whole: list[Speech] = []
     for one in sorted(stretches, key=lambda stretch: (stretch.start_s, stretch.end_s)):
         if whole and one.start_s - whole[-1].end_s < gap_s:

@@ -6,31 +6,31 @@ from experiments.command_line import run_command_line
 COMMANDS = {
     "actor": (
         "stimuli_builder.actor.cli",
-        "Generate a high-speed recording of a synthetic actor, with exact truth and label files.",
+        "Generate a high-speed recording of a synthetic actor, with exact ground truth and label files.",
     ),
     "track": (
         "stimuli_builder.tracking.cli",
-        "Track the eyelids of a recording with the coupled active appearance model.",
+        "Track the eyelids in a recording with the coupled active appearance model.",
     ),
     "train": (
         "stimuli_builder.tracking.cli",
-        "Train the model on labelled frames, report its accuracy by fold, and save it.",
+        "Train the model on labeled frames, report its accuracy per fold, and save it.",
     ),
     "accuracy": (
         "stimuli_builder.tracking.cli",
-        "Compare a track of the synthetic actor with its exact truth.",
+        "Compare a track of the synthetic actor with its exact ground truth.",
     ),
     "label": (
         "stimuli_builder.tracking.cli",
-        "Propose labels for frames chosen for variety, with the eye detector, to be corrected by hand.",
+        "Propose labels for varied frames with the eye detector, for correction by hand.",
     ),
     "iris": (
         "stimuli_builder.tracking.cli",
-        "Measure the irises of a tracked recording, and the millimetres in a pixel that follow.",
+        "Measure the irises in a tracked recording, and estimate the millimeters per pixel.",
     ),
     "blinks": (
         "stimuli_builder.blinks.cli",
-        "Label the blinks of a series (eye aspect ratio or distance) or of a track, and measure them.",
+        "Detect and measure the blinks in a series (eye aspect ratio or distance) or a track.",
     ),
     "profiles": (
         "stimuli_builder.blinks.cli",
@@ -38,11 +38,11 @@ COMMANDS = {
     ),
     "model": (
         "stimuli_builder.blinks.cli",
-        "The PCA blink model: learn from recorded blinks, make new ones, hand curves to animation programs.",
+        "The PCA blink model: learn from recorded blinks, generate new ones, export curves for animation.",
     ),
     "performance": (
         "stimuli_builder.performance.cli",
-        "Write the blinks of a whole performance, timed by pauses and turns of speech.",
+        "Generate the blinks of a performance, timed by pauses and turns of speech.",
     ),
     "bake": (
         "stimuli_builder.characters.cli",
@@ -50,7 +50,7 @@ COMMANDS = {
     ),
     "character": (
         "stimuli_builder.characters.cli",
-        "List the characters that are here, and bring back one of an earlier release.",
+        "List the installed characters, and restore a character of an earlier release.",
     ),
     "plan": (
         "stimuli_builder.clips.cli",
@@ -62,7 +62,7 @@ COMMANDS = {
     ),
     "checks": (
         "stimuli_builder.clips.cli",
-        "Make the clips of a study's motion checks, whose content shows in motion alone.",
+        "Generate the clips of a study's motion checks, whose content is visible only in motion.",
     ),
     "clip": (
         "stimuli_builder.clips.cli",
@@ -70,11 +70,11 @@ COMMANDS = {
     ),
     "manifest": (
         "stimuli_builder.clips.cli",
-        "Write manifest.json for a folder of clips of your own, so that a server can take them.",
+        "Write manifest.json for a folder of your own clips, so that a server can use them.",
     ),
     "strips": (
         "stimuli_builder.clips.cli",
-        "Write the shipped characters at 33 closures as picture strips, for the dashboard's blinks page.",
+        "Write picture strips of the shipped characters at 33 closures, for the dashboard's blinks page.",
     ),
     "scope": (
         "stimuli_builder.sync_patch.cli",

@@ -21,7 +21,7 @@ def compiled(kernel: Kernel) -> Kernel:
 
 
 def compiled_over(*called: ModuleType) -> Callable[[Kernel], Kernel]:
-    """Compile a kernel that holds kernels or numbers of other files: made anew where one of them is edited.
+    """Compile a kernel that holds kernels or numbers of other files: compiled again if one of them is edited.
 
     numba stamps a cache with the time and size of the caller's file; theirs are added.
     """

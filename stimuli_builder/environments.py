@@ -1,4 +1,4 @@
-"""Python environments of their own for libraries that cannot live beside ours, made at first use by uv."""
+"""Separate Python environments for libraries that conflict with ours, created at first use by uv."""
 
 import os
 import shutil
@@ -53,12 +53,12 @@ def ensure_environment(folder: Path, python: str, requirements: Path, what: str,
 
 
 def uv() -> list[str]:
-    """The command uv, on the PATH or beside the running Python."""
+    """The command uv, on the PATH or in the folder of the running Python."""
     beside = Path(sys.executable).with_name("uv")
     path = shutil.which("uv") or (str(beside) if beside.exists() else None)
     if path is None:
         raise InputError(
-            "uv is not on the PATH: install it (pip install uv); it makes the environment needed"
+            "uv is not on the PATH: install it (pip install uv); it creates the required environment"
         )
     return [path]
 

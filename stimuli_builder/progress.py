@@ -1,4 +1,4 @@
-"""Progress bars on stderr; silent where stderr is no terminal."""
+"""Progress bars on stderr; silent if stderr is not a terminal."""
 
 import sys
 from collections.abc import Callable, Iterator

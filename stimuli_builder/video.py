@@ -1,4 +1,4 @@
-"""Video frames through PyAV: upright pictures, grey or RGB, read on a thread of their own."""
+"""Video frames through PyAV: upright pictures, gray or RGB, read on a separate thread."""
 
 from array import array
 from collections.abc import Callable, Iterator, Sequence
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from experiments.errors import InputError
 from experiments.files import remove_quietly, temporary_beside
 
-# When the frames of a video are shown, told from its packets; a varying rate; an end that is cut off.
+# When the frames of a video are shown, from its packets; a varying rate; a truncated end.
 
 Times = NDArray[np.float64]
 Stamps = NDArray[np.int64]
@@ -57,7 +57,7 @@ def read_clock(path: Path, container: Any, stream: Any) -> Clock:
     declared = int(stream.frames or 0)
     if declared and len(stamps) < declared and _held_frames(path) < declared:
         raise DamagedFileError(
-            f"{path}: truncated, it declares {declared} frames and holds {len(stamps)}; copy the file again"
+            f"{path}: truncated: it declares {declared} frames but has {len(stamps)}; copy the file again"
         )
     clock = clock_of(stamps, tick_s, float(1 / (stream.average_rate or 25)))
     declared_s = (container.duration or 0) / av.time_base
@@ -147,7 +147,7 @@ LUMA_FIRST = ("yuv4", "yuvj4", "nv12", "nv21", "gray8", "yuva4")
 
 @dataclass(frozen=True)
 class VideoInfo:
-    """What a scan of the packets tells, before a single frame is decoded.
+    """What a scan of the packets reveals, before a single frame is decoded.
 
     Attributes
     ----------
@@ -179,7 +179,7 @@ class VideoInfo:
 def open_video(path: Path) -> Iterator[tuple[Any, Any]]:
     """Open a video: its container and first video stream, or one clear line."""
     if not path.is_file():
-        raise InputError(f"{path}: expected a video file, found none; check the path")
+        raise InputError(f"{path}: there is no such video file; check the path")
     try:
         container = av.open(str(path))
     except (av.error.FFmpegError, ValueError) as error:
@@ -187,9 +187,9 @@ def open_video(path: Path) -> Iterator[tuple[Any, Any]]:
         raise InputError(f"{path}: not a video that can be read ({reason(error)}){empty}") from error
     with container:
         if container.format.name.endswith(PICTURE_FORMATS) and _packets(path, 2) < 2:
-            raise InputError(f"{path}: expected a video, this is a single picture")
+            raise InputError(f"{path}: expected a video, but this is a single picture")
         if not container.streams.video:
-            raise InputError(f"{path}: expected a video stream, the file has none")
+            raise InputError(f"{path}: expected a video stream, but the file has none")
         stream = container.streams.video[0]
         stream.thread_type = "AUTO"
         yield container, stream
@@ -212,7 +212,7 @@ def grey(frame: Any) -> Picture:
 
 
 def rgb(frame: Any) -> Picture:
-    """Colours of a decoded frame, uint8 (height, width, 3), upright as players show it."""
+    """Colors of a decoded frame, uint8 (height, width, 3), upright as players show it."""
     return _upright(frame, frame.to_ndarray(format="rgb24"))
 
 
@@ -246,7 +246,8 @@ def read_frames(info: VideoInfo, numbers: Sequence[int]) -> dict[int, Picture]:
     outside = [number for number in numbers if not 0 <= number < info.frame_count]
     if outside:
         raise InputError(
-            f"{info.path}: frame {outside[0]} is asked for, the video has frames 0 to {info.frame_count - 1}"
+            f"{info.path}: frame {outside[0]} was requested, but the video has frames 0 to "
+            f"{info.frame_count - 1}"
         )
     pictures: dict[int, Picture] = {}
     with open_video(info.path) as (container, stream):
@@ -396,13 +397,13 @@ def _ends_early(path: Path) -> bool:
 
 
 def declared_frames(info: VideoInfo) -> int:
-    """How many frames a file declares, or its declared duration holds; 0 where it tells neither."""
+    """How many frames a file declares, or its declared duration holds; 0 if it declares neither."""
     with open_video(info.path) as (container, stream):
         return int(stream.frames or round(_declared_s(container, stream) * info.fps))
 
 
 def _declared_s(container: Any, stream: Any) -> float:
-    """Duration of the video stream in seconds; of the whole file, sound included, where it tells no other."""
+    """Duration of the video stream in seconds; of the whole file, sound included, if it declares no other."""
     if stream.duration:
         return float(stream.duration * stream.time_base)
     try:
@@ -445,7 +446,7 @@ def check_video_name(path: Path) -> None:
 class VideoWriter:
     """Writes H.264 into a temporary name and renames it when the block ends without an error.
 
-    Pictures are uint8: (height, width) grey or (height, width, 3) RGB; sides are even.
+    Pictures are uint8: (height, width) gray or (height, width, 3) RGB; sides are even.
     """
 
     def __init__(
@@ -467,7 +468,7 @@ class VideoWriter:
         self._stream.codec_context.gop_size = max(1, round(fps))
 
     def write(self, picture: Picture) -> None:
-        """Append one grey or RGB picture."""
+        """Append one gray or RGB picture."""
         form = "gray" if picture.ndim == 2 else "rgb24"
         self._encode(av.VideoFrame.from_ndarray(picture, format=form))
 

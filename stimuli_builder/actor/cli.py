@@ -18,20 +18,22 @@ def register(app: typer.Typer) -> None:
 
 def actor(
     out: Annotated[Path, typer.Option(help="Video to write (MP4, H.264, 512 x 384).")],
-    truth: Annotated[Path | None, typer.Option(help="Exact truth of every frame (CSV).")] = None,
+    truth: Annotated[Path | None, typer.Option(help="Exact ground truth of every frame (CSV).")] = None,
     labels: Annotated[
         Path | None, typer.Option(help="Label file of frames chosen for variety (JSON).")
     ] = None,
-    seconds: Annotated[float, typer.Option(help="Length of the recording.")] = 20.0,
+    seconds: Annotated[float, typer.Option(help="Length of the recording in seconds.")] = 20.0,
     fps: Annotated[float, typer.Option(help="Frames per second.")] = 300.0,
-    seed: Annotated[int, typer.Option(help="Same seed, same face and same recording.", min=0)] = 1,
-    noise: Annotated[float, typer.Option(help="Sensor noise, sd in grey levels.")] = 2.0,
+    seed: Annotated[
+        int, typer.Option(help="Random seed; the same seed gives the same face and recording.", min=0)
+    ] = 1,
+    noise: Annotated[float, typer.Option(help="Sensor noise, SD in gray levels.")] = 2.0,
     label_frames: Annotated[int, typer.Option(help="Frames in the label file.", min=3, max=500)] = 20,
     label_noise: Annotated[
-        float, typer.Option(help="Error of the labels, sd in pixels of x and of y.", min=0)
+        float, typer.Option(help="Error of the labels, SD of x and y in pixels.", min=0)
     ] = 0.0,
 ) -> None:
-    """Generate a high-speed recording of a synthetic actor, with exact truth and label files.
+    """Generate a high-speed recording of a synthetic actor, with exact ground truth and label files.
 
     Blinks, head drift, gaze, light and sensor noise follow published statistics. The truth has the columns of
     a track up to the distances, then closure (0 open, 1 closed, mean of both eyes), blink (number from 1,
@@ -78,4 +80,4 @@ def _save_labels(person: "Actor", path: Path, video: str, count: int, noise: flo
         video,
         f"synthetic actor, label noise sd {noise:g} px",
     )
-    print(f"{path}: {len(frames)} labelled frames")
+    print(f"{path}: {len(frames)} labeled frames")

@@ -73,7 +73,7 @@ def eye_landmarks(closure: float) -> Values:
 
 
 def head_matrix(head: Values) -> Values:
-    """The 2 x 3 matrix from the face at rest to the picture, turning about the picture's centre."""
+    """The 2 x 3 matrix from the face at rest to the picture, turning about the picture's center."""
     shift_x, shift_y, turn, scale = head
     centre = np.array(PICTURE_SIZE) / 2
     a, b = scale * np.cos(turn), scale * np.sin(turn)

@@ -27,7 +27,7 @@ from stimuli_builder.video import Picture, VideoWriter
 # When and how the synthetic actor blinks, holds the head and looks: published statistics, one seed.
 #
 # Sources: VanderWerf et al. 2003 (phases), Doughty 2001 (rate), Ousler et al. 2014 and the paper (complete
-# and partial blinks); the table stands in docs/explanation/tracking.md.
+# and partial blinks); the table is in docs/explanation/tracking.md.
 
 Values = NDArray[np.float64]
 
@@ -192,7 +192,7 @@ NOISE_TILE = (1024, 1280)
 
 @dataclass(frozen=True)
 class ActorOptions:
-    """What `stimuli actor` is asked for; noise in grey levels (sd)."""
+    """What `stimuli actor` is asked for; noise in gray levels (sd)."""
 
     seconds: float = 20.0
     fps: float = 300.0
@@ -205,7 +205,7 @@ class ActorOptions:
         if not 10 <= self.fps <= 2000:
             raise InputError(f"--fps {self.fps:g}: expected 10 to 2000")
         if not 0 <= self.noise <= 50:
-            raise InputError(f"--noise {self.noise:g}: expected 0 to 50 grey levels")
+            raise InputError(f"--noise {self.noise:g}: expected 0 to 50 gray levels")
 
     @property
     def frame_count(self) -> int:
@@ -265,7 +265,7 @@ class Actor:
         picture[y0:y1, x0:x1] = part
 
     def _exposures(self, number: int, eye: int) -> Values:
-        """Closures over the time the shutter is open, centred on the frame's time: one if the lid rests."""
+        """Closures over the time the shutter is open, centered on the frame's time: one if the lid rests."""
         reach = int(FINE * SHUTTER / 2)
         middle = number * FINE + FINE // 2
         open_time = self._fine.closure[max(middle - reach, 0) : middle + reach + 1, eye]

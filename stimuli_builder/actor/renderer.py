@@ -55,7 +55,7 @@ def clamp(value):
 
 @compiled
 def eyeball(u, v, top, low, gaze_u, gaze_v, iris):
-    """Grey level of the eyeball behind the opening."""
+    """Gray level of the eyeball behind the opening."""
     du, dv = u - gaze_u, v + 0.035 - gaze_v
     radius = hypot(du, dv) / IRIS_RADIUS
     colour = 196.0 - 600.0 * abs(u * u * u) - 440.0 * v * v
@@ -168,7 +168,7 @@ def draw_eye(
             cover[row, column] += np.float32(share * opening)
 
 
-# Procedural textures of the synthetic face: skin with brows and nose, lid skin, iris; grey 0 to 255.
+# Procedural textures of the synthetic face: skin with brows and nose, lid skin, iris; gray 0 to 255.
 
 Texture = NDArray[np.float32]
 

@@ -1,4 +1,4 @@
-"""New blinks: the PCA blink model (paper 3.3.2), three phases modelled apart, and the textbook blinks."""
+"""New blinks: the PCA blink model (paper 3.3.2), three phases modeled apart, and the textbook blinks."""
 
 import json
 from collections.abc import Sequence
@@ -33,7 +33,7 @@ MAX_DRAWS = 1000
 
 @dataclass(frozen=True, eq=False)
 class BlinkModel:
-    """Principal components of length-normalised blinks, with their two scaling factors.
+    """Principal components of length-normalized blinks, with their two scaling factors.
 
     A row of the data matrix is [closure of the closing phase, of the opening phase (of the second eye
     likewise, where there is one), weight x down-phase scale, weight x up-phase scale].
@@ -48,11 +48,11 @@ class BlinkModel:
     explained : (k,) array
         Share of the variance each kept component carries.
     down_frames, up_frames : int
-        Mean phase lengths at 300 fps, to which blinks are normalised.
+        Mean phase lengths at 300 fps, to which blinks are normalized.
     scale_weight : float
         Weight of the scaling-factor columns, see `fit`.
     eyes : int
-        1, or 2 where left/right asymmetry is modelled.
+        1, or 2 where left/right asymmetry is modeled.
     trained_on : tuple of str
         Names of the training profiles.
     """
@@ -207,12 +207,14 @@ class BlinkModel:
             )
         except OSError as error:
             raise InputError(
-                f"{path}: cannot be read ({error.strerror}); `stimuli model fit` makes a model"
+                f"{path}: cannot be read ({error.strerror}); create a model with `stimuli model fit`"
             ) from error
         except InputError:
             raise
         except (ValueError, KeyError, TypeError) as error:
-            raise InputError(f"{path}: not a blink model ({error}); `stimuli model fit` makes one") from error
+            raise InputError(
+                f"{path}: not a blink model ({error}); create one with `stimuli model fit`"
+            ) from error
 
 
 @lru_cache(maxsize=1)
@@ -243,7 +245,7 @@ def _signed(rows: Array) -> Array:
     return rows * np.where(largest < 0, -1.0, 1.0)[:, None]
 
 
-# New blinks that close as recorded ones do: three phases modelled apart, drawn between neighbours.
+# New blinks that close as recorded ones do: three phases modeled apart, drawn between neighbors.
 #
 # The PCA model (paper 3.3.2) scales closing and opening to one length and draws coefficients evenly: closed
 # phases of different lengths cancel in the mean, so its blinks close less than the recorded ones and turn
@@ -291,7 +293,7 @@ class PhaseModel:
     def sample(
         self, duration_frames_30fps: float | None, rng: np.random.Generator, *, profile_id: str
     ) -> BlinkProfile:
-        """Draw a blink between a recorded one and one of its nearest neighbours.
+        """Draw a blink between a recorded one and one of its nearest neighbors.
 
         Lengths and peak are w a + (1 - w) b + noise, forms w A + (1 - w) B; w is even over 0.5 to 1, a and b
         two recorded blinks of which b is one of the three nearest to a. Given a duration (frames at 30 fps)

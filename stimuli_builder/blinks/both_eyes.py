@@ -25,13 +25,13 @@ def asymmetry_lines(
     lines = []
     if len(eyes) > 2 and pair is None and eyes[0].recognised is not None:
         lines.append(
-            f"of {len(eyes)} columns ({few(columns)}) no two are a left and a right eye by their names: each "
-            "is judged by itself, and an eye that moves less is not told"
+            f"no two of the {len(eyes)} columns ({few(columns)}) are named as left and right eye: each is "
+            "judged separately, and an eye that moves less is not reported"
         )
     for eye in eyes:
         winks_s = _winks_s(eye, rejected)
         if winks_s:
-            alone = f"{counted(len(winks_s), 'blink')} of this one alone, {fellow} open"
+            alone = f"{counted(len(winks_s), 'blink')} of this eye only, {fellow} open"
             lines.append(f"{_label(eye)}: {alone}, first at {winks_s[0]:.1f} s")
         side = None if eye.recognised is None else eye.recognised.asymmetry
         # An eye that blinks more often than the other is not the one that does not move.
@@ -46,7 +46,7 @@ def asymmetry_lines(
             how = f"blinks apart from {fellow} ({counted(len(eye.blinks), 'blink')}, none at {others})"
         else:
             how = f"does not move beyond its noise at {others}"
-        lines.append(f"{_label(eye)}: {how}; {fellow} was judged by itself")
+        lines.append(f"{_label(eye)}: {how}; {fellow} was judged separately")
     return lines
 
 

@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 
 CLASSIFIER = "classifier"
 EXAMPLES = """
-Label the blinks of a series (eye aspect ratio or distance) or of a track, and measure them.
+Detect and measure the blinks in a series (eye aspect ratio or distance) or a track.
 
-The series is a CSV with a column of distances; a track's distance columns are found by themselves (left and
-right are sides of the picture: left is the person's right eye, unless it is mirrored). Columns of
-closure (eyeBlinkLeft, AU45_r) are turned round. Blinks,
-squints, gaze shifts and closed eyes are told apart at any rate from 15 to 1,000 frames a second.
-BLINKS.csv gets a row a blink; the blinks' profiles (closure at 300 fps) and a table of all events are
-written beside it. --preset chooses the paper's rule instead; its frame counts are at 300 fps and scale.
+The series is a CSV with a column of distances. A track's distance columns are found automatically. Left and
+right are sides of the picture: left is the person's right eye, unless the picture is mirrored. Columns of
+closure (eyeBlinkLeft, AU45_r) are inverted. Blinks, squints, gaze shifts and closed eyes are distinguished at
+15 to 1,000 frames per second. BLINKS.csv has one row per blink. The blinks' profiles (closure at 300 fps) and
+a table of all events are written to the same folder. --preset selects the paper's rule instead; its frame
+counts refer to 300 fps and are scaled.
 
 Examples:
 
@@ -49,95 +49,106 @@ def _register_blinks(app: typer.Typer) -> None:
 def blinks(
     series: Annotated[Path, typer.Argument(help="Series or track CSV.")],
     out: Annotated[Path, typer.Option(help="Blinks table to write (CSV).")],
-    column: Annotated[list[str] | None, typer.Option(help="Column to label; repeat for both eyes.")] = None,
-    fps: Annotated[float | None, typer.Option(help="Frame rate; from the column time_s without it.")] = None,
+    column: Annotated[list[str] | None, typer.Option(help="Column to use; repeat for both eyes.")] = None,
+    fps: Annotated[float | None, typer.Option(help="Frame rate. Default: from the column time_s.")] = None,
     profiles: Annotated[
         Path | None,
         typer.Option(
-            help="Profiles table to write (empty without a blink); OUT with the ending .profiles.csv "
-            "without it."
+            help=(
+                "Profiles table to write (empty if there is no blink). Default: OUT with the ending "
+                ".profiles.csv."
+            )
         ),
     ] = None,
     preset: Annotated[
         str,
         typer.Option(
-            help="How blinks are told: 'classifier' (any rate), or the paper's rule with rest as part of the "
-            "peak 'velocity', as part of the opening ('relative'), or 0.1 px a frame ('paper')."
+            help=(
+                "How blinks are detected: 'classifier' (any rate), or the paper's rule with rest as a "
+                "fraction of the peak 'velocity', of the opening ('relative'), or as 0.1 px per frame "
+                "('paper')."
+            )
         ),
     ] = "classifier",
     gradient_peak: Annotated[
-        float | None, typer.Option(help="Gradient at rest, as part of the phase's greatest.")
+        float | None, typer.Option(help="Gradient at rest, as a fraction of the phase's maximum.")
     ] = None,
     gradient: Annotated[
-        float | None, typer.Option(help="Gradient at rest, as part of the opening per frame at 300 fps.")
+        float | None,
+        typer.Option(help="Gradient at rest, as a fraction of the opening per frame at 300 fps."),
     ] = None,
     gradient_px: Annotated[
         float | None, typer.Option(help="Gradient at rest in px per frame at 300 fps.")
     ] = None,
     opening_px: Annotated[
-        float | None, typer.Option(help="Opening in px that --gradient-px supposes for a series not in px.")
+        float | None,
+        typer.Option(help="Opening in px that --gradient-px assumes for a series that is not in px."),
     ] = None,
     minimum_depth: Annotated[
-        float | None, typer.Option(help="Least depth of a blink as part of the opening; 0.23 without it.")
+        float | None,
+        typer.Option(help="Minimum depth of a blink, as a fraction of the opening. Default: 0.23."),
     ] = None,
     closed: Annotated[
         float | None,
         typer.Option(
-            help="Distance at lid contact; from the deepest blinks without it. Eyes without a blink need it "
-            "for --curve and --lids."
+            help=(
+                "Distance at lid contact. Default: from the deepest blinks. Required for --curve and --lids "
+                "if an eye has no blink."
+            )
         ),
     ] = None,
-    complete_from: Annotated[float, typer.Option(help="Closure from which a blink is complete.")] = 0.95,
+    complete_from: Annotated[float, typer.Option(help="Minimum closure of a complete blink.")] = 0.95,
     allow_gaps: Annotated[
         bool | None,
         typer.Option(
-            "--allow-gaps/--no-gaps", help="Label round long gaps; tracks allow them, plain series not."
+            "--allow-gaps/--no-gaps", help="Allow long gaps in a series (always allowed in a track)."
         ),
     ] = None,
     events: Annotated[
         Path | None,
-        typer.Option(help="Table of all lid events; OUT with the ending .events.csv without it."),
+        typer.Option(help="Table of all lid events. Default: OUT with the ending .events.csv."),
     ] = None,
     resample: Annotated[
-        bool, typer.Option("--resample", help="Bring uneven times to an even rate first; holes are not seen.")
+        bool,
+        typer.Option("--resample", help="Resample uneven times to a constant rate first; gaps stay missing."),
     ] = False,
     inverted: Annotated[
         bool | None,
         typer.Option(
             "--inverted/--not-inverted",
-            help="Whether high is shut (closures, blendshapes); from the column's name without it.",
+            help="Whether high values mean closed (closures, blendshapes). Default: from the column's name.",
         ),
     ] = None,
     summary: Annotated[Path | None, typer.Option(help="Summary to write (JSON).")] = None,
     report: Annotated[
         Path | None,
-        typer.Option(help="Page to write (HTML): rates, phases, speeds, both eyes, quality, curves."),
+        typer.Option(help="Report to write (HTML): rates, phases, speeds, both eyes, quality, curves."),
     ] = None,
     lids: Annotated[
-        Path | None, typer.Option(help="Every frame's closure, and mm and degrees with --scale (CSV).")
+        Path | None, typer.Option(help="Closure of every frame (CSV); with --scale also mm and degrees.")
     ] = None,
     scale: Annotated[
         str | None,
         typer.Option(
-            help="mm in a pixel (of a card in the picture), 'inter-ocular' (60 mm), 'eye-width' (28.2 mm) "
-            "or 'iris:I.csv' (11.7 mm, by a table of 'stimuli iris')."
+            help=(
+                "mm per pixel (from a card in the picture), 'inter-ocular' (60 mm), 'eye-width' (28.2 mm) "
+                "or 'iris:I.csv' (11.7 mm, from a table of 'stimuli iris')."
+            )
         ),
     ] = None,
     curve: Annotated[
-        Path | None, typer.Option(help="The recording itself as an animation curve, looking down included.")
+        Path | None, typer.Option(help="The recording as an animation curve, including downward gaze.")
     ] = None,
     curve_format: Annotated[
         str, typer.Option(help="Format of --curve, as of 'stimuli model export --format'.")
     ] = "csv",
     plot: Annotated[
-        Path | None, typer.Option(help="The labelled series as a figure (PNG, SVG, PDF).")
+        Path | None, typer.Option(help="Figure of the series with its blinks (PNG, SVG, PDF).")
     ] = None,
     plot_aligned: Annotated[
-        Path | None, typer.Option(help="Aligned blinks and histograms as a figure.")
+        Path | None, typer.Option(help="Figure of aligned blinks and histograms.")
     ] = None,
-    review: Annotated[
-        Path | None, typer.Option(help="Review file (CSV), kept up to date with decisions.")
-    ] = None,
+    review: Annotated[Path | None, typer.Option(help="Review file (CSV); decisions are added to it.")] = None,
     reject: Annotated[
         list[str] | None, typer.Option(help="N=reason or COLUMN:N=reason; needs --review.")
     ] = None,
@@ -188,12 +199,12 @@ def _options(
     if name == CLASSIFIER:
         if given or opening_px is not None or minimum_depth is not None:
             raise InputError(
-                "the --gradient options, --opening-px and --minimum-depth belong to the paper's rule: "
-                "add --preset velocity, relative or paper"
+                "the --gradient options, --opening-px and --minimum-depth need the paper's rule: add "
+                "--preset velocity, relative or paper"
             )
         return preset("velocity")
     if len(given) > 1:
-        raise InputError("give one of --gradient-peak, --gradient and --gradient-px")
+        raise InputError("use only one of --gradient-peak, --gradient and --gradient-px")
     options = preset(name)
     if given:
         options = replace(options, gradient_peak=peak, gradient_opening=opening, gradient_px=px)
@@ -205,7 +216,7 @@ def _options(
 # `stimuli model`: fit the PCA blink model, sample new blinks, export animation curves.
 
 MODEL_HELP = """
-The PCA blink model: learn from recorded blinks, make new ones, hand curves to animation programs.
+The PCA blink model: learn from recorded blinks, generate new ones, export curves for animation.
 
 Examples:
 
@@ -219,15 +230,13 @@ Examples:
 """
 
 ModelOption = Annotated[
-    Path | None, typer.Option(help="Model (JSON) that `stimuli model fit` wrote; the shipped one without it.")
+    Path | None, typer.Option(help="Model (JSON) from `stimuli model fit`. Default: the shipped model.")
 ]
 
 
 PcaOption = Annotated[
     bool,
-    typer.Option(
-        "--pca", help="Draw from the components of the PCA model, as the paper does and Exp 1-3 are built."
-    ),
+    typer.Option("--pca", help="Sample the components of the PCA model, as in the paper and Exp 1-3."),
 ]
 
 
@@ -244,30 +253,30 @@ def _register_model(app: typer.Typer) -> None:
 def fit(
     profiles: Annotated[
         list[Path] | None,
-        typer.Argument(
-            help="Tables of profiles that `stimuli blinks` wrote; the shipped library without any."
-        ),
+        typer.Argument(help="Tables of profiles from `stimuli blinks`. Default: the shipped library."),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Model to write (JSON).")] = None,
     components: Annotated[
         int | None,
         typer.Option(
             min=1,
-            help="Principal components to keep; where not given 5, or one fewer than there are profiles.",
+            help="Principal components to keep. Default: 5, or one fewer than there are profiles.",
             show_default=False,
         ),
     ] = None,
     eyes: Annotated[
         str,
         typer.Option(
-            help="'each': every eye's blink by itself; 'both': left and right together, asymmetry kept; "
-            "'auto': both for a table with three or more blinks seen in both eyes."
+            help=(
+                "'each': each eye separately; 'both': left and right together, keeping asymmetry; 'auto': "
+                "'both' if the table has at least three blinks of both eyes."
+            )
         ),
     ] = "auto",
     plot: Annotated[Path | None, typer.Option(help="Figure of the model (PNG, SVG, PDF).")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the new blinks in the figure.", min=0)] = 1,
 ) -> None:
-    """Fit the model to recorded profiles and tell how much of their variance it keeps.
+    """Fit the model to recorded profiles and print how much of their variance it explains.
 
     Example: stimuli model fit blinks.profiles.csv --out model.json --plot model.png
     """
@@ -280,13 +289,15 @@ def sample(
     out: Annotated[Path, typer.Option(help="Table of profiles to write (CSV).")],
     count: Annotated[int, typer.Option(help="How many blinks.", min=1, max=100_000)] = 10,
     duration: Annotated[
-        float | None, typer.Option(help="Length of each blink in frames at 30 fps; as drawn without it.")
+        float | None, typer.Option(help="Length of each blink in frames at 30 fps. Default: as sampled.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed: the same seed gives the same blinks.", min=0)] = 1,
-    full_closure: Annotated[bool, typer.Option("--full-closure", help="Stretch each to closure 1.")] = False,
+    seed: Annotated[int, typer.Option(help="Random seed; the same seed gives the same blinks.", min=0)] = 1,
+    full_closure: Annotated[
+        bool, typer.Option("--full-closure", help="Stretch each blink to closure 1.")
+    ] = False,
     model: ModelOption = None,
     pca: PcaOption = False,
-    plot: Annotated[Path | None, typer.Option(help="The new blinks as a figure.")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Figure of the new blinks.")] = None,
 ) -> None:
     """Make new blinks that close as recorded ones do, or by the PCA model (--pca, --model).
 
@@ -300,7 +311,7 @@ def sample(
 def textbook(
     out: Annotated[Path, typer.Option(help="Table of profiles to write (CSV).")],
     duration: Annotated[float, typer.Option(help="Length in frames at 30 fps.")] = 9.0,
-    plot: Annotated[Path | None, typer.Option(help="Figure: the four curves beside a model blink.")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Figure of the four curves and a model blink.")] = None,
 ) -> None:
     """Write the four textbook curves of one length: linear and ease-in/ease-out, symmetric and asymmetric.
 
@@ -320,27 +331,32 @@ def export(
         ),
     ] = "csv",
     fps: Annotated[
-        float | None, typer.Option(help="Frame rate of the curve; 300 for csv and json, else 30, without it.")
+        float | None,
+        typer.Option(help="Frame rate of the curve. Default: 300 for csv and json, otherwise 30."),
     ] = None,
     count: Annotated[
         int, typer.Option(help="Blinks from the model, at natural intervals.", min=1, max=10_000)
     ] = 1,
-    duration: Annotated[float | None, typer.Option(help="Length of each in frames at 30 fps.")] = None,
-    seed: Annotated[int, typer.Option(help="Seed of blinks and intervals.", min=0)] = 1,
+    duration: Annotated[float | None, typer.Option(help="Length of each blink in frames at 30 fps.")] = None,
+    seed: Annotated[int, typer.Option(help="Random seed of blinks and intervals.", min=0)] = 1,
     profile: Annotated[
         list[str] | None,
-        typer.Option(help="A shipped profile instead of the model's, by name; repeat for more."),
+        typer.Option(help="Name of a shipped profile to use instead of the model; repeatable."),
     ] = None,
     profiles: Annotated[
-        Path | None, typer.Option(help="All profiles of a table instead of the model's.")
+        Path | None, typer.Option(help="Use all profiles of a table instead of the model.")
     ] = None,
     model: ModelOption = None,
     pca: PcaOption = False,
-    full_closure: Annotated[bool, typer.Option("--full-closure", help="Stretch each to closure 1.")] = False,
-    lead_s: Annotated[float, typer.Option(help="Seconds open before the first and after the last.")] = 0.0,
-    target: Annotated[str, typer.Option(help="Object (Blender) or node (Maya) that has the shapes.")] = "",
+    full_closure: Annotated[
+        bool, typer.Option("--full-closure", help="Stretch each blink to closure 1.")
+    ] = False,
+    lead_s: Annotated[
+        float, typer.Option(help="Seconds with open eyes before the first blink and after the last.")
+    ] = 0.0,
+    target: Annotated[str, typer.Option(help="Object (Blender) or node (Maya) with the shapes.")] = "",
     left: Annotated[str, typer.Option(help="Name of the left eye's shape or attribute.")] = "eyeBlinkLeft",
-    right: Annotated[str, typer.Option(help="Name of the right eye's.")] = "eyeBlinkRight",
+    right: Annotated[str, typer.Option(help="Name of the right eye's shape or attribute.")] = "eyeBlinkRight",
 ) -> None:
     """Export blinks as an animation curve: from the model, from the library, or from a table of profiles.
 
@@ -369,7 +385,7 @@ def export(
     )
 
 
-# `stimuli profiles`: the shipped library of blink profiles, and how it is measured anew.
+# `stimuli profiles`: the shipped library of blink profiles, and how it is measured again.
 
 LIBRARY_HELP = """
 The blink profiles that ship with the project.
@@ -427,7 +443,7 @@ def list_profiles() -> None:
 def plot_profiles(
     figure: Annotated[Path, typer.Argument(help="Figure to write (PNG, SVG, PDF).")],
 ) -> None:
-    """Draw the library: aligned blinks with their mean, durations, amplitudes; a row a recording.
+    """Draw the library: aligned blinks with their mean, durations, amplitudes; one row per recording.
 
     Example: stimuli profiles plot library.png
     """
@@ -443,14 +459,14 @@ def plot_profiles(
 def build_library(
     data: Annotated[Path, typer.Option(help="Folder with the recordings' series.")],
     out: Annotated[
-        Path | None, typer.Option(help="Folder to write; the shipped library's without it.")
+        Path | None, typer.Option(help="Folder to write. Default: the shipped library's folder.")
     ] = None,
     recordings: Annotated[
-        Path | None, typer.Option(help="List of recordings (TOML); the shipped one without it.")
+        Path | None, typer.Option(help="List of recordings (TOML). Default: the shipped list.")
     ] = None,
     components: Annotated[int, typer.Option(help="Components of the model.")] = 5,
 ) -> None:
-    """Measure the library anew: profiles.csv, closures.csv and the model fitted to them, model.json.
+    """Measure the library again: profiles.csv, closures.csv and the fitted model, model.json.
 
     Example: stimuli profiles build --data recordings --out library
     """
@@ -459,7 +475,7 @@ def build_library(
 
     folder = out or LIBRARY_FOLDER
     if not folder.is_dir():
-        raise InputError(f"{folder}: the folder does not exist; make it first")
+        raise InputError(f"{folder}: the folder does not exist; create it first")
     entries = read_recordings(recordings or RECORDINGS_FILE)
     measured = [profile for entry in entries for profile in recorded_profiles(entry, data)]
     write_profiles(folder, measured, entries)
@@ -468,7 +484,7 @@ def build_library(
     typer.echo(
         f"{eye} eye profiles and {len(measured) - eye} pairs from {len(entries)} recordings -> {folder}"
     )
-    typer.echo(f"model: {components} components keep {model.variance_kept:.1%} of the variance")
+    typer.echo(f"model: {components} components explain {model.variance_kept:.1%} of the variance")
 
 
 # The command groups of blinks: `stimuli blinks`, `stimuli model` and `stimuli profiles`.

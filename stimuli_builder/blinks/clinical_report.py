@@ -47,7 +47,7 @@ def report_text(
     frame : DataFrame
         The blinks table, reviewed.
     doubts : sequence of str
-        Lines about the recording's quality beside those that are counted here.
+        Lines about the recording's quality in addition to those that are counted here.
     """
     accepted = frame[frame["accepted"]]
     environment = Environment(
@@ -62,7 +62,7 @@ def report_text(
         quality=quality_rows(eyes),
         pairs=[*pair_lines(eyes, accepted), *asymmetry_lines(eyes, _rejected(frame))],
         doubts=list(doubts),
-        scale=None if scale is None else f"{scale.mm_per_px:.4f} mm in a pixel: {scale.rule}",
+        scale=None if scale is None else f"{scale.mm_per_px:.4f} mm per pixel: {scale.rule}",
         nearly_closed=f"{NEARLY_CLOSED:.0%}",
         figures=[_svg(series_figure(eyes, _rejected(frame))), _svg(sequence_figure(accepted))],
     )
@@ -80,7 +80,7 @@ def blink_rows(eyes: Sequence[EyeBlinks], accepted: pd.DataFrame, scale: Scale |
     pauses = [pd.Series(np.diff(np.sort(part["minimum_s"]))) for part in parts]
     return [
         Row("blinks", tuple(str(len(part)) for part in parts)),
-        Row("blinks a minute", rates),
+        Row("blinks per minute", rates),
         Row("complete / partial", tuple(_complete(part) for part in parts)),
         *_phase_rows(parts),
         *_speed_rows(parts, scale, is_px=eyes[0].series.is_px),
@@ -154,7 +154,7 @@ def quality_rows(eyes: Sequence[EyeBlinks]) -> list[Row]:
     """What the recording is worth: length, rate, gaps, and blinks that could not be measured."""
     return [
         Row("frames", tuple(f"{e.series.distance.size:,}" for e in eyes)),
-        Row("frames a second", tuple(f"{e.series.fps:g}" for e in eyes)),
+        Row("frames per second", tuple(f"{e.series.fps:g}" for e in eyes)),
         Row("frames without a value", tuple(f"{e.series.missing_frames:,}" for e in eyes)),
         Row("frames in filled gaps", tuple(f"{e.series.bridged_frames:,}" for e in eyes)),
         Row("blinks that could not be measured", tuple(str(len(e.refused)) for e in eyes)),
@@ -175,15 +175,16 @@ def pair_lines(eyes: Sequence[EyeBlinks], accepted: pd.DataFrame) -> list[str]:
         if len(columns) != 2:
             return []
         return [
-            "the columns' names do not say which eye is which (EAR_left, EAR_right): blinks are not paired"
+            "the column names do not identify left and right (such as EAR_left, EAR_right): blinks are not "
+            "paired"
         ]
     columns = [columns[k] for k in sorted(pair)]
     pairs = accepted.dropna(subset=["partner"])
     first = pairs[pairs["column"] == columns[0]]
     alone = [int((accepted["column"] == c).sum() - (pairs["column"] == c).sum()) for c in columns]
     lines = [
-        f"{counted(len(first), 'blink')} in both eyes; {alone[0]} in {columns[0]} alone, "
-        f"{alone[1]} in {columns[1]} alone"
+        f"{counted(len(first), 'blink')} in both eyes; {alone[0]} only in {columns[0]}, {alone[1]} only in "
+        f"{columns[1]}"
     ]
     if len(first):
         lines.append(

@@ -30,7 +30,7 @@ _SIDED = re.compile(
 )
 """Words written together: lefteye, eyeblinkleft; not leftover, rightmost."""
 _NO_SIDE_BEFORE = re.compile(r"[0-9]+|squared")
-"""What a single letter before it is no side of: L2, r_squared."""
+"""What makes a single letter before it not a side: L2, r_squared."""
 _CLOSURES = frozenset({"closure", "closedness", "au45"})
 _SHUT = frozenset({"blink", "closed"})
 """Words of columns that are high where the lids are shut: ARKit's eyeBlinkLeft, OpenFace's AU45_r."""
@@ -50,7 +50,7 @@ def words_of(column: str) -> list[str]:
 
 
 def eye_of(column: str) -> Eye | None:
-    """Tell the eye from the words of a column's name: l, left, r, right; else None."""
+    """The eye named by the words of a column's name: l, left, r, right; else None."""
     if _ACTION_UNIT.match(column):
         return None
     words = words_of(column)
@@ -105,7 +105,7 @@ _OF_OTHERS = frozenset({"not", "invalid", "blink", "trial", "task", "response"})
 """With these it says something else than which frames were measured: valid_blink, trial_success."""
 CONFIDENCE_COLUMN = "confidence"
 LEAST_CONFIDENCE = 0.5
-"""Of 0 to 1, as OpenFace writes it beside 'success'; below it a frame is likelier wrong than right."""
+"""Of 0 to 1, as OpenFace writes it next to 'success'; below it a frame is likelier wrong than right."""
 _WORDS = {"true": True, "1": True, "1.0": True, "false": False, "0": False, "0.0": False}
 
 
@@ -127,7 +127,7 @@ def unseen_rows(
     Parameters
     ----------
     columns : sequence of str
-        The series that are labelled.
+        The series that are labeled.
 
     Returns
     -------
@@ -149,11 +149,11 @@ def unseen_rows(
         if not rows.any() or not heeding:
             continue
         eye = "" if len(heeding) == len(columns) else f" of {', '.join(heeding)}"
-        notes.append(f"{path.name}: {rows.sum():,} of {rows.size:,} frames{eye} {why}: taken as not seen")
+        notes.append(f"{path.name}: {rows.sum():,} of {rows.size:,} frames{eye} {why}: treated as missing")
         for column in heeding:
             unseen[column] |= rows
     if any(rows.all() for rows in unseen.values()):
-        raise InputError(f"{'; '.join(notes)}; nothing is left: take the column out if it is wrong")
+        raise InputError(f"{'; '.join(notes)}; no frames are left: remove the column if it is wrong")
     return unseen, notes + _doubtful(table, path)
 
 
@@ -188,15 +188,15 @@ def _cells(column: pd.Series, blank: str) -> "pd.Series[str]":
 
 
 def _other_words(cells: "pd.Series[str]") -> list[str]:
-    """What a column holds beside 0 and 1, true and false."""
+    """Values other than 0 and 1, true and false, that a column has."""
     return [word for word in cells.unique() if word not in _WORDS]
 
 
 def _not_valid(words: "pd.Series[str]", path: Path) -> NDArray[np.bool_]:
     if other := _other_words(words):
         raise InputError(
-            f"{path.name}: column '{words.name}' says which frames are valid by 1 and 0 (true and false), "
-            f"got '{other[0]}'; name it otherwise if it says something else"
+            f"{path.name}: column '{words.name}' marks valid frames with 1 or 0 (true or false), got "
+            f"'{other[0]}'; rename the column if it means something else"
         )
     return ~words.map(_WORDS).to_numpy(dtype=np.bool_)
 
@@ -206,13 +206,13 @@ def _not_sure(column: pd.Series, path: Path) -> NDArray[np.bool_]:
     words = column[np.isnan(values) & column.notna().to_numpy()]
     if words.size:
         raise InputError(
-            f"{path.name}: column '{column.name}' must hold numbers between 0 and 1, got {words.iloc[0]!r}; "
-            "mend it, or name it otherwise"
+            f"{path.name}: column '{column.name}' must have numbers between 0 and 1, got {words.iloc[0]!r}; "
+            "correct it, or rename the column"
         )
     if (values < 0).any() or (values > 1).any():
         raise InputError(
-            f"{path.name}: column '{column.name}' must lie between 0 and 1, got "
-            f"{np.nanmin(values):g} to {np.nanmax(values):g}; divide it, or name it otherwise"
+            f"{path.name}: column '{column.name}' must be between 0 and 1, got {np.nanmin(values):g} to "
+            f"{np.nanmax(values):g}; rescale it, or rename the column"
         )
     return np.asarray(~(values >= LEAST_CONFIDENCE))
 
@@ -223,8 +223,8 @@ def _doubtful(table: pd.DataFrame, path: Path) -> list[str]:
     if not count:
         return []
     return [
-        f"{path.name}: {count:,} of {len(table):,} frames are doubtful: labelled as they are, their points "
-        "may be wrong"
+        f"{path.name}: {count:,} of {len(table):,} frames are doubtful: they were used, but their points may "
+        "be wrong"
     ]
 
 
@@ -237,7 +237,7 @@ INDEX_COLUMNS = ("frame", CONFIDENCE_COLUMN)
 def choose_columns(table: pd.DataFrame, named: Sequence[str], path: Path) -> tuple[list[str], list[str]]:
     """The distance columns to label: those named, else a track's, else the only candidate or pair of eyes.
 
-    Of several, one that holds 0 and 1 alone, or the same as one before it, is no second eye and left out.
+    Of several, a column with only 0 and 1, or equal to an earlier one, is not a second eye and is ignored.
 
     Returns
     -------
@@ -265,21 +265,23 @@ def choose_columns(table: pd.DataFrame, named: Sequence[str], path: Path) -> tup
         measures = lids
     if len(measures) == 2 and eye_pair(measures) is not None:
         eyes = " and ".join(f"'{name}'" for name in measures)
-        return measures, [f"{path.name}: {eyes} are taken as the two eyes; --column NAME takes another"]
+        return measures, [f"{path.name}: {eyes} are used as the two eyes; select others with --column NAME"]
     raise InputError(f"{path.name}: {_not_chosen(table, candidates)}")
 
 
 def _distinct(table: pd.DataFrame, named: list[str], path: Path) -> tuple[list[str], list[str]]:
-    """The columns that may be eyes beside one another, and a line about each of the others."""
+    """The columns that may be different eyes, and a line about each of the others."""
     kept: list[str] = []
     notes = []
     measures = [name for name in named if not _is_presence(table[name])]
     for name in named:
         twin = next((one for one in kept if table[one].equals(table[name])), None)
         if measures and name not in measures:
-            notes.append(f"{path.name}: '{name}' holds only 0 and 1, a presence and no eye: left out")
+            notes.append(f"{path.name}: '{name}' has only 0 and 1, so it is not an eye opening: ignored")
         elif twin is not None:
-            notes.append(f"{path.name}: '{name}' holds the same values as '{twin}', no second eye: left out")
+            notes.append(
+                f"{path.name}: '{name}' has the same values as '{twin}', so it is not a second eye: ignored"
+            )
         else:
             kept.append(name)
     return kept, notes
@@ -293,16 +295,16 @@ def _is_presence(column: pd.Series) -> bool:
 def _not_chosen(table: pd.DataFrame, candidates: Sequence[str]) -> str:
     """Why no column is chosen, and what to do."""
     if candidates:
-        return f"say with --column which series to label; it has {few(candidates)}"
+        return f"select the series with --column; the table has {few(candidates)}"
     whole = [
         f"'{name}' (whole numbers)"
         for name in table.columns
         if table[name].dtype.kind in "iu" and not _is_of_another_kind(str(name))
     ]
     if not whole:
-        return "say with --column which series to label; it has no column of numbers but the times"
+        return "select the series with --column; the table has no column of numbers except the times"
     return (
-        f"expected a column of decimal numbers, got {few(whole)}; if one of them is the distance, name it "
+        f"expected a column of decimal numbers, got {few(whole)}; if one of them is the distance, select it "
         "with --column"
     )
 
@@ -320,7 +322,7 @@ def _near_or_plausible(name: str, candidates: Sequence[str]) -> str:
     return f"; expected one of: {plausible}" if plausible else ""
 
 
-# Values that are no lids: one that a tracker repeats for seconds, and zeros where it saw no face.
+# Values that are not lids: one that a tracker repeats for seconds, and zeros where it found no face.
 
 FROZEN_S = 1.0
 MAX_REPEATS = 0.1
@@ -332,9 +334,9 @@ SHUT_SHARE = 0.2
 JUMP_SHARE = 0.6
 """Part of the opening that no lid leaves, nor comes back to, from one frame to the next."""
 LEAST_JUMP_FPS = 24.5
-"""Of 25 frames a second, whose times may tell a little less. In a longer frame a lid goes so far."""
-NOT_SEEN = "taken as not seen"
-LEFT = "left as it is: nothing else of it closes, so that these may be its blinks"
+"""Of 25 frames a second, whose times may be a little less. In a longer frame a lid goes so far."""
+NOT_SEEN = "treated as missing"
+LEFT = "kept: nothing else closes in this column, so these may be its blinks"
 NEAR_ZERO = 0.1
 """Part of the opening; a series that comes below it without being 0 has lids that meet at 0."""
 
@@ -375,7 +377,7 @@ def without_what_is_not_measured(
     """
     eye = eye_of(column)
     label = f"{path.name}: '{column}'" + (f" ({eye} eye)" if eye else "")
-    kinds = [_Kind("repeats one value for a second or longer", _frozen_runs(opening, fps), measured=1)]
+    kinds = [_Kind("repeats one value for at least one second", _frozen_runs(opening, fps), measured=1)]
     if not turned and fps >= LEAST_JUMP_FPS:
         kinds.append(_zeros(opening))
     notes, kept = [], opening.copy()
@@ -426,7 +428,7 @@ def _zeros(values: Array) -> _Kind:
     if others.min() < NEAR_ZERO * opening:
         return _Kind(what, [])
     low = values < JUMP_SHARE * opening
-    # A frame without a value (NaN) beside a zero tells of no lid on its way either: it is not low.
+    # A frame without a value (NaN) next to a zero is not evidence of a moving lid either: it is not low.
     jumps = [(a, b) for a, b in runs(zero) if not low[max(0, a - 1) : a].any() and not low[b : b + 1].any()]
     has_other_dips = any(not zero[a:b].any() for a, b in runs(low))
     return _Kind(what, jumps, becomes=NOT_SEEN if has_other_dips else LEFT)
@@ -442,7 +444,7 @@ RESTS_HIGH = 0.6
 """A series that is named as a closure and rests above this part of its top is none, or of shut eyes."""
 GLITCH, GLITCHES = 2.0, 3
 """A greatest value that is so many times the third greatest is a glitch, and no level of a shut lid."""
-_WAYS = "add --inverted if high is shut, --not-inverted if it is an opening"
+_WAYS = "add --inverted if high means closed, --not-inverted if high means open"
 
 
 def opening_of(
@@ -450,12 +452,12 @@ def opening_of(
 ) -> tuple[Array, str]:
     """Return a column as an opening, 0 where the lids meet, and a line if it was turned round for that.
 
-    Closures up to 1 become 1 - closure; others are taken from their greatest value that is no glitch.
+    Closures up to 1 become 1 - closure; others are taken from their greatest value that is not a glitch.
 
     Parameters
     ----------
     inverted : bool or None
-        Whether high is shut; None tells it from the column's name.
+        Whether high means closed; None decides by the column's name.
     same_kind : sequence of float64 array
         The column and those of its kind, as the other eye's: one greatest value holds for all, so that an eye
         that closes less keeps to be seen as such.
@@ -468,21 +470,21 @@ def opening_of(
     by_name, known = is_high_when_shut(column), values[np.isfinite(values)]
     if inverted is None and not by_name and _rests_at_the_bottom(known):
         raise InputError(
-            f"{path.name}: column '{column}' rests at {np.median(known):.3g} and rises to "
-            f"{known.max():.3g} for short times, as a closure does (1 = shut): {_WAYS}"
+            f"{path.name}: column '{column}' rests at {np.median(known):.3g} and rises to {known.max():.3g} "
+            f"for short times, like a closure (1 = closed): {_WAYS}"
         )
     if inverted is None and by_name and _rests_high(known):
         raise InputError(
-            f"{path.name}: column '{column}' is named as a closure (1 = shut) and rests at "
-            f"{np.median(known):.3g}, near its top, as an opening does: {_WAYS}"
+            f"{path.name}: column '{column}' is named as a closure (1 = closed) but rests at "
+            f"{np.median(known):.3g}, near its maximum, like an opening: {_WAYS}"
         )
     if not (by_name if inverted is None else inverted) or not known.size:
         return values, ""
     top = max(1.0, *(_top(one[np.isfinite(one)]) for one in same_kind))
-    why = "as its name says" if inverted is None else "as --inverted says"
+    why = "as its name says" if inverted is None else "as set by --inverted"
     return (
         np.maximum(top - values, 0.0),
-        f"{path.name}: '{column}' is high where lids are shut, {why}: taken as {top:g} minus it",
+        f"{path.name}: '{column}' is high when lids are closed, {why}: {top:g} minus the value was used",
     )
 
 

@@ -38,7 +38,7 @@ def read_table(path: Path, *, alone: str = "", as_written: bool = False) -> pd.D
         CSV, Excel, SPSS or JSON.
     alone : str
         A column that may be the file's only one: its commas are decimal. A first line that is a number
-        without a comma is its first value, where no header line stands.
+        without a comma is its first value, if there is no header line.
     as_written : bool
         Cells are the text in the file, and blank lines below the header are rows: only a blank is missing.
 
@@ -56,7 +56,7 @@ def read_table(path: Path, *, alone: str = "", as_written: bool = False) -> pd.D
     if table.empty:
         raise InputError(f"{path.name}: the table has a header but no rows")
     if separator in _SEPARATORS and header != [alone]:
-        said.append(f"columns parted by {_SEPARATORS[separator]}")
+        said.append(f"columns separated by {_SEPARATORS[separator]}")
     if example := _read_decimal_commas(table, separator):
         said.append(f"decimal commas (e.g. '{example}') read as decimal points")
     if said:
@@ -81,7 +81,7 @@ def _opened(
 
 
 def _typed(header: Sequence[str], rows: Iterable[Sequence[str]], as_written: bool) -> pd.DataFrame:
-    """The rows as a table; which columns are numbers is told by pandas."""
+    """The rows as a table; pandas decides which columns are numbers."""
     plain = io.StringIO()
     csv.writer(plain).writerows([header])
     csv.writer(plain).writerows(rows)
@@ -108,7 +108,7 @@ def write_table(file: Path, table: pd.DataFrame) -> None:
 
 
 def line_of(path: Path, row: int) -> int:
-    """Line of a file on which row `row` (from 0) of its table stands; blank lines are no rows.
+    """Line of a file with row `row` (from 0) of its table; blank lines are not rows.
 
     For messages: the file is read again.
     """
@@ -132,14 +132,13 @@ def _refuse_other_formats(path: Path) -> None:
     first = [re.split(r"[,;\t]", line)[0].strip().strip('"').lower() for line in written]
     if any(word.startswith(EYELINK) for word in first) or path.suffix.lower() == ".asc":
         raise InputError(
-            f"{path.name}: this is an EyeLink recording (gaze and pupil), expected a table with a column of "
-            "lid distances; track the lids in a video with 'stimuli track'"
+            f"{path.name}: this is an EyeLink recording (gaze and pupil); expected a table with a column of "
+            "lid distances. Track the lids in a video with 'stimuli track'"
         )
     if first[:2] == ["scorer", "bodyparts"] or first[:3] == ["scorer", "individuals", "bodyparts"]:
         raise InputError(
-            f"{path.name}: this is a DeepLabCut table of points, expected a column of lid distances; write "
-            "the distance between a point of the upper lid and one of the lower into a CSV with one header"
-            " line"
+            f"{path.name}: this is a DeepLabCut table of points; expected a column of lid distances. Write "
+            "the distance between an upper-lid and a lower-lid point to a CSV with one header line"
         )
 
 

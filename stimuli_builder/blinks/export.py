@@ -22,11 +22,11 @@ HORIZONTAL_RANGE_MM = (1.4, 5.0)
 def lower_lid(profile: BlinkProfile, closure: Array | None = None) -> tuple[Array, Array]:
     """Vertical and horizontal displacement of the lower lid during a blink, in mm.
 
-    Measured where a track gave it. Else from physiology: a blink slides the lower lid 1.4-5 mm towards the
-    nose and lifts it 0.5-1 mm, together with the upper lid (Doane 1980, Am J Ophthalmol 89:507, describes
-    the motion). The peaks for a complete blink are drawn from these ranges, the horizontal one evenly on a
-    log scale, by the profile's name: the same profile always moves alike. Both follow the closure; the
-    nasal slide lags it by some 10 ms, and nothing moves while the eye is open.
+    Measured where a track gave it. Else from physiology: a blink slides the lower lid 1.4-5 mm toward the
+    nose and lifts it 0.5-1 mm, together with the upper lid (Doane 1980, Am J Ophthalmol 89:507, describes the
+    motion). The peaks for a complete blink are drawn from these ranges, the horizontal one evenly on a log
+    scale, by the profile's name: the same profile always moves alike. Both follow the closure; the nasal
+    slide lags it by some 10 ms, and nothing moves while the eye is open.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def lower_lid(profile: BlinkProfile, closure: Array | None = None) -> tuple[Arra
     Returns
     -------
     vertical_mm, horizontal_mm : (n,) float64 arrays
-        Upwards and towards the nose positive, 0 with the eye open, at the profile's rate.
+        Upwards and toward the nose positive, 0 with the eye open, at the profile's rate.
     """
     if profile.lower_up_mm is not None and profile.lower_nasal_mm is not None:
         return profile.lower_up_mm, profile.lower_nasal_mm
@@ -103,9 +103,9 @@ def make_curve(
         For the intervals; needed with two or more blinks.
     """
     if not 1 <= fps <= 1000:
-        raise InputError(f"the frame rate of a curve must lie between 1 and 1000, got {fps:g}")
+        raise InputError(f"the frame rate of a curve must be between 1 and 1000, got {fps:g}")
     if not 0 <= lead_s <= 3600:
-        raise InputError(f"the lead must lie between 0 and 3600 seconds, got {lead_s:g}")
+        raise InputError(f"the lead must be between 0 and 3600 seconds, got {lead_s:g}")
     if not profiles:
         raise InputError("a curve needs one blink or more")
     minima = _minimum_frames(profiles, fps, lead_s, np.random.default_rng(seed))
@@ -154,7 +154,7 @@ CSV_COLUMNS = {
     "closure_left": "closure of the left eye, 0 open to 1 closed",
     "closure_right": "closure of the right eye",
     "lower_up_mm": "lift of the lower lids in mm",
-    "lower_nasal_mm": "slide of the lower lids towards the nose in mm",
+    "lower_nasal_mm": "slide of the lower lids toward the nose in mm",
 }
 
 
@@ -392,7 +392,7 @@ def time_unit(fps: float) -> str:
         return f"{rate}fps"
     known = sorted([*_NAMED_UNITS, *_NUMBERED_UNITS])
     near = min(known, key=lambda unit: abs(unit - fps))
-    raise InputError(f"Maya has no time unit of {fps:g} frames a second; the nearest is --fps {near}")
+    raise InputError(f"Maya has no time unit of {fps:g} frames per second; the nearest is --fps {near}")
 
 
 def to_maya(
@@ -442,12 +442,10 @@ def to_usd(
     Raises
     ------
     InputError
-        Where `node` is no name that USD takes.
+        If `node` is not a valid USD name.
     """
     if not _IDENTIFIER.fullmatch(node):
-        raise InputError(
-            f"--target '{node}': expected a name of letters, digits and _ that begins with no digit"
-        )
+        raise InputError(f"--target '{node}': expected letters, digits and _, not starting with a digit")
     samples = ",\n".join(
         f"                {frame}: [{one:g}, {other:g}]"
         for frame, (one, other) in enumerate(zip(curve.left, curve.right, strict=True))
@@ -519,7 +517,7 @@ def check_format(format_name: str, target: CurveTarget, option: str = "--format"
         if not _SAFE_NAME.fullmatch(name):
             raise InputError(f"{named_by} '{name}': expected a name of letters, digits and _ . : | -")
     if target.left == target.right:
-        raise InputError(f"--left and --right are both '{target.left}': each eye needs a shape of its own")
+        raise InputError(f"--left and --right are both '{target.left}': each eye needs a separate shape")
 
 
 def write_curve(format_name: str, curve: AnimationCurve, target: CurveTarget) -> str:

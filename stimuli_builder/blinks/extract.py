@@ -29,15 +29,15 @@ from stimuli_builder.blinks.measure import (
 from stimuli_builder.blinks.profile import OPEN_PERCENTILE, Array, BlinkProfile, Eye
 from stimuli_builder.blinks.series import BlinkSeries, scaled_frames
 
-# Labelled blinks from the classifier's events: their frames, and neighbours that touch.
+# Labeled blinks from the classifier's events: their frames, and neighbors that touch.
 
-CUT = "its beginning or end lies in a gap or outside the recording"
+CUT = "its start or end is in a gap or outside the recording"
 
 
 def recognised_blinks(
     series: BlinkSeries, recognised: RecognisedEvents, options: LabelOptions
 ) -> tuple[list[LabelledBlink], list[RefusedMinimum]]:
-    """Turn the blinks among the events of one eye into labelled blinks.
+    """Turn the blinks among the events of one eye into labeled blinks.
 
     Returns
     -------
@@ -100,7 +100,7 @@ TESTED_FPS = (15, 1000)
 class EyeBlinks:
     """The blinks of one column: the series, its filtered distance, every blink measured, what was refused.
 
-    `recognised` is what the classifier told; None by the paper's rule.
+    `recognised` is the classifier's result; None with the paper's rule.
     """
 
     series: BlinkSeries
@@ -115,7 +115,7 @@ class EyeBlinks:
         return () if self.recognised is None else self.recognised.events
 
     def closed_distance(self, given: float | None) -> float | None:
-        """Distance at lid contact: its blinks', else the one given; None where nothing tells it.
+        """Distance at lid contact: its blinks', else the one given; None if it is unknown.
 
         Raises
         ------
@@ -149,9 +149,9 @@ def blinks_of(
     Parameters
     ----------
     edges : mapping of int to (int, int), optional
-        By minimum frame, an (onset, end) of a person's that takes the place of the labelled one.
+        By minimum frame, an (onset, end) of a person's that takes the place of the labeled one.
     recognised : Recognised, optional
-        What `recognise` told of this series; None labels by the paper's rule with `options`.
+        Result of `recognise` for this series; None labels by the paper's rule with `options`.
     """
     if recognised is None:
         labelled, refused = find_blinks(series.distance, series.fps, options, is_px=series.is_px)
@@ -190,7 +190,7 @@ def _why_none(eye: EyeBlinks, options: LabelOptions) -> str:
     """What a series without a blink holds instead, or why its blinks could not be measured."""
     if eye.refused:
         first = eye.refused[0]
-        more = f"{counted(len(eye.refused), 'dip')} could not be measured, the first"
+        more = f"{counted(len(eye.refused), 'dip')} could not be measured; the first is"
         return f"{more} at frame {first.minimum}: {first.reason}"
     others = Counter(event.kind.replace("_", " ") for event in eye.events if event.kind != "blink")
     deepest = 1 - np.nanmin(eye.smooth) / max(float(np.nanquantile(eye.smooth, 0.9)), 1e-9)
@@ -199,7 +199,7 @@ def _why_none(eye: EyeBlinks, options: LabelOptions) -> str:
         what += f", it has {', '.join(f'{count} x {kind}' for kind, count in others.items())}"
     elif eye.recognised is None and deepest < options.minimum_depth:
         what += f", a blink needs {options.minimum_depth:.0%} (--minimum-depth)"
-    return f"{what}; is the column right, and --fps?"
+    return f"{what}; check the column and --fps"
 
 
 def without_blinks(eyes: Sequence[EyeBlinks]) -> list[str]:
@@ -212,8 +212,8 @@ def rate_doubts(eyes: Sequence[EyeBlinks]) -> list[str]:
     fps, lines = eyes[0].series.fps, []
     if eyes[0].recognised is not None and not TESTED_FPS[0] <= fps <= TESTED_FPS[1]:
         lines.append(
-            f"the classifier was tested at {TESTED_FPS[0]} to {TESTED_FPS[1]:,} frames a second, this is at "
-            f"{fps:.4g}: look at what it tells with --plot"
+            f"the classifier was tested at {TESTED_FPS[0]} to {TESTED_FPS[1]:,} frames per second, but this "
+            f"is {fps:.4g}: check its result with --plot"
         )
     doubt = _rate_doubt(eyes)
     return [*lines, doubt] if doubt else lines
@@ -237,9 +237,9 @@ def _rate_doubt(eyes: Sequence[EyeBlinks]) -> str:
     if PLAUSIBLE_MS[0] <= duration_ms <= PLAUSIBLE_MS[1] and not slow and not fast:
         return ""
     return (
-        f"at {fps:.4g} fps the blinks last {duration_ms:.0f} ms and close "
-        f"in {closing_ms:.0f} ms (medians), where {PLAUSIBLE_MS[0]}-{PLAUSIBLE_MS[1]} and "
-        f"{USUAL_CLOSING_MS[0]}-{USUAL_CLOSING_MS[1]} are usual: is --fps right?"
+        f"at {fps:.4g} fps the blinks last {duration_ms:.0f} ms and close in {closing_ms:.0f} ms (medians), "
+        f"where {PLAUSIBLE_MS[0]}-{PLAUSIBLE_MS[1]} and {USUAL_CLOSING_MS[0]}-{USUAL_CLOSING_MS[1]} are "
+        "usual: check --fps"
     )
 
 

@@ -14,12 +14,12 @@ from stimuli_builder.blinks.profile import Array
 from stimuli_builder.blinks.series import PAPER_FPS, box_filter, scaled_frames
 from stimuli_builder.blinks.times import runs
 
-# The values of the labelling rule and their named sets.
+# The values of the labeling rule and their named sets.
 
 
 @dataclass(frozen=True)
 class LabelOptions:
-    """Values of the labelling rule; all frame counts are at 300 fps, as the paper's, and scale with the rate.
+    """Values of the labeling rule; all frame counts are at 300 fps, as the paper's, and scale with the rate.
 
     Exactly one of the three gradient limits is given.
 
@@ -61,7 +61,8 @@ class LabelOptions:
     def __post_init__(self) -> None:
         if [self.gradient_peak, self.gradient_opening, self.gradient_px].count(None) != 2:
             raise InputError(
-                "give one gradient limit: as part of the peak, of the opening, or in pixels a frame"
+                "use only one gradient limit: as a fraction of the peak, of the opening, or in pixels per "
+                "frame"
             )
         for name, value in vars(self).items():
             least = "0 or more" if name == "minimum_tolerance" else "greater than 0"
@@ -70,7 +71,7 @@ class LabelOptions:
         for name in ("gradient_peak", "minimum_depth", "minimum_tolerance"):
             value = getattr(self, name)
             if value is not None and value >= 1:
-                raise InputError(f"{name.replace('_', '-')} is a part of the whole, below 1, got {value:g}")
+                raise InputError(f"{name.replace('_', '-')} must be a fraction below 1, got {value:g}")
 
 
 DEFAULT_OPTIONS = LabelOptions()
@@ -92,7 +93,7 @@ def preset(name: str) -> LabelOptions:
     return PRESETS[name]
 
 
-# Where a blink turns: the frame of its minimum, told from its flanks where the bottom is flat.
+# Where a blink turns: the frame of its minimum, estimated from its flanks where the bottom is flat.
 
 FLANK = (0.1, 0.5)
 """Parts of the amplitude, from the bottom, between which a flank is steep: they say when the lid turned."""
@@ -102,7 +103,7 @@ def turning_frame(smooth: Array, onset: int, lowest: int, end: int, tolerance: f
     r"""Frame between onset and end at which closing turns to opening.
 
     A lid lingers where it turns: noise of a hundredth of the amplitude decides which frame is lowest, and
-    the filter moves it towards the slower flank. So frames within `tolerance` of the lowest (as part of the
+    the filter moves it toward the slower flank. So frames within `tolerance` of the lowest (as part of the
     amplitude) count alike, and of these the one is taken that parts the bottom as the flanks are steep:
 
     .. math:: t = t_c + (t_o - t_c) \, T_c / (T_c + T_o) \tag{1}
@@ -150,8 +151,8 @@ class LabelledBlink:
 
     `depth` is the fall from the local opening to the minimum, as part of that opening; `baseline` the
     paper's mean about the minimum; `touches_neighbour` says that an end of the blink is the highest
-    point between it and the next one, which began before the eye had come to rest. `event` is what the
-    classifier of lid events told of it, its times between frames; None by the paper's rule.
+    point between it and the next one, which began before the eye had come to rest. `event` is the
+    classifier's event with times between frames; None with the paper's rule.
     """
 
     onset: int
@@ -165,7 +166,7 @@ class LabelledBlink:
 
 @dataclass(frozen=True)
 class RefusedMinimum:
-    """A minimum deep enough for a blink that could not be labelled, and why."""
+    """A minimum deep enough for a blink that could not be labeled, and why."""
 
     minimum: int
     reason: str
@@ -186,7 +187,7 @@ def find_blinks(
     Parameters
     ----------
     distance : (n,) array
-        Inter-eyelid distance; NaN where it is not known: each piece between is labelled by itself.
+        Inter-eyelid distance; NaN where it is not known: each piece between is labeled by itself.
     fps : float
         Rate of the series.
     is_px : bool
@@ -262,10 +263,10 @@ class _Piece:
         self, minimum: int, neighbour: int | None, baseline: float, step: int
     ) -> tuple[int | None, bool]:
         """First frame from the minimum on that is quiet and above the baseline, and whether it had to be
-        the highest one before a neighbouring blink.
+        the highest one before a neighboring blink.
 
         The window of the gradient lies on the frame's far side from the minimum: the eye was at rest just
-        before the onset and is at rest just after the end. A centred window would reach into the blink and
+        before the onset and is at rest just after the end. A centered window would reach into the blink and
         find the onset half a window early.
         """
         limit = minimum + step * self.search_reach

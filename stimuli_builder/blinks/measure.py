@@ -1,4 +1,4 @@
-"""Measure labelled blinks: phases, amplitude, velocities, complete or partial; and cut their profiles."""
+"""Measure labeled blinks: phases, amplitude, velocities, complete or partial; and cut their profiles."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class MeasuredBlink:
 
     The closure takes the line between the resting levels before and after as open (0) and the recording's
     closed level as closed (1). Velocities are of the filtered distance, in its unit per second. `amplitude`
-    is the fall from the open level to the minimum, of the fitted curve where there is one, `closure` the
+    is the fall from the open level to the minimum, of the fitted curve if there is one, `closure` the
     greatest closure. `rest_before` and `rest_after` give how far the resting eye was open before and after:
     closure against the wider of the two. `probability` and the closed phase are the classifier's, and NaN by
     the paper's rule; with it, times lie between frames. The errors are one standard error of each phase, by
@@ -72,8 +72,8 @@ class MeasuredBlink:
 def closed_level(smooth: Array, blinks: Sequence[LabelledBlink], given: float | None = None) -> float:
     """Distance at lid contact: the value given, else the mean minimum of the recording's deepest blinks.
 
-    An eye aspect ratio does not reach 0 when the lids meet; a quarter of the blinks, the deepest, two at
-    least, tell where it stops. A single deepest one would be ruled by noise.
+    An eye aspect ratio does not reach 0 when the lids meet; the deepest quarter of the blinks, at least two,
+    shows where it stops. A single deepest one would depend on noise.
     """
     if given is not None:
         return given
@@ -85,8 +85,8 @@ def closed_level(smooth: Array, blinks: Sequence[LabelledBlink], given: float | 
 def not_below(closed: float, what: str, opening: float) -> InputError:
     """The refusal of a `--closed` at which what is open would be shut."""
     return InputError(
-        f"--closed {closed:g} is not below the opening of {what} (up to {opening:g}); it is the distance "
-        "that stays when the lids meet"
+        f"--closed {closed:g} is not below the opening of {what} (up to {opening:g}); it must be the "
+        "distance that remains when the lids meet"
     )
 
 
@@ -109,7 +109,7 @@ def measure_blinks(
     closed_distance: float | None = None,
     complete_from: float = COMPLETE_FROM,
 ) -> tuple[list[MeasuredBlink], list[RefusedMinimum]]:
-    """Measure every labelled blink; the closed level is the recording's (see `closed_level`).
+    """Measure every labeled blink; the closed level is the recording's (see `closed_level`).
 
     Returns
     -------
@@ -130,7 +130,7 @@ def measure_blinks(
     if not fit and closed_distance is not None:
         widest = max(before for before, _ in levels)
         raise not_below(closed, f"any blink of '{series.column}'", widest)
-    reason = f"it begins or ends no further open than the closed distance {closed:.3g}"
+    reason = f"it begins or ends at or below the closed distance {closed:.3g}"
     refused = [RefusedMinimum(blink.minimum, reason) for blink in blinks if blink not in fit]
     velocity = np.gradient(smooth) * series.fps
     measured = [
@@ -220,7 +220,7 @@ def open_levels(smooth: Array, blink: LabelledBlink) -> tuple[float, float]:
 
 
 def _times(blink: LabelledBlink, fps: float) -> tuple[float, float, float]:
-    """Onset, minimum and end in seconds: the event's, between frames, or the labelled frames'."""
+    """Onset, minimum and end in seconds: the event's, between frames, or the labeled frames'."""
     if blink.event is None:
         return blink.onset / fps, blink.minimum / fps, blink.end / fps
     return blink.event.onset_s, blink.event.minimum_s, blink.event.end_s

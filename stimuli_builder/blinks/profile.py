@@ -30,7 +30,7 @@ class BlinkProfile:
 
     `closure[onset_index]` is the onset and `closure[end_index]` the end; a few samples of the start
     level may come before it (sub-frame phase). Recorded profiles begin and end at 0 (open), textbook
-    ones at their start and end level: whoever renders a lead-in holds `closure[0]`, and in the lead-out
+    ones at their start and end level: a renderer holds `closure[0]` in the lead-in, and in the lead-out
     `closure[-1]`; then nothing jumps.
 
     Parameters
@@ -125,7 +125,7 @@ def _checked_closure(profile_id: str, values: Array) -> Array:
         raise InputError(f"profile {profile_id}: closure needs 3 or more samples, got shape {closure.shape}")
     if not np.isfinite(closure).all() or closure.min() < -1e-9 or closure.max() > 1 + 1e-9:
         low, high = closure.min(), closure.max()
-        raise InputError(f"profile {profile_id}: closure must lie between 0 and 1, got {low:g} to {high:g}")
+        raise InputError(f"profile {profile_id}: closure must be between 0 and 1, got {low:g} to {high:g}")
     closure = np.clip(closure, 0.0, 1.0)
     closure.setflags(write=False)
     return closure
@@ -155,7 +155,7 @@ def to_natural_closure(profile: BlinkProfile) -> BlinkProfile:
 def _stretch(closure: Array) -> Array:
     low, high = float(closure.min()), float(closure.max())
     if high - low < 1e-6:
-        raise InputError("a profile without any closing cannot be stretched to full closure")
+        raise InputError("a profile without closing cannot be stretched to full closure")
     return (closure - low) / (high - low)
 
 
@@ -199,10 +199,13 @@ def resample_phases(profile: BlinkProfile, down_frames: int, up_frames: int) -> 
 
 
 def with_minimum_at_peak(profile: BlinkProfile) -> BlinkProfile:
-    """Move the minimum to the sample of greatest closure; in a made blink it may lie beside its place."""
+    """Move the minimum to the sample of greatest closure; in a generated blink it may be next to its
+    place."""
     peak = profile.onset_index + int(profile.closure[profile.onset_index : profile.end_index + 1].argmax())
     if not profile.onset_index < peak < profile.end_index:
-        raise InputError(f"profile {profile.profile_id} closes most at its onset or end: it is no blink")
+        raise InputError(
+            f"profile {profile.profile_id} closes most at its onset or end, so it is not a blink"
+        )
     down, up = peak - profile.onset_index, profile.end_index - peak
     return replace(profile, minimum_index=peak, down_frames=down, up_frames=up)
 
@@ -232,7 +235,7 @@ TABLE_COLUMNS = {
     "closure": "0 open, 1 closed",
     "closure_other": "the same for the right eye where both were measured, else empty",
     "lower_up_mm": "lower lid's lift in mm where it was measured, else empty",
-    "lower_nasal_mm": "lower lid's slide towards the nose in mm where it was measured, else empty",
+    "lower_nasal_mm": "lower lid's slide toward the nose in mm where it was measured, else empty",
 }
 
 
@@ -270,8 +273,8 @@ def read_profile_table(path: Path) -> list[BlinkProfile]:
         if name not in table.columns:
             there = few(list(table.columns))
             raise InputError(
-                f"{path.name} is no table of profiles (NAME.profiles.csv of `stimuli blinks`): "
-                f"it lacks the column '{name}' and has {there}"
+                f"{path.name} is not a table of profiles (NAME.profiles.csv of `stimuli blinks`): the column "
+                f"'{name}' is missing; it has {there}"
             )
     groups = table.groupby("profile_id", sort=False)
     return [_profile(str(name), group, path) for name, group in groups]

@@ -17,7 +17,7 @@ from stimuli_builder.blinks.series import scaled_frames
 
 Decision = Literal["accept", "reject"]
 MATCH_FRAMES = 10
-"""A decision belongs to the blink whose minimum is within so many frames (at 300 fps) of its own."""
+"""A decision belongs to the blink whose minimum is within so many frames (at 300 fps) of the decision's."""
 
 
 EDGE_COLUMNS = ("onset_frame", "end_frame")
@@ -28,7 +28,7 @@ EDGE_COLUMNS = ("onset_frame", "end_frame")
 class Review:
     """One decision about one blink, found again by its column and minimum, not by its number.
 
-    `onset_frame` and `end_frame` take the place of the labelled ones; None leaves them.
+    `onset_frame` and `end_frame` take the place of the labeled ones; None leaves them.
     """
 
     column: str
@@ -53,7 +53,7 @@ def read_reviews(path: Path) -> list[Review]:
     if list(table.columns) not in (expected[: -len(EDGE_COLUMNS)], expected):
         needed = ", ".join(expected[: -len(EDGE_COLUMNS)])
         raise InputError(
-            f"{path.name} is no review file: expected the columns {needed}, and perhaps "
+            f"{path.name} is not a review file: expected the columns {needed}, and optionally "
             f"{' and '.join(EDGE_COLUMNS)}"
         )
     return [_review(row, number, path) for number, row in enumerate(table.to_dict("records"), start=2)]
@@ -114,11 +114,16 @@ def parse_choice(text: str, decision: Decision, blinks: Sequence[MeasuredBlink])
     column, _, digits = which.rpartition(":")
     columns = list(dict.fromkeys(blink.column for blink in blinks))
     if not digits.strip().isdigit():
-        raise InputError(f"--{decision} {text}: expected the number of a blink, as in --{decision} 3=reason")
+        raise InputError(
+            f"--{decision} {text}: expected the number of a blink, such as --{decision} 3=reason"
+        )
     if decision == "reject" and not reason.strip():
-        raise InputError(f"--reject {text}: say why, as in --reject {which}=talking")
+        raise InputError(f"--reject {text}: a reason is missing; use, for example, --reject {which}=talking")
     if not column and len(columns) > 1:
-        raise InputError(f"--{decision} {text}: blink {digits} of which column? write {columns[0]}:{digits}")
+        raise InputError(
+            f"--{decision} {text}: the column of blink {digits} is missing; use, for example, "
+            f"{columns[0]}:{digits}"
+        )
     if column and column not in columns:
         raise InputError(f"--{decision} {text}: no column '{column}'{did_you_mean(column, columns)}")
     chosen = column or columns[0]
@@ -158,7 +163,7 @@ def moved_edges(
     Raises
     ------
     InputError
-        A moved blink would reach into its neighbour.
+        A moved blink would reach into its neighbor.
     """
     own = [blink for blink in blinks if blink.column == column]
     edges: list[tuple[int, int, int]] = []
@@ -177,7 +182,7 @@ def moved_edges(
         if overlaps and changed:
             raise InputError(
                 f"the review moves blink {number} ({onset} to {end}) and blink {later} ({start} to {stop}) "
-                f"of {column} into each other; move the start or end apart"
+                f"of {column} so that they overlap; separate the start and end"
             )
     return moved
 

@@ -74,7 +74,7 @@ def check_curve(path: Path | None, format_name: str) -> None:
     if ending not in endings and other is not None:
         raise InputError(
             f"--curve {path.name}: --curve-format {format_name} is written as {' or '.join(endings)}; add "
-            f"--curve-format {other}, or end the name so"
+            f"--curve-format {other}, or change the ending"
         )
     check_ending(path, endings, "--curve")
 
@@ -96,13 +96,13 @@ def recorded_curve(eyes: Sequence[EyeBlinks], closed: float | None = None) -> An
     Raises
     ------
     InputError
-        There are more than two columns, or nothing tells the closed level: no blink, and no `closed`.
+        There are more than two columns, or the closed level is unknown: no blink, and no `closed`.
     """
     if len(eyes) > 2:
-        raise InputError(f"a curve has two eyes; choose them with --column, got {len(eyes)} columns")
+        raise InputError(f"a curve has two eyes; select two with --column, got {len(eyes)} columns")
     if closed is None and not any(eye.blinks for eye in eyes):
         columns = ", ".join(f"'{eye.series.column}'" for eye in eyes)
-        raise InputError(f"no blink in {columns}: nothing tells where its lids are closed: give --closed")
+        raise InputError(f"no blink in {columns}, so its closed level is unknown: add --closed")
     left, right = eyes[0], eyes[-1]
     if len(eyes) == 2 and eye_of(left.series.column) == "right":
         left, right = right, left
@@ -126,7 +126,7 @@ def _course(eye: EyeBlinks, closed: float | None) -> Array:
 
 
 def _motion(place_mm: Array | None, count: int) -> Array:
-    """Motion of the lower lid against its usual place; nothing where no track tells it."""
+    """Motion of the lower lid relative to its usual place; empty without a track."""
     if place_mm is None or not np.isfinite(place_mm).any():
         return np.zeros(count)
     return _filled(place_mm - np.nanmedian(place_mm))
@@ -142,7 +142,7 @@ def _filled(values: Array) -> Array:
 
 @dataclass(frozen=True)
 class MoreOutputs:
-    """Options of `stimuli blinks` for outputs beside the blinks table."""
+    """Options of `stimuli blinks` for outputs in addition to the blinks table."""
 
     report: Path | None = None
     lids: Path | None = None
@@ -161,12 +161,10 @@ class MoreOutputs:
         if self.scale is not None:
             check_scale(self.scale)
             if self.lids is None and self.report is None:
-                sys.stderr.write(
-                    "note: --scale has no effect here: mm stand in what --lids and --report write\n"
-                )
+                sys.stderr.write("note: --scale has no effect here: it applies to --lids and --report\n")
 
     def check_names(self) -> None:
-        """Refuse names that tell of another kind of file."""
+        """Reject names that indicate another kind of file."""
         check_curve(self.curve, self.curve_format)
         check_ending(self.report, (".html", ".htm"), "--report")
         check_ending(self.lids, TABLE, "--lids")
@@ -174,7 +172,7 @@ class MoreOutputs:
     def prepared(
         self, source: Path, eyes: Sequence[EyeBlinks], frame: pd.DataFrame, closed: float | None
     ) -> list[Callable[[], None]]:
-        """Work out what is asked for; what comes back writes it and cannot be refused any more.
+        """Compute the requested outputs; the result writes them and can no longer be rejected.
 
         Parameters
         ----------
@@ -184,7 +182,7 @@ class MoreOutputs:
         Raises
         ------
         InputError
-            The scale cannot be told, or a column without a blink has no closed level.
+            The scale is unknown, or a column without a blink has no closed level.
         """
         if not any(self.paths):
             return []
@@ -210,8 +208,8 @@ class MoreOutputs:
         scale, first = scale_of(table, self.scale, source), eyes[0].series
         if scale is not None and not first.is_px:
             raise InputError(
-                f"--scale makes mm of px, and '{first.column}' is in another unit (names of columns in px "
-                "end in _px): leave --scale out, or label a track"
+                f"--scale converts px to mm, but '{first.column}' is in another unit (names of columns in px "
+                "end in _px): remove --scale, or use a track"
             )
         return scale
 
@@ -219,16 +217,16 @@ class MoreOutputs:
 def _with_closed(
     path: Path, eyes: Sequence[EyeBlinks], closed: float | None
 ) -> list[tuple[BlinkSeries, float]]:
-    """Each series with its closed distance; an eye of which nothing tells it is left out, and said."""
+    """Each series with its closed distance; an eye whose distance is unknown is omitted with a note."""
     known = [(eye.series, eye.closed_distance(closed)) for eye in eyes]
     for series, level in known:
         if level is None:
             sys.stderr.write(
-                f"note: {path}: without {series.column}, which has no blink (--closed tells it)\n"
+                f"note: {path}: {series.column} has no blink and was omitted (add --closed to include it)\n"
             )
     levels = [(series, level) for series, level in known if level is not None]
     if not levels:
-        raise InputError(f"{path}: there is no blink, and nothing tells where lids are closed: give --closed")
+        raise InputError(f"{path}: there is no blink, so the closed level is unknown: add --closed")
     return levels
 
 
@@ -238,7 +236,7 @@ def _write_text(path: Path, text: str) -> None:
 
 
 def _doubts(table: pd.DataFrame, eyes: Sequence[EyeBlinks]) -> list[str]:
-    """What a track says of its own frames, and rates that are unlikely."""
+    """What a track says about its frames, and unlikely rates."""
     lines = [*without_blinks(eyes), *rate_doubts(eyes), *eyes[0].series.notes]
     lost = int((table["status"] == "lost").sum()) if "status" in table.columns else 0
     if lost:
@@ -285,7 +283,7 @@ def run_blinks(job: BlinksJob) -> None:
     names = [eye_of(eye.series.column) for eye in eyes]
     profiles = all_profiles(accepted, job.series.stem, names)
     if not profiles and len(frame):
-        raise InputError("the review rejects every blink: nothing is left to write")
+        raise InputError("the review rejects every blink, so there is nothing to write")
     for line in asymmetry_lines(eyes, _rejected(decided)):
         sys.stderr.write(f"note: {line}\n")
     summaries = [
@@ -299,7 +297,7 @@ def run_blinks(job: BlinksJob) -> None:
 
 @dataclass(frozen=True, eq=False)
 class _LabelledRecording:
-    """A labelled and reviewed recording, as it is written; `decided` and `reviews` as of `_reviewed`."""
+    """A labeled and reviewed recording, as it is written; `decided` and `reviews` as of `_reviewed`."""
 
     eyes: Sequence[EyeBlinks]
     frame: pd.DataFrame
@@ -329,7 +327,7 @@ def _write(job: BlinksJob, labelled: _LabelledRecording) -> list[Path | None]:
 
 
 def label_recording(job: BlinksJob) -> list[EyeBlinks]:
-    """Label every column of the job; an unlikely rate is told.
+    """Label every column of the job; an unlikely rate is reported.
 
     A recording without a blink is a result too: a warning says why, and the tables are empty.
     """
@@ -370,11 +368,11 @@ def _check(job: BlinksJob) -> None:
     from stimuli_builder.blinks.plots import check_figure_name
 
     if not 0 < job.complete_from <= 1:
-        raise InputError(f"--complete-from is a closure above 0 and up to 1, got {job.complete_from:g}")
+        raise InputError(f"--complete-from must be a closure above 0 and up to 1, got {job.complete_from:g}")
     if job.closed is not None and job.closed < 0:
-        raise InputError(f"--closed is a distance, 0 or more, got {job.closed:g}")
+        raise InputError(f"--closed must be a distance of 0 or more, got {job.closed:g}")
     if (job.reject or job.accept) and job.review is None:
-        raise InputError("--reject and --accept are kept in a review file: name it with --review FILE")
+        raise InputError("--reject and --accept need a review file: add --review FILE")
     for figure in (job.plot, job.plot_aligned):
         if figure is not None:
             check_figure_name(figure)
@@ -383,7 +381,7 @@ def _check(job: BlinksJob) -> None:
 
 
 def _check_files(job: BlinksJob) -> None:
-    """Refuse names of files that cannot be written, or that tell of another kind of file."""
+    """Reject names of files that cannot be written, or that indicate another kind of file."""
     events = job.events if job.classify else None
     tables = {"--out": job.out, "--profiles": job.profiles, "--events": events, "--review": job.review}
     figures = (job.plot, job.plot_aligned)
@@ -404,7 +402,7 @@ def _reviewed(
     new += [parse_choice(text, "accept", blinks) for text in job.accept]
     old = read_reviews(job.review) if job.review is not None else []
     if job.review is not None and not new and not job.review.exists():
-        raise InputError(f"{job.review}: there is no such review file; --reject N=reason begins one")
+        raise InputError(f"{job.review}: this review file does not exist; create it with --reject N=reason")
     reviews = merge(old, new, reach)
     return reviews, *decide(blinks, reviews, reach)
 
@@ -450,8 +448,8 @@ def _write_figures(
     if job.plot is not None:
         save_figure(series_figure(eyes, _rejected(decided)), job.plot)
     if job.plot_aligned is not None and not profiles:
-        older = "; the one that is there is of an earlier call" if job.plot_aligned.exists() else ""
-        why = f"there is no blink to lay on others{older}"
+        older = "; the existing file is from an earlier run" if job.plot_aligned.exists() else ""
+        why = f"there is no blink to align{older}"
         sys.stderr.write(f"note: {job.plot_aligned} is not written: {why}\n")
     elif job.plot_aligned is not None:
         groups = {eye.series.column: [p for p in profiles if _is_of(p, eye)] for eye in eyes}

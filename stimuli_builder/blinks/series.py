@@ -44,7 +44,7 @@ def tracked_lower_lid(table: pd.DataFrame, column: str) -> tuple[Array, Array] |
 
     The mean of the three lower-lid points along and across the eye's axis (outer to inner canthus, median
     over the recording). In the picture's frame, not the canthi's: these move in a blink themselves. A
-    close-up of one eye does not tell where the nose is: there it is the side the lid slides to.
+    close-up of one eye does not show where the nose is: there it is the side to which the lid slides.
 
     Returns
     -------
@@ -97,7 +97,7 @@ class BlinkSeries:
     is_px : bool
         Whether the distance is in pixels.
     bridged_frames, missing_frames : int
-        Frames filled by a straight line, and frames left out of the labelling.
+        Frames filled by a straight line, and frames left out of the labeling.
     lower_up_mm, lower_nasal_mm : (n,) float64 array or None
         Place of the lower lid where a track holds it.
     notes : tuple of str
@@ -123,7 +123,7 @@ def scaled_frames(paper_frames: float, fps: float) -> float:
 def box_filter(values: Array, width_frames: float) -> Array:
     """Zero-phase moving average over a window of `width_frames`, which need not be a whole number.
 
-    The window is centred, its outermost samples weighted by the part of them it covers: so ten frames
+    The window is centered, its outermost samples weighted by the part of them it covers: so ten frames
     at 300 fps stay 33 ms at any rate. Ends are averaged over the part of the window that exists.
     """
     reach = int(np.ceil((width_frames - 1) / 2))
@@ -177,20 +177,20 @@ def _known_values(table: pd.DataFrame, column: str, fps: float, path: Path) -> A
     values = np.where(np.isfinite(values), values, np.nan)
     if values.size < scaled_frames(300, fps):
         raise InputError(
-            f"{path.name}: {values.size} frames at {fps:g} fps are less than a second: nothing to label"
+            f"{path.name}: {values.size} frames at {fps:g} fps are less than one second, which is too short"
         )
     if not np.isfinite(values).any():
         raise InputError(f"{path.name}: column '{column}' is empty")
     if np.nanmin(values) < 0:
         raise InputError(
-            f"{path.name}: column '{column}' has negative distances ({np.nanmin(values):g}); lids that meet "
-            "are 0 apart: set them to 0, or name another column with --column"
+            f"{path.name}: column '{column}' has negative distances ({np.nanmin(values):g}); the smallest "
+            "possible distance is 0: set them to 0, or select another column with --column"
         )
     return values
 
 
 def _refuse_gaps(gaps: NDArray[np.bool_], table: pd.DataFrame, column: str, path: Path) -> None:
-    """InputError that tells the first of gaps (n,) that nothing explains."""
+    """InputError that names the first unexplained gap (n,)."""
     if not gaps.any():
         return
     first = int(np.argmax(gaps))
@@ -200,17 +200,17 @@ def _refuse_gaps(gaps: NDArray[np.bool_], table: pd.DataFrame, column: str, path
     rest = gaps[first:]
     length = int(np.argmin(rest)) if not rest.all() else rest.size
     raise InputError(
-        f"{path.name}: column '{column}' has no value on {length} frames from {start} on; "
-        "mend the series, or label round the gap with --allow-gaps"
+        f"{path.name}: column '{column}' has no value for {length} frames from {start} on; correct the "
+        "series, or add --allow-gaps"
     )
 
 
 def _numbers(table: pd.DataFrame, column: str, path: Path) -> Array:
-    """(n,) a column's values; InputError naming the first that is no number."""
+    """(n,) a column's values; InputError naming the first that is not a number."""
     if table[column].dtype.kind not in "fiu":
         words = table[column][pd.to_numeric(table[column], errors="coerce").isna() & table[column].notna()]
         got = f", got {words.iloc[0]!r} in line {line_of(path, int(words.index[0]))}" if words.size else ""
-        raise InputError(f"{path.name}: column '{column}' must hold numbers{got}")
+        raise InputError(f"{path.name}: column '{column}' must have numbers{got}")
     return table[column].to_numpy(dtype=np.float64)
 
 
@@ -237,7 +237,7 @@ def read_series(
         raise InputError(f"{path.name} has no column time_s: --resample needs the time of every frame")
     if not resample and TIMES in table.attrs and are_uneven(table):
         # Stamps of a camera or tracker: their steps differ by nature, unlike the even ones of a time_s.
-        resample, times_note = True, f"{times_note}; uneven, so brought to an even rate"
+        resample, times_note = True, f"{times_note}; uneven, so resampled to a constant rate"
     rate = series_fps(table, fps, path, uneven=resample)
     unseen, notes = unseen_rows(table, chosen, path)
     notes = [times_note, *left_out, *notes, *_set_openings(table, chosen, path, inverted, unseen, rate)]

@@ -1,4 +1,4 @@
-"""The blinks table (a row a blink) and the summary of a recording."""
+"""The blinks table (one row per blink) and the summary of a recording."""
 
 import json
 from collections import Counter
@@ -25,9 +25,9 @@ from stimuli_builder.blinks.review import Review
 BLINK_COLUMNS = {
     "number": "number of the blink in its column, from 1",
     "column": "column of the series; left and right of a track are sides of the picture",
-    "onset_frame": "frame where the eye begins to close",
-    "minimum_frame": "frame of the least inter-eyelid distance",
-    "end_frame": "frame where the eye has come to rest again",
+    "onset_frame": "frame at which the eye begins to close",
+    "minimum_frame": "frame of the smallest inter-eyelid distance",
+    "end_frame": "frame at which the eye is at rest again",
     "onset_s": "onset in seconds from the first frame",
     "minimum_s": "minimum in seconds",
     "end_s": "end in seconds",
@@ -36,28 +36,28 @@ BLINK_COLUMNS = {
     "down_ms": "length of the closing phase in ms",
     "up_ms": "length of the opening phase in ms",
     "duration_ms": "onset to end in ms",
-    "open_distance": "open level at the minimum, between the levels at rest before and after it",
+    "open_distance": "open level at the minimum, interpolated between the resting levels before and after it",
     "minimum_distance": "filtered distance at the minimum",
-    "closed_distance": "distance taken as lid contact in this column",
-    "amplitude": "fall from the open level to the minimum, of the fitted curve where there is one",
+    "closed_distance": "distance used as lid contact in this column",
+    "amplitude": "fall from the open level to the minimum, of the fitted curve if there is one",
     "closure": "greatest closure, 0 open to 1 closed",
-    "complete": "true where the closure reaches the limit for a complete blink",
-    "peak_closing_velocity": "greatest speed of closing, in the unit of the series a second",
-    "peak_opening_velocity": "greatest speed of opening, in the unit of the series a second",
-    "rest_before": "closure of the resting eye before the blink, against the wider of before and after",
+    "complete": "true if the closure reaches the limit for a complete blink",
+    "peak_closing_velocity": "greatest speed of closing, in the unit of the series per second",
+    "peak_opening_velocity": "greatest speed of opening, in the unit of the series per second",
+    "rest_before": "closure of the resting eye before the blink, relative to the wider of before and after",
     "rest_after": "closure of the resting eye after the blink, likewise",
-    "touches_neighbour": "true where the eye does not come to rest before the neighbouring blink",
-    "probability": "the classifier's probability that it is a blink; empty by the paper's rule",
+    "touches_neighbour": "true if the eye does not come to rest before the neighboring blink",
+    "probability": "the classifier's probability that it is a blink; empty with the paper's rule",
     "closed_from_s": "start of the closed phase (95% of the amplitude reached), in seconds; likewise",
     "closed_to_s": "end of the closed phase",
-    "down_error_ms": "standard error of down_ms by the fit of the phases; empty by the paper's rule",
+    "down_error_ms": "standard error of down_ms from the fit of the phases; empty with the paper's rule",
     "up_error_ms": "standard error of up_ms; likewise",
     "duration_error_ms": "standard error of duration_ms; likewise",
-    "plausible": "false where no lid has such phases, or they are too uncertain: not in medians and spreads",
-    "partner": "number of the other eye's blink of the same moment; empty where only one eye blinked",
+    "plausible": "false if the phases are implausible or too uncertain; not in medians and spreads",
+    "partner": "number of the other eye's simultaneous blink; empty if only one eye blinked",
     "partner_lag_ms": "onset of this blink minus its partner's",
     "partner_closure": "greatest closure of this blink minus its partner's",
-    "accepted": "false where a review rejected the blink",
+    "accepted": "false if a review rejected the blink",
     "reason": "reason given in the review",
 }
 DURATION_BIN_MS = 1000 / 30
@@ -74,7 +74,7 @@ EVENT_COLUMNS = {
     "minimum_s": "deepest moment",
     "closed_to_s": "end of the deepest phase",
     "end_s": "end of reopening",
-    "depth": "greatest depth as part of the opening",
+    "depth": "greatest depth, as a fraction of the opening",
 }
 
 
@@ -234,7 +234,7 @@ def _mean_blink(profiles: Sequence[BlinkProfile]) -> dict[str, list[float]]:
 FEW_BLINKS = 3
 """Fewer than these say nothing of how far this person's lids close at most."""
 MAX_NAME = 17
-"""Letters of a column's name beside which the figures keep their width on a screen of 80."""
+"""Letters of a column's name that leave the figures their width on a screen of 80."""
 HEADERS = ("blinks", "/min", "complete", "rejected", "down", "up", "total", "closure")
 
 
@@ -262,12 +262,12 @@ def print_blinks(summaries: Sequence[dict[str, Any]], lost: Sequence[Review], *,
             console.print(f"{row['column']}: {line}")
     for review in lost:
         console.print(
-            f"the review names a blink at frame {review.minimum_frame} of {review.column}: none is there"
+            f"the review names a blink at frame {review.minimum_frame} of {review.column}, but there is none"
         )
 
 
 def shortened(name: str, longest: int = MAX_NAME) -> str:
-    """A name of at most `longest` letters, an ellipsis for its middle: both ends tell columns apart."""
+    """A name of at most `longest` letters, an ellipsis for its middle: both ends distinguish columns."""
     if len(name) <= longest:
         return name
     end = (longest - 1) // 2
@@ -278,17 +278,17 @@ def _column_lines(row: dict[str, Any], *, closed_given: bool) -> list[str]:
     lines = []
     if 0 < row["blinks"] < FEW_BLINKS and not closed_given:
         lines.append(
-            "too few blinks to say which are complete: closed is what they themselves reach; give --closed "
-            "where it is known"
+            "there are too few blinks to decide which are complete: their own deepest level was used as "
+            "closed; add --closed if it is known"
         )
-    lines += [f"minimum at frame {one['minimum']} left out: {one['reason']}" for one in row["refused"]]
+    lines += [f"minimum at frame {one['minimum']} excluded: {one['reason']}" for one in row["refused"]]
     if row["other_events"]:
         kinds = [f"{count} {kind.replace('_', ' ')}" for kind, count in row["other_events"].items()]
-        lines.append(f"besides blinks: {', '.join(kinds)}")
+        lines.append(f"other events: {', '.join(kinds)}")
     if row["missing_frames"]:
-        lines.append(f"{row['missing_frames']} frames without a value were left out")
+        lines.append(f"{row['missing_frames']} frames without a value were excluded")
     if row["bridged_frames"]:
-        lines.append(f"{row['bridged_frames']} frames in short gaps were filled")
+        lines.append(f"{row['bridged_frames']} frames in short gaps were interpolated")
     return lines
 
 

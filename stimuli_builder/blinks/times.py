@@ -17,7 +17,7 @@ MAX_BRIDGED_MS = 1000 / 30
 TIMES = "times"
 """Under this name a table keeps which of its columns time_s is from."""
 TIME_NAME = re.compile(r"(?:time|timestamp)(?P<unit>s|ms|us|µs|μs|ns|sec|seconds|milliseconds|nanoseconds)?")
-"""Letters of their names; of a unit s says nothing, as the steps tell it."""
+"""Letters of their names; a unit s says nothing, because the steps decide it."""
 STATED = {
     "ms": "ms",
     "milliseconds": "ms",
@@ -34,7 +34,7 @@ _TIMECODE = re.compile(r"(\d+):(\d+):(\d+)[:;](\d+(?:\.\d+)?)")
 TOLD_FPS = (10, 10_000)
 """Rates that may be given."""
 RESAMPLED = "resampled"
-"""So marked, a table's rows are no lines of its file."""
+"""Marks a table whose rows are not lines of its file."""
 UNITS = (("s", 1.0, 0.9), ("ms", 1e-3, 200.0), ("µs", 1e-6, 2e5), ("ns", 1e-9, np.inf))
 """Units of times, their seconds, and the step below which a series is in them."""
 HOLE_STEPS = 2.5
@@ -81,7 +81,7 @@ def _times_s(column: pd.Series, path: Path) -> tuple[Array, str]:
     if not np.isfinite(steps).all() or (steps == 1).all():
         got = "counts frames" if (steps == 1).all() else "is not a number in every row"
         raise InputError(
-            f"{path.name}: '{column.name}' {got}; expected times: give the recording's rate with --fps"
+            f"{path.name}: '{column.name}' {got}; expected times: add the recording's rate with --fps"
         )
     parts = {unit: part for unit, part, _ in UNITS}
     unit = STATED.get(_stated_unit(str(column.name))) or _unit(float(np.median(steps)))
@@ -125,7 +125,7 @@ def _letters(column: str) -> str:
 def _unit(step: float) -> str:
     """The unit in which a usual step is one of a recording, of 5 frames a second or more.
 
-    Only seconds may be slower, so that a recording of 5 frames a second is told as what it is.
+    Only seconds may be slower, so that a recording of 5 frames per second is recognized.
     """
     return next(unit for unit, _, below in UNITS if step < below)
 
@@ -147,8 +147,8 @@ def refuse_other_rate(table: pd.DataFrame, fps: float, path: Path) -> None:
 def _refuse_contradiction(fps: float, measured: float, table: pd.DataFrame, path: Path) -> None:
     if abs(fps / measured - 1) > 0.01:
         raise InputError(
-            f"--fps {fps:g} contradicts {path.name}, whose {_name(table)} runs at {measured:.2f}; "
-            "leave --fps out"
+            f"--fps {fps:g} contradicts {path.name}, whose {_name(table)} runs at {measured:.2f}; remove "
+            "--fps"
         )
 
 
@@ -160,17 +160,17 @@ def series_fps(table: pd.DataFrame, fps: float | None, path: Path, *, uneven: bo
     measured = _measured_fps(table, path, uneven=uneven) if "time_s" in table.columns else None
     if fps is None and measured is None:
         raise InputError(
-            f"{path.name} has no column time_s (it has {few(list(table.columns))}); expected a "
-            "track, or lid distances: give the recording's rate with --fps"
+            f"{path.name} has no column time_s (it has {few(list(table.columns))}); expected a track, or lid "
+            "distances with the recording's rate (--fps)"
         )
     if fps is not None and not (np.isfinite(fps) and TOLD_FPS[0] <= fps <= TOLD_FPS[1]):
-        raise InputError(f"the rate must lie between 10 and 10000 frames a second, got --fps {fps:g}")
+        raise InputError(f"the rate must be between 10 and 10000 frames per second, got --fps {fps:g}")
     if fps is not None and measured is not None:
         _refuse_contradiction(fps, measured, table, path)
     rate = measured if measured is not None else fps
     if rate is None or rate < 10:
         raise InputError(
-            f"{path.name}: at {rate:.3g} frames a second no blink can be seen; 10 or more are needed"
+            f"{path.name}: at {rate:.3g} frames per second blinks cannot be detected; at least 10 are needed"
         )
     return rate
 
@@ -192,8 +192,8 @@ def _measured_fps(table: pd.DataFrame, path: Path, *, uneven: bool) -> float:
     if not uneven and off.any():
         line = line_of(path, int(np.argmax(off)) + 1)  # a step ends at the second of two rows
         raise InputError(
-            f"{path.name}: {_name(table)} is uneven (line {line}); labels need a constant frame rate: "
-            "--resample brings it to one"
+            f"{path.name}: {_name(table)} is uneven (line {line}); blinks need a constant frame rate: add "
+            "--resample"
         )
     # A pause of a minute says nothing of the rate.
     return float(1 / steps[~_is_hole(steps)].mean())
@@ -238,7 +238,7 @@ def resampled(
     -------
     table : DataFrame
     unseen : dict of str to (n,) bool array
-        By column, frames of the new table that lie in a hole, or beside a row that was not seen.
+        By column, frames of the new table that are in a hole, or next to a row that was not seen.
     note : str
         How many holes, and how long together; empty without one.
     """
@@ -248,7 +248,7 @@ def resampled(
     if count > MAX_FRAMES:
         raise InputError(
             f"{path.name}: time_s runs over {times[-1] - times[0]:,.0f} s, {count:,} frames at {fps:.4g} fps "
-            f"where {MAX_FRAMES:,} are the most: cut the recording where it pauses, or mend time_s"
+            f"but at most {MAX_FRAMES:,} are allowed: cut the recording at the pause, or fix time_s"
         )
     even = np.minimum(times[0] + np.arange(count) / fps, times[-1])
     left = np.clip(np.searchsorted(times, even, side="right") - 1, 0, steps.size - 1)
@@ -273,8 +273,8 @@ def _hole_note(steps: Array, path: Path) -> str:
         return ""
     return (
         f"{path.name}: {counted(holes.size, 'hole')} in time_s (steps longer than "
-        f"{_hole_limit_s(steps) * 1000:.0f} ms), {holes.sum():.3g} s together, not seen: left out of "
-        "blinks a minute"
+        f"{_hole_limit_s(steps) * 1000:.0f} ms), {holes.sum():.3g} s in total: excluded from blinks per "
+        "minute"
     )
 
 

@@ -21,8 +21,8 @@ INTER_OCULAR_MM = 60.0
 LID_RADIUS_MM = 12.0
 """Radius about which the upper lid's margin turns: the eyeball's."""
 SCALES = {
-    "inter-ocular": f"the middles of both eyes are {INTER_OCULAR_MM:g} mm apart",
-    "eye-width": f"an eye is {FISSURE_LENGTH_MM:g} mm from canthus to canthus",
+    "inter-ocular": f"the centers of both eyes are {INTER_OCULAR_MM:g} mm apart",
+    "eye-width": f"an eye is {FISSURE_LENGTH_MM:g} mm wide from canthus to canthus",
 }
 
 
@@ -37,7 +37,7 @@ FISSURES_MM = (3.0, 16.0)
 
 @dataclass(frozen=True)
 class Scale:
-    """Millimetres in a pixel, and the assumption it rests on."""
+    """Millimeters per pixel, and the assumption it rests on."""
 
     mm_per_px: float
     rule: str
@@ -51,18 +51,18 @@ def scale_doubt(series: BlinkSeries, scale: Scale | None) -> str:
     if FISSURES_MM[0] <= opening <= FISSURES_MM[1]:
         return ""
     return (
-        f"{series.column}: the lids are {opening:.3g} mm apart when open, where people's are "
-        f"{FISSURES_MM[0]:g} to {FISSURES_MM[1]:g}: is --scale right ({scale.rule})?"
+        f"{series.column}: the lids are {opening:.3g} mm apart when open, but usual values are "
+        f"{FISSURES_MM[0]:g} to {FISSURES_MM[1]:g}: check --scale ({scale.rule})"
     )
 
 
 def check_scale(scale: str) -> float | None:
-    """Return the mm in a pixel that a wish for a scale gives, or None where it is a rule of `SCALES`.
+    """Return the mm per pixel of a requested scale, or None where it is a rule of `SCALES`.
 
     Raises
     ------
     InputError
-        The wish is no number that can be, and no rule.
+        The requested scale is neither a possible number nor a rule.
     """
     if scale in SCALES:
         return None
@@ -76,21 +76,22 @@ def check_scale(scale: str) -> float | None:
         rules = ", ".join(f"'{rule}'" for rule in SCALES) + f" or '{IRIS_FILE}' and a table of stimuli iris"
         near = nearest(scale, SCALES)
         raise InputError(
-            f"--scale {scale}: expected a number of mm in a pixel, {rules}"
+            f"--scale {scale}: expected a number of mm per pixel, {rules}"
             + (f"; did you mean '{near}'?" if near else "")
         ) from None
     if not (np.isfinite(value) and 0 < value < 10):
-        raise InputError(f"--scale is a number of mm in a pixel, above 0 and below 10, got {scale}")
+        raise InputError(f"--scale must be a number of mm per pixel above 0 and below 10, got {scale}")
     return value
 
 
 def scale_of(table: pd.DataFrame, scale: str | None, path: Path) -> Scale | None:
-    """Return the scale of a track: a number of mm in a pixel, or a rule of `SCALES`; None without a wish.
+    """Return the scale of a track: a number of mm per pixel, or a rule of `SCALES`; None if none is
+    requested.
 
     Raises
     ------
     InputError
-        The wish is no number and no rule, or the table has no landmarks for the rule.
+        The requested scale is neither a number nor a rule, or the table has no landmarks for the rule.
     """
     if scale is None:
         return None
@@ -100,7 +101,7 @@ def scale_of(table: pd.DataFrame, scale: str | None, path: Path) -> Scale | None
     value = check_scale(scale)
     if value is None:
         return _by_rule(table, scale, path)
-    return Scale(value, f"{value:g} mm in a pixel, as given (a card or a ruler in the picture)")
+    return Scale(value, f"{value:g} mm per pixel, as given (from a card or a ruler in the picture)")
 
 
 def iris_table(scale: str | None) -> Path | None:
@@ -119,14 +120,14 @@ def _by_irises(path: Path) -> Scale:
     if seen.size < LEAST_IRISES:
         raise InputError(
             f"--scale {IRIS_FILE}{path.name}: expected a table of stimuli iris with {LEAST_IRISES} irises or "
-            f"more, got {seen.size}; measure them by stimuli iris VIDEO TRACK --out I.csv"
+            f"more, got {seen.size}; measure them with stimuli iris VIDEO TRACK --out I.csv"
         )
     middles = [float(np.nanmedian(one)) for one in diameters.T if np.isfinite(one).any()]
     if max(middles) > MAX_IRIS_RATIO * min(middles):
         raise InputError(
             f"--scale {IRIS_FILE}{path.name}: the irises of both eyes are {min(middles):.3g} and "
-            f"{max(middles):.3g} px wide (medians), which those of one face are not: look at the recording "
-            "with stimuli track --preview, or give mm in a pixel"
+            f"{max(middles):.3g} px wide (medians), which is implausible for one face: check the recording "
+            "with stimuli track --preview, or give mm per pixel"
         )
     middle = float(np.median(seen))
     rule = f"an iris is {IRIS_MM:g} mm wide, {middle:.1f} px here (median of {seen.size:,} in {path.name})"
@@ -147,7 +148,7 @@ def _by_rule(table: pd.DataFrame, rule: str, path: Path) -> Scale:
     else:
         length, true = np.hypot(*(points[:, 0, 5] - points[:, 0, 0]).T), FISSURE_LENGTH_MM
     if not np.isfinite(length).any():
-        raise InputError(f"{path.name}: no frame has landmarks, so there is no scale")
+        raise InputError(f"{path.name}: no frame has landmarks, so the scale cannot be computed")
     return Scale(true / float(np.nanmedian(length)), SCALES[rule])
 
 

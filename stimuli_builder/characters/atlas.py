@@ -43,8 +43,7 @@ def decode_picture(folder: Path, picture: Picture, size: Sequence[int], what: st
     if image.size != tuple(size):
         declared = " x ".join(str(n) for n in size)
         raise InputError(
-            f"{what}: {picture.file} is {image.width} x {image.height} px, "
-            f"the declaration asks for {declared} px"
+            f"{what}: {picture.file} is {image.width} x {image.height} px, but {declared} px are declared"
         )
     return np.asarray(image, dtype=np.uint8)
 
@@ -260,7 +259,7 @@ class Atlas:
 
     @property
     def lower_lid_layer(self) -> LowerLidLayer:
-        """The lower-lid layer, read anew at each call; InputError where the character has none.
+        """The lower-lid layer, read again at each call; InputError where the character has none.
 
         It knows this atlas: kept here, the two would hold one another's pictures in memory.
         """
@@ -305,7 +304,7 @@ class Atlas:
         if picture.frame >= len(frames) or frames.shape[1:3] != (height, width):
             raise InputError(
                 f"{what}: {picture.file} holds {len(frames)} of {frames.shape[2]} x {frames.shape[1]} px, "
-                f"the declaration asks for frame {picture.frame} of {width} x {height} px"
+                f"but frame {picture.frame} of {width} x {height} px is declared"
             )
         return np.asarray(frames[picture.frame], np.uint8)
 

@@ -13,14 +13,14 @@ from stimuli_builder.characters.retired import load_retired, restore
 from stimuli_builder.clips.characters import SHIPPED_FOLDER, geometry, shipped_names
 
 BAKERS = "palpebra.bakers"
-"""Entry points by which a package of its own adds a command to `stimuli bake`."""
+"""Entry points by which a separate package adds a command to `stimuli bake`."""
 KNOWN_BAKERS = {
     "face": "A character on face-kit geometry.",
-    "samples": "Synthetic training data for whatever finds eyelids in pictures.",
+    "samples": "Synthetic training data for eyelid detectors.",
 }
 
 bake_app = command_group("Render a character's atlas of baked pictures.")
-character_app = command_group("List the characters that are here, and bring back one of an earlier release.")
+character_app = command_group("List the installed characters, and restore a character of an earlier release.")
 
 
 @bake_app.callback()
@@ -30,7 +30,7 @@ def _bake() -> None:
 
 @character_app.command("list")
 def list_characters() -> None:
-    """List the characters that are here, and those that earlier releases had.
+    """List the installed characters, and those of earlier releases.
 
     Examples:
 
@@ -39,13 +39,13 @@ def list_characters() -> None:
     names = shipped_names()
     for name in names:
         shape = geometry(name)
-        lower = "its lower lid moves" if shape.lower_range_mm else "no lower lid of its own"
+        lower = "its lower lid moves" if shape.lower_range_mm else "no separate lower lid"
         typer.echo(
             f"{name:16} {shape.size_px[0]} x {shape.size_px[1]} px, opens {shape.opening_mm:g} mm, {lower}"
         )
     for name, retired in load_retired().items():
         if name not in names:
-            typer.echo(f"{name:16} not here: `stimuli character fetch {name}` ({retired.label})")
+            typer.echo(f"{name:16} not installed: `stimuli character fetch {name}` ({retired.label})")
 
 
 @character_app.command("fetch")
@@ -55,14 +55,17 @@ def fetch_character(
         Path | None,
         typer.Option(
             "--from",
-            help="Clone of Palpebra, an earlier release unpacked, or the character's folder [this clone].",
+            help=(
+                "Clone of Palpebra, an unpacked earlier release, or the character's folder [default: this "
+                "clone]."
+            ),
         ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder to hold it [beside the characters that ship].")
+        Path | None, typer.Option(help="Folder for it [default: next to the shipped characters].")
     ] = None,
 ) -> None:
-    """Bring back a character of an earlier release, byte for byte, so that its studies render as they did.
+    """Restore a character of an earlier release, byte for byte, so that its studies render as before.
 
     Nothing is downloaded: its pictures come from the history of your clone, or from an earlier release.
 

@@ -1,4 +1,4 @@
-"""Encodings of colour: sRGB and linear light, the planes of a video, and blends between levels."""
+"""Encodings of color: sRGB and linear light, the planes of a video, and blends between levels."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -50,7 +50,7 @@ def level_weights(levels: NDArray[np.float64], closures: ArrayLike) -> NDArray[n
     Returns
     -------
     float64 array (m, n)
-        Each row sums to 1 and has at most two neighbours above 0. The mean of rows is the weight vector of
+        Each row sums to 1 and has at most two neighbors above 0. The mean of rows is the weight vector of
         motion blur over these closures.
 
     Examples
@@ -70,9 +70,9 @@ def level_weights(levels: NDArray[np.float64], closures: ArrayLike) -> NDArray[n
     return weights
 
 
-# Planes in which a level's colours are encoded, and the way back; whole numbers, so every machine agrees.
+# Planes in which a level's colors are encoded, and the way back; whole numbers, so every machine agrees.
 #
-# Brightness and two differences of colours (YCoCg: Malvar & Sullivan 2003, eq. 1) instead of R, G and B. A
+# Brightness and two differences of colors (YCoCg: Malvar & Sullivan 2003, eq. 1) instead of R, G and B. A
 # face's three primaries are alike, and H.264 does not predict one plane from another: for the same error the
 # differences take a quarter to a third less. In ten bits all three keep every code value:
 #
@@ -82,10 +82,10 @@ def level_weights(levels: NDArray[np.float64], closures: ArrayLike) -> NDArray[n
 # with r, g, b in 0-255, y in 0-1020, o and n in 2-1022, o' = o - 512, n' = n - 512.
 
 FORMAT = "yuv444p10le"
-"""Name of the planes' layout in the video; their stream says nothing of the colours (2)."""
+"""Name of the planes' layout in the video; their stream says nothing of the colors (2)."""
 _CODE = np.dtype("<u2")
 MIDDLE = 512
-"""Code value of no difference between colours."""
+"""Code value of no difference between colors."""
 Planes = tuple[NDArray[np.uint16], NDArray[np.uint16], NDArray[np.uint16]]
 
 

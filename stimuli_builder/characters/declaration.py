@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from experiments.errors import InputError, wrong_value
 
-REPAIR = "put a whole file in its place, or bake the character again"
+REPAIR = "restore the complete file, or bake the character again"
 """What to do about a character's file that is missing or damaged; its pictures may be of anybody's making."""
 DECLARATION_FILE = "character.toml"
 Closure = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -29,12 +29,12 @@ class Picture(_Declared):
     @model_validator(mode="after")
     def _stays_in_folder(self) -> "Picture":
         if Path(self.file).is_absolute() or ".." in Path(self.file).parts:
-            raise ValueError(f"file '{self.file}' must lie inside the character's folder")
+            raise ValueError(f"file '{self.file}' must be inside the character's folder")
         return self
 
 
 class PictureOrFrame(Picture):
-    """A picture of its own, or where `file` is a video the one of number `frame`, from 0."""
+    """A separate picture, or, if `file` is a video, its frame number `frame`, from 0."""
 
     frame: int | None = Field(None, ge=0)
 
@@ -48,7 +48,7 @@ class Level(PictureOrFrame):
 class LowerLidPose(PictureOrFrame):
     """The lower lid's region of the open-eye frame with the lower lid moved.
 
-    `vertical_mm` is up, `horizontal_mm` towards the nose, both of the lid's centre.
+    `vertical_mm` is up, `horizontal_mm` toward the nose, both of the lid's center.
     """
 
     vertical_mm: float
@@ -58,7 +58,7 @@ class LowerLidPose(PictureOrFrame):
 class LowerLid(_Declared):
     """The lower-lid layer: poses of the open eye and mattes of what covers the lower lid.
 
-    A matte is a grey picture of the layer's region: 1 (white) where upper lid or upper lashes hide the
+    A matte is a gray picture of the layer's region: 1 (white) where upper lid or upper lashes hide the
     lower lid at that closure. `crop` is x, y, width, height in px of the full frame.
     """
 
@@ -81,9 +81,9 @@ class LowerLid(_Declared):
         given = sorted((pose.vertical_mm, pose.horizontal_mm) for pose in self.poses)
         needed = sorted((v, h) for v in self.vertical_mm for h in self.horizontal_mm)
         if given != needed:
-            raise ValueError("lower_lid.poses must hold every pair of vertical_mm and horizontal_mm once")
+            raise ValueError("lower_lid.poses must have every pair of vertical_mm and horizontal_mm once")
         if 0.0 not in self.vertical_mm or 0.0 not in self.horizontal_mm:
-            raise ValueError("lower_lid.poses must hold the resting pose (vertical_mm 0, horizontal_mm 0)")
+            raise ValueError("lower_lid.poses must include the resting pose (vertical_mm 0, horizontal_mm 0)")
         if any(matte.frame is not None for matte in self.mattes):
             raise ValueError(
                 "lower_lid.mattes must be pictures; only base, levels and poses may be frames of a video"
@@ -95,8 +95,8 @@ class LowerLid(_Declared):
 class Declaration(_Declared):
     """The whole of `character.toml`; lengths in mm on the screen at actual size, positions in px.
 
-    `version` counts the bakes of a name that were given to others: pictures that changed have another and
-    are a character of their own, `alder@2`; poses of the lower lid added to a character count further.
+    `version` counts the bakes of a name that were given to others: pictures that changed have another and are
+    a separate character, `alder@2`; poses of the lower lid added to a character count further.
     """
 
     name: str = Field(pattern="^[a-z0-9][a-z0-9_-]*(@[1-9][0-9]{0,3})?$")
@@ -141,7 +141,7 @@ def _require_inside(crop: tuple[int, int, int, int], size: tuple[int, int], wher
     x, y, width, height = crop
     if min(x, y) < 0 or min(width, height) < 1 or x + width > size[0] or y + height > size[1]:
         raise ValueError(
-            f"{where} {list(crop)} (x, y, width, height) must lie inside the {list(size)} px frame"
+            f"{where} {list(crop)} (x, y, width, height) must be inside the {list(size)} px frame"
         )
 
 
@@ -152,7 +152,7 @@ def _require_nested(inner: tuple[int, int, int, int], outer: tuple[int, int, int
         or inner[0] + inner[2] > outer[0] + outer[2]
         or inner[1] + inner[3] > outer[1] + outer[3]
     ):
-        raise ValueError("lower_lid.crop must lie inside crop")
+        raise ValueError("lower_lid.crop must be inside crop")
 
 
 def read_declaration(folder: Path) -> Declaration:
@@ -168,19 +168,17 @@ def read_declaration(folder: Path) -> Declaration:
         text = file.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
         raise InputError(
-            f"{folder} is no character: its {DECLARATION_FILE} is no text in UTF-8; {REPAIR}"
+            f"{folder} is not a character: its {DECLARATION_FILE} is not UTF-8 text; {REPAIR}"
         ) from error
     except OSError as error:
-        raise InputError(
-            f"{folder} is no character: it has no {DECLARATION_FILE} that can be read"
-        ) from error
+        raise InputError(f"{folder} is not a character: it has no readable {DECLARATION_FILE}") from error
     try:
         return Declaration.model_validate(tomllib.loads(text))
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{file} is not TOML: {error}; correct that line") from error
     except ValidationError as error:
         raise InputError(
-            f"{file}: {_first_fault(error)}; correct it (docs/how-to/own-character.md) or bake again where "
+            f"{file}: {_first_fault(error)}; correct it (docs/how-to/own-character.md) or bake it again if "
             "another version of Palpebra wrote it"
         ) from error
 

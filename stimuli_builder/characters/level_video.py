@@ -91,7 +91,7 @@ def video_frames(content: bytes, what: str, file: str) -> Iterator[NDArray[np.ui
     except (av.error.FFmpegError, ValueError, IndexError) as error:
         raise InputError(f"{what} is damaged: cannot decode {file}; {REPAIR}") from error
     if not shown:
-        raise InputError(f"{what} is damaged: {file} holds no frame; {REPAIR}")
+        raise InputError(f"{what} is damaged: {file} has no frame; {REPAIR}")
 
 
 def _count(content: bytes) -> int:
@@ -110,7 +110,7 @@ def _frame(picture: NDArray[np.uint8]) -> av.VideoFrame:
 
 
 def _rgb(frame: Any) -> NDArray[np.uint8]:
-    """Code values of a decoded frame, by our own conversion of colours alone."""
+    """Code values of a decoded frame, by our own conversion of colors alone."""
     if frame.format.name not in (FORMAT, "gbrp"):
         raise ValueError(f"planes are {frame.format.name}, expected {FORMAT} or gbrp")
     planes = frame_planes(frame)

@@ -54,7 +54,7 @@ def restore(name: str, source: Path | None, target: Path) -> Path:
     """
     known = load_retired()
     if name not in known:
-        raise InputError(f"no retired character '{name}'{did_you_mean(name, known)}")
+        raise InputError(f"there is no retired character '{name}'{did_you_mean(name, known)}")
     retired = known[name]
     if (target / DECLARATION_FILE).is_file():
         _check(name, retired, target)
@@ -68,8 +68,8 @@ def restore(name: str, source: Path | None, target: Path) -> Path:
             draft.replace(target)
     except OSError as error:
         raise InputError(
-            f"cannot write {target}: {error.strerror}; give another folder with --out and name "
-            "it as the character"
+            f"cannot write {target}: {error.strerror}; choose another folder with --out and use it as the "
+            "character"
         ) from error
     return target
 
@@ -94,12 +94,12 @@ def _archive(name: str, retired: Retired, source: Path) -> bytes:
     try:
         done = subprocess.run(command, capture_output=True, check=False)  # noqa: S603 - fixed arguments
     except OSError as error:
-        raise InputError(f"fetching '{name}' needs git, which is not here: {error.strerror}") from error
+        raise InputError(f"fetching '{name}' needs git, which was not found: {error.strerror}") from error
     if done.returncode:
         said = (done.stderr.decode(errors="replace").strip().splitlines() or ["no message"])[-1]
         raise InputError(
-            f"{source} does not hold '{name}' ({said}): expected a whole clone of Palpebra (`git fetch "
-            "--unshallow` completes one) or an earlier release, given with --from"
+            f"{source} does not contain '{name}' ({said}): use --from with a complete clone of Palpebra "
+            "(complete it with `git fetch --unshallow`) or an earlier release"
         )
     return done.stdout
 
@@ -107,6 +107,6 @@ def _archive(name: str, retired: Retired, source: Path) -> bytes:
 def _check(name: str, retired: Retired, folder: Path) -> None:
     if load_atlas(folder).fingerprint() != retired.sha256:
         raise InputError(
-            f"{folder} holds another '{name}' than earlier releases had: its pictures have another SHA-256; "
-            "take it from a clone or a release that nobody changed"
+            f"'{name}' in {folder} differs from the one in earlier releases: its pictures have another "
+            "SHA-256; use an unchanged clone or release"
         )

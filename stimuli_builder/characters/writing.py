@@ -54,7 +54,7 @@ CLOSURES = (0.0, 0.25, 0.5, 1.0)
 
 
 def draw_crop(closure: float, lift: int = 0) -> NDArray[np.uint8]:
-    """Grey skin with one dark eye: the lid covers it from above, the lower lid lifts by whole pixels."""
+    """Gray skin with one dark eye: the lid covers it from above, the lower lid lifts by whole pixels."""
     image = np.full((CROP[3], CROP[2], 3), 180, np.uint8)
     top = 2 + round(12 * closure)
     image[top : 14 - lift, 8:32] = (40, 60, 90)

@@ -22,7 +22,7 @@ Generator = np.random.Generator
 LATTICE = 60
 """Dots along each side of the picture."""
 JITTER = 4
-"""How many dots what is shown may stand away from the middle."""
+"""Maximum distance of what is shown from the middle, in dots."""
 
 _DIGITS = (
     "00100 01100 00100 00100 00100 00100 01110",
@@ -69,7 +69,7 @@ def placed_mask(shown: Mask, rng: Generator) -> Mask:
 #
 # Each picture is a lattice of independent dots, each dark or bright with probability 1/2. Within a segment
 # of `SEGMENT` steps the dots inside the mask move one way and those outside the other, one dot a step, over
-# two textures that are independent of each other; a share 1 - coherence of the dots is drawn anew in each
+# two textures that are independent of each other; a share 1 - coherence of the dots is drawn again in each
 # picture.
 #
 # - One picture. A shifted texture of independent dots is a texture of independent dots, so that inside,

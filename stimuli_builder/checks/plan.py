@@ -99,7 +99,8 @@ def bt709(colour: str) -> tuple[int, int, int]:
 # `stimuli checks`, and the checks of `stimuli build`: the clips and their rows of the manifest.
 
 SEED_NAME = ".checks-seed"
-"""Beside the manifest while checks are made: the seed drawn, so that an interrupted build goes on with it."""
+"""In the manifest's folder while checks are made: the seed, so that an interrupted build continues with
+it."""
 SEED_BITS = 53
 Progress = Callable[[int, int], None]
 
@@ -116,7 +117,8 @@ class ChecksReport:
 def build_checks(
     experiment: Experiment, folder: Path, options: Options, progress: Progress, *, anew: bool = False
 ) -> ChecksReport:
-    """Make the clips of an experiment's motion checks beside its clips, and name them in the manifest.
+    """Make the clips of an experiment's motion checks in the folder of its clips, and name them in the
+    manifest.
 
     Parameters
     ----------
@@ -131,12 +133,12 @@ def build_checks(
     """
     if not any(motion_checks_by_block(experiment)):
         raise InputError(
-            f"'{experiment.name}' asks for no motion checks; set online_recruitment in [evidence], or "
-            "per_block in [evidence.motion_checks]"
+            f"'{experiment.name}' has no motion checks; set online_recruitment in [evidence], or per_block "
+            "in [evidence.motion_checks]"
         )
     former = former_manifest(experiment, folder)
     if former is None:
-        raise InputError(f"{folder} holds no {MANIFEST_NAME}; make the clips first, with `stimuli build`")
+        raise InputError(f"{folder} has no {MANIFEST_NAME}; build the clips first with `stimuli build`")
     seed = seed_for(folder, former, options, anew=anew)
     planned = planned_checks(experiment, seed, options)
     state = BuildState.read(folder, former)

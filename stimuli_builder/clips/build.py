@@ -67,7 +67,7 @@ def build(
     Raises
     ------
     InputError
-        The design cannot be analysed or rendered, the folder belongs to another experiment or cannot be
+        The design cannot be analyzed or rendered, the folder belongs to another experiment or cannot be
         written, or the build was interrupted; what is built by then is kept and used by the next run.
     """
     options, machines = options or Options(), machines or Machines()

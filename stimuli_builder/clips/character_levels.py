@@ -61,7 +61,7 @@ class BakedCharacter:
 
 
 def measured_movement(provenance: Mapping[str, Any]) -> dict[str, float]:
-    """Millimetres by part of the face, as its bake measured them; empty for characters made elsewhere."""
+    """Millimeters by part of the face, as its bake measured them; empty for characters made elsewhere."""
     measured = provenance.get("moved_mm_at_closure_1")
     if not isinstance(measured, Mapping):
         return {}
@@ -167,7 +167,7 @@ def _resized(frame: NDArray[np.float32], size_px: tuple[int, int]) -> NDArray[np
     return np.asarray(cv2.resize(frame, size_px, interpolation=method), np.float32)
 
 
-# The cartoon as clips need it: drawn anew at every size.
+# The cartoon as clips need it: drawn again at every size.
 
 NAME = "cartoon"
 NATIVE_WIDTH_PX = 960

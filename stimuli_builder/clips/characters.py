@@ -33,15 +33,16 @@ def character_folder(name: str, beside: Path | None = None) -> Path:
         return folder.resolve()
     if name in load_retired():
         raise InputError(
-            f"character '{name}' does not ship any more: `stimuli character fetch {name}` brings it back for "
-            "studies that were made with it; a new study names another, say character = 'alder@8'"
+            f"character '{name}' is no longer shipped. Restore it for existing studies with `stimuli "
+            f"character fetch {name}`; for a new study use another, such as character = 'alder@8'"
         )
     if folder.is_dir():
         raise InputError(
-            f"{folder} is no character: it holds no character.toml (docs/how-to/own-character.md)"
+            f"{folder} is not a character: it has no character.toml (docs/how-to/own-character.md)"
         )
     raise InputError(
-        f"no character '{name}': neither shipped nor a folder{did_you_mean(name, shipped_names())}"
+        f"there is no character '{name}': it is neither shipped nor a "
+        f"folder{did_you_mean(name, shipped_names())}"
     )
 
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from stimuli_builder.clips.build import Progress, Report
 
 
-# `stimuli plan`, `stimuli build` and `stimuli verify`; other commands have files of their own.
+# `stimuli plan`, `stimuli build` and `stimuli verify`; other commands have separate files.
 
 ExperimentName = Annotated[
     str, typer.Argument(help="exp1 to exp3, a demo, or a TOML file.", show_default=False)
@@ -24,7 +24,7 @@ ExperimentName = Annotated[
 PLAN_HELP = """
 Print an experiment's design: factors, cells, clips, trials, blocks and expected minutes.
 
-Also printed: which 'real' exemplars show a recording for the second time.
+It also lists 'real' exemplars that show a recording for the second time.
 
 The keys of --json: name, title, participants, factors, cells, exemplars_per_cell, unique_clips,
 trials_per_participant, practice_trials, blocks, order, expected_minutes, repeated_profiles.
@@ -38,8 +38,8 @@ Examples:
 BUILD_HELP = """
 Build an experiment's clips (H.264 in MP4) and manifest.json.
 
-Only what is missing or has changed is rendered; after an interruption the same command goes on. The same
-seed gives the same bytes on one machine and the same curves on any.
+Only missing or changed clips are rendered. After an interruption, run the same command to continue. The same
+seed gives the same bytes on one machine and the same curves on any machine.
 
 Examples:
 
@@ -53,10 +53,10 @@ VERIFY_HELP = """
 Check a folder of clips against its manifest: presence, hashes, frame counts, timing and eyelid opening.
 
 The opening of each eye is measured in the decoded pixels of every frame and compared with its closure curve.
-Clips whose character has changed since, or is not here, are checked for the rest alone.
+If the character has changed or is not installed, this comparison is skipped.
 
-A warning names every feature other than the factor by which a level can be recognized: where the lids rest at
-the start and end, length, picture size, brightness. --levels lists all of them.
+A warning lists every other feature by which a level can be recognized: where the lids rest at the start and
+end, length, picture size, brightness. --levels lists all features.
 
 Examples:
 
@@ -96,18 +96,20 @@ def plan_command(
 
 def build_command(
     experiment: ExperimentName,
-    out: Annotated[Path, typer.Option(help="Folder for the clips; made if it is not there.")],
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes; default: one a core.")] = None,
+    out: Annotated[Path, typer.Option(help="Folder for the clips; created if missing.")],
+    workers: Annotated[
+        int | None, typer.Option(min=1, help=("Number of processes. Default: one per core."))
+    ] = None,
     dask: Annotated[str | None, typer.Option(help="Address of a Dask scheduler to render on.")] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed in place of the declared one.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Random seed instead of the declared one.")] = None,
     preview: Annotated[
         bool, typer.Option("--preview", help="Also write preview.png (contact sheet) and preview.html.")
     ] = False,
     barcode: Annotated[
-        bool, typer.Option("--test-barcode", help="Draw each frame's number into its corner, for tests.")
+        bool, typer.Option("--test-barcode", help="Draw each frame's number in its corner, for tests.")
     ] = False,
     quiet: Annotated[
-        bool, typer.Option("--quiet-when-current", help="Print nothing when no clip had to be built.")
+        bool, typer.Option("--quiet-when-current", help="Print nothing if no clip had to be built.")
     ] = False,
 ) -> None:
     """Build the clips of an experiment."""
@@ -135,8 +137,8 @@ def _print_report(report: "Report", out: Path) -> None:
     checks = f" and {len(manifest.checks)} of checks" if manifest.checks else ""
     removed = f", {len(report.removed)} old ones removed" if report.removed else ""
     print(
-        f"{manifest.experiment}: {clips} clips{checks} in {out} ({size_mb:.1f} MB); "
-        f"{report.built} built, {report.reused} already there{removed}"
+        f"{manifest.experiment}: {clips} clips{checks} in {out} ({size_mb:.1f} MB); {report.built} built, "
+        f"{report.reused} unchanged{removed}"
     )
     for note in manifest.notes:
         if note.startswith("exemplar "):
@@ -145,9 +147,9 @@ def _print_report(report: "Report", out: Path) -> None:
 
 def verify_command(
     folder: Annotated[Path, typer.Argument(help="Folder with manifest.json.", show_default=False)],
-    characters: Annotated[Path | None, typer.Option(help="Folder that holds characters of your own.")] = None,
+    characters: Annotated[Path | None, typer.Option(help="Folder with your own characters.")] = None,
     levels: Annotated[
-        bool, typer.Option("--levels", help="List how well each feature of the clips tells levels apart.")
+        bool, typer.Option("--levels", help="List how well each feature of the clips distinguishes levels.")
     ] = False,
 ) -> None:
     """Check built clips."""
@@ -159,18 +161,18 @@ def verify_command(
         print(finding)
     if verdict.findings:
         wrong = len({finding.clip.file for finding in verdict.findings})
-        again = "write the manifest again with `stimuli manifest`, which converts what has to be converted"
+        again = "run `stimuli manifest` again, which converts clips where necessary"
         raise InputError(
-            f"{wrong} of {verdict.clips} clips are not what the manifest says; "
+            f"{wrong} of {verdict.clips} clips differ from the manifest; "
             + (again if verdict.is_made_elsewhere else "build them again with `stimuli build`")
         )
-    measured = "the opening was measured in none"
+    measured = "the opening was not measured in any clip"
     if verdict.opening_checked:
         measured = (
             f"opening measured in {verdict.opening_checked}, "
             f"at most {verdict.worst_opening_mm:.2f} mm from the curve"
         )
-    print(f"{verdict.clips} clips: hashes, frames and timing are right; {measured}")
+    print(f"{verdict.clips} clips: hashes, frames and timing are correct; {measured}")
     if levels:
         _print_leaks(verdict.leaks)
     for leak in verdict.leaks:
@@ -180,7 +182,7 @@ def verify_command(
 
 def _print_leaks(leaks: "Sequence[LevelLeak]") -> None:
     """One line per factor and feature: the share of clips that the feature guesses right, and p."""
-    print("factor, feature: share of the best level's clips and of the others guessed right (p)")
+    print("factor, feature: proportion of the best level's clips and of the others classified correctly (p)")
     for leak in leaks:
         shown = f"{leak.right:.2f} and {leak.others:.2f}, {leak.clips} clips (p {leak.p_value:.2g})"
         print(f"  {leak.factor}, {leak.feature}: {leak.level} {shown}{' *' if leak.reported else ''}")
@@ -188,7 +190,7 @@ def _print_leaks(leaks: "Sequence[LevelLeak]") -> None:
 
 @contextmanager
 def progress_bar(what: str) -> "Iterator[Progress]":
-    """Show clips done and time left on stderr; nothing where stderr is no terminal."""
+    """Show clips done and time left on stderr; nothing if stderr is not a terminal."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -204,11 +206,11 @@ def progress_bar(what: str) -> "Iterator[Progress]":
 # `stimuli checks`: the clips of a study's motion checks.
 
 CHECKS_HELP = """
-Make the clips of a study's motion checks, whose content shows in motion alone.
+Generate the clips of a study's motion checks, whose content is visible only in motion.
 
-`stimuli build` makes them too; this command adds them to clips of your own, or makes other ones. They come
-from a secret seed, kept in manifest.json with the right answers: keep that file from participants. The same
-seed gives the same bytes on one machine.
+`stimuli build` also generates them. This command adds them to your own clips, or replaces them. They depend
+on a secret seed, stored in manifest.json with the correct answers: do not give that file to participants. The
+same seed gives the same bytes on one machine.
 
 Examples:
 
@@ -224,13 +226,11 @@ def checks_command(
     experiment: Annotated[
         str, typer.Argument(help="exp1 to exp3, a demo, or a TOML file.", show_default=False)
     ],
-    out: Annotated[Path, typer.Option(help="Folder that holds the study's clips and manifest.json.")],
+    out: Annotated[Path, typer.Option(help="Folder with the study's clips and manifest.json.")],
     seed: Annotated[
-        int | None, typer.Option(min=0, help="Seed; a secret one is drawn, and kept, where not given.")
+        int | None, typer.Option(min=0, help="Random seed. Default: a secret seed is drawn and stored.")
     ] = None,
-    anew: Annotated[
-        bool, typer.Option("--anew", help="Make other checks than those that are there.")
-    ] = False,
+    anew: Annotated[bool, typer.Option("--anew", help="Replace the existing checks by new ones.")] = False,
 ) -> None:
     """Make the clips of motion checks."""
     from experiments.load import load_experiment
@@ -239,7 +239,7 @@ def checks_command(
     from stimuli_builder.clips.plan import experiment_folder
 
     if anew and seed is not None:
-        raise InputError("--anew draws a seed; leave out --seed")
+        raise InputError("--anew draws a new seed; remove --seed")
     declared = load_experiment(experiment)
     options = Options(checks_seed=seed, beside=experiment_folder(experiment))
     with progress_bar(f"checks of {declared.name}") as progress:
@@ -248,20 +248,20 @@ def checks_command(
     removed = f", {len(report.removed)} old ones removed" if report.removed else ""
     print(
         f"{declared.name}: {len(report.manifest.checks)} clips of checks in {out} ({size_mb:.1f} MB); "
-        f"{report.built} made{removed}"
+        f"{report.built} built{removed}"
     )
 
 
 # `stimuli manifest`: the manifest of clips that were not made here.
 
 MANIFEST_HELP = """
-Write manifest.json for a folder of clips of your own, so that a server can take them.
+Write manifest.json for a folder of your own clips, so that a server can use them.
 
-Levels are read from file names by a pattern, or from a CSV table (column `file`, then one a factor;
-`exemplar` numbers the clips of a cell). With the declaration the clips are compared with its design.
-Videos of any usual format are taken. Where each is H.264 that browsers play, the manifest is written
-beside them; else all are put into FOLDER/clips (or --out): converted as the server converts uploads, with
-frame map and lowest PSNR in the manifest and each original beside its clip.
+Levels are read from file names with a pattern, or from a CSV table (column `file`, then one per factor;
+`exemplar` numbers the clips of a cell). With --experiment, the clips are compared with its design. All common
+video formats are accepted. If all videos are H.264 that browsers can play, the manifest is written to their
+folder. Otherwise they are converted to FOLDER/clips (or --out), as the server converts uploads. The manifest
+then has a frame map and the lowest PSNR, and each original is kept with its clip.
 
 Examples:
 
@@ -275,14 +275,17 @@ Examples:
 
 def manifest_command(
     folder: Annotated[Path, typer.Argument(help="Folder of videos.", show_default=False)],
-    pattern: Annotated[str | None, typer.Option(help="Names of factors in braces, as in file names.")] = None,
+    pattern: Annotated[
+        str | None, typer.Option(help=("Pattern of file names, with factor names in braces."))
+    ] = None,
     table: Annotated[Path | None, typer.Option(help="CSV with the levels of each file.")] = None,
     experiment: Annotated[
-        str | None, typer.Option(help="TOML file (or exp1 ...) that declares the study.")
+        str | None, typer.Option(help="Declaration of the study: a TOML file, or exp1 to exp3.")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for clips and manifest.")] = None,
     fps: Annotated[
-        float | None, typer.Option(min=1, max=240, help="Frame rate of every clip; else each its own.")
+        float | None,
+        typer.Option(min=1, max=240, help=("Frame rate of all clips. Default: each clip keeps its rate.")),
     ] = None,
 ) -> None:
     """Write the manifest of somebody's own clips."""
@@ -292,13 +295,15 @@ def manifest_command(
     from table_files.open import named_rows
 
     if (pattern is None) == (table is None):
-        raise InputError("expected either --pattern or --table, to know which levels each clip has")
+        raise InputError("the levels of each clip are unknown: add either --pattern or --table")
     names = clip_names(folder)
     if pattern is not None:
         placed = levels_from_names(pattern, names)
     elif table is not None:
         if not table.is_file():
-            raise InputError(f"no file {table}; expected a CSV with a column 'file' and one a factor")
+            raise InputError(
+                f"there is no file {table}; expected a CSV with a column 'file' and one column per factor"
+            )
         placed = levels_from_rows(named_rows(table), names)
     print(*understood(placed, pattern), sep="\n", flush=True)
     declared = load_experiment(experiment) if experiment else None
@@ -311,7 +316,7 @@ def manifest_command(
 
 @contextmanager
 def _looking_into(total: int) -> Iterator[Callable[[int], None]]:
-    """A function to report how many are done: a bar on stderr, nothing where that is no terminal."""
+    """A function to report how many are done: a bar on stderr, nothing if that is not a terminal."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -326,9 +331,9 @@ def _looking_into(total: int) -> Iterator[Callable[[int], None]]:
 # `stimuli strips`: the pictures that the dashboard's blinks page plays.
 
 STRIPS_HELP = """
-Write the shipped characters at 33 closures as picture strips, for the dashboard's blinks page.
+Write picture strips of the shipped characters at 33 closures, for the dashboard's blinks page.
 
-`make run` does this; after a character was baked anew, `make run` or this command brings them up to date.
+`make run` does this. After a character was baked again, update them with `make run` or this command.
 
 Examples:
 
@@ -337,7 +342,7 @@ Examples:
 
 
 def strips_command(
-    out: Annotated[Path, typer.Option(help="Folder for the pictures and strips.json; made if not there.")],
+    out: Annotated[Path, typer.Option(help="Folder for the pictures and strips.json; created if missing.")],
 ) -> None:
     """Write one WebP a character, and strips.json."""
     from stimuli_builder.clips.preview import write_strips

@@ -16,8 +16,8 @@ CLIP_HELP = """
 Render one clip from a blink profile and a character.
 
 PROFILE is real, model, SL, AL, SL_ease, AL_ease, the name of a shipped recording (`stimuli profiles`), or a
-CSV file of closure samples at 300 fps (0 open, 1 closed), columns separated by commas, semicolons
-or tabs, with decimal points or commas.
+CSV file of closure samples at 300 fps (0 open, 1 closed). Columns are separated by commas, semicolons or
+tabs; decimal points and commas are accepted.
 
 Examples:
 
@@ -47,28 +47,35 @@ Eyes = Literal["alike", "separate"]
 
 def clip_command(
     out: Annotated[Path, typer.Option(help="MP4 file to write.")],
-    profile: Annotated[str, typer.Option(help="Blink to show, see above.")] = "model",
+    profile: Annotated[str, typer.Option(help="Blink to show (see above).")] = "model",
     character: Annotated[
         str, typer.Option(help="A shipped character (`stimuli character list`) or a character folder.")
     ] = "cartoon",
     duration: Annotated[float | None, typer.Option(help="Blink length in frames at 30 fps.")] = None,
-    duration_ms: Annotated[float | None, typer.Option(help="Blink length in ms, instead.")] = None,
+    duration_ms: Annotated[
+        float | None, typer.Option(help=("Blink length in ms, instead of --duration."))
+    ] = None,
     amplitude: Annotated[
-        Amplitude, typer.Option(help="full: the eye shuts (FC); natural: as measured (NC).")
+        Amplitude, typer.Option(help="full: the eye closes completely (FC); natural: as measured (NC).")
     ] = "full",
     blur: Annotated[bool, typer.Option("--blur/--no-blur", help="Motion blur (MB) or none (NB).")] = True,
     lower_lid: Annotated[LowerLid, typer.Option(help="Lower-lid signals that move.")] = "none",
-    brow_mm: Annotated[float | None, typer.Option(help="mm that the brows sink while the eye shuts.")] = None,
-    cheek_mm: Annotated[float | None, typer.Option(help="mm that the cheeks rise.")] = None,
-    squint_mm: Annotated[
-        float | None, typer.Option(help="mm that the skin below the eye draws up and nasally.")
+    brow_mm: Annotated[
+        float | None, typer.Option(help=("Distance in mm that the brows sink while the eye closes."))
     ] = None,
-    gaze_mm: Annotated[float | None, typer.Option(help="mm that the iris turns down under the lid.")] = None,
+    cheek_mm: Annotated[float | None, typer.Option(help="Distance in mm that the cheeks rise.")] = None,
+    squint_mm: Annotated[
+        float | None,
+        typer.Option(help=("Distance in mm that the skin below the eye moves up and toward the nose.")),
+    ] = None,
+    gaze_mm: Annotated[
+        float | None, typer.Option(help=("Distance in mm that the iris turns down under the lid."))
+    ] = None,
     eyes: Annotated[
-        Eyes, typer.Option(help="One signal for both eyes, or left and right recorded.")
+        Eyes, typer.Option(help="One signal for both eyes, or the recorded left and right eye.")
     ] = "alike",
-    exemplar: Annotated[int, typer.Option(min=1, help="Which blink of that kind.")] = 1,
-    seed: Annotated[int, typer.Option(help="Decides every random choice.")] = 2011,
+    exemplar: Annotated[int, typer.Option(min=1, help="Number of the blink of that kind.")] = 1,
+    seed: Annotated[int, typer.Option(help="Random seed of all choices.")] = 2011,
     fps: Annotated[int, typer.Option(min=24, max=60, help="Frame rate.")] = 30,
     size: Annotated[str, typer.Option(help="Width x height in px, at most 1920x1200.")] = "960x360",
     clip_frames: Annotated[int | None, typer.Option(min=1, help="Length of the clip in frames.")] = None,
@@ -79,9 +86,7 @@ def clip_command(
     from stimuli_builder.clips.single import SingleClip, render_single
 
     if out.suffix.lower() != ".mp4":
-        raise InputError(
-            f"--out: expected a file that ends in .mp4, got '{out.name}'; clips are H.264 in MP4"
-        )
+        raise InputError(f"--out: expected a name ending in .mp4, got '{out.name}'; clips are H.264 in MP4")
     width, height = parse_size(size)
     settings = settings_from(
         character=character,

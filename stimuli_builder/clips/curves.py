@@ -26,9 +26,9 @@ def frame_windows(sample_count: int, fps: float, blur: bool) -> Iterator[tuple[N
     """Yield for each output frame the samples of a signal that it shows, and their weights, which sum to 1.
 
     With blur a frame is the mean of the samples inside its time, the paper's average of ten (4.1.1):
-    our frame k at 30 fps stands at sample 10 k + 5 and averages 10 k ... 10 k + 9, five before and four
+    our frame k at 30 fps is at sample 10 k + 5 and averages 10 k ... 10 k + 9, five before and four
     after. Where a frame's time cuts a sample, the sample counts by its share. Without blur a frame is
-    the sample it stands at. The averaging itself must be done in linear light.
+    the sample at its time. The averaging itself must be done in linear light.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ class ClipCurve:
     closure : float64 array (n,)
         0 open, 1 closed; of the left eye where `closure_other` holds the right one's.
     lower_vertical_mm, lower_horizontal_mm : float64 array (n,) or None
-        The lower lid's lift and its slide towards the nose; None leaves the lower lid to the character.
+        The lower lid's lift and its slide toward the nose; None leaves the lower lid to the character.
     onset_sample : int
         Where the blink begins; the first of a performance.
     blinks_s : tuple of float
@@ -178,9 +178,8 @@ def clip_curve(
     total = int(np.ceil(frames * step - 1e-9))
     if end > total:
         raise InputError(
-            f"profile {profile.profile_id} ends at frame {end / step:.1f}, "
-            f"{onset / step:.1f} frames of open eye included: longer than the clip "
-            f"of {frames} frames; ask for a longer clip"
+            f"profile {profile.profile_id} ends at frame {end / step:.1f}, {onset / step:.1f} including "
+            f"frames of open eye, which is longer than the clip of {frames} frames; use a longer clip"
         )
 
     def held(values: Array) -> Array:
@@ -241,7 +240,7 @@ def within_reach(curve: ClipCurve, reach: Reach | None) -> tuple[ClipCurve, dict
     Parameters
     ----------
     reach : ((low, high), (low, high)) in mm, or None
-        What the character can show of lift and of slide towards the nose.
+        What the character can show of lift and of slide toward the nose.
 
     Returns
     -------
@@ -255,7 +254,7 @@ def within_reach(curve: ClipCurve, reach: Reach | None) -> tuple[ClipCurve, dict
     if reach is None or curve.lower_vertical_mm is None or curve.lower_horizontal_mm is None:
         return curve, {}
     vertical = _held(curve, curve.lower_vertical_mm, reach[0], "up")
-    horizontal = _held(curve, curve.lower_horizontal_mm, reach[1], "towards the nose")
+    horizontal = _held(curve, curve.lower_horizontal_mm, reach[1], "toward the nose")
     said = {"lower_vertical_held_mm": vertical[1], "lower_horizontal_held_mm": horizontal[1]}
     shown = replace(curve, lower_vertical_mm=vertical[0], lower_horizontal_mm=horizontal[0])
     return shown, {name: f"{beyond:.4f}" for name, beyond in said.items() if beyond > 10.0**-DECIMALS}
@@ -268,7 +267,7 @@ def _held(curve: ClipCurve, signal: Array, limits: tuple[float, float], way: str
     if beyond > HELD_MM:
         raise InputError(
             f"profile {curve.profile_id} moves the lower lid {signal.min():.2f} to {signal.max():.2f} mm "
-            f"{way}, its character is baked for {limits[0]:g} to {limits[1]:g} mm; bake it further "
-            "(docs/explanation/characters.md) or leave this signal out with lower_lid"
+            f"{way}, but its character is baked for {limits[0]:g} to {limits[1]:g} mm; bake a larger range "
+            "(docs/explanation/characters.md) or omit this signal with lower_lid"
         )
     return held, beyond

@@ -35,9 +35,9 @@ def performance_curve(
 ) -> ClipCurve:
     """Return performance `number` (from 1) of a family of exemplars, as `settings` time it.
 
-    Blink k of a performance has the same shape whatever the timing: shapes and times come from streams of
-    random numbers of their own. With `amplitude` full every blink closes the eyes fully; with natural as
-    many do as the engine was fitted to, and the others as far as it draws.
+    Blink k of a performance has the same shape whatever the timing: shapes and times come from separate
+    streams of random numbers. With `amplitude` full every blink closes the eyes fully; with natural as many
+    do as the engine was fitted to, and the others as far as it draws.
 
     Parameters
     ----------
@@ -141,7 +141,8 @@ def _speech(settings: RenderSettings, beside: Path | None) -> list[Speech]:
     stretches, length_s = speech_of((beside or Path()) / file, speaker or None)
     if length_s < settings.seconds:
         raise InputError(
-            f"{settings.speech} lasts {length_s:.1f} s, the clip {settings.seconds:g} s; shorten `seconds`"
+            f"{settings.speech} lasts {length_s:.1f} s, but the clip lasts {settings.seconds:g} s; reduce "
+            "`seconds`"
         )
     return stretches
 
@@ -173,7 +174,7 @@ class PlannedClip:
 
 @dataclass(frozen=True)
 class Options:
-    """What a build may choose beside the declaration: see `stimuli build --help`."""
+    """What a build may choose in addition to the declaration: see `stimuli build --help`."""
 
     seed: int | None = None
     checks_seed: int | None = None
@@ -207,9 +208,9 @@ def check_levels(experiment: Experiment) -> None:
             for other in factor.levels[:number]:
                 if other.render == level.render:
                     raise InputError(
-                        f"factor '{factor.name}': '{other.name}' and '{level.name}' change nothing "
-                        "of the rendering, so their clips would be the same; give them `render`, or write "
-                        "the manifest of clips of your own with `stimuli manifest`"
+                        f"factor '{factor.name}': '{other.name}' and '{level.name}' do not change the "
+                        "rendering, so their clips would be the same; add `render` to them, or write the "
+                        "manifest of your own clips with `stimuli manifest`"
                     )
 
 
@@ -252,7 +253,7 @@ def check_look(settings: RenderSettings, character: Geometry) -> None:
         )
     if settings.gaze_mm and settings.character in DRAWN:
         raise InputError(
-            f"character '{settings.character}' is drawn with eyes that look straight on; leave gaze_mm out, "
+            f"character '{settings.character}' is drawn with eyes that look straight ahead; remove gaze_mm, "
             "set it to 0, or use a baked face"
         )
     character.scaled(settings.width_px, settings.height_px)

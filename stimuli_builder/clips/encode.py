@@ -71,8 +71,8 @@ def encode_clip(
             return path.read_bytes()
     except OSError as error:
         raise InputError(
-            f"the clip cannot be written in {tempfile.gettempdir()} ({error.strerror}); make room there or "
-            "set TMPDIR"
+            f"the clip cannot be written to {tempfile.gettempdir()} ({error.strerror}); free up space or set "
+            "TMPDIR"
         ) from error
 
 

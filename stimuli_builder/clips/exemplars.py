@@ -45,7 +45,7 @@ def read_closure_file(path: Path) -> list[BlinkProfile]:
     Raises
     ------
     InputError
-        The file is missing, has no closure, or a sample is no number between 0 and 1.
+        The file is missing, has no closure, or a sample is not a number between 0 and 1.
     """
     table = _table(path)
     if "profile_id" in table.columns:
@@ -64,8 +64,8 @@ def read_closure_file(path: Path) -> list[BlinkProfile]:
     minimum = int(np.argmax(closure))
     if not 0 < minimum < len(closure) - 1:
         raise InputError(
-            f"{path.name}: the greatest closure must lie inside the blink, it is sample {minimum + 1} "
-            f"of {len(closure)}; add the closing and the opening"
+            f"{path.name}: the greatest closure must be inside the blink, but it is sample {minimum + 1} of "
+            f"{len(closure)}; add the closing and the opening"
         )
     return [
         BlinkProfile(
@@ -100,7 +100,7 @@ def _numbers(path: Path, table: pd.DataFrame, name: str) -> Array:
     values = pd.to_numeric(table[name], errors="coerce").to_numpy(dtype=np.float64)
     wrong = np.flatnonzero(~np.isfinite(values))
     if len(wrong):
-        # Beside a word decimal commas are still commas; the word is what is wrong.
+        # Next to a word, decimal commas are still commas; the word is the error.
         cells = table[name].astype(str).str.replace(",", ".")
         words = np.flatnonzero(pd.to_numeric(cells, errors="coerce").isna())
         sample = int([*words, *wrong][0])
@@ -203,7 +203,7 @@ def _blink(
 def _textbook(
     kind: TextbookKind, settings: RenderSettings, family: str, number: int, seed: int
 ) -> BlinkProfile:
-    """A textbook blink that begins and ends at rest, as recorded and modelled ones do (decision 0975)."""
+    """A textbook blink that begins and ends at rest, as recorded and modeled ones do (decision 0975)."""
     rng = generator("textbook", seed, family, number)
     recorded = load_library()[int(rng.integers(len(load_library())))]
     peak = 1.0 if settings.amplitude == "full" else float(recorded.closure.max())
@@ -214,8 +214,8 @@ def _textbook(
 def _drawn_by_phases(family: str, number: int, seed: int, separate: bool) -> BlinkProfile:
     if separate:
         raise InputError(
-            "profile 'phases' gives blinks of one eye; expected eyes = 'alike', or profile 'real' or 'model' "
-            "for eyes that move apart"
+            "profile 'phases' has blinks of one eye; use eyes = 'alike', or profile 'real' or 'model' for "
+            "eyes that move separately"
         )
     rng = generator("phases", seed, family, number)
     return _phase_model().sample(None, rng, profile_id=f"phases-{seed}-{family}-{number}")

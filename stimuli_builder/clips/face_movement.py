@@ -1,4 +1,4 @@
-"""What moves in a face beside its lids when a study declares it: brow, cheek, squint and gaze."""
+"""What moves in a face in addition to its lids when a study declares it: brow, cheek, squint and gaze."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -72,20 +72,20 @@ DRAWN_BROW = SkinField((0.0, -1.0), 3.0, 27.0, 4.5, 6.5, power=16.0)
 # d(x, y; w) = w m E(x, y; w) (-1/2, -1),   E = A(x) S(y_m - y) S(y - y_l)                               (2)
 #
 # Letters: x to the temple, y up, mm from the middle of the open eye; S a smoothstep over RAMP_MM, A one over
-# the iris, falling to 0 beside it.
+# the iris, falling to 0 next to it.
 
 IRIS_MM, BESIDE_MM = 5.9, 2.5
-"""Half the width of what turns with the iris, and how far beside it the sclera follows."""
+"""Half the width of what turns with the iris, and how far next to it the sclera follows."""
 RAMP_MM = 1.6
 IN_PER_DOWN = 0.5
 _FITTED_MM = 4.5
 _LEVELS = 33
 _BLUR_MM = 0.2
 _CLEAR = 0.01
-"""Squared difference of colour between open and shut below which a pixel tells nothing."""
+"""Squared difference of color between open and shut below which a pixel is not informative."""
 _RANGE = (0.15, 0.85)
 _LEAST_MM2 = 4.0
-"""Least area that tells where the margins lie."""
+"""Minimum area from which the margins can be estimated."""
 _ROUNDS, _NEAR_MM = 8, 0.5
 
 
@@ -112,7 +112,7 @@ class Fissures:
     covered : float32 array (h, w)
         Closure at which each pixel of the window comes to look more shut than open.
     told : bool array (h, w)
-        Where open and shut differ enough to tell.
+        Where open and closed differ enough.
     """
 
     character: LevelSet
@@ -229,8 +229,9 @@ def _eyes(character: LevelSet, geometry: Geometry) -> list[_Eye]:
         fissure = fissures.at(column, outwards)
         if fissure is None:
             raise InputError(
-                f"character '{character.name}': no eye that shuts lies {geometry.inter_ocular_mm / 2:g} mm "
-                "beside the picture's middle; leave out brow_mm, cheek_mm, squint_mm and gaze_mm"
+                f"character '{character.name}': no eye that closes was found "
+                f"{geometry.inter_ocular_mm / 2:g} mm from the picture's center; remove brow_mm, cheek_mm, "
+                "squint_mm and gaze_mm"
             )
         eyes.append(_Eye(outwards, fissure))
     return eyes

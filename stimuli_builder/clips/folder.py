@@ -20,7 +20,7 @@ from stimuli_builder.clips.design_clips import Options, PlannedClip
 # Which inputs have been rendered to which file: how a build goes on where it stopped.
 
 STATE_NAME = ".built.jsonl"
-"""Beside the manifest while a build runs: one line of JSON for each finished clip."""
+"""In the manifest's folder while a build runs: one line of JSON for each finished clip."""
 RENDER_KEY = "render"
 """Key of the input hash in a manifest clip's `inputs`."""
 
@@ -108,14 +108,16 @@ def _state_lines(path: Path) -> Iterator[Built]:
 def former_manifest(experiment: Experiment, folder: Path) -> Manifest | None:
     """The manifest of the build before, None where there is none; InputError where it is another study's."""
     if folder.exists() and not folder.is_dir():
-        raise InputError(f"{folder}: expected a folder for the clips, this is a file; choose another name")
+        raise InputError(
+            f"{folder}: expected a folder for the clips, but this is a file; choose another name"
+        )
     if not (folder / MANIFEST_NAME).exists():
         return None
     former = read_manifest(folder)
     if former.experiment != experiment.name:
         raise InputError(
-            f"{folder} holds the clips of '{former.experiment}', not of '{experiment.name}'; "
-            "choose another folder"
+            f"{folder} has the clips of '{former.experiment}', not of '{experiment.name}'; choose another "
+            "folder"
         )
     return former
 
@@ -137,7 +139,7 @@ def readable_failures(folder: Path, state: BuildState) -> Iterator[None]:
         yield
     except KeyboardInterrupt as error:
         raise InputError(
-            f"interrupted; {state.count} clips are finished in {folder}, the same command goes on from there"
+            f"interrupted; {state.count} clips are finished in {folder}. Run the same command to continue"
         ) from error
     except OSError as error:
         raise InputError(
@@ -149,8 +151,8 @@ def readable_failures(folder: Path, state: BuildState) -> Iterator[None]:
 # What `manifest.json` says of each clip and of the whole set. It holds no time and no path.
 
 CONVENTIONS = (
-    "closure: 300 samples a second, 0 open, 1 closed, over the whole clip; output frame k at 30 fps stands "
-    "at sample 10 k + 5 and with motion blur is the mean of samples 10 k to 10 k + 9 in linear light",
+    "closure: 300 samples a second, 0 open, 1 closed, over the whole clip; output frame k at 30 fps is at "
+    "sample 10 k + 5 and with motion blur is the mean of samples 10 k to 10 k + 9 in linear light",
     "an exemplar of a textbook profile differs from the others in its sub-frame onset; every built-in "
     "profile begins and ends with open eyes at rest (closure 0)",
 )

@@ -38,7 +38,7 @@ def draw_barcode(
 
 
 def read_barcode(luma: NDArray[np.uint8]) -> int | None:
-    """The frame number in a decoded picture (height, width) of luma or grey; None where there is none."""
+    """The frame number in a decoded picture (height, width) of luma or gray; None where there is none."""
     middles = luma[luma.shape[0] - CELL_PX // 2, CELL_PX // 2 : CELL_PX * (BITS + 2) : CELL_PX]
     white = middles > 125
     if not (white[0] and not white[1]):

@@ -49,9 +49,9 @@ class Geometry:
         first, after = self.blink_rows
         if after and (first * scale < top or after * scale > top + height_px):
             raise InputError(
-                f"a picture of {width_px} x {height_px} px cuts off what moves in a blink of '{self.name}', "
-                f"which is {whole[1]} px high at that width; ask for a greater height (its own size: "
-                f"width_px = {self.size_px[0]}, height_px = {self.size_px[1]})"
+                f"a picture of {width_px} x {height_px} px cuts off moving parts of a blink of "
+                f"'{self.name}', which is {whole[1]} px high at that width; use a larger height (its own "
+                f"size: width_px = {self.size_px[0]}, height_px = {self.size_px[1]})"
             )
         return whole, top
 
@@ -98,7 +98,7 @@ class Movement:
 
     @classmethod
     def of_inputs(cls, inputs: Mapping[str, str]) -> "Movement":
-        """What a manifest says that a clip was rendered with; ValueError where it is no number."""
+        """What a manifest says that a clip was rendered with; ValueError if it is not a number."""
         said = {part: inputs.get(f"{PREFIX}{part}_mm") for part in PARTS}
         return cls(**{part: float(mm) for part, mm in said.items() if mm is not None})
 

@@ -26,7 +26,7 @@ class Look:
 
     `character` is a name or a folder; `beside` the folder it may be relative to. `fingerprint` is the
     SHA-256 of all its pictures, `encoder` names the encoder and its settings, `movement` what of the face
-    moves beside what those pictures show.
+    moves in addition to what those pictures show.
     """
 
     character: str

@@ -26,7 +26,7 @@ def kept_levels(
 
     The last two are kept; at great sizes only the last one.
     """
-    # Every core is already taken by a process of its own.
+    # Every core is already used by a separate process.
     cv2.setNumThreads(1)
     if size_px[0] > ROOMY_WIDTH_PX:
         kept_levels.cache_clear()

@@ -71,7 +71,7 @@ def to_yuv(
 ) -> None:
     """Convert 16-bit linear light (h, w, 3), h and w even, to limited-range BT.709 4:2:0 planes.
 
-    Chroma stands where H.264 puts it by default: on the left one of two luma columns, between two rows;
+    Chroma is where H.264 puts it by default: on the left one of two luma columns, between two rows;
     it is the [1 2 1] / 4 mean of columns and the mean of the rows.
     """
     height, width, _ = light.shape

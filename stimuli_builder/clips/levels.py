@@ -67,7 +67,8 @@ class LowerLid:
         for index, change in enumerate(layer.each_change()):
             part = placed(change)[rows, columns] * np.float32(FULL_SCALE / CHANGE_STEP)
             changes[index] = np.clip(np.rint(part), -32767, 32767)
-        # The poses' video need not lie beside that of the levels, from which the factors' shade is made.
+        # The poses' video need not be in the folder of the levels' video, from which the factors' shade is
+        # made.
         character.forget_poses()
         factors = np.empty((len(closures), *array_shape), np.uint16)
         for index in range(len(closures)):
@@ -109,7 +110,7 @@ class LowerLid:
 
 
 def _hat(grid: Array, values: Array) -> Array:
-    """(samples, grid) shares of the two neighbours of each value."""
+    """(samples, grid) shares of the two neighbors of each value."""
     if len(grid) == 1:
         return np.ones((len(values), 1))
     index = np.clip(np.searchsorted(grid, values, side="right") - 1, 0, len(grid) - 2)
@@ -191,7 +192,7 @@ class LevelSet:
         return self.base.shape[1], self.base.shape[0]
 
     def level_weights(self, closures: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(m, n) weights over levels of m closures: linear between the two neighbours."""
+        """(m, n) weights over levels of m closures: linear between the two neighbors."""
         return level_weights(self.closures, closures)
 
     def thinned(self, step: int) -> "LevelSet":

@@ -29,7 +29,8 @@ from video_conversion.video_file import NotAClip
 def check_against_declaration(placed: Placed, experiment: Experiment) -> None:
     """InputError unless clips have the factors, levels and cells that are declared, and no others.
 
-    Factors before levels, and levels before cells: a misspelt name is told, not the cells that it empties.
+    Factors before levels, and levels before cells: a misspelled name is reported, not the cells that it
+    empties.
     """
     for check in (_factors, _levels):
         if problems := check(placed, experiment):
@@ -42,12 +43,13 @@ def _factors(placed: Placed, experiment: Experiment) -> list[str]:
     without = [name for name in declared if name not in present]
     undeclared = [
         f"factor '{name}' of the clips is not declared in {experiment.name}"
-        + (did_you_mean(name, without) or f", which has {', '.join(declared)}; declare it, or leave it out")
+        + (did_you_mean(name, without) or f", which has {', '.join(declared)}; declare it, or remove it")
         for name in present
         if name not in declared
     ]
     return undeclared or [
-        f"the clips have no levels of '{name}', a factor of {experiment.name}; add it to pattern or table"
+        f"the clips have no levels of '{name}', a factor of {experiment.name}; add it to the pattern or the "
+        "table"
         for name in without
     ]
 
@@ -67,7 +69,7 @@ def _levels(placed: Placed, experiment: Experiment) -> list[str]:
         unused += [
             f"no clip has the level '{level}' of {factor.name}, which is declared" for level in without
         ]
-    return undeclared or [f"{problem}; add its clips or take it out" for problem in unused]
+    return undeclared or [f"{problem}; add its clips or remove it" for problem in unused]
 
 
 def _check_cells(placed: Placed, experiment: Experiment) -> None:
@@ -78,13 +80,13 @@ def _check_cells(placed: Placed, experiment: Experiment) -> None:
         if cells:
             cell, exemplar = min(cells)
             raise InputError(
-                f"{len(declared)} clips are declared, {len(present)} are here: {cell}, exemplar {exemplar}, "
-                f"{word}; correct the names or the declaration"
+                f"{len(declared)} clips are declared, but {len(present)} were found: {cell}, exemplar "
+                f"{exemplar}, {word}; correct the names or the declaration"
             )
 
 
 def cell_of(levels: dict[str, str], factors: Sequence[str]) -> str:
-    """The cell of these levels, by its name: a level each factor, in order."""
+    """The cell of these levels, by name: one level per factor, in order."""
     return "/".join(levels[factor] for factor in factors)
 
 
@@ -98,7 +100,7 @@ NO_DEFINITION = hashlib.sha256(b"").hexdigest()
 def clip_names(folder: Path) -> list[str]:
     """Names of the videos of a folder; InputError where there are none, or two would be one clip."""
     if not folder.is_dir():
-        raise InputError(f"expected a folder of videos, got {folder}, which is none")
+        raise InputError(f"expected a folder of videos, but {folder} is not a folder")
     names = sorted(path.name for path in folder.iterdir() if path.suffix.lower() in VIDEO_ENDINGS)
     if not names:
         raise InputError(f"expected videos ({', '.join(VIDEO_ENDINGS)}) in {folder}, got none")
@@ -119,7 +121,7 @@ def write_own_manifest(
     Parameters
     ----------
     placed : dict
-        Levels and exemplar of each video, by its name.
+        Levels and exemplar of each video, by name.
     experiment : Experiment or None
         The declaration whose design they are to have.
     out : Path or None
@@ -128,7 +130,7 @@ def write_own_manifest(
     fps : float or None
         Frames per second of every clip; None: each its own.
     report : callable
-        Is told how many videos have been looked into.
+        Called with the number of videos examined.
 
     Returns
     -------
@@ -141,7 +143,8 @@ def write_own_manifest(
         A video has no cell or cannot be a clip; nothing has been written then.
     """
     if experiment is not None:
-        # First, since what is misspelt is told by what is declared; cells would only be said to lack clips.
+        # First, because the declaration reveals misspelled names; otherwise cells would only be reported as
+        # empty.
         check_against_declaration(placed, experiment)
     check_factorial(placed)
     factors = experiment.factor_names if experiment else tuple(next(iter(placed.values()))[0])
@@ -160,8 +163,8 @@ def write_own_manifest(
             _fill(target, folder, Path(temporary), prepared)
         elif manifest.sources:
             raise InputError(
-                f"{len(manifest.sources)} of {len(prepared)} videos have to be converted; expected another "
-                f"folder than {folder} for --out, since originals stay as they are"
+                f"{len(manifest.sources)} of {len(prepared)} videos have to be converted; choose a folder "
+                f"other than {folder} for --out, because originals are not changed"
             )
     write_bytes(target / MANIFEST_NAME, manifest_text(manifest).encode())
     return manifest, target
@@ -260,7 +263,10 @@ def _slips(placed: Placed) -> Iterator[str]:
         for rare, usual in permutations(counts, 2):
             if counts[usual] >= RARER * counts[rare] and _named_alike(rare, usual):
                 file = next(file for file, (levels, _) in placed.items() if levels[name] == rare)
-                yield f"'{rare}' of {name} ({file}) looks like '{usual}': correct the name if it is meant"
+                yield (
+                    f"'{rare}' of {name} ({file}) looks like '{usual}': correct the name if '{usual}' is "
+                    "intended"
+                )
 
 
 def _named_alike(one: str, other: str) -> bool:
@@ -281,4 +287,4 @@ def _numbers_in_levels(placed: Placed, pattern: str | None) -> Iterator[str]:
         if len(numbered) == len(counts) > len(bases) and len(bases) > 1:
             meant = pattern.replace(f"{{{name}}}", f"{{{name}}}{numbered[0][2]}{{{FIRST_FIELD}}}", 1)
             end = f"levels of {name} end in numbers ({numbered[0][0]})"
-            yield f"{end}; if they number the clips, give '{meant}'"
+            yield f"{end}; if they number the clips, use '{meant}'"

@@ -30,7 +30,7 @@ PAGE_NAME, SHEET_NAME = "preview.html", "preview.png"
 
 
 def write_preview(manifest: Manifest, folder: Path) -> tuple[Path, Path]:
-    """Write `preview.png` and `preview.html` beside the clips; returns their paths."""
+    """Write `preview.png` and `preview.html` to the folder of the clips; returns their paths."""
     sheet, page = folder / SHEET_NAME, folder / PAGE_NAME
     picture = Image.fromarray(contact_sheet(manifest, folder))
     with whole_file(sheet) as temporary:
@@ -78,7 +78,7 @@ def _label(clip: Clip) -> str:
 
 
 def page_text(manifest: Manifest) -> str:
-    """The page; it plays the files beside it and needs nothing from elsewhere."""
+    """The page; it plays the files in its folder and needs nothing else."""
     environment = Environment(loader=PackageLoader("stimuli_builder.clips", "templates"), autoescape=True)
     # Inside a script element only "</" could end it early.
     encoded = partial(json.dumps, ensure_ascii=True, separators=(",", ":"))

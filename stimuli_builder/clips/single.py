@@ -65,11 +65,13 @@ def _blink(clip: SingleClip) -> Exemplar:
     shipped = {p.profile_id: p for paired in (False, True) for p in load_library(paired=paired)}
     if clip.profile not in shipped:
         names = [*PROFILES, *shipped]
-        raise InputError(f"no blink profile '{clip.profile}'{did_you_mean(clip.profile, names)}")
+        raise InputError(f"there is no blink profile '{clip.profile}'{did_you_mean(clip.profile, names)}")
     profile = shipped[clip.profile]
     profile = of_declared_length(profile, settings)
     if settings.eyes == "separate" and profile.closure_other is None:
-        raise InputError(f"profile {clip.profile} shows one eye; --eyes separate needs one of both eyes")
+        raise InputError(
+            f"profile {clip.profile} shows one eye; --eyes separate needs a profile of both eyes"
+        )
     if settings.eyes == "alike":
         profile = replace(profile, closure_other=None)
     return Exemplar(amplitude_of(profile, settings.amplitude), repeated=False, phase_samples=0)

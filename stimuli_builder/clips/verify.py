@@ -36,7 +36,7 @@ from video_conversion.video_file import NotAClip, examine
 
 Array = NDArray[np.float64]
 STEP_PX = 3
-"""Every third pixel both ways tells enough."""
+"""Every third pixel in both directions is enough."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +86,7 @@ class OpeningMeter:
         """
         curve = _curve_of(clip)
         if curve.lower_vertical_mm is not None and self._character.read_lower is None:
-            raise InputError("its lower lid moves, its character's does not")
+            raise InputError("its lower lid moves, but its character's does not")
         known: dict[bytes, list[float]] = {}
         rows = []
         blur = clip.inputs.get("motion_blur") != "false"
@@ -177,8 +177,8 @@ class Verdict:
 
     `opening_checked` counts the clips whose eyelid opening was measured in the pixels; clips of a
     character that has changed since, or that is not here, cannot be measured. `worst_opening_mm` is the
-    largest distance between measured and promised opening. `leaks` holds what tells the levels of a factor
-    apart, for every feature of the clips. `is_made_elsewhere` is true for clips that `stimuli manifest` or a
+    largest distance between measured and promised opening. `leaks` has what distinguishes the levels of a
+    factor, for every feature of the clips. `is_made_elsewhere` is true for clips that `stimuli manifest` or a
     server took in: they need not be as `stimuli build` makes them, but must play as they are.
     """
 
@@ -247,7 +247,7 @@ def _own_problems(path: Path, clip: Clip | CheckClip) -> Iterator[str]:
         yield str(error)
         return
     if conversion.changes:
-        yield f"browsers do not play it as it is; it needs a conversion ({'; '.join(conversion.changes)})"
+        yield f"browsers cannot play it; it needs a conversion ({'; '.join(conversion.changes)})"
     if abs(float(conversion.rate) - clip.fps) > RATE_TOLERANCE * clip.fps:
         yield f"expected {clip.fps:g} frames per second, got {float(conversion.rate):g}"
 
@@ -264,7 +264,7 @@ def _check(
     if not path.is_file():
         return [f"missing from {folder}"], None
     if file_sha256(path) != clip.sha256:
-        return [f"its bytes are not those of the {MANIFEST_NAME} (another sha256)"], None
+        return [f"its bytes differ from the {MANIFEST_NAME} (another sha256)"], None
     try:
         meter = None if isinstance(clip, CheckClip) or not clip.closure else meters.of(clip)
     except (InputError, ValueError) as error:
@@ -288,7 +288,7 @@ def _check(
     worst = float(off.max())
     if worst > TOLERANCE_MM:
         problems.append(
-            f"frame {int(off.argmax())}: an eye is open {worst:.2f} mm more or less than the curve says"
+            f"frame {int(off.argmax())}: the opening of an eye differs from the curve by {worst:.2f} mm"
         )
     return problems, worst
 
@@ -332,7 +332,7 @@ def _timing_problems(stream: Any, times: list[Fraction | None], clip: Clip | Che
     if any(at is None or abs(at - k * due) > due / 100 for k, at in enumerate(times)):
         yield f"its frames are not spaced evenly at {clip.fps:g} fps"
     if stream.codec_context.has_b_frames:
-        yield "it holds B-frames"
+        yield "it has B-frames"
 
 
 class _Meters:

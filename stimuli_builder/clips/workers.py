@@ -27,7 +27,7 @@ Reading takes as long as 5 (a baked face) to 16 clips (the cartoon), and two sha
 
 
 class JobQueues:
-    """One queue a worker, each a run of the sorted jobs; whoever is done takes from the end of the longest.
+    """One queue per worker, each a run of the sorted jobs; an idle worker takes from the end of the longest.
 
     Parameters
     ----------

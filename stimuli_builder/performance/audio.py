@@ -30,7 +30,7 @@ def read_audio(path: Path) -> tuple[bytes, float]:
     try:
         with av.open(str(path)) as container:
             if not container.streams.audio:
-                raise InputError(f"{path}: expected a file with sound, this one has none")
+                raise InputError(f"{path}: expected a file with sound, but this one has none")
             resampler = av.AudioResampler(format="s16", layout="mono", rate=RATE_HZ)
             frames = [
                 part.to_ndarray() for frame in container.decode(audio=0) for part in resampler.resample(frame)
@@ -44,7 +44,7 @@ def read_audio(path: Path) -> tuple[bytes, float]:
         ) from error
     samples = np.concatenate([frame.ravel() for frame in frames]) if frames else np.zeros(0, dtype=np.int16)
     if not samples.size:
-        raise InputError(f"{path}: expected sound, the file holds no samples")
+        raise InputError(f"{path}: expected sound, but the file has no samples")
     return samples.astype("<i2").tobytes(), samples.size / RATE_HZ
 
 

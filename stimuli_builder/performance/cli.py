@@ -22,28 +22,29 @@ def performance(
     ] = "csv",
     fps: Annotated[float, typer.Option(help="Frame rate of the curves.")] = 60.0,
     seed: Annotated[
-        int, typer.Option(help="The same seed gives the same blinks; speakers differ with one seed too.")
+        int,
+        typer.Option(
+            help=("Random seed; the same seed gives the same blinks. Speakers differ even with one seed.")
+        ),
     ] = 1,
     state: Annotated[
         str,
-        typer.Option(
-            help="What the person does while not speaking: rest, reading, screen, speaking, listening."
-        ),
+        typer.Option(help="Activity while not speaking: rest, reading, screen, speaking, listening."),
     ] = "listening",
     duration: Annotated[
-        float | None, typer.Option(help="Length in seconds; the recording's without it.")
+        float | None, typer.Option(help="Length in seconds. Default: the recording's length.")
     ] = None,
     speaker: Annotated[
-        str | None, typer.Option(help="Of subtitles with voices (<v Name>), whose eyes these are.")
+        str | None, typer.Option(help="Speaker whose eyes these are, for subtitles with voices (<v Name>).")
     ] = None,
     rate: Annotated[
-        float | None, typer.Option(help="Blinks a minute in --state, instead of the published mean.")
+        float | None, typer.Option(help="Blinks per minute in --state. Default: the published mean.")
     ] = None,
-    target: Annotated[str, typer.Option(help="Object (Blender) or node (Maya) that has the shapes.")] = "",
+    target: Annotated[str, typer.Option(help="Object (Blender) or node (Maya) with the shapes.")] = "",
     left: Annotated[str, typer.Option(help="Name of the left eye's shape or attribute.")] = "eyeBlinkLeft",
-    right: Annotated[str, typer.Option(help="Name of the right eye's.")] = "eyeBlinkRight",
+    right: Annotated[str, typer.Option(help="Name of the right eye's shape or attribute.")] = "eyeBlinkRight",
 ) -> None:
-    """Write the blinks of a whole performance, timed by pauses and turns of speech.
+    """Generate the blinks of a performance, timed by pauses and turns of speech.
 
     Examples:
 

@@ -41,13 +41,13 @@ def speech_in_subtitles(path: Path, speaker: str | None = None) -> tuple[list[Sp
     voices = sorted({caption.voice for caption in captions if caption.voice})
     if speaker is None and len(voices) > 1:
         raise InputError(
-            f"{path}: expected one person, got {len(voices)} voices ({', '.join(voices)}); name the one "
-            f"whose eyes these are: --speaker {shlex.quote(voices[0])}, in an experiment speech = "
+            f"{path}: expected one person, got {len(voices)} voices ({', '.join(voices)}); choose one: "
+            f"--speaker {shlex.quote(voices[0])}, in an experiment speech = "
             f'"{path.name}#{voices[0]}"'
         )
     if speaker is not None and speaker not in voices:
         spoken = f"; voices: {', '.join(voices)}" if voices else "; the file names no voices"
-        raise InputError(f"{path}: nobody is called '{speaker}'{did_you_mean(speaker, voices)}{spoken}")
+        raise InputError(f"{path}: there is no speaker '{speaker}'{did_you_mean(speaker, voices)}{spoken}")
     length_s = max((_seconds(caption.end) for caption in captions), default=0.0)
     own = [caption for caption in captions if speaker is None or caption.voice == speaker]
     return join_speech([_stretch(path, caption) for caption in own]), length_s
@@ -71,7 +71,7 @@ def _captions(path: Path) -> list[Caption]:
 def _stretch(path: Path, caption: Caption) -> Speech:
     start_s, end_s = _seconds(caption.start), _seconds(caption.end)
     if end_s <= start_s:
-        raise InputError(f"{path}: a subtitle ends at {caption.end}, not after its start at {caption.start}")
+        raise InputError(f"{path}: a subtitle ends at {caption.end}, before or at its start {caption.start}")
     return Speech(start_s, end_s)
 
 
@@ -139,7 +139,7 @@ def write_performance(job: PerformanceJob) -> None:
     )
     if job.source is not None and not stretches:
         Console(stderr=True, markup=False).print(
-            f"{job.source}: nobody speaks; the blinks are those of '{job.state}'"
+            f"{job.source}: there is no speech; the blinks are those of '{job.state}'"
         )
 
 
@@ -181,7 +181,7 @@ def speech_of(source: Path, speaker: str | None = None) -> tuple[list[Speech], f
     if source.suffix.lower() in SUFFIXES:
         return speech_in_subtitles(source, speaker)
     if speaker is not None:
-        raise InputError("--speaker is for subtitles with voices; a recording has nobody's name")
+        raise InputError("--speaker is only for subtitles with voices; a recording has no names")
 
     from stimuli_builder.performance.audio import speech_in_audio
 

@@ -9,8 +9,8 @@ HELP = """
 Read the sync patch from a film of the screen or a photodiode: missing frames and intervals.
 
 Declare `sync_patch = true` in `[display]`, start a run, and film the patch (lower left corner of the clip)
-with 240 pictures a second, the phone on a stand, from before the start key until after the clip. Several
-clips may be in one film. A file ending in .csv is a photodiode's trace over the middle field: time_ms, value.
+at 240 frames per second, with the phone on a stand, from before the start key until after the clip. One film
+may have several clips. A file ending in .csv is a photodiode's trace over the middle field: time_ms, value.
 
 Examples:
 
@@ -31,13 +31,15 @@ def scope(
     ],
     camera_fps: Annotated[
         float | None,
-        typer.Option(min=1, help="Pictures a second as taken, where the file plays in slow motion."),
+        typer.Option(min=1, help="Frames per second of the recording, if the file plays in slow motion."),
     ] = None,
     fps: Annotated[
-        float | None, typer.Option(min=1, help="Frames a second of the clip; seen from the film by default.")
+        float | None,
+        typer.Option(min=1, help=("Frames per second of the clip. Default: estimated from the film.")),
     ] = None,
     frames: Annotated[
-        int | None, typer.Option(min=1, help="Frames of the clip; by default up to the last one seen.")
+        int | None,
+        typer.Option(min=1, help=("Number of frames of the clip. Default: up to the last one detected.")),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Write each onset to this CSV.")] = None,
 ) -> None:
@@ -72,7 +74,7 @@ def _of_trace(path: Path, fps: float | None) -> Said:
     from stimuli_builder.sync_patch import onsets
 
     if fps is None:
-        raise InputError("a photodiode's trace needs the clip's rate: --fps 30")
+        raise InputError("a photodiode's trace needs the clip's rate: add, for example, --fps 30")
     changes = onsets.changes(onsets.read_trace(path), fps)
     return onsets.of_trace(changes), onsets.rows_of_trace(changes)
 

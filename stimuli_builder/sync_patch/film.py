@@ -83,7 +83,7 @@ CANDIDATES = 12
 QUAD_TOLERANCE = 0.06
 FIELD_PX = 16
 MIDDLE = slice(5, 11)
-"""Of a straightened field of 16 pixels only the middle is read: its rim mixes with the neighbours."""
+"""Of a straightened field of 16 pixels only the middle is read: its rim mixes with the neighbors."""
 
 
 def range_of(pictures: Iterable[Grey]) -> Grey:
@@ -95,7 +95,7 @@ def range_of(pictures: Iterable[Grey]) -> Grey:
         lowest = smooth if lowest is None else np.minimum(lowest, smooth)
         highest = smooth if highest is None else np.maximum(highest, smooth)
     if lowest is None or highest is None:
-        raise InputError("expected a film of the screen, it has no pictures")
+        raise InputError("expected a film of the screen, but it has no frames")
     return highest - lowest
 
 
@@ -114,7 +114,7 @@ def candidates(change: Grey) -> list[Corners]:
 
 
 def brightness(picture: Grey, corners: Corners) -> NDArray[np.float64]:
-    """Mean grey value of each of the nine fields, row by row, 0 to 255."""
+    """Mean gray value of each of the nine fields, row by row, 0 to 255."""
     side = 3 * FIELD_PX
     square = np.array([[0, 0], [side, 0], [side, side], [0, side]], np.float32)
     straight = cv2.warpPerspective(picture, cv2.getPerspectiveTransform(corners, square), (side, side))
@@ -130,7 +130,7 @@ def _clockwise(corners: Corners) -> Corners:
 
 PICTURES_PER_S_MIN = 100.0
 CONTRAST_MIN = 25.0
-"""Grey values between a field's white and black; less is noise."""
+"""Gray values between a field's white and black; less is noise."""
 DARKEST, LIGHTEST = 1, 99
 """Percentiles that stand for black and white: single pictures may be spoilt."""
 
@@ -157,7 +157,7 @@ def read_film(path: Path, camera_fps: float | None = None, say: Said = lambda _:
     camera_fps : float, optional
         Pictures a second as taken, where the file plays in slow motion; by default the file's own times.
     say : callable
-        Is told what is being done.
+        Called with the current step.
 
     Raises
     ------
@@ -168,17 +168,17 @@ def read_film(path: Path, camera_fps: float | None = None, say: Said = lambda _:
     rate = 1000 * (len(times_ms) - 1) / float(times_ms[-1] - times_ms[0])
     if rate < PICTURES_PER_S_MIN:
         raise InputError(
-            f"{path}: expected at least {PICTURES_PER_S_MIN:.0f} pictures a second, got {rate:.0f}; "
-            "where the file plays in slow motion, say how it was taken: --camera-fps 240"
+            f"{path}: expected at least {PICTURES_PER_S_MIN:.0f} frames per second, got {rate:.0f}; if the "
+            "file plays in slow motion, add the camera's rate: --camera-fps 240"
         )
-    say(f"looking for the patch in {len(times_ms)} pictures")
+    say(f"looking for the patch in {len(times_ms)} frames")
     quads = candidates(range_of(_pictures(path)))
-    say(f"reading {len(quads)} place(s) that change as a patch does")
+    say(f"reading {len(quads)} place(s) that change like a patch")
     corners, numbers = _best(_brightness(path, quads))
     if corners is None or numbers is None:
         raise InputError(
-            f"{path}: found no sync patch; film the whole patch, sharp and at least 40 pixels wide, "
-            "with the camera still, from before the start key until after the clip"
+            f"{path}: no sync patch was found; film the whole patch, in focus and at least 40 pixels wide, "
+            "with a still camera, from before the start key until after the clip"
         )
     return Film(times_ms[: len(numbers)], numbers, rate, corners)
 

@@ -96,8 +96,8 @@ def plays(
     cut = [_onsets(times_ms[part], numbers[part]) for part in _parts(numbers)]
     if not cut:
         raise InputError(
-            "expected at least one whole play, white before and after it, found none: "
-            "film from before the start key until after the clip"
+            "expected at least one complete presentation with white before and after it, found none: film "
+            "from before the start key until after the clip"
         )
     rate = fps or _rate([onsets for onsets, _ in cut])
     count = frames or 1 + max(onset.frame for onsets, _ in cut for onset in onsets)
@@ -129,7 +129,7 @@ def _onsets(times_ms: NDArray[np.float64], numbers: NDArray[np.int64]) -> tuple[
 
 
 def _unwrapped(number: int, before: Sequence[Onset]) -> int:
-    """The frame nearest after the one before; a step back is kept, it tells of a fault."""
+    """The frame nearest after the previous one; a step back is kept because it shows a fault."""
     if not before:
         return number
     step = (number - before[-1].frame) % NUMBERS
@@ -144,7 +144,7 @@ def _rate(cut: Sequence[Sequence[Onset]]) -> float:
         if after.frame > before.frame
     ]
     if not steps:
-        raise InputError("expected a clip of two frames or more, saw one: give its rate with --fps")
+        raise InputError("expected a clip of at least two frames, found one: add its rate with --fps")
     seen = 1000 / float(np.median(steps))
     return min(RATES, key=lambda rate: abs(np.log(rate / seen)))
 
@@ -197,7 +197,7 @@ def read_trace(path: Path) -> Trace:
     if rows.ndim != 2 or rows.shape[1] != 2 or len(rows) < 2:
         raise InputError(f"{path}: expected two columns of numbers, time_ms and value, and two lines or more")
     if not (np.diff(rows[:, 0]) > 0).all():
-        raise InputError(f"{path}: expected times that grow from line to line, in ms")
+        raise InputError(f"{path}: expected times in ms that increase from line to line")
     return Trace(rows[:, 0], rows[:, 1])
 
 
@@ -218,7 +218,7 @@ def changes(trace: Trace, fps: float) -> Changes:
     """
     dark, light = np.percentile(trace.values, [DARKEST, LIGHTEST])
     if light - dark < CONTRAST_MIN:
-        raise InputError("expected a diode that sees light and dark, its values hardly change")
+        raise InputError("expected a diode trace with light and dark, but its values hardly change")
     crossings = _crossings(trace.times_ms, (trace.values - dark) / (light - dark))
     period_ms = 1000 / fps
     plays: list[list[float]] = []
@@ -230,7 +230,7 @@ def changes(trace: Trace, fps: float) -> Changes:
             plays[-1].append(at_ms)
         last_ms = at_ms
     if not plays:
-        raise InputError("expected at least one play after a light field, found none")
+        raise InputError("expected at least one presentation after a light field, found none")
     return Changes(tuple(tuple(times) for times in plays), period_ms)
 
 
@@ -256,13 +256,19 @@ NAMED_MAX = 12
 def of_film(plays: Sequence[PlayOnScreen], pictures_per_s: float) -> list[str]:
     """A line a play, and one over all."""
     lines = [
-        f"{len(plays)} play(s) of {plays[0].frames} frames at {plays[0].fps:g} fps; "
-        f"onsets to within {500 / pictures_per_s:.1f} ms ({pictures_per_s:.0f} pictures a second)"
+        f"{len(plays)} presentation(s) of {plays[0].frames} frames at {plays[0].fps:g} fps; onsets accurate "
+        f"to {500 / pictures_per_s:.1f} ms ({pictures_per_s:.0f} frames per second)"
     ]
-    lines += [f"play {number}: {_play(play)}" for number, play in enumerate(plays, start=1)]
+    lines += [f"presentation {number}: {_play(play)}" for number, play in enumerate(plays, start=1)]
     complete = sum(not play.missing for play in plays)
     worst = max(max(abs(late) for late in play.late_ms) for play in plays)
-    return [*lines, f"{complete} of {len(plays)} play(s) without a missing frame; worst {worst:.1f} ms off"]
+    return [
+        *lines,
+        (
+            f"{complete} of {len(plays)} presentation(s) without a missing frame; maximum deviation "
+            f"{worst:.1f} ms"
+        ),
+    ]
 
 
 def _play(play: PlayOnScreen) -> str:
@@ -272,8 +278,8 @@ def _play(play: PlayOnScreen) -> str:
     gone = f"{len(missing)} missing ({named}{more})" if missing else "none missing"
     intervals, late = play.intervals_ms, play.late_ms
     return (
-        f"{gone}; intervals {min(intervals):.1f} to {max(intervals):.1f} ms; "
-        f"{min(late):+.1f} to {max(late):+.1f} ms off the clip's times"
+        f"{gone}; intervals {min(intervals):.1f} to {max(intervals):.1f} ms; {min(late):+.1f} to "
+        f"{max(late):+.1f} ms from the clip's times"
     )
 
 
@@ -284,9 +290,13 @@ def of_trace(changes: Changes) -> list[str]:
         long = [step for step in steps if step > LONG_SHARE * changes.period_ms]
         ends = f"intervals {min(steps):.1f} to {max(steps):.1f} ms" if steps else "no interval"
         lines.append(
-            f"play {number}: {len(steps) + 1} changes; {ends}; {len(long)} longer than a frame and a half"
+            f"presentation {number}: {len(steps) + 1} changes; {ends}; {len(long)} longer than a frame and a "
+            "half"
         )
-    return [*lines, "A photodiode cannot tell a missing frame from a late one; a film of the patch can."]
+    return [
+        *lines,
+        ("A photodiode cannot distinguish a missing frame from a late one; a film of the patch can."),
+    ]
 
 
 def rows_of_film(plays: Sequence[PlayOnScreen]) -> list[tuple[object, ...]]:

@@ -1,1 +1,1 @@
-"""The coupled active appearance model: learned from a handful of labelled frames, fitted to every frame."""
+"""The coupled active appearance model: learned from a handful of labeled frames, fitted to every frame."""

@@ -24,7 +24,7 @@ Advance = Callable[[], None] | None
 
 @dataclass(frozen=True)
 class HeldOut:
-    """A labelled frame fitted by a model that never saw it, found without knowing its label.
+    """A labeled frame fitted by a model that never saw it, found without knowing its label.
 
     Attributes
     ----------
@@ -33,11 +33,11 @@ class HeldOut:
     distance_errors_px : float64 array (eyes,) or None
         Inter-eyelid distance minus the label's.
     residuals : float64 array (eyes,) or None
-        Root mean square grey levels.
+        Root mean square gray levels.
     point_errors_px : float64 array (9 * eyes,) or None
         Distance of each landmark from its label.
     width_px : float or None
-        Mean width of the labelled eyes.
+        Mean width of the labeled eyes.
     points : float64 array (9 * eyes, 2) or None
         Landmarks as fitted, in pixels of the video.
     """
@@ -62,14 +62,14 @@ def cross_validate(
     refine: bool = False,
     advance: Advance = None,
 ) -> list[HeldOut]:
-    """Train on all folds but one and fit the labelled frames of that one, for every fold.
+    """Train on all folds but one and fit the labeled frames of that one, for every fold.
 
     Parameters
     ----------
     pictures, points : dict of int to Picture, dict of int to float64 array
         By frame number; points (9 * eyes, 2).
     folds : int
-        Frame k of the ascending labelled frames is in fold k modulo `folds`.
+        Frame k of the ascending labeled frames is in fold k modulo `folds`.
     refine : bool, optional
         Refine the labels of the training frames of each fold, without sight of the frames left out.
     advance : callable, optional
@@ -169,12 +169,12 @@ def compare_with_truth(track: Path, truth: Path) -> TruthReport:
     for row, true in zip_longest(track_rows(track), track_rows(truth)):
         if row is None or true is None or row["frame"] != true["frame"]:
             raise InputError(
-                f"{track}: its frames are not those of {truth}; compare a track with its own truth"
+                f"{track}: its frames differ from those of {truth}; compare a track with its own ground truth"
             )
         if "status" in true and "status" not in row:
             raise InputError(
-                f"expected a track, which has a column 'status', and then its truth; got {track} and "
-                f"{truth}: give them the other way round"
+                f"expected a track (with a column 'status') and then its truth, got {track} and {truth}: "
+                "swap them"
             )
         again += row.get("status") == "reinitialised"
         if row.get("status") == "lost":

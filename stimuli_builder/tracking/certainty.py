@@ -20,7 +20,7 @@ DOUBTFUL_SHARE = 0.05
 DIFFERING_SHARE = 0.06
 """Mean distance of the lids from a detector's, as part of the eye's width, that makes a frame doubtful."""
 UNUSUAL_SD = 2.5
-"""Root mean square of the coupled parameters in standard deviations that no labelled frame reaches."""
+"""Root mean square of the coupled parameters in standard deviations that no labeled frame reaches."""
 JUMP_SHARE = 0.35
 """A canthus does not move by more of the eye's width from one frame to the next."""
 STEEPEST = 2.0
@@ -30,7 +30,7 @@ LOWER_CURVE = (5, 6, 7, 8, 0)
 
 
 def with_errors(model: CoupledModel, held_out: Sequence[HeldOut], limits: Values) -> CoupledModel:
-    """Give a model what its errors are stated from: labelled frames left out of training.
+    """Give a model what its errors are stated from: labeled frames left out of training.
 
     log(frame error) is regressed on log(residual / usual residual); the slope is kept between 0 and 2 and
     shrunk as by ten more frames without a slope. A stated error is the root mean square on such frames,
@@ -97,11 +97,11 @@ def doubt(
         return f"model and detector differ by {difference:.0%} of the eye's width"
     unusual = float(np.sqrt(np.mean((fit.c / np.maximum(model.sd, 1e-9)) ** 2)))
     if unusual > UNUSUAL_SD:
-        return f"a shape unlike the labelled ones ({unusual:.1f} sd)"
+        return f"the shape is unlike the labeled ones ({unusual:.1f} SD)"
     if before is not None and jump_px(points, before) > JUMP_SHARE * width:
         return "the eyes jump from one frame to the next"
     if fits_badly(errors, width):
-        return f"the picture fits badly: {_error_in_words(errors, width)}"
+        return f"the model fits the picture badly: {_error_in_words(errors, width)}"
     return ""
 
 

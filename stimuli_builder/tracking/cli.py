@@ -13,20 +13,20 @@ if TYPE_CHECKING:
 # `stimuli track` and `stimuli train`.
 
 Video = Annotated[
-    Path, typer.Argument(help="Recording: anything PyAV reads, colour or grey, upright or rotated.")
+    Path, typer.Argument(help="Video that PyAV can read, in color or gray, upright or rotated.")
 ]
 LabelFile = Annotated[
     Path | None, typer.Option("--labels", help="Label file (JSON) of about 20 frames of VIDEO.")
 ]
-OneEye = Annotated[bool, typer.Option("--one-eye", help="Close-up of one eye: 9 points a frame.")]
+OneEye = Annotated[bool, typer.Option("--one-eye", help="Close-up of one eye: 9 points per frame.")]
 ShapeVariance = Annotated[
-    float, typer.Option(help="Share of shape variance kept (n modes).", min=0.5, max=1.0)
+    float, typer.Option(help="Proportion of shape variance kept (n modes).", min=0.5, max=1.0)
 ]
 LookVariance = Annotated[
-    float, typer.Option(help="Share of appearance variance kept (m modes).", min=0.5, max=1.0)
+    float, typer.Option(help="Proportion of appearance variance kept (m modes).", min=0.5, max=1.0)
 ]
 CoupledVariance = Annotated[
-    float, typer.Option(help="Share of coupled variance kept (l modes).", min=0.5, max=1.0)
+    float, typer.Option(help="Proportion of coupled variance kept (l modes).", min=0.5, max=1.0)
 ]
 FewestModes = Annotated[
     bool, typer.Option("--paper-modes/--variance-only", help="Keep at least the paper's 8, 10 and 10 modes.")
@@ -35,18 +35,18 @@ BasePixels = Annotated[int, typer.Option(help="Pixels of the base mesh.", min=50
 Refine = Annotated[
     bool | None,
     typer.Option(
-        "--refine/--no-refine", help="Make labels consistent with the pictures; unset: where it helps."
+        "--refine/--no-refine", help="Make labels consistent with the pictures. Default: if it helps."
     ),
 ]
-Folds = Annotated[int, typer.Option(help="Folds of the accuracy report.", min=2, max=50)]
+Folds = Annotated[int, typer.Option(help="Number of folds of the accuracy report.", min=2, max=50)]
 VariableRate = Annotated[
-    bool, typer.Option("--accept-variable-rate", help="Take a variable frame rate, with its own time stamps.")
+    bool, typer.Option("--accept-variable-rate", help="Accept a variable frame rate, with its time stamps.")
 ]
 DamagedEnd = Annotated[
     bool,
     typer.Option(
         "--accept-damaged-end",
-        help="Track a file that is cut off or damaged up to the first frame that cannot be read.",
+        help="Track a truncated or damaged file up to the first frame that cannot be read.",
     ),
 ]
 
@@ -61,17 +61,19 @@ def register(app: typer.Typer) -> None:
 
 def track(
     video: Video,
-    out: Annotated[Path, typer.Option(help="Track to write (CSV), or the folder for a folder's tracks.")],
+    out: Annotated[
+        Path, typer.Option(help=("Track to write (CSV), or the output folder if the input is a folder."))
+    ],
     labels: LabelFile = None,
     model: Annotated[
-        Path | None, typer.Option(help="Reuse a model of 'stimuli train' instead of labels.")
+        Path | None, typer.Option(help="Use a model from 'stimuli train' instead of labels.")
     ] = None,
     one_eye: OneEye = False,
     preview: Annotated[
-        Path | None, typer.Option(help="Also draw mesh and distance trace on the video (MP4).")
+        Path | None, typer.Option(help="Also draw the mesh and the distance trace on the video (MP4).")
     ] = None,
     plot: Annotated[
-        Path | None, typer.Option(help="Also save the trace with labelled blinks (PNG, SVG, PDF).")
+        Path | None, typer.Option(help="Also plot the trace with the detected blinks (PNG, SVG, PDF).")
     ] = None,
     shape_variance: ShapeVariance = 0.98,
     appearance_variance: LookVariance = 0.90,
@@ -85,12 +87,14 @@ def track(
     relabel: Annotated[
         Path | None,
         typer.Option(
-            help="Label file for the worst frames, to be corrected by hand; where it is there, the frames "
-            "corrected or accepted in it train the model and win over the detector."
+            help=(
+                "Label file for the worst frames, to be corrected by hand. If it exists, its corrected or "
+                "accepted frames train the model and override the detector."
+            )
         ),
     ] = None,
 ) -> None:
-    """Track the eyelids of a recording with the coupled active appearance model.
+    """Track the eyelids in a recording with the coupled active appearance model.
 
     Without labels a face detector finds the eyes and trains the model (its environment, 270 MB, is made at
     first use); labels placed by hand (--labels) are more exact.
@@ -154,9 +158,9 @@ def train(
     folds: Folds = 5,
     accept_variable_rate: VariableRate = False,
 ) -> None:
-    """Train the model on labelled frames, report its accuracy by fold, and save it.
+    """Train the model on labeled frames, report its accuracy per fold, and save it.
 
-    Every labelled frame is left out of training once and then found without its label. The report gives the
+    Every labeled frame is left out of training once and then found without its label. The report gives the
     root mean square distance of the landmarks from the labels and the error of the inter-eyelid distance.
 
     Examples:
@@ -174,7 +178,7 @@ def train(
     from stimuli_builder.tracking.model import save_model
 
     if labels is None:
-        raise InputError("expected --labels with the label file of this video")
+        raise InputError("add --labels with the label file of this video")
     check_targets([out], [video, labels])
     if out is not None:
         check_ending(out, (".npz",), "a model")
@@ -221,7 +225,7 @@ def accuracy(
     track: Annotated[Path, typer.Argument(help="Track of the synthetic actor (CSV).")],
     truth: Annotated[Path, typer.Argument(help="Truth that 'stimuli actor' wrote (CSV).")],
 ) -> None:
-    """Compare a track of the synthetic actor with its exact truth.
+    """Compare a track of the synthetic actor with its exact ground truth.
 
     Example:
 
@@ -232,7 +236,7 @@ def accuracy(
     report = compare_with_truth(track, truth)
     blinks = "no blink" if report.blink_p95_px is None else f"{report.blink_p95_px:.3f} px in blinks"
     print(
-        f"{report.frames:,} frames, {report.lost:,} lost, {report.reinitialised:,} re-initialised\n"
+        f"{report.frames:,} frames, {report.lost:,} lost, {report.reinitialised:,} re-initialized\n"
         f"landmarks: RMS {report.rms_px:.3f} px, 95th percentile {report.p95_px:.3f} px, {blinks}\n"
         f"inter-eyelid distance: error sd {report.distance_sd_px:.3f} px, "
         f"bias {report.distance_bias_px:+.3f} px"
@@ -241,19 +245,19 @@ def accuracy(
 
 def label(
     video: Annotated[Path, typer.Argument(help="Recording of a face.")],
-    out: Annotated[Path, typer.Option(help="Label file to write (JSON), to be corrected by hand.")],
+    out: Annotated[Path, typer.Option(help="Label file to write (JSON), for correction by hand.")],
     one_eye: Annotated[
-        bool, typer.Option("--one-eye", help="Close-up of one eye: 9 points a frame.")
+        bool, typer.Option("--one-eye", help="Close-up of one eye: 9 points per frame.")
     ] = False,
-    frames: Annotated[int, typer.Option(help="Frames to label, chosen for variety.", min=3, max=200)] = 20,
+    frames: Annotated[int, typer.Option(help="Number of varied frames to label.", min=3, max=200)] = 20,
     accept_variable_rate: Annotated[
-        bool, typer.Option("--accept-variable-rate", help="Take a variable frame rate.")
+        bool, typer.Option("--accept-variable-rate", help="Accept a variable frame rate.")
     ] = False,
 ) -> None:
-    """Propose labels for frames chosen for variety, with the eye detector, to be corrected by hand.
+    """Propose labels for varied frames with the eye detector, for correction by hand.
 
     The detector's environment (270 MB) is made at first use. Upper-lid points of half-closed lids can be 1
-    to 2 pixels off: review every frame on the labelling page before training.
+    to 2 pixels off: review every frame on the labeling page before training.
 
     Examples:
 
@@ -278,11 +282,11 @@ def label(
 
 
 def iris(
-    video: Annotated[Path, typer.Argument(help="Recording that was tracked.")],
+    video: Annotated[Path, typer.Argument(help="The tracked recording.")],
     track: Annotated[Path, typer.Argument(help="Its track (CSV of 'stimuli track').")],
     out: Annotated[Path, typer.Option(help="Table of the irises to write (CSV).")],
 ) -> None:
-    """Measure the irises of a tracked recording, and the millimetres in a pixel that follow.
+    """Measure the irises in a tracked recording, and estimate the millimeters per pixel.
 
     Middle and diameter of each iris in pixels, empty where the eye is shut or doubtful, or no edge is seen.
 
@@ -301,12 +305,12 @@ def iris(
     with frame_progress() as progress:
         task = progress.add_task("irises", total=info.frame_count)
         summary = write_irises(info, track, out, lambda: progress.advance(task))
-    print(f"{out}: {summary.seen:,} irises seen in {summary.frames:,} frames")
+    print(f"{out}: {summary.seen:,} irises measured in {summary.frames:,} frames")
     if summary.diameter_px > 0:
         print(
             f"median diameter {summary.diameter_px:.2f} px (middle half within {summary.spread_px:.2f} px): "
-            f"{summary.mm_per_px:.4f} mm in a pixel if an iris is {IRIS_MM:g} mm wide\n"
+            f"{summary.mm_per_px:.4f} mm per pixel if an iris is {IRIS_MM:g} mm wide\n"
             f"use it with: stimuli blinks {track} --scale {summary.mm_per_px:.4f}"
         )
     else:
-        print("too few irises to tell how many millimetres a pixel is")
+        print("too few irises to estimate the millimeters per pixel")

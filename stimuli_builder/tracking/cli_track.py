@@ -37,7 +37,7 @@ def report_track(out: Path, summary: TrackSummary, prepared_s: float) -> None:
     """Print how many frames were tracked, doubtful and lost, how fast, and the usual reasons."""
     print(
         f"{out}: {summary.frames:,} frames, {summary.tracked:,} tracked "
-        f"({summary.doubtful:,} of them doubtful), {summary.reinitialised:,} re-initialised, "
+        f"({summary.doubtful:,} of them doubtful), {summary.reinitialised:,} re-initialized, "
         f"{summary.lost:,} lost\n"
         f"{summary.fit_fps:,.0f} frames/s fit only, "
         f"{summary.end_to_end_fps:,.0f} frames/s with decoding; "
@@ -47,7 +47,7 @@ def report_track(out: Path, summary: TrackSummary, prepared_s: float) -> None:
     for (status, _), (number, first, whole) in usual[:REASONS_TOLD]:
         print(f"{counted(number, 'frame')} {status}, the first is {first}: {whole}")
     if summary.tracked == summary.doubtful:
-        warn("no frame is beyond doubt; look at a --preview before using any number")
+        warn("every frame is doubtful; check a --preview before you use any number")
 
 
 def report_modes(lesson: Lesson) -> None:
@@ -86,12 +86,12 @@ class TrackJob:
 
 
 def run_track(job: TrackJob) -> None:
-    """Track one video and write what is asked for; all checks come first."""
+    """Track one video and write the requested files; all checks come first."""
     _check(job)
     try:
         _track(job, open_video(job.video, job.accept_variable_rate, job.accept_damaged_end))
     except DamagedFileError as error:
-        raise InputError(f"{error}, or track what can be read with --accept-damaged-end") from error
+        raise InputError(f"{error}, or track the readable part with --accept-damaged-end") from error
 
 
 def _track(job: TrackJob, info: VideoInfo) -> None:
@@ -111,8 +111,9 @@ def _track(job: TrackJob, info: VideoInfo) -> None:
     if summary.repeated:
         share = 1 - summary.repeated / summary.frames
         warn(
-            f"{counted(summary.repeated, 'frame')} repeat the one before at even steps, as after a change of "
-            f"the frame rate: about {share * info.fps:.3g} pictures a second differ, not {info.fps:.4g}"
+            f"{counted(summary.repeated, 'frame')} repeat the previous frame at regular intervals, as after "
+            f"a change of the frame rate: about {share * info.fps:.3g} frames per second differ, not "
+            f"{info.fps:.4g}"
         )
     if job.accept_damaged_end:
         _say_how_far(info)
@@ -128,24 +129,28 @@ def track_folder(job: TrackJob) -> None:
     ------
     InputError
         The folder holds no video, outputs of one video are asked for, or some video was refused: the others
-        are tracked all the same, and each refusal is told when it comes.
+        are tracked all the same, and each refusal is reported when it happens.
     """
     if job.labels or job.relabel or job.preview or job.plot:
-        raise InputError("a folder takes --model or nothing: labels, --relabel and pictures are one video's")
+        raise InputError(
+            "for a folder only --model is possible: --labels, --relabel and pictures need a single video"
+        )
     videos = sorted(path for path in job.video.iterdir() if path.suffix.lower() in VIDEO_SUFFIXES)
     if not videos:
-        raise InputError(f"{job.video}: no video in this folder ({' '.join(sorted(VIDEO_SUFFIXES))})")
+        raise InputError(
+            f"{job.video}: there is no video in this folder ({' '.join(sorted(VIDEO_SUFFIXES))})"
+        )
     if job.out.exists() and not job.out.is_dir():
-        raise InputError(f"{job.out}: expected a folder for the tracks of {job.video}, this is a file")
+        raise InputError(f"{job.out}: expected a folder for the tracks of {job.video}, but this is a file")
     if not job.out.parent.is_dir():
-        raise InputError(f"{job.out}: the folder {job.out.parent} does not exist; make it first")
+        raise InputError(f"{job.out}: the folder {job.out.parent} does not exist; create it first")
     job.out.mkdir(exist_ok=True)
     namesakes = Counter(video.stem for video in videos)
     refused = 0
     for number, video in enumerate(videos, start=1):
         out = job.out / f"{video.stem if namesakes[video.stem] == 1 else video.name}.csv"
         if out.exists():
-            print(f"{number}/{len(videos)} {out}: there already")
+            print(f"{number}/{len(videos)} {out}: already exists")
             continue
         print(f"{number}/{len(videos)} {video.name}")
         try:
@@ -171,9 +176,9 @@ def _say_how_far(info: VideoInfo) -> None:
 
 def _check(job: TrackJob) -> None:
     if job.labels is not None and job.model is not None:
-        raise InputError("expected --labels or --model, or neither; give one of them")
+        raise InputError("use --labels or --model, not both")
     if job.relabel is not None and (job.labels is not None or job.model is not None):
-        raise InputError("--relabel belongs to tracking without --labels and --model; leave them out")
+        raise InputError("--relabel is for tracking without --labels and --model; remove them")
     if job.relabel is not None:
         temporary_beside(job.relabel)
     check_targets([job.out, job.preview, job.plot], [job.video, job.labels, job.model, job.relabel])
@@ -206,7 +211,7 @@ def _model(job: TrackJob, info: VideoInfo) -> tuple[CoupledModel, Hints]:
         return _label_free(job, info)
     model = load_model(job.model)
     if job.one_eye and model.eyes == 2:
-        raise InputError(f"{job.model}: a model of two eyes, --one-eye expects one; leave --one-eye out")
+        raise InputError(f"{job.model}: this is a model of two eyes; remove --one-eye")
     return model, {}
 
 
@@ -217,12 +222,12 @@ def _label_free(job: TrackJob, info: VideoInfo) -> tuple[CoupledModel, Hints]:
         seen = survey(info, one_eye=job.one_eye, advance=lambda now: progress.update(task, completed=now))
     line = f"eyes found on {len(seen.points):,} of {seen.looked_at:,} frames looked at"
     more = (
-        f"; {seen.several_faces:,} show several faces, the largest over the recording is taken"
+        f"; {seen.several_faces:,} show several faces; the largest over the recording was used"
         if seen.several_faces
         else ""
     )
     if seen.further:
-        more += f"; {counted(seen.further, 'smaller face')} beside, seen in parts of the picture alone"
+        more += f"; {counted(seen.further, 'smaller face')} more, detected only in parts of the picture"
     print(f"{line}{more}; training on them", flush=True)
     with step_progress("training", training_steps(refine=job.refine)) as advance:
         lesson = label_free_lesson(
@@ -250,7 +255,7 @@ def _relabel(path: Path, info: VideoInfo, model: CoupledModel, job: TrackJob, hi
     count = "counts" if len(hand) == 1 else "count"
     print(
         f"{path}: {counted(len(hand), 'frame')} corrected or accepted, which {count}; {proposed} as "
-        "proposed, which do not: correct or accept them on the labelling page, then run this command again"
+        "proposed, which do not: correct or accept them on the labeling page, then run this command again"
     )
 
 
@@ -265,10 +270,10 @@ def _pictures(job: TrackJob, info: VideoInfo, model: CoupledModel) -> None:
 
 
 def _plot(track: Path, fps: float, figure: Path) -> None:
-    """Plot a track that is written; what no blinks can be told from stays without a plot, and is said."""
+    """Plot a written track; one in which blinks cannot be detected has no plot, with a message."""
     try:
         count = plot_track(track, fps, figure)
     except InputError as error:
-        warn(f"{figure}: no plot, the track is written ({error})")
+        warn(f"{figure}: the track was written, but not the plot ({error})")
         return
     print(f"{figure}: trace with {counted(count, 'blink')}")

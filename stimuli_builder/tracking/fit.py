@@ -32,7 +32,7 @@ class MeshArrays(NamedTuple):
     ends : int array (eyes,)
         One past the last pixel of each eye.
     left, right, above, below : uint32 array (N,)
-        Neighbours of each pixel.
+        Neighbors of each pixel.
     """
 
     vertices: Any
@@ -108,13 +108,13 @@ class Fit:
     vertices : float32 array (V, 2)
         In the reduced picture.
     residuals : float64 array (eyes,)
-        Root mean square grey levels.
+        Root mean square gray levels.
     spreads : float64 array (eyes,)
-        Standard deviation of the picture's grey levels over each eye.
+        Standard deviation of the picture's gray levels over each eye.
     iterations : int
         0 if the fit broke down.
     light : (float, float)
-        Gain and offset that would bring the picture's grey levels nearest to the model's; (1, 0) if the fit
+        Gain and offset that would bring the picture's gray levels nearest to the model's; (1, 0) if the fit
         broke down.
     """
 
@@ -128,7 +128,7 @@ class Fit:
 
     @property
     def overall_residual(self) -> float:
-        """Root mean square grey levels over both eyes."""
+        """Root mean square gray levels over both eyes."""
         squares = [residual * residual for residual in self.residuals.tolist()]
         return math.sqrt(sum(squares) / len(squares))
 
@@ -154,7 +154,7 @@ class Algebra:
 
 
 def similarity_directions(vertices: Values) -> tuple[Values, Values, Values]:
-    """Unit vertex movements (4, V, 2) of scale, turn, shift x and shift y, with their norms and centre."""
+    """Unit vertex movements (4, V, 2) of scale, turn, shift x and shift y, with their norms and center."""
     centre = vertices.mean(0)
     from_centre = vertices - centre
     turned = np.stack([-from_centre[:, 1], from_centre[:, 0]], axis=1)

@@ -21,9 +21,9 @@ from stimuli_builder.video import Picture
 Values = NDArray[np.float64]
 
 BRIGHTER = 1.16
-"""Least grey level of a highlight, in medians of the cheek: hardly any skin around lids is as bright."""
+"""Least gray level of a highlight, in medians of the cheek: hardly any skin around lids is as bright."""
 SATURATED, OVER_SKIN = 230.0, 1.03
-"""Grey level that is a highlight on bright skin, if it is brighter than the skin at all: many videos end at a
+"""Gray level that is a highlight on bright skin, if it is brighter than the skin at all: many videos end at a
 luma of 235."""
 LEAST_SHARE = 0.02
 """Part of lids and skin around them below which a highlight is one on the cornea, and hides no lid."""
@@ -34,13 +34,13 @@ DARK_IRIS, NO_IRIS = 0.45, 0.62
 """A quarter of the pixels between open lids is darker than this part of the skin, since an iris is among them
 (0.2 to 0.4 of it without a highlight, 0.4 to 0.6 under a weak one); shut lids under a highlight have 0.6."""
 BETWEEN = 0.18
-"""Part of the pixels between half-open lids that are no white, which lies in shade, but a highlight."""
+"""Part of the pixels between half-open lids that are not the shaded white of the eye, but a highlight."""
 SHUT, OPEN = 0.1, 0.7
-"""Openings, in the widest labelled ones, between which lids under a highlight are not believed: a wide open
+"""Openings, in the widest labeled ones, between which lids under a highlight are not believed: a wide open
 eye shows its iris, one seen shut its lashes, but shut lids under a highlight are seen half open."""
 HIDDEN = 0.3
 """Stated error, in eye's widths, of lids around which all is a highlight; a part of it for a part."""
-GLARE = "glare over {}: lids under a highlight are not seen"
+GLARE = "glare over {}: lids under a highlight cannot be detected"
 EYE_NAMES = {1: ("the eye",), 2: ("the left eye", "the right eye")}
 COLUMNS, ROWS = 21, 14
 HALF_WIDE, TOP, BOTTOM = 0.5, -0.35, 0.3
@@ -69,7 +69,7 @@ class GlareCheck:
         Parameters
         ----------
         picture : uint8 array (h, w)
-            Grey, reduced as the fit's.
+            Gray, reduced as the fit's.
 
         Returns
         -------
@@ -84,7 +84,7 @@ class GlareCheck:
             share, outside, inside, quarter, opening = highlights(picture, points)
             wide = opening / float(self._usual[eye])
             dark = 0 < quarter <= DARK_IRIS
-            # Whites may outshine dark skin, next to a dark iris: that is no highlight.
+            # Whites may outshine dark skin, next to a dark iris: that is not a highlight.
             seen = outside >= LEAST_OUTSIDE or (inside >= BETWEEN and not dark)
             if not seen or share < LEAST_SHARE:
                 continue
@@ -136,7 +136,7 @@ def opening_share(along: Values, down: Values) -> float:
 
 @compiled
 def level_at(picture: Picture, x: float, y: float) -> float:
-    """Grey level between four pixels; the nearest ones beyond the picture."""
+    """Gray level between four pixels; the nearest ones beyond the picture."""
     height, width = picture.shape
     x, y = min(max(x, 0.0), width - 1.001), min(max(y, 0.0), height - 1.001)
     left, top = int(x), int(y)
@@ -153,7 +153,7 @@ def highlights(picture: Picture, eye: Points) -> tuple[float, float, float, floa
     Parameters
     ----------
     picture : uint8 array (h, w)
-        Grey.
+        Gray.
     eye : float64 array (9, 2)
         In its pixels.
 

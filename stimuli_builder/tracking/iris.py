@@ -31,13 +31,13 @@ ANGLES = 11
 LEAST_OPEN = 0.25
 """Opening, as part of the eye's width, below which lids leave too little of the edge."""
 LEAST_STEP = 4.0
-"""Grey levels by which the picture must get brighter across the edge."""
+"""Gray levels by which the picture must get brighter across the edge."""
 LEAST_POINTS = 5
 """Points of either arc that must lie between the lids."""
 SOFT = 40.0
-"""Grey levels at which a step counts half: a lamp's reflection is worth little more than the white."""
+"""Gray levels at which a step counts half: a lamp's reflection is worth little more than the white."""
 REACHES = (0.012, 0.03)
-"""How far inside and outside the edge is compared: near, to tell where it is, and far, to see it."""
+"""How far inside and outside the edge is compared: near, to locate it, and far, to detect it."""
 MARGIN = 0.02
 FINE_PX = 100
 """A wider eye is looked at in a reduced picture."""
@@ -47,7 +47,7 @@ STAGES = ((0.035, 0.02), (0.015, 0.008), (0.006, 0.004), (0.0025, 0.002))
 
 @dataclass(frozen=True)
 class Iris:
-    """One eye's iris: middle and diameter in pixels, and the grey levels its edge is darker by."""
+    """One eye's iris: middle and diameter in pixels, and the gray levels its edge is darker by."""
 
     x: float
     y: float
@@ -61,7 +61,7 @@ def measure_iris(picture: Picture, eye: Points) -> Iris | None:
     Parameters
     ----------
     picture : uint8 array (h, w)
-        Grey.
+        Gray.
     eye : float64 array (9, 2)
         Its points in the order of label files, in pixels.
 
@@ -185,11 +185,11 @@ def _grey(picture: NDArray[np.float32], axes: Values, u: float, v: float) -> flo
     return float(top + fr * (low - top))
 
 
-# The irises of a tracked recording, frame by frame, and the millimetres in a pixel that follow.
+# The irises of a tracked recording, frame by frame, and the millimeters in a pixel that follow.
 
 BELIEVED = ("tracked", "reinitialised")
 LEAST_FRAMES = 5
-"""Irises that must be seen before a scale is told."""
+"""Minimum number of irises for a scale."""
 
 
 @dataclass(frozen=True)
@@ -213,7 +213,7 @@ class IrisSummary:
 
     @property
     def mm_per_px(self) -> float:
-        """Millimetres in a pixel if an iris is 11.7 mm wide."""
+        """Millimeters per pixel if an iris is 11.7 mm wide."""
         return IRIS_MM / self.diameter_px
 
 
@@ -245,7 +245,7 @@ def write_irises(info: VideoInfo, track: Path, out: Path, advance: Callable[[], 
             advance()
         if count != info.frame_count or next(rows, None) is not None:
             raise InputError(
-                f"{track}: not a track of {info.path}, which has {info.frame_count} frames; give the video "
+                f"{track}: not a track of {info.path}, which has {info.frame_count} frames; use the video "
                 "that was tracked"
             )
     return _summary(count, diameters)

@@ -57,7 +57,7 @@ def compose(modes, c, first, last, out):
 
 @compiled
 def differentiate(values, left, right, above, below, gx, gy):
-    """Central differences of values (N,) along x and y; neighbours are pixel numbers, uint32 (N,)."""
+    """Central differences of values (N,) along x and y; neighbors are pixel numbers, uint32 (N,)."""
     half = np.float32(0.5)
     for x in range(values.shape[0]):
         gx[x] = half * (values[right[x]] - values[left[x]])

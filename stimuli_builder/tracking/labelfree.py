@@ -31,7 +31,7 @@ Values = NDArray[np.float64]
 TRAINED_ON = 26
 ENOUGH_BY_HAND = 12
 FACE_SHARE, CLOSE_UP_SHARE = 0.02, 0.03
-"""What the detector's lids may be off that no held-out frame tells, as part of the eye's width, in faces and
+"""Error of the detector's lids that no held-out frame reveals, as a fraction of the eye's width, in faces and
 in close-ups: a stated error is then right within a factor of 1.7 on rendered faces (exact truth) and on the
 recordings with labels (bench/rendered_tracks.py and stated_error.py)."""
 MODES = 6
@@ -87,8 +87,8 @@ def proposed_labels(info: VideoInfo, seen: Survey, out: Path, wanted_frames: int
     good = plausible(seen.points)
     if len(good) < wanted_frames:
         raise InputError(
-            f"{info.path}: eyes were found on {len(good)} frames, {wanted_frames} are wanted; "
-            "ask for fewer (--frames)"
+            f"{info.path}: eyes were found in {len(good)} frames, but {wanted_frames} are required; use a "
+            "smaller --frames"
         )
     eyes = len(next(iter(good.values()))) // EYE_POINTS
     chosen = {n: good[n] for n in most_varied(good, wanted_frames)}
@@ -107,7 +107,7 @@ def label_free_lesson(
     refine: bool | None = None,
     advance: Advance = None,
 ) -> Lesson:
-    """Train the model on the most varied of the detections; frames labelled by hand (all of `by_hand`) win.
+    """Train the model on the most varied of the detections; frames labeled by hand (all of `by_hand`) win.
 
     Twelve frames by hand or more train alone: a person and a detector mean slightly different points.
     `advance` is called after each of `training_steps`.
@@ -127,11 +127,11 @@ def label_free_lesson(
     return replace(lesson, model=replace(lesson.model, point_errors=errors))
 
 
-# The worst frames of a track as a label file: to be corrected on the labelling page and taken in again.
+# The worst frames of a track as a label file: to be corrected on the labeling page and taken in again.
 
 WORST = 12
 APART_S = 0.1
-"""Frames nearer to one another than this show the same; a fast camera's neighbours would fill the list."""
+"""Frames nearer to one another than this show the same; a fast camera's neighbors would fill the list."""
 
 
 def worst_frames(track: Path, eyes: int, fps: float, hints: Mapping[int, Points | str]) -> dict[int, Points]:
@@ -166,7 +166,8 @@ def write_relabel(
     worst: Mapping[int, Points],
     by_hand: Mapping[int, Points],
 ) -> int:
-    """Write the frames to correct as proposals, beside those corrected before; return how many are proposed.
+    """Write the frames to correct as proposals, in addition to those corrected before; return how many are
+    proposed.
 
     Parameters
     ----------

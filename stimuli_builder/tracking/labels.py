@@ -56,7 +56,7 @@ def _check_eye(where: str, eye: Points, first: int) -> None:
     """Refuse an eye whose outline crosses itself by more than the wobble of a closed eye's labels."""
     if np.hypot(*(eye[5] - eye[0])) < 4:
         raise InputError(
-            f"{where}: canthi {first + 1} and {first + 6} are under 4 px apart; label a larger eye"
+            f"{where}: canthi {first + 1} and {first + 6} are less than 4 px apart; label a larger eye"
         )
     along, down, width = eye_axis(eye)
     x, y = (eye - eye[0]) @ along / width, (eye - eye[0]) @ down / width
@@ -74,20 +74,20 @@ def _check_eye(where: str, eye: Points, first: int) -> None:
     crossed = np.flatnonzero(upper_y - y[6:9] > CROSSING_TOLERANCE)
     if len(crossed):
         raise InputError(
-            f"{where}: lower-lid point {first + 7 + crossed[0]} lies above the upper lid; they cross"
+            f"{where}: lower-lid point {first + 7 + crossed[0]} is above the upper lid; correct the points"
         )
 
 
 FEWEST_FRAMES = 3
 POINT_ORDER = (
-    "9 points an eye, image-left eye first: outer canthus, 4 upper-lid points outer to inner, inner canthus, "
-    "3 lower-lid points inner to outer; image-right eye mirrored"
+    "9 points per eye, image-left eye first: outer canthus, 4 upper-lid points outer to inner, inner "
+    "canthus, 3 lower-lid points inner to outer; image-right eye mirrored"
 )
 
 
 @dataclass(frozen=True)
 class Labels:
-    """Landmarks of labelled frames.
+    """Landmarks of labeled frames.
 
     Attributes
     ----------
@@ -98,7 +98,7 @@ class Labels:
     proposed : dict of int to float64 array or None
         What a program proposed for frames that nobody has accepted since; None where the file does not say.
     origin : str
-        Where the points come from, in words of whoever wrote the file.
+        Where the points come from, in the words of the file's author.
     """
 
     path: Path
@@ -127,7 +127,7 @@ def load_labels(
     size_px, frame_count : (int, int), int
         Of the video the labels are to be used with; checked where given.
     fewest : int
-        Frames that must be labelled.
+        Frames that must be labeled.
 
     Raises
     ------
@@ -138,16 +138,17 @@ def load_labels(
     width, height = _size(path, document)
     if size_px is not None and (width, height) != tuple(size_px):
         raise InputError(
-            f"{path}: labels were made on {width} x {height} pixels, the video has "
-            f"{size_px[0]} x {size_px[1]}; "
-            "use the video they were made on"
+            f"{path}: labels were made on {width} x {height} pixels, but the video has {size_px[0]} x "
+            f"{size_px[1]}; use the labeled video"
         )
     frames = _frames(path, document.get("frames"), fewest)
     eyes = len(next(iter(frames.values()))) // EYE_POINTS
     for number, points in frames.items():
         check_frame(f"{path}: frame {number}", points, eyes, (width, height))
         if frame_count is not None and number >= frame_count:
-            raise InputError(f"{path}: frame {number} is labelled, the video ends at frame {frame_count - 1}")
+            raise InputError(
+                f"{path}: frame {number} is labeled, but the video ends at frame {frame_count - 1}"
+            )
     origin = document.get("origin")
     return Labels(
         path,
@@ -207,12 +208,13 @@ def _number(path: Path, key: object) -> int:
 
 def _frames(path: Path, data: object, fewest: int) -> dict[int, Points]:
     if data is None:
-        raise InputError(f"{path}: 'frames' is missing; expected the points of each labelled frame")
+        raise InputError(f"{path}: 'frames' is missing; expected the points of each labeled frame")
     if not isinstance(data, dict):
         raise InputError(f"{path}: expected 'frames': {{frame number: points}}, found {type(data).__name__}")
     if len(data) < fewest:
         raise InputError(
-            f"{path}: {len(data)} labelled frames, at least {fewest} are needed and about 20 are good"
+            f"{path}: {len(data)} labeled frames, but at least {fewest} are needed and about 20 are "
+            "recommended"
         )
     frames: dict[int, Points] = {}
     for key, points in data.items():
@@ -223,7 +225,8 @@ def _frames(path: Path, data: object, fewest: int) -> dict[int, Points]:
     counts = sorted({len(points) for points in frames.values()})
     if len(counts) > 1:
         raise InputError(
-            f"{path}: some frames have {counts[0]} points and some {counts[-1]}; label all alike"
+            f"{path}: some frames have {counts[0]} points and some {counts[-1]}; use the same number "
+            "everywhere"
         )
     return dict(sorted(frames.items()))
 
@@ -293,7 +296,7 @@ SAME_PX = 0.0006
 def as_proposed(labels: Labels) -> frozenset[int]:
     """Frames whose points are still those proposed, and which nobody has accepted.
 
-    The labelling page keeps accepted frames alone, and leaves no proposal standing for them.
+    The labeling page keeps accepted frames alone, and leaves no proposal standing for them.
     """
     proposed = labels.proposed or {}
     return frozenset(
@@ -316,13 +319,13 @@ def unreviewed_note(labels: Labels) -> str:
     waiting, count = len(as_proposed(labels)), len(labels.frames)
     if waiting:
         return (
-            f"{labels.path}: {waiting} of {counted(count, 'frame')} are as they were proposed and nobody "
-            "accepted them; all train as given: correct or accept each on the labelling page"
+            f"{labels.path}: {waiting} of {counted(count, 'frame')} are unreviewed proposals, which are used "
+            "for training as they are: correct or accept each on the labeling page"
         )
     if labels.proposed is None and labels.origin in (DETECTED, TRACKED):
         return (
-            f"{labels.path}: its origin is '{labels.origin}' and it keeps no proposals, so that nothing "
-            "tells which frames a person saw; save it on the labelling page once they are right"
+            f"{labels.path}: its origin is '{labels.origin}' and it has no proposals, so reviewed frames "
+            "cannot be identified; save it on the labeling page when they are correct"
         )
     return ""
 
@@ -332,6 +335,6 @@ def unmarked_note(labels: Labels) -> str:
     if labels.proposed is not None or labels.origin != TRACKED:
         return ""
     return (
-        f"{labels.path}: an earlier version wrote it and it keeps no proposals, so that all its "
-        f"{counted(len(labels.frames), 'frame')} count as corrected; remove it and run again if they are not"
+        f"{labels.path}: an earlier version wrote it without proposals, so all its "
+        f"{counted(len(labels.frames), 'frame')} count as corrected; if they are not, remove it and run again"
     )

@@ -25,7 +25,7 @@ FOLDS = 5
 
 @dataclass(frozen=True)
 class Lesson:
-    """A trained model, the labelled frames left out in turn, and whether labels were refined."""
+    """A trained model, the labeled frames left out in turn, and whether labels were refined."""
 
     model: CoupledModel
     labels: Labels
@@ -39,8 +39,8 @@ def open_video(path: Path, accept_variable_rate: bool = False, accept_damaged_en
     if info.variable and not accept_variable_rate:
         steps = np.diff(info.times_s) * 1000
         raise InputError(
-            f"{path}: variable frame rate, steps of {steps.min():.1f} to {steps.max():.1f} ms; "
-            "convert it to a constant rate, or keep its own time stamps with --accept-variable-rate"
+            f"{path}: variable frame rate, steps of {steps.min():.1f} to {steps.max():.1f} ms; convert it to "
+            "a constant rate, or keep its time stamps with --accept-variable-rate"
         )
     return info
 
@@ -55,7 +55,7 @@ def learn(
     refine: bool | None = None,
     advance: Advance = None,
 ) -> Lesson:
-    """Train on the labelled frames of a video.
+    """Train on the labeled frames of a video.
 
     Parameters
     ----------
@@ -107,9 +107,9 @@ def lesson_from(
 def check_eyes(labels: Labels, one_eye: bool) -> None:
     """Refuse labels of two eyes for a close-up of one, and the other way round."""
     if one_eye and labels.eyes == 2:
-        raise InputError(f"{labels.path}: holds 18 points a frame, --one-eye expects 9; leave --one-eye out")
+        raise InputError(f"{labels.path}: has 18 points per frame, but --one-eye expects 9; remove --one-eye")
     if not one_eye and labels.eyes == 1:
-        raise InputError(f"{labels.path}: holds 9 points a frame, the labels of one eye; add --one-eye")
+        raise InputError(f"{labels.path}: has 9 points per frame, the labels of one eye; add --one-eye")
 
 
 def _typical(results: list[HeldOut]) -> float:
@@ -122,7 +122,7 @@ def _typical(results: list[HeldOut]) -> float:
 
 def fold_lines(results: Sequence[HeldOut]) -> Iterator[str]:
     """One line a fold and one for all: RMS against labels, inter-eyelid distance, frames not found."""
-    yield "accuracy on frames left out of training, in pixels of the video, against the labels as given"
+    yield "accuracy on frames not used for training, in pixels of the video, compared with the given labels"
     names = ("fold", "frames", "RMS", "median", "worst", "distance bias", "sd")
     widths = (6, 7, 8, 8, 8, 14, 7)
     yield " ".join(f"{name:>{width}}" for name, width in zip(names, widths, strict=True)) + "  not found"

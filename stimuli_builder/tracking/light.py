@@ -1,4 +1,4 @@
-"""The light of a recording against that of its labelled frames: a gain and an offset of the grey levels."""
+"""The light of a recording against that of its labeled frames: a gain and an offset of the gray levels."""
 
 from dataclasses import dataclass
 
@@ -12,28 +12,28 @@ from stimuli_builder.video import Picture
 Values = NDArray[np.float32]
 
 STEADY_LEVELS = 4.0
-"""A change of light that moves no grey level by more is left alone: even light changes no track."""
+"""A change of light that moves no gray level by more is left alone: even light changes no track."""
 DARK, BRIGHT = 30.0, 220.0
-"""Grey levels of eyes between which a change of light is judged."""
+"""Gray levels of eyes between which a change of light is judged."""
 SHARE = 0.2
 """Part of what a frame says of the light that is taken over; the rest is as before."""
 RETURN = 0.02
-"""Part by which the light goes back to that of the labelled frames with every frame: the model's own modes
+"""Part by which the light goes back to that of the labeled frames with every frame: the model's own modes
 of brightness can take the place of a gain, and nothing else would keep the two from drifting apart."""
 GAINS = (0.5, 2.0)
-"""Gains believed; beyond them few grey levels are left, and a covered eye might be made to look like one."""
+"""Gains believed; beyond them few gray levels are left, and a covered eye might be made to look like one."""
 
 
 @dataclass(frozen=True)
 class Light:
-    """Grey levels v of a recording are gain v + offset in the light of the labelled frames."""
+    """Gray levels v of a recording are gain v + offset in the light of the labeled frames."""
 
     gain: float = 1.0
     offset: float = 0.0
 
     @property
     def steady(self) -> bool:
-        """Whether no grey level of an eye would move by more than four."""
+        """Whether no gray level of an eye would move by more than four."""
         ends = [abs((self.gain - 1) * level + self.offset) for level in (DARK, BRIGHT)]
         return max(ends) <= STEADY_LEVELS
 
@@ -43,7 +43,7 @@ class Light:
         return GAINS[0] <= self.gain <= GAINS[1]
 
     def evened(self, picture: Picture) -> Picture:
-        """The grey picture (h, w) as it would be in the light of the labelled frames."""
+        """The gray picture (h, w) as it would be in the light of the labeled frames."""
         if self.steady:
             return picture
         levels = np.clip(np.rint(self.gain * np.arange(256) + self.offset), 0, 255).astype(np.uint8)
@@ -54,7 +54,7 @@ class Light:
         return Light(gain * self.gain, gain * self.offset + offset)
 
     def following(self, gain: float, offset: float) -> "Light":
-        """This light a part of the way on to what an evened picture says, and back towards none."""
+        """This light a part of the way on to what an evened picture says, and back toward none."""
         seen = self.then(gain, offset)
         if not seen.believable:
             return self
@@ -67,7 +67,7 @@ class Light:
 
 @compiled
 def light_between(look: Values, sampled: Values, weights: Values) -> tuple[float, float]:
-    """Gain and offset that bring sampled grey levels (N,) to a model's look (N,), float32; weights (N,).
+    """Gain and offset that bring sampled gray levels (N,) to a model's look (N,), float32; weights (N,).
 
     The noise is in the samples, so that they are regressed on the look and the line is turned round: a gain
     regressed the other way would come out low by what the model does not explain, frame after frame.

@@ -80,7 +80,7 @@ class BaseMesh:
         )
 
     def neighbours(self) -> tuple[NDArray[np.uint32], ...]:
-        """Pixel number of the left, right, upper and lower neighbour, each (N,).
+        """Pixel number of the left, right, upper and lower neighbor, each (N,).
 
         Where one of a pair is outside the mesh, both name the pixel itself, so that their difference is 0.
         """
@@ -98,7 +98,7 @@ class BaseMesh:
         return left, right, above, below
 
     def gradient(self, appearance: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Central differences along x and y of an appearance (..., N); 0 where a neighbour is outside."""
+        """Central differences along x and y of an appearance (..., N); 0 where a neighbor is outside."""
         left, right, above, below = self.neighbours()
         return (
             (appearance[..., right] - appearance[..., left]) / 2,
@@ -155,7 +155,7 @@ def mesh_from(vertices: Points, triangles: NDArray[np.int64], eye_of: NDArray[np
 def _barycentric_forms(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     system = np.concatenate([corners, np.ones((len(corners), 3, 1))], axis=2)
     if np.abs(np.linalg.det(system)).min() < 1e-9:
-        raise InputError("the mean of the labelled shapes has a flat triangle; check the labels' point order")
+        raise InputError("the mean of the labeled shapes has a flat triangle; check the labels' point order")
     return np.asarray(np.linalg.inv(system).transpose(0, 2, 1))
 
 
@@ -183,7 +183,7 @@ def reduce_picture(picture: Picture, factor: int) -> Picture:
 
 
 def reduced_points(points: Points, factor: int) -> Points:
-    """Where points of the full picture (pixel centres at integers) lie in the reduced one."""
+    """Where points of the full picture (pixel centers at integers) lie in the reduced one."""
     return np.asarray((points + 0.5) / factor - 0.5)
 
 
@@ -194,7 +194,7 @@ def restored_points(points: Points, factor: int) -> Points:
 
 @compiled
 def same_picture(one: Picture, other: Picture) -> bool:
-    """Whether two grey pictures of one size are equal, told at the first row that differs."""
+    """Whether two gray pictures of one size are equal; it stops at the first row that differs."""
     for row in range(one.shape[0]):
         differs = False
         for column in range(one.shape[1]):
@@ -206,7 +206,7 @@ def same_picture(one: Picture, other: Picture) -> bool:
 
 @compiled
 def shows_something(picture: Picture, grey_levels: int, step: int) -> bool:
-    """Whether the grey levels of every step-th row and column span so many, told as soon as they do."""
+    """Whether the gray levels of every step-th row and column span so many; it stops as soon as they do."""
     low, high = picture[0, 0], picture[0, 0]
     for row in range(0, picture.shape[0], step):
         for column in range(0, picture.shape[1], step):

@@ -37,21 +37,21 @@ class CoupledModel:
     shape_modes : float64 array (l, V, 2)
         Movement of the vertices per coupled parameter.
     appearance : float32 array (l + 1, N)
-        A0, then the appearance modes of the coupled parameters, in grey levels.
+        A0, then the appearance modes of the coupled parameters, in gray levels.
     weights : float32 array (N,)
         Mean 1; how much a pixel counts, low where left-out frames are badly explained.
     sd : float64 array (l,)
-        Standard deviation of each coupled parameter over the labelled frames.
+        Standard deviation of each coupled parameter over the labeled frames.
     examples, poses : float64 array
-        (F, l) and (F, 4); parameters and similarity of each labelled frame.
+        (F, l) and (F, 4); parameters and similarity of each labeled frame.
     patches : uint8 array (P, h, w)
-        Eye regions of a few labelled frames, for the search over a whole picture.
+        Eye regions of a few labeled frames, for the search over a whole picture.
     patch_frames : int64 array (P,)
-        The labelled frame each patch shows, and patch_corners (P, 2), its top left corner.
+        The labeled frame each patch shows, and patch_corners (P, 2), its top left corner.
     reduction : int
         Whole factor by which pictures are reduced before fitting.
     residual_limits : float64 array (eyes,)
-        Root mean square grey levels above which a fit is not believed.
+        Root mean square gray levels above which a fit is not believed.
     usual_residuals : float64 array (eyes,)
         Of frames left out of training; a fit's error is stated against them.
     point_errors : float64 array (9 * eyes,)
@@ -155,14 +155,12 @@ def load_model(path: Path) -> CoupledModel:
             arrays = {name: stored[name] for name in ARRAYS}
             mesh = mesh_from(stored["vertices"], stored["triangles"], stored["eye_of"])
     except FileNotFoundError as error:
-        raise InputError(
-            f"{path}: expected a model file, found none; make one with 'stimuli train'"
-        ) from error
+        raise InputError(f"{path}: there is no such model file; create one with 'stimuli train'") from error
     except Exception as error:
-        raise InputError(f"{path}: not a model that 'stimuli train' wrote") from error
+        raise InputError(f"{path}: not a model from 'stimuli train'") from error
     if facts.get("format") != FORMAT:
         raise InputError(
-            f"{path}: model format {facts.get('format')}, this program reads {FORMAT}; train it again"
+            f"{path}: model format {facts.get('format')}, but this version reads {FORMAT}; train it again"
         )
     return CoupledModel(mesh=mesh, **arrays, **_facts(facts))
 
@@ -178,17 +176,17 @@ def _facts(facts: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-# The coupled model learnt from labelled frames.
+# The coupled model learnt from labeled frames.
 
 WEIGHT_FLOOR = 0.3
 
 
 @dataclass(frozen=True)
 class TrainingOptions:
-    """How much of the labelled frames' variation the model keeps.
+    """How much of the labeled frames' variation the model keeps.
 
     Each count of modes is the one that keeps the wanted share of variance, but not fewer than the paper's
-    counts (8, 10, 10) where the labelled frames carry that many.
+    counts (8, 10, 10) where the labeled frames carry that many.
     """
 
     shape_variance: float = 0.98
@@ -203,12 +201,12 @@ class TrainingOptions:
 def train(
     pictures: list[Picture], points: Points, markers: LidMarkers, options: TrainingOptions
 ) -> CoupledModel:
-    """Learn the model from labelled frames.
+    """Learn the model from labeled frames.
 
     Parameters
     ----------
     pictures : list of Picture
-        F grey pictures, all of one size.
+        F gray pictures, all of one size.
     points : float64 array (F, 9 * eyes, 2)
         Landmarks in their pixels.
 
@@ -261,7 +259,7 @@ def train(
 
 
 def _base(points: Points, options: TrainingOptions) -> tuple[BaseMesh, int, Points]:
-    """Base mesh, reduction and the labelled shapes with border in reduced pixels."""
+    """Base mesh, reduction and the labeled shapes with border in reduced pixels."""
     full = np.array([with_border(frame) for frame in points])
     mesh = build_mesh(mean_shape(full), options.base_pixels)
     scales = [np.hypot(*similarity_between(mesh.vertices, shape)[:2]) for shape in full]
@@ -270,7 +268,7 @@ def _base(points: Points, options: TrainingOptions) -> tuple[BaseMesh, int, Poin
 
 
 def principal(rows: Values, variance: float, fewest: int) -> tuple[Values, Values, float]:
-    """Principal components of rows (F, D) already centred.
+    """Principal components of rows (F, D) already centered.
 
     Returns
     -------
@@ -286,14 +284,14 @@ def principal(rows: Values, variance: float, fewest: int) -> tuple[Values, Value
 
 
 def pixel_weights(textures: Values, modes: int) -> NDArray[np.float32]:
-    """Inverse variance of what each labelled frame shows that the others do not explain, mean 1.
+    """Inverse variance of what each labeled frame shows that the others do not explain, mean 1.
 
     A glint or a shift of gaze is not in the model; its pixels would drag the mesh.
 
     Parameters
     ----------
     textures : float64 array (F, N)
-        Grey levels; frame by frame is left out and rebuilt from `modes` modes of the others.
+        Gray levels; frame by frame is left out and rebuilt from `modes` modes of the others.
     """
     squares = np.zeros(textures.shape[1])
     for frame in range(len(textures)):
@@ -306,7 +304,7 @@ def pixel_weights(textures: Values, modes: int) -> NDArray[np.float32]:
 
 
 def _unexplained(others: Values, rest: Values, modes: int) -> Values:
-    """What `rest` (N,) has beyond the first principal components of centred rows (F, N)."""
+    """What `rest` (N,) has beyond the first principal components of centered rows (F, N)."""
     strengths, directions = np.linalg.eigh(others @ others.T)
     kept = np.flatnonzero(strengths > 1e-10 * max(strengths[-1], 1e-300))[-modes:]
     share = directions[:, kept].T @ (others @ rest) / strengths[kept]
@@ -314,7 +312,7 @@ def _unexplained(others: Values, rest: Values, modes: int) -> Values:
 
 
 def warp_picture(mesh: BaseMesh, picture: Picture, shape: Points) -> Values:
-    """The picture pulled back from `shape` (V, 2) to the base frame: grey levels (N,)."""
+    """The picture pulled back from `shape` (V, 2) to the base frame: gray levels (N,)."""
     out = np.empty(mesh.pixel_count, np.float32)
     pull: Any = sample
     pull(
@@ -326,7 +324,7 @@ def warp_picture(mesh: BaseMesh, picture: Picture, shape: Points) -> Values:
 def _patches(
     pictures: list[Picture], shapes: Points, count: int = 5
 ) -> tuple[Picture, NDArray[np.int64], Values]:
-    """Eye regions of labelled frames spread over the range of shapes, cut at one common size."""
+    """Eye regions of labeled frames spread over the range of shapes, cut at one common size."""
     spread = np.ptp(shapes[:, :, 1], axis=1) * 0 + (shapes - shapes.mean(1, keepdims=True)).reshape(
         len(shapes), -1
     ).var(1)

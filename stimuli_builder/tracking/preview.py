@@ -102,11 +102,11 @@ def _write_text(canvas: Picture, text: str) -> None:
     )
 
 
-# The trace of a track with its labelled blinks (the paper's Figure 3).
+# The trace of a track with its labeled blinks (the paper's Figure 3).
 
 
 def plot_track(track: Path, fps: float, figure: Path) -> int:
-    """Recognise the blinks of a track, save the figure, return how many there are.
+    """Recognize the blinks of a track, save the figure, return how many there are.
 
     With two eyes, the number of blinks is that of the eye that shows more.
     """

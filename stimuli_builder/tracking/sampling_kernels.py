@@ -164,7 +164,7 @@ def sample(picture, vertices, triangles, starts, forms, px, py, out):
 
 @compiled
 def grey_spreads(levels: NDArray[np.float32], ends: NDArray[np.int64], eyes: int) -> NDArray[np.float64]:
-    """Standard deviation of grey levels (N,) over each eye, (eyes,); eye e has those up to ends[e]."""
+    """Standard deviation of gray levels (N,) over each eye, (eyes,); eye e has those up to ends[e]."""
     spreads = np.empty(eyes)
     first = 0
     for eye in range(eyes):

@@ -1,4 +1,4 @@
-"""Finding the eyes again: closures tried at a known place, or patches of labelled frames anywhere."""
+"""Finding the eyes again: closures tried at a known place, or patches of labeled frames anywhere."""
 
 from collections.abc import Iterator
 
@@ -43,7 +43,7 @@ class Finder:
         return self._best(picture, ((c, pose) for c in self._closures))
 
     def anywhere(self, picture: Picture) -> Fit | None:
-        """Best fit started at the places of the whole picture most like labelled frames."""
+        """Best fit started at the places of the whole picture most like labeled frames."""
         return self._best(picture, self._starts(picture))
 
     def _best(self, picture: Picture, starts: Iterator[tuple[Values, Values]]) -> Fit | None:
@@ -88,7 +88,7 @@ def inside(fit: Fit, picture: Picture) -> bool:
 
 
 def _spread_closures(fitter: Fitter) -> list[Values]:
-    """Parameters of labelled frames from the most closed to the most open, evenly spread."""
+    """Parameters of labeled frames from the most closed to the most open, evenly spread."""
     model = fitter.model
     shapes = model.mesh.vertices + np.tensordot(model.examples, model.shape_modes, axes=1)
     lids = shapes[:, : EYE_POINTS * model.eyes]
@@ -102,12 +102,12 @@ def _spread_closures(fitter: Fitter) -> list[Values]:
 
 SCALE_RANGE = (0.5, 2.0)
 FLAT_SHARE = 0.25
-"""Spread of grey levels, as part of the other eye's or the labelled ones', below which there is no eye to be
+"""Spread of gray levels, as part of the other eye's or the labeled ones', below which there is no eye to be
 seen: a shut eye has 0.7 of an open one's or more in two recordings, plain things over it 0 to 0.05."""
 
 
 class Faults:
-    """Tells what is wrong with fits of one model."""
+    """Reports what is wrong with fits of one model."""
 
     def __init__(self, model: CoupledModel):
         self._model = model
@@ -124,7 +124,7 @@ class Faults:
             return "the eyes left the picture"
         size = float(np.hypot(*fit.pose[:2]))
         if not self._sizes[0] < size < self._sizes[1]:
-            return f"the eyes would be {size / self._sizes[0] * SCALE_RANGE[0]:.2g} times their labelled size"
+            return f"the eyes would be {size / self._sizes[0] * SCALE_RANGE[0]:.2g} times their labeled size"
         excess = fit.residuals / self._model.residual_limits
         eye = int(excess.argmax())
         if excess[eye] > 1:

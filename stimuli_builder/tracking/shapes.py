@@ -20,7 +20,7 @@ BORDER_BELOW = 0.40
 
 @dataclass(frozen=True)
 class LidMarkers:
-    """Per eye, the points whose mean is the centred marker of the upper and of the lower lid.
+    """Per eye, the points whose mean is the centered marker of the upper and of the lower lid.
 
     Point numbers count over all points of the template (0 to 8 first eye, 9 to 17 second).
     """

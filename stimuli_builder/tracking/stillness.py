@@ -13,7 +13,7 @@ LEAST_FRAMES = 10
 """Frames that a window holds at least; below 5 frames/s it is longer, as a calm person's lids may be alike in
 two frames."""
 STILL_SHARE = 0.002
-"""Root mean square move about their mean over two seconds, as part of the eye's width, below which lids stand
+"""Root mean square move about their mean over two seconds, as part of the eye's width, below which lids are
 still: 0.06 mm. Still pictures have 0.16% or less under noise, and where a codec has settled; the calmest two
 seconds of three actors have 1.2%, of two recordings 4% (most hold a blink)."""
 
@@ -55,7 +55,7 @@ class Stillness:
         return self._count >= self.window and share < STILL_SHARE
 
     def forget(self) -> None:
-        """Begin anew: a frame showed no eyes."""
+        """Start again: a frame showed no eyes."""
         self._count, self._first = 0, None
 
 
@@ -63,7 +63,7 @@ class Stillness:
 def moved_share(
     points: Points, first: Points, oldest: Points, sums: Points, squares: Points, frames: int
 ) -> float:
-    """Take a frame's points into a window, and tell how far the points of the window move.
+    """Take a frame's points into a window, and return how far the points of the window move.
 
     Parameters
     ----------

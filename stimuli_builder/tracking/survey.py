@@ -57,8 +57,11 @@ SMOOTHED = 0.03
 """Blur of the surroundings in eye's widths, so that noise and single lashes count little."""
 IN_PICTURE = 0.4
 """Part of the surroundings that two looks must both show to be compared."""
-COVERED = "{} covered: lids are not read steadily; what surrounds them and the other eye do not say shut"
-UNSTEADY = "{} covered, shut tightly or turned away: its lids are not read steadily"
+COVERED = (
+    "{} covered: the lids cannot be tracked reliably, and neither the surroundings nor the other eye "
+    "suggest closure"
+)
+UNSTEADY = "{} covered, closed tightly or turned away: the lids cannot be tracked reliably"
 """What an unsteady contour can mean in a recording without steady looks to compare its surroundings with."""
 NAMES = {(True,): "eye", (True, False): "left eye", (False, True): "right eye", (True, True): "both eyes"}
 
@@ -104,8 +107,8 @@ def covered_frames(
     }
     if len(numbers) - len(covers) < fewest:
         raise InputError(
-            f"{path}: an eye is covered on {len(covers)} of {len(numbers)} frames that show one, "
-            "too few are left to track without labels; label frames by hand (--labels)"
+            f"{path}: an eye is covered in {len(covers)} of {len(numbers)} frames that show one; too few are "
+            "left to track without labels. Label frames by hand (--labels)"
         )
     return covers
 
@@ -129,7 +132,7 @@ def covered(spreads: Values, numbers: NDArray[np.int64], surroundings: Looks | N
     limits = np.clip(UNUSUAL * np.percentile(spreads, 25, axis=0), LEAST_SPREAD, MAX_SPREAD)
     alike = _likeness_to_steady(spreads, BESIDE * limits, surroundings)
     above = (spreads > limits) & (alike < np.interp(spreads, UNSTEADIER, FAMILIAR))
-    # Looks with others between them that show no eyes are not beside one another.
+    # Looks with others between them that show no eyes are not adjacent.
     steps = np.diff(numbers)
     neighbours = (steps <= steps.min(initial=numbers[-1] + 1))[:, None]
     beside = np.zeros_like(above)
@@ -146,7 +149,7 @@ def _steady(spreads: Values) -> Flags:
 def _likeness_to_steady(spreads: Values, least: Values, surroundings: Looks | None) -> Values:
     """How like steady looks' the surroundings of eyes are whose spread is above `least` (looks, eyes).
 
-    -1 where the recording has too few steady looks to tell, or the other eye is as steady as ever.
+    -1 where the recording has too few steady looks, or the other eye is as steady as ever.
     """
     alike = np.full(spreads.shape, -1.0)
     if surroundings is None:
@@ -176,7 +179,7 @@ def likenesses(one: Looks, others: Looks) -> Values:
 
 
 def surroundings_of(picture: Picture, points: Points) -> Looks:
-    """Grey levels around each eye, free of its place, size and turn; NaN beyond the picture.
+    """Gray levels around each eye, free of its place, size and turn; NaN beyond the picture.
 
     Parameters
     ----------
@@ -214,8 +217,8 @@ FEWEST = 6
 LEAST_SEEN = 0.3
 """Share of the frames looked at that must show a face: below it, what was found is hardly one."""
 UPRIGHT_DEG = 60
-"""A line through both eyes that is turned further against the picture's rows tells a picture on its side or
-upside down: left and right, above and below an eye are then not what they are called."""
+"""A line through both eyes that is turned further against the picture's rows indicates a picture on its side
+or upside down: left and right, above and below an eye are then not what they are called."""
 STEADY = 3.0
 """Eyes' widths over the frames looked at stay within this factor, or they belong to no one face."""
 UNSURE_SHARE = 0.075
@@ -237,7 +240,7 @@ class Survey:
     several_faces : int
         Frames among them with more than one face; the one larger over the recording was taken.
     further : int
-        Faces more than those that are seen at once, too small beside the whole picture for the detector to
+        Faces more than those that are seen at once, too small in the whole picture for the detector to
         see them there: the second most in a frame looked at in parts, the most of up to two frames.
     unseen : frozenset of int
         Frames looked at in which the eyes of that face were not seen, or not wholly in the picture.
@@ -264,7 +267,7 @@ def survey(info: VideoInfo, *, one_eye: bool, advance: Callable[[int], None] | N
     Raises
     ------
     InputError
-        Too few frames show a face, or what was found is no face.
+        Too few frames show a face, or what was found is not a face.
     """
     seen, further = _looked(info, one_eye, advance)
     several = sum(len(faces) > 1 for faces in seen.values())
@@ -336,7 +339,7 @@ def _first(info: VideoInfo, step: int) -> list[Picture]:
 
 
 def _read_every(step: int) -> Callable[[Any], Picture]:
-    """Read every step-th frame's colours and nothing of the others: turning a frame into RGB costs most."""
+    """Read every step-th frame's colors and nothing of the others: turning a frame into RGB costs most."""
     counter = count()
 
     def read(frame: Any) -> Picture:
@@ -371,15 +374,15 @@ def _require_face(info: VideoInfo, labels: dict[int, Points], looked: int, one_e
     more = "" if one_eye else "; for a close-up of one eye add --one-eye"
     if len(labels) < max(FEWEST, LEAST_SEEN * looked):
         raise InputError(
-            f"{info.path}: a face was found on {len(labels)} of {looked} frames looked at, too few to track "
-            f"without labels{more}; or label frames by hand (--labels)"
+            f"{info.path}: a face was found in {len(labels)} of {looked} frames, too few to track without "
+            f"labels{more}; or label frames by hand (--labels)"
         )
     wide = np.array([np.hypot(*(points[5] - points[0])) for points in labels.values()])
     low, high = np.percentile(wide, [5, 95])
     if not one_eye and high > STEADY * max(low, 1e-6):
         raise InputError(
-            f"{info.path}: what looks like eyes is {low:.0f} to {high:.0f} px wide over the frames looked "
-            f"at: no one face{more}; or label frames by hand (--labels)"
+            f"{info.path}: the detected eyes are {low:.0f} to {high:.0f} px wide, which is not one "
+            f"face{more}; or label frames by hand (--labels)"
         )
 
 
@@ -387,7 +390,7 @@ def _require_agreement(info: VideoInfo, detections: Sequence[Detection]) -> None
     shares = np.array([np.mean(one.mirror_shares) for one in detections])
     known = shares[np.isfinite(shares)]
     if 2 * len(known) < len(shares):
-        told = f"is not seen in the mirror image on {len(shares) - len(known)} of {len(shares)} frames"
+        told = f"is not detected in the mirror image of {len(shares) - len(known)} of {len(shares)} frames"
     elif (share := float(np.median(known))) > UNSURE_SHARE:
         told = (
             f"is read differently in the mirror image (by {share:.0%} of the eyes' width, {UNSURE_SHARE:.1%} "
@@ -396,6 +399,6 @@ def _require_agreement(info: VideoInfo, detections: Sequence[Detection]) -> None
     else:
         return
     raise InputError(
-        f"{info.path}: what looks like a face {told}; for a close-up of one eye add --one-eye; or label "
-        "frames by hand (--labels)"
+        f"{info.path}: the detected face {told}; for a close-up of one eye add --one-eye; or label frames by "
+        "hand (--labels)"
     )

@@ -22,12 +22,12 @@ from table_files.open import named_rows
 COLUMN_MEANINGS = {
     "frame": "frame number from 0",
     "time_s": "presentation time of the frame in seconds, from 0",
-    "x01": "first landmark in pixels, x to the right, centres at integers; so on to x18 (one eye: x09)",
+    "x01": "first landmark in pixels, x to the right, centers at integers; so on to x18 (one eye: x09)",
     "y01": "first landmark in pixels, y down; likewise to y18 (y09 for one eye)",
-    "left_distance_px": "inter-eyelid distance of the image-left eye, square to the canthus line",
+    "left_distance_px": "inter-eyelid distance of the image-left eye, perpendicular to the canthus line",
     "right_distance_px": "the same of the image-right eye",
     "distance_px": "the same in one-eye tracks, instead of the two columns before",
-    "residual": "root mean square difference of model and picture over the eyes, grey levels of 0 to 255",
+    "residual": "root mean square difference of model and picture over the eyes, gray levels of 0 to 255",
     "iterations": "Gauss-Newton iterations used",
     "error_px": "stated error of the frame, root mean square over its points; empty where none is known",
     "e01": "stated error of the first landmark in pixels; so on to e18 (one eye: e09)",
@@ -149,7 +149,7 @@ class TrackedFrame:
     distances : float64 array (eyes,) or None
         In pixels, image-left eye first.
     residual : float or None
-        Root mean square grey levels over all base pixels; None if no fit came to an end.
+        Root mean square gray levels over all base pixels; None if no fit came to an end.
     errors : float64 array (9 * eyes,) or None
         Stated error of each point in pixels.
     """

@@ -21,15 +21,15 @@ from stimuli_builder.tracking.table import TrackedFrame, TrackSummary, TrackWrit
 from stimuli_builder.tracking.tracker import FROZEN, STILL, Tracker
 from stimuli_builder.video import DamagedFileError, Picture, VideoInfo, frames
 
-# Frames held back for two seconds: only what follows tells that a picture stood still, or repeats evenly.
+# Frames held back for two seconds: only what follows shows that a picture was frozen, or repeats regularly.
 
-STOOD = "the picture stands still: about the eyes it is that of the frames around it"
+STOOD = "frozen picture: around the eyes it is the same as in neighboring frames"
 STOOD_S = 0.5
 STOOD_FRAMES = 5
 """The fewest frames of a picture that stands still; below 10 frames/s they last longer than half a second."""
 ALIKE_SHARE = 0.01
 ALIKE_LEVELS = 3.0
-"""Pictures are alike where less than this share of the pixels about the eyes differs by more grey levels than
+"""Pictures are alike where less than this share of the pixels about the eyes differs by more gray levels than
 these. A codec's own changes stay below it but for the first frames; two people and the actor, as recorded and
 compressed down to CRF 40, are like an earlier frame of theirs for 0.2 s at most."""
 EVEN_RUN_S = 0.1
@@ -159,7 +159,7 @@ def evenly_repeated(repeats: list[int], longest: int) -> bool:
 
 @compiled
 def pictures_alike(one: Picture, other: Picture, levels: int, share: float) -> bool:
-    """Whether at most a share of the pixels of two grey pictures differs by more grey levels than given."""
+    """Whether at most a share of the pixels of two gray pictures differs by more gray levels than given."""
     allowed = share * one.shape[0] * one.shape[1]
     count = 0
     for row in range(one.shape[0]):
@@ -192,12 +192,12 @@ def track_video(
     Raises
     ------
     InputError
-        The video differs in size from the labelled one, breaks off, or shows no such eyes at all. Nothing is
+        The video differs in size from the labeled one, breaks off, or shows no such eyes at all. Nothing is
         left under the name `out` then.
     """
     if model.size_px != info.size_px:
         raise InputError(
-            f"{info.path}: {info.size_px[0]} x {info.size_px[1]} pixels, the model was trained on "
+            f"{info.path}: {info.size_px[0]} x {info.size_px[1]} pixels, but the model was trained on "
             f"{model.size_px[0]} x {model.size_px[1]}; label frames of this video"
         )
     tracker, summary = Tracker(model, info.fps), TrackSummary()
@@ -240,4 +240,6 @@ def _refuse_nothing(info: VideoInfo, summary: TrackSummary) -> None:
             f"{info.path}: truncated or damaged, {summary.frames} of {info.frame_count} frames can be decoded"
         )
     if summary.tracked == 0:
-        raise InputError(f"{info.path}: no eyes like the labelled ones in any of its {summary.frames} frames")
+        raise InputError(
+            f"{info.path}: no eyes like the labeled ones were found in its {summary.frames} frames"
+        )

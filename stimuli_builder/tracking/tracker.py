@@ -67,10 +67,10 @@ def _to_parameters(model: CoupledModel) -> NDArray[np.float64]:
 Values = NDArray[np.float64]
 
 FROZEN = "the same picture as the frame before"
-STILL = "the lids have not moved for two seconds: the picture may stand still"
-UNSEEN = "the detector sees no such eyes here, or not wholly in the picture"
+STILL = "the lids have not moved for two seconds: the picture may be frozen"
+UNSEEN = "the detector finds no such eyes here, or they are partly outside the picture"
 BLANK_RANGE = 12
-"""Grey levels between the darkest and the brightest pixel below which a picture shows nothing."""
+"""Gray levels between the darkest and the brightest pixel below which a picture shows nothing."""
 WORSE = 1.1
 """A fit from the detector may have so much more residual than the one it replaces."""
 NEAR_EVERY_FRAME = 30
@@ -107,7 +107,7 @@ class Tracker:
     def look(self, hint: Points | str) -> None:
         """Take in that a detector looks at the next frame: after one that sees nothing, fits are doubtful.
 
-        A patch of cheek or wall may pass for eyes, and between two looks nobody else tells.
+        A patch of cheek or wall may pass for eyes, and between two looks nothing else reveals it.
 
         Parameters
         ----------
@@ -215,7 +215,7 @@ class Tracker:
                 return self._accepted(best, "reinitialised", f"found again after {self._loss}")
             return self._accepted(best, "tracked", "")
         self._lose()
-        self._loss = self._loss or fault or "no place in the picture resembles the labelled frames"
+        self._loss = self._loss or fault or "no part of the picture resembles the labeled frames"
         residual = best.overall_residual if best is not None and best.iterations else None
         # What a detector says here and now explains more than what the loss began with.
         why = self._unseen or self._loss
@@ -227,7 +227,7 @@ class Tracker:
             self._stillness.forget()
 
     def _other_lights(self, best: Fit | None) -> Iterator[Light]:
-        """The labelled light, where another was followed to the loss, and the one that a fit tells."""
+        """The labeled light, where another was followed to the loss, and the one from a fit."""
         if self._light != Light():
             yield Light()
         told = Light() if best is None else self._light.then(*best.light)

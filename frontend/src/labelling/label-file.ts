@@ -151,7 +151,7 @@ function straightened(eye: Shape): Point[] {
 
 function checkEye(where: string, eye: Shape, first: number): void {
   if (eyeWidth(eye) < 4) {
-    throw new LabelProblem(`${where}: canthi ${first + 1} and ${first + 6} are under 4 px apart; label a larger eye`);
+    throw new LabelProblem(`${where}: canthi ${first + 1} and ${first + 6} are less than 4 px apart; label a larger eye`);
   }
   const flat = straightened(eye);
   const outline = [0, 1, 2, 3, 4, 5, 6, 7, 8, 0];

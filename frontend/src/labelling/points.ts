@@ -6,7 +6,7 @@ export type Size = readonly [width: number, height: number];
 
 export const EYE_POINTS = 9;
 export const POINT_ORDER =
-  "9 points an eye, image-left eye first: outer canthus, 4 upper-lid points outer to inner, inner canthus, " +
+  "9 points per eye, image-left eye first: outer canthus, 4 upper-lid points outer to inner, inner canthus, " +
   "3 lower-lid points inner to outer; image-right eye mirrored";
 
 /** One open eye, its canthi at x 0 and 1, in widths of the eye. */

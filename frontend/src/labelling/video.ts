@@ -39,7 +39,7 @@ export async function openVideo(file: File): Promise<OpenedVideo> {
 
 async function opened(name: string, input: Input): Promise<OpenedVideo> {
   const track = await input.getPrimaryVideoTrack();
-  if (track === null) throw new VideoProblem(`${name}: expected a video stream, the file has none`);
+  if (track === null) throw new VideoProblem(`${name}: expected a video stream, but the file has none`);
   if (!(await track.canDecode())) {
     throw new VideoProblem(
       `${name}: this browser cannot decode ${(await track.getCodec()) ?? "its codec"}; ` +

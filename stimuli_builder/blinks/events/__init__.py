@@ -1,1 +1,1 @@
-"""What the lids do in a distance series: blinks, squints, gaze shifts and closed eyes told apart."""
+"""What the lids do in a distance series: blinks, squints, gaze shifts and closed eyes."""

@@ -1,4 +1,4 @@
-"""Dips of a lid series that may be something, and the numbers by which they are told apart."""
+"""Dips of a lid series that may be events, and the features by which they are classified."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -25,7 +25,7 @@ def courses(values: Array, peaks: NDArray[np.int64], fps: float) -> Array:
 
 
 def span_means(values: Array, centres: Array, edges: Array) -> Array:
-    """Mean of a series (n,) between edges (s + 1,) about each centre (p,), both in frames: (p, s).
+    """Mean of a series (n,) between edges (s + 1,) about each center (p,), both in frames: (p, s).
 
     Samples are joined by straight lines, so that a span shorter than a frame has a mean too and the same
     lid gives the same means at every rate. Beyond its ends the series keeps its last value.
@@ -134,7 +134,7 @@ LEVELS = (0.2, 0.5, 0.85)
 
 
 def find_candidates(depth: Depth) -> list[Candidate]:
-    """Every dip that rises clearly above noise and is no ripple of a larger one, in order of time."""
+    """Every dip that rises clearly above noise and is not a ripple of a larger one, in order of time."""
     least = max(LEAST_PROMINENCE, NOISES * depth.noise)
     padded = np.concatenate([[depth.smooth.min()], depth.smooth, [depth.smooth.min()]])
     wide = 2 * int(REACH_S * depth.fps) + 1

@@ -80,7 +80,7 @@ def draw(kind: Kind, onset: float, rng: np.random.Generator) -> Motion:
 
 
 def smooth_step(share: Array, sharpness: float) -> Array:
-    """Smooth step from 0 to 1 over share 0 to 1; greater sharpness moves it towards the end."""
+    """Smooth step from 0 to 1 over share 0 to 1; greater sharpness moves it toward the end."""
     x = np.clip(share, 0, 1) ** sharpness
     return np.asarray(x * x * (3 - 2 * x))
 

@@ -1,4 +1,4 @@
-"""The classifier itself: small networks over the features of a dip; their weights ship beside them."""
+"""The classifier itself: small networks over the features of a dip; their weights ship in the same folder."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -35,7 +35,7 @@ TICKS = 10_000
 
 @dataclass(frozen=True, eq=False)
 class Network:
-    """A multilayer perceptron: standardised features, layers of tanh, softmax over `kinds`.
+    """A multilayer perceptron: standardized features, layers of tanh, softmax over `kinds`.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class Network:
 
 @cache
 def shipped_network(path: Path) -> Network:
-    """One of the networks that ship, `FIRST_LOOK` or `SECOND_LOOK`, made by `train.py` beside them."""
+    """One of the networks that ship, `FIRST_LOOK` or `SECOND_LOOK`, made by `train.py` in the same folder."""
     return stored_network(path)
 
 
@@ -76,7 +76,7 @@ def stored_network(path: Path) -> Network:
 
 
 def store(network: Network, path: Path, **about: str | int | Sequence[str]) -> None:
-    """Write a network, its weights rounded to ten-thousandths, and what is told `about` it, as npz."""
+    """Write a network, its weights rounded to ten-thousandths, and the text `about` it, as npz."""
     arrays: dict[str, Any] = {name: np.array(value) for name, value in about.items()}
     arrays |= {"kinds": np.array(network.kinds), "mean": network.mean, "spread": network.spread}
     for number, (weights, offsets) in enumerate(network.layers):
@@ -108,7 +108,7 @@ class MeasuredPiece:
     deep : float
         How deep this piece's blinks go, as depth.
     features : float64 array (dips, features)
-        What the first look is told of each dip.
+        Inputs of the first look for each dip.
     """
 
     start: int
@@ -151,7 +151,7 @@ def looked_at(eyes: Sequence[BlinkSeries]) -> list[list[Piece]]:
 
 
 def measure_pieces(eyes: Sequence[BlinkSeries]) -> list[list[MeasuredPiece]]:
-    """Pieces of each series with what the first look is told of their dips."""
+    """Pieces of each series with the first look's inputs for their dips."""
     pieces = [_dips_of(series) for series in eyes]
     others = partners(pieces)
     return [
@@ -164,7 +164,7 @@ def measure_pieces(eyes: Sequence[BlinkSeries]) -> list[list[MeasuredPiece]]:
 
 
 def _dips_of(series: BlinkSeries) -> list[MeasuredPiece]:
-    """Pieces of a series with their dips, of which nothing is told yet."""
+    """Pieces of a series with their dips, not yet classified."""
     pieces = []
     for start, stop in runs(np.isfinite(series.distance)):
         if stop - start >= max(5, SHORTEST_PIECE_S * series.fps):
@@ -193,7 +193,7 @@ def _whole(pieces: Sequence[MeasuredPiece]) -> Array:
 
 
 def of_piece(whole: Array | None, piece: MeasuredPiece) -> Array | None:
-    """The part of a whole series that lies beside a piece, as long as it; NaN beyond the end."""
+    """The part of another series at the time of a piece, equally long; NaN beyond the end."""
     if whole is None:
         return None
     size = piece.depth.smooth.size
@@ -201,11 +201,11 @@ def of_piece(whole: Array | None, piece: MeasuredPiece) -> Array | None:
     return np.pad(part, (0, size - part.size), constant_values=np.nan)
 
 
-# A second look at each dip: what it was taken for at first, and what goes on about it, tell it better.
+# A second look at each dip: its first classification, and what happens around it, classify it better.
 #
 # The dips before and after, the dip of the other eye, lids' courses about the crossings at half height (how
-# fast a lid goes tells a partial blink from a squint, and the deepest frame of a held lid does not show it),
-# and what the recording is full of: where somebody squints often, one more squint is likelier.
+# fast a lid moves distinguishes a partial blink from a squint, and the deepest frame of a held lid does not
+# show it), and what the recording is full of: where somebody squints often, one more squint is likelier.
 
 NEIGHBOURS = (-2, -1, 1, 2)
 SAME_DIP_S = 0.2
@@ -267,7 +267,7 @@ def _log(probabilities: Array) -> Array:
 
 
 def _nothing(count: int) -> Array:
-    """Log probabilities (count, kinds) of what is no dip at all."""
+    """Log probabilities (count, kinds) of what is not a dip at all."""
     return np.tile(_log(np.eye(len(CLASSES))[-1]), (count, 1))
 
 
@@ -286,7 +286,7 @@ def _neighbour(piece: Piece, step: int) -> Array:
 def _partner(piece: Piece, other: list[Piece], whole: Array | None) -> Array:
     """(dips, kinds + 4) of the other eye's dip at the same time that is least likely to be nothing.
 
-    Where the other eye is not seen, as where there is none, a dip is its own partner, and is told so.
+    If the other eye is missing or not visible, a dip is its own partner, which is an input too.
     """
     count, times = len(piece.candidates), piece.peaks_s
     own = np.concatenate([_log(piece.probabilities), np.zeros((count, 4))], axis=1)

@@ -257,7 +257,7 @@ def _crossed_to(candidate: Candidate, rests: tuple[RestingLid, RestingLid], dept
 
 
 def _crossed(candidate: Candidate, fps: float) -> Timing:
-    """Phases of an event that is no blink: the crossings of its prominence."""
+    """Phases of an event that is not a blink: the crossings of its prominence."""
     left, right = candidate.left, candidate.right
     return Timing(
         left[0] / fps,
@@ -302,7 +302,7 @@ def _fit_of(timing: Timing, depth: Depth) -> PhaseFit | None:
 
 
 def _single(events: list[LidEvent], squints: Collection[int]) -> list[LidEvent]:
-    """Keep the likelier of two blinks too close to be two, of which one that is no squint comes first."""
+    """Keep the likelier of two blinks too close to be two, of which one that is not a squint comes first."""
     kept: list[LidEvent] = []
     for event in sorted(events, key=lambda event: event.minimum_s):
         last = kept[-1] if kept else None

@@ -48,7 +48,7 @@ class LidEvent:
     kind : str
         "blink", "squint", "gaze_shift" or "closed_eye" (closed phase of 0.5 s or more).
     probability : float
-        The classifier's, of this kind among the four and 'nothing'; 1 where `with_long_closures` tells.
+        The classifier's, of this kind among the four and 'nothing'; 1 if from `with_long_closures`.
     frame : int
         Deepest frame of the series.
     onset_s, closed_from_s, minimum_s, closed_to_s, end_s : float
@@ -74,7 +74,7 @@ class LidEvent:
     is_moved: bool = False
 
 
-# Eyes shut for longer than the classifier's dips last: told by the level of the same eye's blinks.
+# Eyes closed for longer than the classifier's dips last: detected by the level of the same eye's blinks.
 
 LONG_S = 2.0
 SHUT_SHARE = 0.2
@@ -87,18 +87,18 @@ EDGE_S = 0.5
 
 
 def with_long_closures(distance: Array, fps: float, events: Sequence[LidEvent]) -> list[LidEvent]:
-    """The events in order of time, with closed eyes of two seconds or longer of which none tells.
+    """The events in order of time, with closed eyes of two seconds or longer that none of them covers.
 
-    Their probability is 1: they are told by a rule. An eye that does not open again before a gap or the end
-    is told too, with that as its end. Blinks within are of lids that tremble, and are left out. Where the eye
-    has no blink nothing tells its closed level, and nothing is added.
+    Their probability is 1: a rule detects them. An eye that does not open again before a gap or the end is
+    included, with that as its end. Blinks within are trembling lids, and are removed. If the eye has no
+    blink, its closed level is unknown, and nothing is added.
 
     Parameters
     ----------
     distance : (n,) float64 array
         Of the whole series, NaN in gaps.
     events : sequence of LidEvent
-        What the classifier tells of it.
+        The classifier's events of it.
     """
     minima = [distance[event.frame] for event in events if event.kind == "blink"]
     if not minima:
@@ -119,7 +119,7 @@ def with_long_closures(distance: Array, fps: float, events: Sequence[LidEvent]) 
 
 
 def _tells(event: LidEvent, start_s: float, stop_s: float) -> bool:
-    """Whether an event tells of the shut lids from `start_s` to `stop_s`: one of another kind, or as long."""
+    """Whether an event covers the closed lids from `start_s` to `stop_s`: one of another kind, or as long."""
     overlaps = event.onset_s < stop_s and start_s < event.end_s
     long_enough = event.closed_to_s - event.closed_from_s >= TOLD_SHARE * (stop_s - start_s)
     return overlaps and event.kind != "blink" and (event.kind != "closed_eye" or long_enough)
@@ -159,7 +159,7 @@ def _event(distance: Array, fps: float, start: int, stop: int, closed: float, op
     )
 
 
-# Events of one eye that overlap: one motion told twice, or two that touch.
+# Events of one eye that overlap: one motion detected twice, or two that touch.
 
 SHUT = frozenset({"blink", "closed_eye"})
 LOWERED = frozenset({"squint", "gaze_shift"})
@@ -169,10 +169,10 @@ LOWERED = frozenset({"squint", "gaze_shift"})
 def separate_events(events: Sequence[LidEvent], depth: Array, start: int, fps: float) -> list[LidEvent]:
     """Events of one piece in order of time, of which those that shut do not overlap, nor those that lower.
 
-    Of two events that are no blinks, where the deepest moment of one lies in the other, the longer stays: a
-    lid that trembles while it is held is one event. Others that overlap, a blink beside a closed eye too,
-    part where the eye is open widest between them. A closed eye of whose closed phase less is left than one
-    lasts is no event, and leaves its neighbours as they were.
+    Of two events that are not blinks, if the deepest moment of one is in the other, the longer stays: a lid
+    that trembles while it is held is one event. Other overlapping events, also a blink next to a closed eye,
+    are split where the eye is widest open between them. A closed eye whose remaining closed phase is too
+    short is not an event, and leaves its neighbors as they were.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ def _nested(one: LidEvent, other: LidEvent) -> bool:
 
 
 def _parted(events: Sequence[LidEvent], depth: Array, start: int, fps: float) -> list[LidEvent]:
-    """Events in order of time, neighbours that overlap parted at the widest opening between them."""
+    """Events in order of time, neighbors that overlap parted at the widest opening between them."""
     parted = list(events)
     for number, (first, second) in enumerate(pairwise(events)):
         if first.end_s <= second.onset_s:
@@ -236,7 +236,7 @@ def _cut_to_times(event: LidEvent, onset_s: float, end_s: float) -> LidEvent:
 # eyes do the same. Where one eye shuts wholly and the other does not move, its own look is taken.
 
 SURE = 0.9
-"""Probability of a blink, by a look at its eye alone, from which a wink is told."""
+"""Probability of a blink, from its eye alone, above which it is a wink."""
 WINK_SHUT_SHARE = 0.8
 """Part of the depth of an eye's own blinks to which a wink goes at least."""
 OPEN_SHARE = 0.2
@@ -246,7 +246,7 @@ OPEN_SHARE = 0.2
 def with_winks(
     told: Sequence[LidEvent], alone: Sequence[LidEvent], own: Array, other: Array, fps: float
 ) -> tuple[list[LidEvent], list[float]]:
-    """The events of one eye with the winks that its look alone tells of, and when its winks are deepest.
+    """The events of one eye with the winks detected from it alone, and when its winks are deepest.
 
     Parameters
     ----------
@@ -300,7 +300,7 @@ def _is_wink(event: LidEvent, own: Array, other: Array, fps: float) -> bool:
 LIKELY = 0.5
 """Probability from which a dip of an eye by itself is one of the blinks that the other is compared at."""
 MUCH_LESS = 0.5
-"""Below this part of the other's movement an eye is no witness of the other's blinks."""
+"""Below this part of the other's movement an eye is not evidence about the other's blinks."""
 LEAST_MOVEMENT = 0.05
 """Below this part of the other's movement an eye does not move, whatever its noise."""
 NOISES = 2.0
@@ -379,7 +379,7 @@ def _depth(pieces: Sequence[Piece]) -> Array:
 
 
 def _movement(depth: Array, candidate: Candidate, piece: Piece, away_s: float) -> float:
-    """Mean depth where a dip is deepest above the median beside it; NaN where that is not seen."""
+    """Mean depth where a dip is deepest above the median around it; NaN where that is missing."""
     fps = piece.depth.fps
     start = piece.start + away_s * fps
     first, last = (start + edge for edge in (candidate.left[0], candidate.right[0]))

@@ -136,7 +136,7 @@ GOOD_MISFIT = 0.06
 OUTSIDE_S = 0.01
 """A blink does not reach beyond the rests next to it: by so much more costs as one standard deviation."""
 MISFIT = 0.03
-"""Part of the amplitude by which a real blink leaves the template, beside noise."""
+"""Part of the amplitude by which a real blink leaves the template, in addition to noise."""
 
 FORM_MEAN = np.array([0.0, 0.0, 0.5, 0.5])
 FORM_SD = np.array([0.2, 0.2, 0.5, 0.5])
@@ -194,7 +194,7 @@ class Timing:
 
 @cache
 def shipped_forms() -> Forms:
-    """The template that ships, made by `measure_template.py` beside it."""
+    """The template that ships, made by `measure_template.py` in the same folder."""
     document = json.loads(FORMS.read_text(encoding="utf-8"))
     return Forms(*(np.array(document[name]) for name in ("closing", "opening", "log_s", "log_sd")))
 
@@ -204,7 +204,7 @@ def timing_of(
 ) -> Timing:
     """Fit the template about one dip, between the rests before and after it.
 
-    Minimises sum_k ((r_k - b_k - A T(t_k)) / s)^2 + sum_j ((log p_j - m_j) / sd_j)^2 over the start, the
+    Minimizes sum_k ((r_k - b_k - A T(t_k)) / s)^2 + sum_j ((log p_j - m_j) / sd_j)^2 over the start, the
     phases and the forms p of the template T, which keeps between the far ends of the rests; its amplitude A
     and the resting levels b before and after follow linearly.
     """
@@ -246,7 +246,7 @@ class _Fit:
         return np.einsum("fni,fi->fn", columns, weights), weights
 
     def rest(self, p: Array) -> Array:
-        """(fits, residuals) what is minimised."""
+        """(fits, residuals) what is minimized."""
         fitted, _ = self.solved(p)
         ends = p[:, 0] + np.exp(p[:, 1:4]).sum(1)
         outside = np.stack([self.times[0] - p[:, 0], ends - self.times[-1]], axis=1)
@@ -275,7 +275,7 @@ class _Fit:
         return np.asarray(least_squares(rest, start, jac=self.slope, method="trf", max_nfev=40).x)
 
     def cost(self, p: Array) -> float:
-        """What is minimised, summed."""
+        """What is minimized, summed."""
         return float((self.rest(p[None]) ** 2).sum())
 
     def misfit(self, p: Array) -> float:
@@ -313,7 +313,7 @@ class _Fit:
         )
 
     def errors(self, p: Array) -> tuple[float, float, float]:
-        """Standard errors of closing, opening and the whole in seconds, by the slope of what is minimised."""
+        """Standard errors of closing, opening and the whole in seconds, by the slope of what is minimized."""
         slope = self.slope(p)
         covariance = np.linalg.pinv(slope.T @ slope)
         moved = p[None] + np.concatenate([1e-4 * np.eye(p.size), -1e-4 * np.eye(p.size)])

@@ -59,7 +59,7 @@ NEAR_HOLD_S = 0.1
 
 
 def labelled_features(look: str, series: GeneratedSeries) -> tuple[Array, list[str]]:
-    """What a look is told of every dip of every eye, and what each is."""
+    """A look's inputs for every dip of every eye, and what each dip is."""
     eyes = [BlinkSeries(distance=d, fps=series.fps, column="d", is_px=False) for d in series.distances]
     pieces: Sequence[Sequence[MeasuredPiece]]
     if look == "first":
@@ -125,7 +125,7 @@ def training_data(look: str, count: int) -> tuple[NDArray[np.float32], list[str]
 
 
 def train_network(features: NDArray[np.float32], classes: NDArray[np.int64], lesson: Lesson) -> MLPClassifier:
-    """Train the network on standardised features (n, features), stage by stage."""
+    """Train the network on standardized features (n, features), stage by stage."""
     network = MLPClassifier(
         lesson.units, activation="tanh", alpha=1e-4, batch_size=512, random_state=SEED, warm_start=True
     )

@@ -1,4 +1,4 @@
-"""Measure the shipped library anew from its recordings."""
+"""Measure the shipped library again from its recordings."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -46,7 +46,7 @@ def recorded_profiles(
     path = next((folder / recording.file for folder in folders if (folder / recording.file).is_file()), None)
     if path is None:
         raise InputError(
-            f"recording {recording.name}: {recording.file} is not in {data}; say with --data where it is"
+            f"recording {recording.name}: {recording.file} is not in {data}; give its folder with --data"
         )
     eyes = [
         blinks_of(series, options)
@@ -61,7 +61,7 @@ def recorded_profiles(
 def write_profiles(
     folder: Path, profiles: Sequence[BlinkProfile], recordings: Sequence[Recording]
 ) -> tuple[Path, Path]:
-    """Write profiles.csv (a row a profile) and closures.csv (a row a sample at 300 fps)."""
+    """Write profiles.csv (one row per profile) and closures.csv (one row per sample at 300 fps)."""
     by_name = {recording.name: recording for recording in recordings}
     rows = [_row(profile, by_name[profile.recording]) for profile in profiles]
     table, closures = folder / "profiles.csv", folder / "closures.csv"

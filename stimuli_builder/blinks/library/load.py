@@ -93,8 +93,8 @@ def read_profiles(profiles_csv: Path, closures_csv: Path) -> tuple[BlinkProfile,
         return tuple(_with_origin(samples[str(row["profile_id"])], row) for row in rows)
     except (KeyError, ValueError) as error:
         raise InputError(
-            f"{profiles_csv.name} and {closures_csv.name} do not belong together ({error}); "
-            "`stimuli profiles build` writes both"
+            f"{profiles_csv.name} and {closures_csv.name} do not belong together ({error}); write both with "
+            "`stimuli profiles build`"
         ) from error
 
 

@@ -24,7 +24,7 @@ class Detection:
     points : float64 array
         (18, 2) or, for one eye, (9, 2) in pixels, in the order of label files.
     iris : float64 array (eyes, 5, 2)
-        Centre and four points of each iris's edge.
+        Center and four points of each iris's edge.
     box : float64 array (4,)
         Least x and y, then greatest x and y, of the face; of the eye in a close-up.
     spreads : tuple of float
@@ -154,9 +154,9 @@ Face = dict[int, Detection]
 def one_face(seen: Mapping[int, Sequence[Detection]]) -> Face:
     """Frame -> the face to be tracked: the one that is larger over the whole recording.
 
-    Faces are followed from look to look by place and size. Pieces of like size that are hardly ever seen
-    beside one another are joined (a person who moved far, a gap, a cut), then the largest summed area is
-    taken: mean area times share of frames. A face of another size never stands in where this one is not seen.
+    Faces are followed from look to look by place and size. Pieces of similar size that are hardly ever seen
+    together are joined (a person who moved far, a gap, a cut), then the largest summed area is taken: mean
+    area times share of frames. A face of another size never replaces it where this one is not seen.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ def one_face(seen: Mapping[int, Sequence[Detection]]) -> Face:
 
 
 def _followed(seen: Mapping[int, Sequence[Detection]]) -> list[Face]:
-    """Pieces: every face as its frames for as long as place and size tell that it is the same."""
+    """Pieces: every face as its frames for as long as place and size show that it is the same."""
     pieces: list[Face] = []
     last_look: list[int] = []
     for look, number in enumerate(sorted(seen)):
@@ -225,7 +225,7 @@ def _continued(
 
 
 def _joined(first: Face, others: Sequence[Face]) -> tuple[Face, list[Face]]:
-    """A piece with all others of its size that are not seen beside it, and the ones left over."""
+    """A piece with all others of its size that are not seen together with it, and the remaining ones."""
     person, left = dict(first), []
     width = _mean_width(first)
     for other in others:

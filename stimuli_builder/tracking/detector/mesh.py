@@ -28,7 +28,7 @@ from stimuli_builder.tracking.detector.detection import (
 from stimuli_builder.tracking.shapes import Points, eye_axis, widths
 from stimuli_builder.video import Picture
 
-# Talks to `mesh_worker.py`, which runs in an environment of its own.
+# Talks to `mesh_worker.py`, which runs in a separate environment.
 
 HERE = Path(__file__).parent
 REQUIREMENTS = HERE / "requirements.txt"
@@ -77,7 +77,7 @@ class MeshClient:
         Raises
         ------
         ValueError
-            The picture is of another kind, a grey one say.
+            The picture is of another kind, a gray one say.
         InputError
             The worker ended.
         """
@@ -94,8 +94,8 @@ class MeshClient:
             return json.loads(stdout.read(length))
         except (BrokenPipeError, struct.error) as error:
             raise InputError(
-                "the face detector ended unexpectedly; remove its environment "
-                f"({cache_folder()}) and run the command again, which makes it anew"
+                f"the face detector ended unexpectedly; remove its environment ({cache_folder()}) and run "
+                "the command again to create a new one"
             ) from error
 
 
@@ -103,8 +103,8 @@ class MeshClient:
 
 LEAST_EYE_PX = 10
 FACE_VIEWS = ((-0.2, 1.0), (0.2, 1.0), (0.0, 0.8), (0.0, 1.25))
-"""A face's eye is read in these besides, to tell whether one is there: shift along it in widths, and size.
-Those of another size tell an eye of which a half is covered too."""
+"""A face's eye is also read in these, to check that it is there: shift along it in widths, and size. Those of
+another size also detect an eye of which one half is covered."""
 FILLING = 0.8
 """Part of the picture's shorter side from which on a face fills it, and is looked at with a margin."""
 MARGIN = 0.25
@@ -114,7 +114,7 @@ SAME_FACE = 0.2
 """Parts of an eye's width within which a face lies where its mirror image does: 0.06 or less in recordings
 of faces, 0.23 or more where the mesh saw faces in a close-up."""
 IRIS_MIRRORED = (0, 3, 2, 1, 4)
-"""Centre, right, upper, left and lower edge of an iris, as a mirror image has them."""
+"""Center, right, upper, left and lower edge of an iris, as a mirror image has them."""
 
 
 def views_of(eye: Points, *, flip: bool) -> list[Region]:
@@ -180,7 +180,7 @@ class FaceMesh:
 
         Each face is read in the picture and in its mirror image, and the mean is taken. One that fills the
         picture may not be seen: the mesh expects something around it. Where none is seen or one fills it, the
-        picture is looked at in a grey margin.
+        picture is looked at in a gray margin.
         """
         faces = self._read_twice(picture)
         if not faces or _fills(faces[0], picture):
@@ -301,8 +301,8 @@ class CloseUp:
         width = float(np.median(np.hypot(*(canthi[:, 1] - canthi[:, 0]).T)))
         if width < LEAST_EYE_PX:
             raise InputError(
-                f"the eye of this close-up is seen {width:.0f} px wide, and {LEAST_EYE_PX} are needed; "
-                "leave out --one-eye if the video shows a face"
+                f"the eye in this close-up is {width:.0f} px wide, but at least {LEAST_EYE_PX} px are "
+                "needed; remove --one-eye if the video shows a face"
             )
         x, y = np.median(canthi.mean(1), axis=0).tolist()
         self._views = Region(x, y, SIDE_OF_WIDTH * width, flip).views(width)
@@ -348,7 +348,8 @@ class CloseUp:
 
 
 FACES_ASKED = 5
-"""Pictures of a close-up in which a whole face is looked for: what is no close-up gives lids of a cheek."""
+"""Pictures of a close-up in which a whole face is looked for: otherwise a picture that is not a close-up
+gives lids on a cheek."""
 
 
 @contextmanager
@@ -375,8 +376,8 @@ def _refuse_faces(mesh: FaceMesh, pictures: Sequence[Picture]) -> None:
     faces = sum(_shows_a_face(mesh, picture) for picture in few)
     if 2 * faces > len(few):
         raise InputError(
-            f"a whole face is seen on {faces} of {len(few)} frames looked at, and --one-eye is for close-ups "
-            "of one eye; leave it out"
+            f"a whole face was detected in {faces} of {len(few)} frames, but --one-eye is for close-ups of "
+            "one eye; remove --one-eye"
         )
 
 

@@ -1,4 +1,4 @@
-"""MediaPipe's face mesh as a process of its own: pictures in on stdin, contours out on stdout.
+"""MediaPipe's face mesh as a separate process: pictures in on stdin, contours out on stdout.
 
 Runs in the environment of requirements.txt (numpy < 2) and imports nothing of this project. A message is
 the length of its JSON head (8 bytes, little endian), the head, and for a request the picture (RGB, uint8).

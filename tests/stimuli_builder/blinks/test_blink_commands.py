@@ -62,7 +62,7 @@ def test_few_blinks_do_not_tell_how_far_lids_close(stimuli, series_file, tmp_pat
         "--out",
         tmp_path / "b.csv",
     )
-    said = "gap_l: too few blinks to say which are complete"
+    said = "gap_l: there are too few blinks to decide which are complete"
     assert said in " ".join(stimuli(*command).out.split())
     assert said not in " ".join(stimuli(*command, "--closed", 2).out.split())
 
@@ -110,9 +110,9 @@ def test_a_decision_about_a_blink_that_is_gone_is_told_and_kept(stimuli, series_
         (["--column", "gap_l", "--fps", "300", "--resample"], "no column time_s"),
         (["--column", "gap_l", "--fps", "300", "--preset", "papr"], "did you mean 'paper'"),
         (["--column", "gap_l", "--fps", "300", "--reject", "1=x"], "--review"),
-        (["--column", "gap_l", "--fps", "300", "--review", "r.csv"], "no such review file"),
+        (["--column", "gap_l", "--fps", "300", "--review", "r.csv"], "this review file does not exist"),
         (["--column", "gap_l", "--fps", "300", "--review", "r.csv", "--reject", "9=x"], "has blinks 1 to 4"),
-        (["--column", "gap_l", "--fps", "300", "--review", "r.csv", "--reject", "1"], "say why"),
+        (["--column", "gap_l", "--fps", "300", "--review", "r.csv", "--reject", "1"], "a reason is missing"),
         (["--column", "gap_l", "--fps", "300", "--review", "r.csv", "--reject", "x=y"], "number of a blink"),
         (
             ["--column", "gap_l", "--column", "gap_r", "--fps", "300", "--review", "r.csv", "--accept", "1"],
@@ -127,9 +127,9 @@ def test_a_decision_about_a_blink_that_is_gone_is_told_and_kept(stimuli, series_
             ["--column", "gap_l", "--fps", "300", "--lids", "l.xlsx"],
             "--lids: expected a name that ends in .csv or .txt, got 'l.xlsx'",
         ),
-        (["--column", "gap_l", "--fps", "300", "--plot", "figure.gif"], "no figure format 'gif'"),
+        (["--column", "gap_l", "--fps", "300", "--plot", "figure.gif"], "'gif' is not a figure format"),
         (["--column", "gap_l", "--fps", "300", "--summary", "none/s.json"], "does not exist"),
-        (["--column", "gap_l", "--fps", "300", "--summary", "b.csv"], "a name of its own"),
+        (["--column", "gap_l", "--fps", "300", "--summary", "b.csv"], "a unique name"),
         (["--column", "gap_l", "--fps", "300", "--closed", "40"], "is not below the opening of any blink"),
         (["--column", "gap_l", "--fps", "300", "--closed", "-1"], "0 or more"),
         (["--column", "gap_l", "--fps", "300", "--complete-from", "2"], "up to 1"),
@@ -146,7 +146,7 @@ def test_a_decision_about_a_blink_that_is_gone_is_told_and_kept(stimuli, series_
                 "--gradient-px",
                 "1",
             ],
-            "give one of",
+            "use only one of",
         ),
     ],
 )
@@ -168,7 +168,7 @@ def test_a_rate_that_makes_strange_blinks_is_doubted_not_refused(stimuli, series
     ended = stimuli("blinks", series_file, "--column", "gap_l", "--fps", fps, "--out", tmp_path / "b.csv")
     assert ended.code == 0
     assert ended.err.startswith("warning: at ")
-    assert "is --fps right?" in ended.err
+    assert "check --fps" in ended.err
 
 
 def test_a_model_is_fitted_drawn_from_and_plotted(stimuli, series_file, tmp_path):
@@ -212,16 +212,19 @@ def test_every_format_is_exported(stimuli, tmp_path, name):
     [
         (["export", "--format", "may", "--out", "x"], "did you mean 'maya'"),
         (["export", "--profile", "espbm-left-99", "--out", "x"], "no shipped profile"),
-        (["export", "--profile", "espbm-left-01", "--model", "m.json", "--out", "x"], "give one of them"),
+        (
+            ["export", "--profile", "espbm-left-01", "--model", "m.json", "--out", "x"],
+            "use only one of --profile",
+        ),
         (["export", "--left", "a b", "--out", "x"], "expected a name"),
-        (["export", "--left", "a", "--right", "a", "--out", "x"], "a shape of its own"),
+        (["export", "--left", "a", "--right", "a", "--out", "x"], "a separate shape"),
         (["export", "--format", "maya", "--fps", "31", "--out", "x"], "nearest is --fps 30"),
         (["fit", "--eyes", "bth"], "did you mean 'both'"),
         (["fit", "--components", "99"], "allow 1 to"),
         (["fit", "none.csv"], "no file none.csv; expected a table"),
         (["sample", "--duration", "0", "--out", "x.csv"], "a blink lasts"),
         (["sample", "--model", "none.json", "--out", "x.csv"], "cannot be read"),
-        (["sample", "--out", "x.csv", "--plot", "x.bmp"], "no figure format"),
+        (["sample", "--out", "x.csv", "--plot", "x.bmp"], "is not a figure format"),
     ],
 )
 def test_a_wrong_call_of_model_gets_one_line(stimuli, monkeypatch, tmp_path, arguments, message):
@@ -284,7 +287,7 @@ def test_a_review_moves_the_start_and_end_of_a_blink(stimuli, series_file, tmp_p
     [
         ("gap_l,{minimum},accept,,{minimum},", "expected onset_frame before"),
         ("gap_l,{minimum},accept,,,x", "end_frame must be a whole number"),
-        ("gap_l,{minimum},accept,,,{far}", "into each other"),
+        ("gap_l,{minimum},accept,,,{far}", "so that they overlap"),
         ("gap_l,{last},accept,,,99999", "the last is"),
     ],
 )
@@ -313,9 +316,7 @@ def test_a_blink_that_a_gap_cuts_is_told_by_its_frame_and_not_as_too_shallow(sti
     out = tmp_path / "b.csv"
     ended = stimuli("blinks", series_file, "--column", "gap_l", "--fps", 300, "--out", out, "--allow-gaps")
     assert (ended.code, ended.err.count("\n")) == (0, 1)
-    told = re.search(
-        r"1 dip could not be measured, the first at frame (\d+): its beginning or end", ended.err
-    )
+    told = re.search(r"1 dip could not be measured; the first is at frame (\d+): its start or end", ended.err)
     assert told
     assert abs(int(told[1]) - lowest) < 8
     assert "deepest dip" not in ended.err

@@ -57,7 +57,7 @@ def test_left_and_right_keep_their_asymmetry(curve):
 
 @pytest.mark.parametrize(("fps", "lead"), [(0, 0), (float("nan"), 0), (30, -1), (5000, 0)])
 def test_impossible_curves_are_refused(fps, lead):
-    with pytest.raises(InputError, match="must lie between"):
+    with pytest.raises(InputError, match="must be between"):
         make_curve([textbook_profile("SL", 9)], fps, lead)
 
 

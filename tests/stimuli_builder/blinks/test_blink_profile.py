@@ -128,7 +128,7 @@ def test_writing_and_reading_a_table_is_the_identity(tmp_path):
 
 def test_a_table_without_its_columns_is_refused(tmp_path):
     (tmp_path / "t.csv").write_text("profile,closure\na,0\n", encoding="utf-8")
-    with pytest.raises(InputError, match="lacks the column 'profile_id' and has profile, closure"):
+    with pytest.raises(InputError, match="the column 'profile_id' is missing; it has profile, closure"):
         read_profile_table(tmp_path / "t.csv")
 
 

@@ -31,11 +31,11 @@ def test_the_report_is_one_page_with_a_value_for_each_eye(labelled, tmp_path):
     assert page.count("<svg") == 2
     cells = dict(re.findall(r'<th scope="row">([^<]+)</th><td>([^<]*)</td>', page))
     assert cells["blinks"] == "4"
-    assert float(cells["blinks a minute"]) == pytest.approx(24, abs=0.2)
+    assert float(cells["blinks per minute"]) == pytest.approx(24, abs=0.2)
     assert cells["complete / partial"] == "2 / 2"
     duration = float(cells["duration, ms"].split()[0])
     assert duration == pytest.approx(pd.read_csv(tmp_path / "b.csv")["duration_ms"][:4].median(), abs=1)
-    assert "4 blinks in both eyes; 0 in gap_l alone, 0 in gap_r alone" in page
+    assert "4 blinks in both eyes; 0 only in gap_l, 0 only in gap_r" in page
 
 
 def test_every_frame_has_its_closure(labelled, tmp_path, make_known):
@@ -74,7 +74,7 @@ def test_a_scale_by_the_irises_makes_mm_of_px(stimuli, close_up, tmp_path):
     lids = pd.read_csv(tmp_path / "l.csv")
     assert lids["distance_mm"].median() == pytest.approx(34 * 11.7 / 46.8, abs=0.02)
     page = (tmp_path / "r.html").read_text(encoding="utf-8")
-    assert "0.2500 mm in a pixel: an iris is 11.7 mm wide, 46.8 px here (median of 50 in i.csv)" in page
+    assert "0.2500 mm per pixel: an iris is 11.7 mm wide, 46.8 px here (median of 50 in i.csv)" in page
 
 
 def test_irises_that_are_not_of_one_face_are_no_scale(stimuli, close_up, tmp_path):
@@ -90,7 +90,7 @@ def test_a_scale_that_no_eye_has_is_doubted_on_screen_and_in_the_report(stimuli,
     files = ("--out", tmp_path / "b.csv", "--report", tmp_path / "r.html")
     ended = stimuli("blinks", close_up, *files, "--scale", "2.5")
     assert ended.code == 0, ended.err
-    doubt = "mm apart when open, where people's are 3 to 16"
+    doubt = "mm apart when open, but usual values are 3 to 16"
     assert doubt in ended.err
     assert doubt in (tmp_path / "r.html").read_text(encoding="utf-8").replace("&#39;", "'")
     assert "apart when open" not in stimuli("blinks", close_up, *files, "--scale", "0.25").err
@@ -104,7 +104,7 @@ def test_the_table_of_irises_is_not_written_over(stimuli, close_up, tmp_path):
         "blinks", close_up, "--out", tmp_path / "b.csv", "--lids", table, "--scale", f"iris:{table}"
     )
     assert ended.code == 2
-    assert "already in use in this call" in ended.err
+    assert "already used in this call" in ended.err
     assert table.read_bytes() == before
 
 
@@ -201,7 +201,7 @@ def test_a_chord_of_the_eyeball_is_its_angle():
         (("--curve", "c"), "--curve: expected a name that ends in .csv or .txt, got 'c'"),
         (("--report", "r.html", "--scale", "inter-ocular"), "needs a track of both eyes"),
         (("--lids", "l.csv", "--scale", "0.5"), "is in another unit"),
-        (("--report", "b.csv"), "a name of its own"),
+        (("--report", "b.csv"), "a unique name"),
     ],
 )
 def test_bad_input_leaves_nothing(labelled, monkeypatch, tmp_path, more, message):

@@ -87,19 +87,19 @@ GOOD = [0.3] * 400
     ("header", "columns", "wanted", "fps", "message"),
     [
         ("frame,EAR_l", [range(400), GOOD], ["EAR_x"], 240, r"no column 'EAR_x'; did you mean 'EAR_l'\?"),
-        ("frame,a,b", [range(400), GOOD, GOOD], [], 240, "say with --column"),
-        ("frame,a", [range(400), ["x"] * 400], ["a"], 240, "must hold numbers"),
+        ("frame,a,b", [range(400), GOOD, GOOD], [], 240, "select the series with --column"),
+        ("frame,a", [range(400), ["x"] * 400], ["a"], 240, "must have numbers"),
         (
             "frame,a",
             [range(400), [*GOOD[:6], "abc", *GOOD[7:]]],
             ["a"],
             240,
-            "must hold numbers, got 'abc' in line 8",
+            "must have numbers, got 'abc' in line 8",
         ),
-        ("frame,a", [range(400), GOOD], ["a"], None, "give the recording's rate"),
+        ("frame,a", [range(400), GOOD], ["a"], None, "add the recording's rate"),
         ("frame,a", [range(400), GOOD], ["a"], -5, "between 10 and 10000"),
         ("frame,a", [range(400), GOOD], ["a"], float("nan"), "between 10 and 10000"),
-        ("frame,a", [range(20), GOOD[:20]], ["a"], 240, "less than a second"),
+        ("frame,a", [range(20), GOOD[:20]], ["a"], 240, "less than one second"),
         ("frame,a", [range(400), [""] * 400], ["a"], 240, "is empty"),
         (
             "frame,a",
@@ -142,7 +142,7 @@ def test_a_column_that_is_named_twice_is_read_once(tmp_path: Path) -> None:
 def test_a_word_in_a_series_that_is_to_be_resampled_is_named(tmp_path: Path) -> None:
     values = [*GOOD[:6], "lost", *GOOD[7:]]
     path = _write(tmp_path / "series.csv", "time_s,a", [np.arange(400) / 240, values])
-    with pytest.raises(InputError, match=r"must hold numbers, got 'lost' in line 8"):
+    with pytest.raises(InputError, match=r"must have numbers, got 'lost' in line 8"):
         read_series(path, ["a"], resample=True)
 
 

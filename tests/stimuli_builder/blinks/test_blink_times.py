@@ -29,7 +29,7 @@ def test_a_pause_in_the_times_is_no_recording(stimuli, make_known, tmp_path: Pat
     )
     assert ended.code == 0, ended.err
     assert "s.csv: 1 hole in time_s" in ended.err
-    assert "60 s together" in ended.err
+    assert "60 s in total" in ended.err
     (column,) = json.loads((tmp_path / "s.json").read_text(encoding="utf-8"))["columns"]
     assert column["blinks"] == 4
     assert column["fps"] == pytest.approx(fps, rel=0.001)
@@ -64,19 +64,19 @@ def test_an_empty_value_is_still_refused_beside_a_hole(tmp_path: Path) -> None:
     values = np.full(400, 20.0)
     values[50:100] = np.nan
     path = written(tmp_path / "s.csv", times, values)
-    with pytest.raises(InputError, match=r"has no value on 5[01] frames"):
+    with pytest.raises(InputError, match=r"has no value for 5[01] frames"):
         read_series(path, resample=True)
 
 
 def test_times_that_jump_by_years_are_refused(tmp_path: Path) -> None:
     times = np.arange(400) / 60
     times[200:] += 1.7e9
-    with pytest.raises(InputError, match="are the most: cut the recording where it pauses"):
+    with pytest.raises(InputError, match="are allowed: cut the recording at the pause"):
         read_series(written(tmp_path / "s.csv", times, np.full(400, 20.0)), resample=True)
 
 
 def test_a_rate_too_low_is_told_in_few_digits(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"at 0\.03 frames a second no blink"):
+    with pytest.raises(InputError, match=r"at 0\.03 frames per second blinks cannot"):
         read_series(written(tmp_path / "s.csv", np.arange(400) / 0.03, np.full(400, 20.0)))
 
 

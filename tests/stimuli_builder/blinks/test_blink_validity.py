@@ -34,8 +34,8 @@ def test_frames_that_are_not_valid_are_not_seen(
     ended = stimuli("blinks", tmp_path / "s.csv", "--column", "gap_l", "--fps", FPS, *files)
     assert ended.code == 0, ended.err
     assert "s.csv: 120 of 1,200 frames" in ended.err
-    assert "taken as not seen" in ended.err
-    assert "taken as not seen" in (tmp_path / "r.html").read_text(encoding="utf-8")
+    assert "treated as missing" in ended.err
+    assert "treated as missing" in (tmp_path / "r.html").read_text(encoding="utf-8")
     events = pd.read_csv(tmp_path / "b.events.csv")
     assert events["kind"].to_list() == ["blink"] * 4
 
@@ -53,7 +53,7 @@ def test_frames_not_valid_stay_unseen_when_times_are_evened(make_known, tmp_path
     ("name", "good", "bad", "message"),
     [
         ("valid", "yes", "no", "by 1 and 0 .* got 'yes'"),
-        ("success", 0, 0, "nothing is left: take the column out"),
+        ("success", 0, 0, "no frames are left: remove the column"),
         ("confidence", 98, 12, "between 0 and 1, got 12 to 98"),
     ],
 )
@@ -82,7 +82,7 @@ def test_doubtful_frames_of_a_track_are_said(stimuli, make_known, tmp_path: Path
 def test_a_confidence_in_words_is_refused(tmp_path: Path) -> None:
     table = pd.DataFrame({"gap": np.full(400, 20.0), "confidence": ["97%"] * 400})
     table.to_csv(tmp_path / "s.csv", index=False)
-    with pytest.raises(InputError, match="'confidence' must hold numbers between 0 and 1, got '97%'"):
+    with pytest.raises(InputError, match="'confidence' must have numbers between 0 and 1, got '97%'"):
         read_series(tmp_path / "s.csv", ["gap"], 240)
 
 
@@ -91,7 +91,7 @@ def test_a_validity_of_a_longer_name_is_heeded(make_known, tmp_path: Path, name:
     table = spoilt(make_known, name, 1, 0).rename(columns={" gap_l": "EAR2D6_l"})
     table.assign(face_x=1.5).to_csv(tmp_path / "s.csv", index=False)
     (series,) = read_series(tmp_path / "s.csv", ["EAR2D6_l"], FPS)
-    assert series.notes == (f"s.csv: 120 of 1,200 frames are not valid by '{name}': taken as not seen",)
+    assert series.notes == (f"s.csv: 120 of 1,200 frames are not valid by '{name}': treated as missing",)
     assert series.missing_frames == 120
 
 

@@ -40,13 +40,13 @@ def test_one_left_and_one_right_eye_are_taken_without_being_named(tmp_path: Path
     table = pd.DataFrame({"EAR_r": values[0], "EAR_l": values[1], **ones})
     columns, notes = choose_columns(table, (), tmp_path / "s.csv")
     assert columns == ["EAR_r", "EAR_l"]
-    assert notes == ["s.csv: 'EAR_r' and 'EAR_l' are taken as the two eyes; --column NAME takes another"]
+    assert notes == ["s.csv: 'EAR_r' and 'EAR_l' are used as the two eyes; select others with --column NAME"]
 
 
 @pytest.mark.parametrize("names", [("EAR_l", "EAR_r", "EAR_mean"), ("a", "b"), ("EAR_l", "gap_l")])
 def test_columns_that_are_no_one_pair_of_eyes_are_to_be_named(tmp_path: Path, names: tuple[str, ...]) -> None:
     table = pd.DataFrame({name: np.linspace(1.5, 2.5, 50) + n for n, name in enumerate(names)})
-    with pytest.raises(InputError, match="say with --column"):
+    with pytest.raises(InputError, match="select the series with --column"):
         choose_columns(table, (), tmp_path / "s.csv")
 
 
@@ -81,7 +81,7 @@ def test_blinks_of_two_of_three_columns_are_paired(stimuli, series_file: Path, t
         "gap_l": 4, "gap_r": 4, "mean": 0,
     }  # fmt: skip
     page = (tmp_path / "r.html").read_text(encoding="utf-8")
-    assert "4 blinks in both eyes; 0 in gap_l alone, 0 in gap_r alone" in page
+    assert "4 blinks in both eyes; 0 only in gap_l, 0 only in gap_r" in page
 
 
 def test_columns_of_which_no_two_are_eyes_are_told(stimuli, series_file: Path, tmp_path: Path) -> None:
@@ -92,8 +92,8 @@ def test_columns_of_which_no_two_are_eyes_are_told(stimuli, series_file: Path, t
     ended = stimuli("blinks", tmp_path / "s.csv", *names, "--fps", 300, "--out", tmp_path / "b.csv")
     assert ended.code == 0, ended.err
     assert ended.err == (
-        "note: of 3 columns (gap_l, b, c) no two are a left and a right eye by their names: each is judged "
-        "by itself, and an eye that moves less is not told\n"
+        "note: no two of the 3 columns (gap_l, b, c) are named as left and right eye: each is judged "
+        "separately, and an eye that moves less is not reported\n"
     )
 
 
@@ -103,7 +103,7 @@ def test_a_presence_is_no_second_eye(make_known, tmp_path: Path) -> None:
     for named in ((), ("AU45_r", "AU45_c")):
         (series,) = read_series(path, named, FPS)
         assert series.column == "AU45_r"
-    assert "s.csv: 'AU45_c' holds only 0 and 1, a presence and no eye: left out" in series.notes
+    assert "s.csv: 'AU45_c' has only 0 and 1, so it is not an eye opening: ignored" in series.notes
     assert [one.column for one in read_series(path, ["AU45_c"], FPS)] == ["AU45_c"]
 
 
@@ -112,7 +112,9 @@ def test_columns_that_are_the_same_are_no_two_eyes(make_known, tmp_path: Path) -
     path = write(tmp_path, EAR_l=distance, EAR_r=distance)
     (series,) = read_series(path, ["EAR_l", "EAR_r"], FPS)
     assert series.column == "EAR_l"
-    assert series.notes == ("s.csv: 'EAR_r' holds the same values as 'EAR_l', no second eye: left out",)
+    assert series.notes == (
+        "s.csv: 'EAR_r' has the same values as 'EAR_l', so it is not a second eye: ignored",
+    )
 
 
 def test_columns_of_whole_numbers_are_told_and_taken_by_name(make_known, tmp_path: Path) -> None:
@@ -122,7 +124,7 @@ def test_columns_of_whole_numbers_are_told_and_taken_by_name(make_known, tmp_pat
         read_series(path, fps=FPS)
     assert str(error.value) == (
         "s.csv: expected a column of decimal numbers, got 'gap' (whole numbers), 'seen' (whole numbers); if "
-        "one of them is the distance, name it with --column"
+        "one of them is the distance, select it with --column"
     )
     assert [one.column for one in read_series(path, ["gap"], FPS)] == ["gap"]
 
@@ -135,7 +137,7 @@ def test_a_rate_beyond_those_tested_is_told(
     files = ("--out", tmp_path / "b.csv", "--report", tmp_path / "r.html")
     ended = stimuli("blinks", path, "--column", "gap_l", "--fps", fps, *files)
     assert ended.code == 0, ended.err
-    line = f"the classifier was tested at 15 to 1,000 frames a second, this is at {fps:g}"
+    line = f"the classifier was tested at 15 to 1,000 frames per second, but this is {fps:g}"
     assert ended.err.count(f"warning: {line}") == told
     assert (line in (tmp_path / "r.html").read_text(encoding="utf-8")) == told
     rule = ("--preset", "velocity", "--out", tmp_path / "c.csv")

@@ -69,7 +69,7 @@ def test_a_closure_is_turned_round_and_said(stimuli, make_known, tmp_path: Path,
     arguments = ("--column", "eyeBlinkLeft", "--fps", 300, "--out", tmp_path / "b.csv")
     ended = stimuli("blinks", tmp_path / "s.csv", *arguments)
     assert ended.code == 0, ended.err
-    assert "'eyeBlinkLeft' is high where lids are shut, as its name says" in ended.err
+    assert "'eyeBlinkLeft' is high when lids are closed, as its name says" in ended.err
     assert pd.read_csv(tmp_path / "b.csv")["minimum_s"].to_list() == pytest.approx([2, 4, 6, 8], abs=0.02)
 
 
@@ -78,7 +78,7 @@ def test_what_looks_like_a_closure_waits_for_a_word(stimuli, make_known, tmp_pat
     arguments = ("--column", "a", "--fps", 300, "--out", tmp_path / "b.csv")
     ended = stimuli("blinks", tmp_path / "s.csv", *arguments)
     assert ended.code != 0
-    assert "add --inverted if high is shut, --not-inverted if it is an opening" in ended.err
+    assert "add --inverted if high means closed, --not-inverted if high means open" in ended.err
     assert stimuli("blinks", tmp_path / "s.csv", *arguments, "--inverted").code == 0
     assert len(pd.read_csv(tmp_path / "b.csv")) == 4
 
@@ -103,7 +103,7 @@ def test_an_opening_is_not_taken_for_a_closure(make_known, tmp_path: Path, part:
 
 def test_an_opening_that_is_named_as_a_closure_waits_for_a_word(make_known, tmp_path: Path) -> None:
     pd.DataFrame({"eyeBlinkLeft": make_known(noise=0.05).distance}).to_csv(tmp_path / "s.csv", index=False)
-    with pytest.raises(InputError, match=r"is named as a closure .* near its top, as an opening does"):
+    with pytest.raises(InputError, match=r"is named as a closure .* near its maximum, like an opening"):
         read_series(tmp_path / "s.csv", ["eyeBlinkLeft"], 300)
 
 
@@ -131,7 +131,7 @@ def test_columns_without_a_side_are_not_said_to_blink_apart(
 
 def test_words_in_place_of_a_closure_are_refused(tmp_path: Path) -> None:
     pd.DataFrame({"eyeBlinkLeft": ["x"] * 400}).to_csv(tmp_path / "s.csv", index=False)
-    with pytest.raises(InputError, match="must hold numbers"):
+    with pytest.raises(InputError, match="must have numbers"):
         read_series(tmp_path / "s.csv", ["eyeBlinkLeft"], 240)
 
 

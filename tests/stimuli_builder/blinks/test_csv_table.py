@@ -20,7 +20,7 @@ def test_semicolons_and_decimal_commas_are_read_and_said(stimuli, series_file, t
     assert stimuli("blinks", series_file, *plain, tmp_path / "a.csv").code == 0
     ended = stimuli("blinks", german, *plain, tmp_path / "b.csv")
     assert ended.code == 0, ended.err
-    assert "note: german.csv: columns parted by semicolons, decimal commas (e.g. '" in ended.err
+    assert "note: german.csv: columns separated by semicolons, decimal commas (e.g. '" in ended.err
     assert (tmp_path / "a.csv").read_bytes() == (tmp_path / "b.csv").read_bytes()
 
 
@@ -28,7 +28,7 @@ def test_semicolons_and_decimal_commas_are_read_and_said(stimuli, series_file, t
     ("text", "values", "note"),
     [
         ("frame,a\n0,0.5\n1,\n", [0.5, None], None),
-        ("frame\ta\n0\t0.5\n1\t0.25\n", [0.5, 0.25], "t.csv: columns parted by tabs"),
+        ("frame\ta\n0\t0.5\n1\t0.25\n", [0.5, 0.25], "t.csv: columns separated by tabs"),
         ("\ufefframe;a\n0;0,5\n1;1\n", [0.5, 1], "read as decimal points"),
         ('frame,a\n0,"0,5"\n1,\n', [0.5, None], "t.csv: decimal commas (e.g. '0,5') read"),
         ("frame;a\n0;1,5E-05\n1;-0,5\n", [1.5e-05, -0.5], "read as decimal points"),
@@ -59,14 +59,14 @@ def test_decimal_commas_among_commas_are_refused(tmp_path, text):
 def test_thousands_are_no_decimals(tmp_path):
     path = tmp_path / "t.csv"
     path.write_text('frame,a\n0,"1,234"\n1,999\n', encoding="utf-8")
-    with pytest.raises(InputError, match="must hold numbers"):
+    with pytest.raises(InputError, match="must have numbers"):
         read_series(path, ["a"], 240)
 
 
 def test_words_beside_decimal_commas_stay_words(tmp_path):
     path = tmp_path / "t.csv"
     path.write_text("frame;a\n0;0,5\n1;lost\n", encoding="utf-8")
-    with pytest.raises(InputError, match="must hold numbers"):
+    with pytest.raises(InputError, match="must have numbers"):
         read_series(path, ["a"], 240)
 
 
@@ -109,7 +109,7 @@ def test_many_candidates_are_not_all_listed(tmp_path):
         ",".join(f"x{number}" for number in range(50)) + "\n" + ",".join(["0.5"] * 50) + "\n",
         encoding="utf-8",
     )
-    with pytest.raises(InputError, match=r"it has x0, x1, x2, x3, x4, x5 and 44 more$"):
+    with pytest.raises(InputError, match=r"the table has x0, x1, x2, x3, x4, x5 and 44 more$"):
         read_series(path, [], 240)
 
 
@@ -132,7 +132,7 @@ def test_a_scale_nobody_knows_is_refused_always(stimuli, series_file, monkeypatc
     ended = stimuli(*call)
     assert ended.code == 2
     assert ended.err == (
-        "error: --scale foo: expected a number of mm in a pixel, 'inter-ocular', 'eye-width' or "
+        "error: --scale foo: expected a number of mm per pixel, 'inter-ocular', 'eye-width' or "
         "'iris:' and a table of stimuli iris\n"
     )
     assert not (tmp_path / "b.csv").exists()
@@ -142,7 +142,7 @@ def test_a_scale_without_effect_is_said(stimuli, series_file, tmp_path):
     call = ("blinks", series_file, "--column", "gap_l", "--fps", 300, "--out", tmp_path / "b.csv")
     ended = stimuli(*call, "--scale", "0.25")
     assert ended.code == 0
-    assert ended.err == "note: --scale has no effect here: mm stand in what --lids and --report write\n"
+    assert ended.err == "note: --scale has no effect here: it applies to --lids and --report\n"
 
 
 @pytest.mark.parametrize("separator", [",", ";", "\t"])
@@ -157,7 +157,7 @@ def test_blank_lines_are_counted_as_lines(tmp_path, separator):
     for number in range(200, 220):
         lines[number] = lines[number].removesuffix("0.3")
     (tmp_path / "s.csv").write_text("\n".join([f"time_s{separator}EAR", *lines]), encoding="utf-8")
-    with pytest.raises(InputError, match="no value on 20 frames from line 202 on"):
+    with pytest.raises(InputError, match="no value for 20 frames from line 202 on"):
         read_series(tmp_path / "s.csv", ["EAR"])
     del lines[300:320]
     (tmp_path / "s.csv").write_text("\n".join([f"time_s{separator}EAR", *lines]), encoding="utf-8")

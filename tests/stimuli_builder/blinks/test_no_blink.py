@@ -32,7 +32,7 @@ def test_a_recording_without_a_blink_has_a_report(stimuli, still, tmp_path: Path
     page = (tmp_path / "r.html").read_text(encoding="utf-8")
     assert "gap_l: no blinks in 10 s" in page
     cells = dict(re.findall(r'<th scope="row">([^<]+)</th><td>([^<]*)</td>', page))
-    assert (cells["blinks"], cells["blinks a minute"]) == ("0", "0.0")
+    assert (cells["blinks"], cells["blinks per minute"]) == ("0", "0.0")
     (column,) = json.loads((tmp_path / "s.json").read_text(encoding="utf-8"))["columns"]
     assert (column["blinks"], column["rate_per_minute"]) == (0, 0)
     assert len(pd.read_csv(tmp_path / "b.csv")) == 0
@@ -42,7 +42,7 @@ def test_a_recording_without_a_blink_has_a_report(stimuli, still, tmp_path: Path
 
 def test_a_closed_distance_makes_a_curve_of_an_eye_without_a_blink(stimuli, still, tmp_path: Path) -> None:
     more = ("--report", tmp_path / "r.html", "--curve", tmp_path / "c.json", "--curve-format", "json")
-    assert "nothing tells where its lids are closed: give --closed" in stimuli(*still, *more).err
+    assert "so its closed level is unknown: add --closed" in stimuli(*still, *more).err
     ended = stimuli(*still, *more, "--lids", tmp_path / "l.csv", "--closed", 4)
     assert ended.code == 0, ended.err
     closure = json.loads((tmp_path / "c.json").read_text(encoding="utf-8"))["closure_left"]
@@ -63,7 +63,7 @@ def test_tables_and_figures_of_an_earlier_run_are_not_left_as_if_they_were_of_th
     assert len(pd.read_csv(tmp_path / "b.profiles.csv")) == 0
     assert "b.profiles.csv" in ended.out.replace("\n", "")  # a long path is wrapped
     assert f"note: {tmp_path / 'a.png'} is not written" in ended.err
-    assert "the one that is there is of an earlier call" in ended.err
+    assert "the existing file is from an earlier run" in ended.err
 
 
 def test_profiles_of_no_blink_make_no_model(stimuli, still, tmp_path: Path) -> None:
@@ -89,5 +89,5 @@ def test_a_closed_distance_beyond_the_opening_of_an_eye_without_a_blink_is_refus
     ended = stimuli(*still, "--report", "r.html", *more, "--closed", 40)
     assert ended.code == 2
     assert "--closed 40 is not below the opening of 'gap_l' (up to 34" in ended.err
-    assert "it is the distance that stays when the lids meet" in ended.err
+    assert "it must be the distance that remains when the lids meet" in ended.err
     assert {path.name for path in tmp_path.iterdir()} == {"still.csv"}

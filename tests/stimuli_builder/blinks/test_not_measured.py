@@ -27,7 +27,7 @@ def test_a_value_that_is_repeated_for_seconds_is_told_and_not_seen(
     distance[frozen] = distance[frozen.start]
     series = read(tmp_path, distance, fps)
     (note,) = series.notes
-    assert "s.csv: 'gap_l' (left eye) repeats one value for a second or longer: once, 2.2 s" in note
+    assert "s.csv: 'gap_l' (left eye) repeats one value for at least one second: once, 2.2 s" in note
     assert "first at 2.6" in note
     assert series.missing_frames == pytest.approx(2.2 * fps, abs=1)
     assert np.isnan(series.distance[frozen.start + 1 : frozen.stop]).all()
@@ -144,7 +144,7 @@ def test_zeros_that_may_be_the_only_closures_are_left(make_known, tmp_path: Path
     series = read(tmp_path, opening, 60.0, "openness_l")
     (note,) = series.notes
     assert "s.csv: 'openness_l' (left eye) jumps to 0 and back from one frame to the next: 3 times" in note
-    assert "left as it is: nothing else of it closes" in note
+    assert "kept: nothing else closes in this column" in note
     assert series.missing_frames == 0
     assert (series.distance == 0).sum() == closed.sum() - 1
 

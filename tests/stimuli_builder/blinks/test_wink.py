@@ -67,13 +67,11 @@ def test_a_wink_is_in_the_table_and_said_unless_rejected(stimuli, make_known, tm
     alone = table[table["partner"].isna()]
     assert alone["column"].to_list() == ["EAR_l"]
     assert alone["minimum_s"].to_list() == pytest.approx([WINK_S], abs=0.05)
-    assert (
-        "note: left eye (EAR_l): 1 blink of this one alone, the other eye open, first at 6.0 s" in ended.err
-    )
+    assert "note: left eye (EAR_l): 1 blink of this eye only, the other eye open, first at 6.0 s" in ended.err
     page, reject = tmp_path / "r.html", f"EAR_l:{WINK + 1}=talking"
     ended = stimuli(
         "blinks", tmp_path / "s.csv", "--column", "EAR_l", "--column", "EAR_r", "--fps", 120,
         "--out", tmp_path / "b.csv", "--review", tmp_path / "v.csv", "--reject", reject, "--report", page,
     )  # fmt: skip
     assert ended.code == 0, ended.err
-    assert "of this one alone" not in ended.err + page.read_text(encoding="utf-8")
+    assert "of this eye only" not in ended.err + page.read_text(encoding="utf-8")

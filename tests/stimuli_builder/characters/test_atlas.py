@@ -129,7 +129,7 @@ def test_wrong_declaration_is_one_clear_line(tiny_character: Path, old: str, new
             b'format = 9\nname = "new"\nlabel = "New"\n',
             "this key is required but missing; .* bake it again",
         ),
-        (b"\xff\xfe", "no text in UTF-8; put a whole file in its place"),
+        (b"\xff\xfe", "not UTF-8 text; restore the complete file"),
         (b"", "this key is required but missing"),
     ],
 )
@@ -141,5 +141,5 @@ def test_an_atlas_of_another_format_is_one_clear_line(tmp_path: Path, content: b
 
 
 def test_folder_without_declaration_is_no_character(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="is no character"):
+    with pytest.raises(InputError, match="is not a character"):
         load_atlas(tmp_path)

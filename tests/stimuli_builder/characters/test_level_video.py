@@ -96,7 +96,7 @@ def test_a_video_of_another_length_than_the_levels(in_video: Path, spare: int) -
         level["sha256"] = video.sha256
     write_declaration(in_video, Declaration.model_validate(declared))
     if spare < 0:
-        with pytest.raises(InputError, match="holds 3 of 40 x 16 px, the declaration asks for frame 3"):
+        with pytest.raises(InputError, match="holds 3 of 40 x 16 px, but frame 3"):
             find_character(str(in_video)).levels((48, 24))
     else:
         assert len(find_character(str(in_video)).levels((48, 24)).levels) == len(CLOSURES)
@@ -105,7 +105,7 @@ def test_a_video_of_another_length_than_the_levels(in_video: Path, spare: int) -
 def test_a_video_of_another_size_than_the_crop_is_refused(in_video: Path) -> None:
     declared = read_declaration(in_video).model_dump() | {"crop": (4, 4, 38, 16)}
     write_declaration(in_video, Declaration.model_validate(declared))
-    with pytest.raises(InputError, match="of 40 x 16 px, the declaration asks for frame 0 of 38 x 16 px"):
+    with pytest.raises(InputError, match="of 40 x 16 px, but frame 0 of 38 x 16 px is declared"):
         find_character(str(in_video)).levels((48, 24))
 
 
@@ -118,7 +118,7 @@ def test_a_damaged_video_is_said_in_one_line(in_video: Path) -> None:
 
 def test_bytes_that_are_no_video_are_said_in_one_line() -> None:
     with pytest.raises(
-        InputError, match=r"levels is damaged: cannot decode x.mkv; put a whole file in its place"
+        InputError, match=r"levels is damaged: cannot decode x.mkv; restore the complete file"
     ):
         decode_level_video(b"no video at all", "levels", "x.mkv")
 
@@ -127,7 +127,7 @@ def test_a_frame_beyond_the_video_is_refused(in_video: Path) -> None:
     declared = read_declaration(in_video).model_dump()
     declared["levels"][-1]["frame"] = 9
     write_declaration(in_video, Declaration.model_validate(declared))
-    with pytest.raises(InputError, match=r"holds 4 of 40 x 16 px, the declaration asks for frame 9"):
+    with pytest.raises(InputError, match=r"holds 4 of 40 x 16 px, but frame 9"):
         load_atlas(in_video).check_files()
 
 

@@ -81,7 +81,7 @@ def test_other_pictures_than_it_had_are_refused_and_nothing_stays(
 ) -> None:
     file = tiny_character / "character.toml"
     file.write_text(file.read_text() + "\n# changed\n")
-    with pytest.raises(InputError, match="holds another 'old' than earlier releases had"):
+    with pytest.raises(InputError, match="differs from the one in earlier releases"):
         restore("old", tiny_character, tmp_path / "data" / "old")
     assert not list((tmp_path / "data").iterdir())
 
@@ -99,7 +99,7 @@ def test_the_next_version_is_one_that_nobody_has() -> None:
 
 @pytest.mark.parametrize(
     ("name", "said"),
-    [("odl", "no retired character 'odl'; did you mean 'old'"), ("old", "does not hold 'old'")],
+    [("odl", "no retired character 'odl'; did you mean 'old'"), ("old", "does not contain 'old'")],
 )
 def test_what_cannot_be_had_is_one_line(repository: Path, tmp_path: Path, name: str, said: str) -> None:
     empty = tmp_path / "empty"

@@ -140,7 +140,7 @@ def test_a_study_without_checks_has_a_manifest_without_them(tmp_path: Path) -> N
     content = json.loads((tmp_path / "clips" / MANIFEST_NAME).read_text())
     assert "checks" not in content
     assert "checks_seed" not in content
-    with pytest.raises(InputError, match="asks for no motion checks"):
+    with pytest.raises(InputError, match="has no motion checks"):
         checks.build_checks(plain, tmp_path / "clips", Options(), silent)
 
 
@@ -154,21 +154,21 @@ def test_the_command_says_what_it_made(copied: Path, tmp_path: Path) -> None:
     assert read_manifest(copied).checks_seed == 8
     nowhere = run.invoke(app, ["checks", str(toml), "--out", str(tmp_path / "none")])
     assert isinstance(nowhere.exception, InputError)
-    assert "make the clips first" in str(nowhere.exception)
+    assert "build the clips first" in str(nowhere.exception)
 
 
 @pytest.mark.parametrize(
     ("before", "after", "message"),
     [
         ("per_block = 2", "per_block = 11", "expected at most 10, got 11"),
-        ("clips = 5", "clips = 3", "expected at least the 4 checks"),
+        ("clips = 5", "clips = 3", "expected at least 4, one per check"),
         ('"first_eye"]', '"letter"]', "letter"),
         ("clips = 5", "clips = 5\ncontrast = 0.0", "expected more than 0, got 0.0"),
         ("clips = 5", "clips = 5\ndifficulty = nan", "finite"),
         (
             "clips = 5",
             "clips = 5\nwording = [{ check = 'shape', question = { en = 'q' }, choices = [] }]",
-            "shape has 4 choices, got 0",
+            "expected 4 choices for shape, got 0",
         ),
     ],
 )

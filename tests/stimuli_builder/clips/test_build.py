@@ -125,7 +125,7 @@ def test_an_interrupted_build_goes_on_where_it_stopped(small: Small, built: Path
 
 def test_a_folder_of_another_experiment_is_left_alone(small_text: str, copied: Path, tmp_path: Path) -> None:
     other = make_small(tmp_path / "study", small_text.replace('name = "small"', 'name = "other"'))
-    with pytest.raises(InputError, match="holds the clips of 'small'"):
+    with pytest.raises(InputError, match="has the clips of 'small'"):
         other.build(copied)
 
 
@@ -250,10 +250,14 @@ def test_a_file_in_place_of_the_folder_is_refused(small: Small, tmp_path: Path) 
 @pytest.mark.parametrize(
     ("old", "new", "line"),
     [
-        ('character = "tiny"', 'character = "tinny"', "cell own/real, exemplar 1: no character 'tinny'"),
+        (
+            'character = "tiny"',
+            'character = "tinny"',
+            "cell own/real, exemplar 1: there is no character 'tinny'",
+        ),
         ('character = "cartoon"', 'character = "cartoon", lower_lid = "both"', "no lower-lid layer"),
         ("height_px = 120", "height_px = 200", "120 px high"),
-        ("width_px = 320", "width_px = 480", "cell cartoon/real, .* cuts off what moves in a blink"),
+        ("width_px = 320", "width_px = 480", "cell cartoon/real, .* cuts off moving parts of a blink"),
         ('profile = "mine.csv"', 'profile = "yours.csv"', "yours.csv"),
     ],
 )

@@ -127,7 +127,7 @@ def test_a_clip_of_a_file_with_decimal_commas(
     file.write_text("closure;lower_up_mm\n" + "".join(f"0,{n};0\n" for n in (0, 2, 4, 6, 8, 9, 7, 5, 3, 1)))
     call = ("--profile", file, "--size", "320x120", "--out", out)
     assert stimuli(monkeypatch, "clip", *call) == 0
-    said = "columns parted by semicolons, decimal commas (e.g. '0,0') read as decimal points"
+    said = "columns separated by semicolons, decimal commas (e.g. '0,0') read as decimal points"
     assert capsys.readouterr().err == f"note: blink.csv: {said}\n"
 
 
@@ -166,7 +166,7 @@ def test_a_clip_is_called_what_it_is(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     assert stimuli(monkeypatch, "clip", "--out", tmp_path / "one.avi") == 2
-    assert "--out: expected a file that ends in .mp4, got 'one.avi'" in capsys.readouterr().err
+    assert "--out: expected a name ending in .mp4, got 'one.avi'" in capsys.readouterr().err
 
 
 def test_a_failed_check_exits_2(

@@ -106,7 +106,7 @@ def test_a_lower_lid_that_wavers_about_rest_is_held_there_and_the_manifest_told(
 @pytest.mark.parametrize(
     ("vertical", "horizontal", "message"),
     [
-        ([0.0, 0.5, 0.0], [0.0, 6.2, 0.0], r"0\.00 to 6\.20 mm towards the nose.*baked for 0 to 5 mm"),
+        ([0.0, 0.5, 0.0], [0.0, 6.2, 0.0], r"0\.00 to 6\.20 mm toward the nose.*baked for 0 to 5 mm"),
         ([0.0, -0.4, 0.0], [0.0, 2.0, 0.0], r"-0\.40 to 0\.00 mm up.*baked for 0 to 1 mm"),
     ],
 )

@@ -181,13 +181,13 @@ height_px = 180
 
 def test_what_cannot_move_is_said_in_one_line(alder: LevelSet) -> None:
     settings = settings_from(character="cartoon", gaze_mm=0.4)
-    with pytest.raises(InputError, match="is drawn with eyes that look straight on; leave gaze_mm"):
+    with pytest.raises(InputError, match="is drawn with eyes that look straight ahead; remove gaze_mm"):
         check_look(settings, geometry("cartoon"))
     check_look(settings_from(character="cartoon", gaze_mm=0.0), geometry("cartoon"))
     with pytest.raises(InputError, match=r"--brow-mm: expected at most 1, got 1\.5"):
         settings_from(brow_mm=1.5)
     elsewhere = replace(geometry("alder@8"), inter_ocular_mm=16.0)
-    with pytest.raises(InputError, match=r"no eye that shuts lies 8 mm beside .* leave out brow_mm"):
+    with pytest.raises(InputError, match=r"no eye that closes was found 8 mm from .* remove brow_mm"):
         moved_levels(alder, elsewhere, Movement(brow=0.5))
     assert look_of(settings_from(character="alder@8", brow_mm=0.0), Options()).movement.declared == {
         "brow": 0

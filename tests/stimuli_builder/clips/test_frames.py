@@ -141,7 +141,7 @@ def test_other_sizes_are_resampled_with_still_edges(
     ("size", "line"),
     [
         ((48, 40), "24 px high"),
-        ((48, 10), "cuts off what moves in a blink of 'tiny', which is 24 px high"),
+        ((48, 10), "cuts off moving parts of a blink of 'tiny', which is 24 px high"),
         ((48, 10), "its own size: width_px = 48, height_px = 24"),
     ],
 )

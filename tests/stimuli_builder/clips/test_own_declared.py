@@ -51,7 +51,7 @@ BY_NAME = ("--pattern", "{speed}_{shape}.mp4")
             [name for name in CELLS if "medium" not in name],
             "no clip has the level 'medium' of speed, which is declared; add its clips",
         ),
-        (CELLS[:-1], "6 clips are declared, 5 are here: fast/square, exemplar 1, is missing"),
+        (CELLS[:-1], "6 clips are declared, but 5 were found: fast/square, exemplar 1, is missing"),
     ],
     ids=["a slip", "a whole level", "two slips", "an unused level", "one clip"],
 )

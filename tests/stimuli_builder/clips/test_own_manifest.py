@@ -72,7 +72,7 @@ def test_a_manifest_is_written_by_the_names(monkeypatch: pytest.MonkeyPatch, cli
     ]  # fmt: skip
     assert manifest.experiment == load_experiment(str(study)).name
     (clips / manifest.clips[0].file).unlink()
-    with pytest.raises(InputError, match="put the file back, or write the manifest again with `stimuli man"):
+    with pytest.raises(InputError, match="restore the file, or write the manifest again with `stimuli man"):
         check_files(manifest, clips)
 
 
@@ -84,8 +84,8 @@ def test_without_a_declaration_the_folder_names_the_set(monkeypatch: pytest.Monk
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--pattern", "{speed}-{exemplar}.mp4"), "does not follow the pattern"),
-        ((), "expected either --pattern or --table"),
+        (("--pattern", "{speed}-{exemplar}.mp4"), "does not match the pattern"),
+        ((), "the levels of each clip are unknown: add either --pattern or --table"),
         (("--table", "none.csv"), "no file none.csv"),
         (
             ("--pattern", "{pace}_ä_{exemplar}.mp4", "--experiment", STUDY_FILE),
@@ -97,7 +97,7 @@ def test_without_a_declaration_the_folder_names_the_set(monkeypatch: pytest.Monk
         ),
         (
             ("--pattern", "{speed}_{style}_{exemplar}.mp4", "--experiment", STUDY_FILE),
-            "factor 'style' of the clips is not declared in robots, which has speed; declare it, or leave",
+            "factor 'style' of the clips is not declared in robots, which has speed; declare it, or remove",
         ),
     ],
 )
@@ -130,9 +130,9 @@ def test_a_stray_level_is_named_beside_what_was_understood(
     told = capsys.readouterr()
     assert told.out.splitlines() == [
         "levels of speed, with their clips: fast (4), slow (3), slwo (1)",
-        "'slwo' of speed (slwo_4.mp4) looks like 'slow': correct the name if it is meant",
+        "'slwo' of speed (slwo_4.mp4) looks like 'slow': correct the name if 'slow' is intended",
     ]
-    assert "every cell needs the same number of clips: fast has 4, slwo has 1" in told.err
+    assert "expected the same number of clips in every cell: fast has 4, slwo has 1" in told.err
 
 
 def test_a_forgotten_exemplar_is_named(
@@ -143,7 +143,7 @@ def test_a_forgotten_exemplar_is_named(
     assert stimuli(monkeypatch, "manifest", clips, "--pattern", "{speed}.mp4") == 0
     assert capsys.readouterr().out.splitlines()[:2] == [
         "levels of speed, with their clips: fast_ä_1 (1), fast_ä_2 (1), slow_ä_1 (1), slow_ä_2 (1)",
-        "levels of speed end in numbers (fast_ä_1); if they number the clips, give '{speed}_{exemplar}.mp4'",
+        "levels of speed end in numbers (fast_ä_1); if they number the clips, use '{speed}_{exemplar}.mp4'",
     ]
 
 
@@ -159,7 +159,7 @@ def test_levels_that_cannot_be_rendered_are_refused(
 ) -> None:
     out = clips.parent / "out"
     assert stimuli(monkeypatch, "build", clips.parent / "robots.toml", "--out", out) != 0
-    assert "'10' and '2' change nothing of the rendering" in capsys.readouterr().err
+    assert "'10' and '2' do not change the rendering" in capsys.readouterr().err
     assert not out.exists()
 
 
@@ -258,7 +258,7 @@ def test_a_quicktime_clip_of_an_older_manifest_is_named_with_advice_that_can_be_
     assert stimuli(monkeypatch, "verify", clips) != 0
     told = capsys.readouterr()
     assert "was QuickTime" in told.out
-    assert "write the manifest again with `stimuli manifest`" in told.err
+    assert "run `stimuli manifest` again" in told.err
     assert stimuli(monkeypatch, *arguments, "--out", clips.parent / "again") == 0
     assert stimuli(monkeypatch, "verify", clips.parent / "again") == 0
     store_clips(

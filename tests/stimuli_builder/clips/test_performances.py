@@ -109,7 +109,7 @@ def test_speech_beside_the_toml_is_answered(tmp_path: Path) -> None:
     )
     chosen = settings_of("events", speech="talk.vtt", seconds=10)
     assert performance_curve(chosen, "", 1, 7, tmp_path).blinks_s
-    with pytest.raises(InputError, match=r"talk\.vtt lasts 12\.0 s, the clip 20 s"):
+    with pytest.raises(InputError, match=r"talk\.vtt lasts 12\.0 s, but the clip lasts 20 s"):
         performance_curve(settings_of("events", speech="talk.vtt"), "", 1, 7, tmp_path)
     with pytest.raises(InputError, match="no such file"):
         performance_curve(settings_of("events", speech="other.vtt"), "", 1, 7, tmp_path)
@@ -193,5 +193,5 @@ def test_the_timing_studies_plan() -> None:
 def test_more_frames_than_a_trial_may_log_are_refused() -> None:
     text = (SHIPPED / "timing.toml").read_text().replace("seconds = 20.0", "seconds = 60.0\nfps = 60")
     assert parse_experiment(text.replace("[trial]", "[trial]\nviews = 5", 1)).trial
-    with pytest.raises(InputError, match="6 views of 3600 frames are more than the 20000"):
+    with pytest.raises(InputError, match="6 views of 3600 frames exceed the 20000"):
         parse_experiment(text.replace("[trial]", "[trial]\nviews = 6", 1))

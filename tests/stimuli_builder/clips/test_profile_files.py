@@ -90,7 +90,7 @@ def test_a_table_of_profiles_with_semicolons(tmp_path: Path) -> None:
         ("closure\n0\n-0.2\n0\n", "sample 2 is -0.2"),
         ("closur\n0\n1\n0\n", "no column 'closure'; did you mean 'closur'"),
         ("run,score\n1,2\n", r"no column 'closure'; expected one blink .* or a table of profiles \(NAME"),
-        ("closure\n1\n0.5\n0\n", "must lie inside the blink"),
+        ("closure\n1\n0.5\n0\n", "must be inside the blink"),
         ("", "bad.csv is empty; expected a table"),
     ],
 )

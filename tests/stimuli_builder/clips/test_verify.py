@@ -75,7 +75,7 @@ def test_a_blink_one_frame_late_is_found_in_the_pixels(small: Small, copied: Pat
     closure = json.loads((copied / MANIFEST_NAME).read_text())["clips"][0]["closure"]
     rewrite(copied, {"closure": [closure[0]] * 10 + closure[:-10]})
     (finding,) = verify(copied, small.folder).findings
-    assert "mm more or less than the curve says" in finding.problem
+    assert "the opening of an eye differs from the curve by" in finding.problem
 
 
 LIDS = """
@@ -126,8 +126,8 @@ def test_eyes_apart_and_a_moving_lower_lid_are_measured(lids: tuple[Small, Path]
 @pytest.mark.parametrize(
     ("number", "change", "problem"),
     [
-        (0, {"closure_other": []}, "an eye is open"),
-        (1, {"lower_vertical_mm": [], "lower_horizontal_mm": []}, "an eye is open"),
+        (0, {"closure_other": []}, "the opening of an eye"),
+        (1, {"lower_vertical_mm": [], "lower_horizontal_mm": []}, "the opening of an eye"),
         (1, {"closure": [0.0] * 100}, "needs 100 finite samples"),
         (0, {"closure": [0.0] * 20, "closure_other": []}, "its curve is 2 frames long"),
         (0, {"closure": [2.0] * 200, "closure_other": []}, "closure must lie between 0 and 1"),

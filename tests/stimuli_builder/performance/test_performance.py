@@ -117,7 +117,7 @@ def test_silence_has_no_speech_and_the_blinks_of_the_state(tmp_path: Path) -> No
     out = tmp_path / "out.json"
     done = CliRunner().invoke(app, ["performance", str(path), "--out", str(out), "--format", "json"])
     assert done.exit_code == 0, done.output
-    assert "nobody speaks" in " ".join(done.output.split())
+    assert "there is no speech" in " ".join(done.output.split())
     assert len(json.loads(out.read_text())["closure_left"]) == 3600
 
 
@@ -126,7 +126,7 @@ def test_subtitles_out_of_order_and_by_voice(tmp_path: Path) -> None:
     path.write_text(SUBTITLES, encoding="utf-8")
     anna, length_s = speech_in_subtitles(path, "Anna")
     assert (anna, length_s) == ([Speech(1.0, 2.5), Speech(2.9, 5.0)], 8.0)
-    with pytest.raises(InputError, match=r"nobody is called 'Ana'.*Anna.*voices: Anna, Bob"):
+    with pytest.raises(InputError, match=r"there is no speaker 'Ana'.*Anna.*voices: Anna, Bob"):
         speech_in_subtitles(path, "Ana")
 
 
@@ -176,7 +176,7 @@ def test_blinks_gather_at_turn_ends(tmp_path: Path) -> None:
         (["--duration", "5", "--format", "fbx"], "unknown --format 'fbx'"),
         (["--duration", "5", "--rate", "0"], "expected --rate"),
         (["--duration", "86400", "--fps", "1000"], "expected at most 6000000 frames, got 86400000"),
-        (["--duration", "5", "--left", "a", "--right", "a"], "each eye needs a shape of its own"),
+        (["--duration", "5", "--left", "a", "--right", "a"], "each eye needs a separate shape"),
     ],
 )
 def test_bad_input_is_one_line(tmp_path: Path, arguments: list[str], told: str) -> None:
@@ -194,7 +194,7 @@ def test_bad_input_is_one_line(tmp_path: Path, arguments: list[str], told: str) 
         (b"1\n00:00:xx --> 00:00:05,000\nhello\n", "expected subtitles with times, found none"),
         (
             b"1\n00:00:06,000 --> 00:00:05,000\nhello\n",
-            "a subtitle ends at 00:00:05.000, not after its start",
+            "a subtitle ends at 00:00:05.000, before or at its start",
         ),
         (b"", "expected subtitles"),
     ],

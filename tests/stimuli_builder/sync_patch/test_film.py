@@ -96,7 +96,7 @@ def test_the_command_names_the_missing_frame_and_writes_onsets(
     scope(path, out=tmp_path / "onsets.csv")
     printed = capsys.readouterr().out
     assert "1 missing (3)" in printed
-    assert "0 of 1 play(s) without a missing frame" in printed
+    assert "0 of 1 presentation(s) without a missing frame" in printed
     rows = list(csv.DictReader((tmp_path / "onsets.csv").read_text().splitlines()))
     assert [int(row["frame"]) for row in rows] == [*range(3), *range(4, FRAMES)]
     assert float(rows[2]["interval_ms"]) == pytest.approx(2 * PERIOD_MS, abs=9)
@@ -104,13 +104,13 @@ def test_the_command_names_the_missing_frame_and_writes_onsets(
 
 def test_a_slow_motion_file_needs_the_camera_s_rate(tmp_path: Path) -> None:
     path = film(tmp_path / "film.mp4", steady(4, FPS), replace(PHONE, fps=30.0), 300)
-    with pytest.raises(InputError, match=r"at least 100 pictures a second, got 30.*--camera-fps 240"):
+    with pytest.raises(InputError, match=r"at least 100 frames per second, got 30.*--camera-fps 240"):
         read_film(path)
 
 
 def test_a_film_without_a_patch_is_one_line(tmp_path: Path) -> None:
     path = film(tmp_path / "film.mp4", Shown({}, 0.0), PHONE, 60)
-    with pytest.raises(InputError, match="found no sync patch; film the whole patch"):
+    with pytest.raises(InputError, match="no sync patch was found; film the whole patch"):
         read_film(path)
 
 

@@ -44,7 +44,7 @@ def test_a_missing_frame_is_a_long_interval(tmp_path: Path, capsys: pytest.Captu
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("time_ms,value\n0,1\n0,2\n", "expected times that grow"),
+        ("time_ms,value\n0,1\n0,2\n", "expected times in ms that increase"),
         ("time_ms,value\n0,one\n", "expected two columns of numbers"),
         ("time_ms,value\n", "has a header but no rows"),
     ],

@@ -54,11 +54,11 @@ def test_labels_for_another_video_size(refused, document, tmp_path):
     document["image_size_px"] = [640, 480]
     path = tmp_path / "labels.json"
     path.write_text(json.dumps(document))
-    assert "made on 640 x 480 pixels, the video has 512 x 384" in refused(labels=path)
+    assert "made on 640 x 480 pixels, but the video has 512 x 384" in refused(labels=path)
 
 
 def test_two_eye_labels_with_one_eye_and_the_reverse(refused, document, tmp_path):
-    assert "leave --one-eye out" in refused(None, None, "--one-eye")
+    assert "remove --one-eye" in refused(None, None, "--one-eye")
     document["frames"] = {key: points[:9] for key, points in document["frames"].items()}
     del document["mid_upper"], document["mid_lower"]
     path = tmp_path / "labels.json"
@@ -67,7 +67,7 @@ def test_two_eye_labels_with_one_eye_and_the_reverse(refused, document, tmp_path
 
 
 def test_missing_unreadable_and_soundless_videos(refused, tmp_path):
-    assert "found none" in refused(tmp_path / "none.mp4")
+    assert "there is no such video file" in refused(tmp_path / "none.mp4")
     text = tmp_path / "text.mp4"
     text.write_text("this is no video")
     assert "not a video that can be read" in refused(text)
@@ -77,7 +77,7 @@ def test_missing_unreadable_and_soundless_videos(refused, tmp_path):
     assert "; the file is empty" in refused(empty)
     picture = tmp_path / "picture.png"
     cv2.imwrite(str(picture), np.zeros((24, 32, 3), np.uint8))
-    assert "picture.png: expected a video, this is a single picture" in refused(picture)
+    assert "picture.png: expected a video, but this is a single picture" in refused(picture)
 
 
 def test_pictures_that_follow_one_another_in_a_file_are_a_video(tmp_path):
@@ -120,7 +120,7 @@ def test_a_video_without_a_face(refused, recording, tmp_path, stimuli):
     path = tmp_path / "wall.mp4"
     write_frames(path, wall)
     error = refused(path, None, "--model", model)
-    assert "no eyes like the labelled ones in any of its 12 frames" in error
+    assert "no eyes like the labeled ones were found in its 12 frames" in error
 
 
 def test_variable_frame_rate_is_refused_or_accepted_by_name(refused, recording, tmp_path, stimuli):
@@ -151,31 +151,33 @@ def test_a_model_for_another_size_or_no_model(refused, recording, tmp_path, less
     with VideoWriter(small, 100, (256, 192)) as writer:
         for picture in recording.pictures[:5]:
             writer.write(np.ascontiguousarray(picture[::2, ::2]))
-    assert "256 x 192 pixels, the model was trained on 512 x 384" in refused(small, None, "--model", model)
-    assert "not a model that 'stimuli train' wrote" in refused(None, None, "--model", recording.truth)
-    assert "found none" in refused(None, None, "--model", tmp_path / "none.npz")
+    assert "256 x 192 pixels, but the model was trained on 512 x 384" in refused(
+        small, None, "--model", model
+    )
+    assert "not a model from 'stimuli train'" in refused(None, None, "--model", recording.truth)
+    assert "there is no such model file" in refused(None, None, "--model", tmp_path / "none.npz")
 
 
 def test_labels_and_model_are_not_given_together(stimuli, recording, tmp_path):
     both = ("--labels", recording.labels, "--model", tmp_path / "m.npz")
     code, _, error = stimuli("track", recording.video, "--out", tmp_path / "track.csv", *both)
     assert code == 2
-    assert "give one of them" in error
+    assert "not both" in error
 
 
 def test_relabelling_belongs_to_tracking_without_labels(stimuli, recording, tmp_path):
     given = ("--labels", recording.labels, "--relabel", tmp_path / "worst.json")
     code, _, error = stimuli("track", recording.video, "--out", tmp_path / "track.csv", *given)
     assert code == 2
-    assert "--relabel belongs to" in error
+    assert "--relabel is for" in error
 
 
 @pytest.mark.parametrize(
     ("name", "option", "message"),
     [
         ("preview.txt", "--preview", "use a name in .mp4"),
-        ("plot.gif", "--plot", "no figure format 'gif'"),
-        ("track.csv", "--preview", "a name of its own"),
+        ("plot.gif", "--plot", "'gif' is not a figure format"),
+        ("track.csv", "--preview", "a unique name"),
     ],
 )
 def test_a_second_output_that_cannot_be_written_is_refused_first(refused, tmp_path, name, option, message):
@@ -197,7 +199,7 @@ def test_no_output_takes_the_place_of_an_input(stimuli, recording, tmp_path):
     for call in calls:
         code, _, error = stimuli(*call)
         assert (code, error.count("\n")) == (2, 1)
-        assert "a name of its own" in error
+        assert "a unique name" in error
     assert video.read_bytes() == recording.video.read_bytes()
     assert labels.read_bytes() == recording.labels.read_bytes()
 
@@ -233,7 +235,7 @@ def test_a_folder_is_tracked_and_goes_on_where_it_stopped(stimuli, folder, tmp_p
     (folder / "b.mov").unlink()
     code, said, error = stimuli(*given)
     assert (code, error) == (0, "")
-    assert "there already" in said
+    assert "already exists" in said
     assert (tmp_path / "tracks" / "a.csv").stat().st_mtime_ns == before
 
 
@@ -248,7 +250,7 @@ def test_videos_of_one_name_in_a_folder_have_a_track_each(stimuli, folder, tmp_p
 
 def test_a_folder_takes_no_options_of_one_video(stimuli, folder, recording, tmp_path):
     one = ("--labels", recording.labels)
-    assert "are one video's" in stimuli("track", folder, "--out", tmp_path / "tracks", *one)[2]
+    assert "need a single video" in stimuli("track", folder, "--out", tmp_path / "tracks", *one)[2]
     (tmp_path / "none").mkdir()
     assert "no video in this folder" in stimuli("track", tmp_path / "none", "--out", tmp_path / "t")[2]
     assert not (tmp_path / "tracks").exists()
@@ -261,7 +263,7 @@ def test_accuracy_of_files_that_do_not_belong_together(stimuli, recording, tmp_p
     other.write_text("\n".join(recording.truth.read_text().splitlines()[:50]) + "\n")
     code, _, error = stimuli("accuracy", other, recording.truth)
     assert code == 2
-    assert "compare a track with its own truth" in error
+    assert "compare a track with its own ground truth" in error
     assert "not a track" in stimuli("accuracy", recording.labels, recording.truth)[2]
 
 
@@ -314,7 +316,7 @@ def test_a_track_too_short_for_a_plot_is_written_and_the_plot_is_told(stimuli, r
     assert code == 0
     assert "30 frames" in said
     assert error.startswith(
-        f"warning: {plot}: no plot, the track is written (t.csv: 30 frames at 200 fps are"
+        f"warning: {plot}: the track was written, but not the plot (t.csv: 30 frames at 200 fps are"
     )
     assert error.count("\n") == 1
     assert out.exists()

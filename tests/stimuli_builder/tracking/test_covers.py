@@ -129,7 +129,7 @@ def test_eyes_that_stay_are_not_covered_in_a_sharp_picture_or_a_poor_one(spread)
 @pytest.mark.parametrize(
     ("covers", "eyes", "words"),
     [
-        ([(0, range(5, 9))], 1, "eye covered, shut tightly or turned away: "),
+        ([(0, range(5, 9))], 1, "eye covered, closed tightly or turned away: "),
         ([(0, range(5, 9))], 2, "left eye covered, shut tightly or turned away: "),
         ([(1, range(5, 6))], 2, "right eye covered, shut tightly or turned away: "),
         ([(0, range(5, 9)), (1, range(5, 9))], 2, "both eyes covered, shut tightly or turned away: "),
@@ -161,7 +161,7 @@ def test_blinks_that_are_read_less_steadily_are_no_covers():
 @pytest.mark.parametrize("covers", [range(5, 37), range(40)])
 def test_covers_for_most_of_a_recording_or_all_of_it_are_told(covers):
     seen = looks(0.025, [(0, covers)])
-    with pytest.raises(InputError, match=f"an eye is covered on {len(covers)} of 40 frames that show one"):
+    with pytest.raises(InputError, match=f"an eye is covered in {len(covers)} of 40 frames that show one"):
         covered_frames(VIDEO, seen, fewest=20)
     assert sorted(covered_frames(VIDEO, seen, fewest=0)) == list(covers)
 
@@ -249,7 +249,7 @@ def test_without_steady_looks_every_unsteady_eye_is_covered_or_shut():
     seen = {n: [0.05, 0.05] for n in range(40)} | {n: [0.12, 0.12] for n in range(10, 25)}
     told = covered_frames(VIDEO, seen, 6, surroundings())
     assert set(told) == set(range(10, 25))
-    assert all("shut tightly or turned away" in why for why in told.values())
+    assert all("closed tightly or turned away" in why for why in told.values())
 
 
 @pytest.mark.parametrize("kind", ["skin", "cheek"])

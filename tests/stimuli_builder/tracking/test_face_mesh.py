@@ -73,8 +73,8 @@ def test_a_face_that_is_read_alike_in_mirror_images_is_taken():
     ("shares", "told"),
     [
         ([0.1, 0.12, 0.09, np.inf], "read differently in the mirror image (by 10% of"),
-        ([0.02, np.inf, np.inf, np.inf], "not seen in the mirror image on 3 of 4 frames"),
-        ([np.inf, np.inf], "not seen in the mirror image on 2 of 2 frames"),
+        ([0.02, np.inf, np.inf, np.inf], "not detected in the mirror image of 3 of 4 frames"),
+        ([np.inf, np.inf], "not detected in the mirror image of 2 of 2 frames"),
     ],
     ids=["differs", "mostly absent", "absent"],
 )

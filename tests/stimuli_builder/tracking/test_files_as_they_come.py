@@ -86,7 +86,7 @@ def test_one_eye_in_an_upright_picture_is_tracked(recording, tmp_path):
 
 def test_a_wrong_rotation_in_the_head_is_one_line_and_no_track(lesson, recording, tmp_path):
     video = written(tmp_path / "wrong.mp4", recording.pictures[:12], rotation_deg=180)
-    with pytest.raises(InputError, match="no eyes like the labelled ones") as refused:
+    with pytest.raises(InputError, match="no eyes like the labeled ones") as refused:
         track_video(lesson.model, scan_video(video), tmp_path / "t.csv")
     assert "\n" not in str(refused.value)
     assert not (tmp_path / "t.csv").exists()

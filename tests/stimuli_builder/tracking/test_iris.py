@@ -72,7 +72,7 @@ def test_the_command_tells_the_scale(stimuli, recording, course, track, tmp_path
     rows = list(csv.DictReader(out.read_text().splitlines()))
     assert len(rows) == 200
     assert list(rows[0])[2:5] == ["left_iris_x_px", "left_iris_y_px", "left_iris_diameter_px"]
-    told = float(said.split(" mm in a pixel")[0].split()[-1])
+    told = float(said.split(" mm per pixel")[0].split()[-1])
     assert told == pytest.approx(IRIS_MM / true_iris(course, 0, 0)[1], rel=0.06)
 
 

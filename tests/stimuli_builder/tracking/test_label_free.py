@@ -186,7 +186,7 @@ def test_labels_are_proposed_from_what_the_detector_saw(recording, detections, t
     openings = [points[7, 1] - points[2:4, 1].mean() for points in labels.frames.values()]
     every = [points[7, 1] - points[2:4, 1].mean() for points in detections.values()]
     assert np.ptp(openings) > 0.8 * np.ptp(every)
-    with pytest.raises(InputError, match="60 are wanted"):
+    with pytest.raises(InputError, match="60 are required"):
         proposed_labels(info, Survey(detections, 40, 0), tmp_path / "m.json", 60)
     assert not (tmp_path / "m.json").exists()
 
@@ -323,7 +323,7 @@ def test_eyes_that_reach_out_of_the_picture_count_as_unseen_and_the_reason_says_
         picture[:, -cut_px:] = 128
     write_frames(tmp_path / "cut.mp4", pictures, fps=30)
     assert survey(scan_video(tmp_path / "cut.mp4"), one_eye=False).unseen == unseen
-    assert UNSEEN.endswith("or not wholly in the picture")
+    assert UNSEEN.endswith("or they are partly outside the picture")
 
 
 def test_a_whole_face_is_refused_as_a_close_up_and_a_close_up_is_not(detector, shared_data, monkeypatch):
@@ -363,7 +363,7 @@ def test_pictures_are_chosen_from_the_first_to_the_last(count):
 def test_a_close_up_whose_eye_is_seen_below_ten_px_is_refused(detector, shared_data):
     clip = shared_data / "face_video" / "short_human_3blink.mp4"
     pictures = [cv2.resize(p, (12, 9), interpolation=cv2.INTER_AREA) for p in frames(clip, read=rgb)]
-    message = r"seen \d px wide, and 10 are needed; leave out --one-eye"
+    message = r"\d px wide, but at least 10 px are needed; remove --one-eye"
     with (
         pytest.raises(InputError, match=message) as refused,
         open_detector(one_eye=True, first=pictures[::24]),

@@ -59,10 +59,10 @@ def spoil(document, how):
 @pytest.mark.parametrize(
     ("how", "line"),
     [
-        ("few", "2 labelled frames, at least 3"),
+        ("few", "2 labeled frames, but at least 3"),
         ("outside", "point 4 at (600, 100) is outside the picture of 512 x 384"),
         ("swapped points", "cross; check the point order"),
-        ("lids crossed", "lies above the upper lid"),
+        ("lids crossed", "is above the upper lid"),
         ("eyes swapped", "the eyes are swapped"),
         ("no size", "'image_size_px' is missing; expected [width, height]"),
         ("count", "expected 18 points (or 9 for one eye), found 17"),
@@ -73,7 +73,7 @@ def spoil(document, how):
         ("same frame", "occurs twice"),
         ("size", "expected 'image_size_px'"),
         ("no frames", "'frames' is missing; expected the points"),
-        ("canthi", "under 4 px apart"),
+        ("canthi", "less than 4 px apart"),
         ("markers", "expected points 9 to 17"),
     ],
 )
@@ -95,7 +95,7 @@ def test_a_frame_given_twice_in_the_file_is_refused(document, tmp_path):
 
 def test_labels_of_another_size_or_a_longer_video_are_refused(document, tmp_path):
     path = saved(tmp_path, document)
-    with pytest.raises(InputError, match="made on 512 x 384 pixels, the video has 640 x 480"):
+    with pytest.raises(InputError, match="made on 512 x 384 pixels, but the video has 640 x 480"):
         load_labels(path, (640, 480))
     with pytest.raises(InputError, match="the video ends at frame 4"):
         load_labels(path, (512, 384), 5)

@@ -135,6 +135,6 @@ def test_labels_that_nobody_reviewed_are_told(command, stimuli, recording, tmp_p
     assert "warning: " in error
     assert "12 of 12 frames are as they were proposed and nobody accepted them; all train as given" in error
     changed(labels, lambda document: document.update(proposed={}))
-    assert "as they were proposed" not in stimuli(*given)[2]
+    assert "unreviewed proposals" not in stimuli(*given)[2]
     changed(labels, lambda document: document.pop("proposed"))
-    assert "keeps no proposals, so that nothing tells which frames a person saw" in stimuli(*given)[2]
+    assert "has no proposals, so reviewed frames cannot be identified" in stimuli(*given)[2]

@@ -308,7 +308,7 @@ def test_a_face_on_its_side_is_refused_in_one_line(face, tmp_path, quarters):
     with pytest.raises(InputError) as refused:
         survey(scan_video(video), one_eye=False)
     line = str(refused.value)
-    assert f"the face is turned by {90 * quarters} degrees clockwise" in line or "a face was found on" in line
+    assert f"the face is turned by {90 * quarters} degrees clockwise" in line or "a face was found in" in line
     assert "\n" not in line
 
 
@@ -335,6 +335,6 @@ def test_a_recording_that_shows_a_face_on_few_frames_is_refused_with_their_numbe
     rng = np.random.default_rng(3)
     walls = [np.clip(rng.normal(120, 8, (360, 640)), 0, 255).astype(np.uint8) for _ in range(60)]
     write_frames(video, face[:12] + walls, fps=30)
-    with pytest.raises(InputError, match="a face was found on 2 of 12 frames looked at") as refused:
+    with pytest.raises(InputError, match="a face was found in 2 of 12 frames") as refused:
         survey(scan_video(video), one_eye=False)
     assert "\n" not in str(refused.value)

@@ -24,7 +24,7 @@ def track(recording, lesson, tmp_path_factory):
 
 
 def test_actor_is_tracked_within_the_limits(track, recording):
-    with pytest.raises(InputError, match="give them the other way round"):
+    with pytest.raises(InputError, match="swap them"):
         compare_with_truth(recording.truth, track[0])
     report = compare_with_truth(track[0], recording.truth)
     assert (report.frames, report.lost, report.reinitialised) == (200, 0, 0)
