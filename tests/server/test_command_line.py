@@ -101,7 +101,7 @@ def test_an_archived_study_is_not_changed_from_the_command_line(
         run_server_command(settings, "seal", "short", "--out", str(sources / "seal.json")),
     ):
         assert (refused.returncode, refused.stderr.count("\n")) == (2, 1), refused.stderr
-        assert "is in the archive; take it out again" in refused.stderr
+        assert "is archived. Remove it from the archive" in refused.stderr
     with services.database.read() as session:
         kept = session.query(Study).one()
         assert (kept.status, kept.active_version, len(kept.versions)) == ("closed", 1, 1)

@@ -71,7 +71,7 @@ def test_own_clips_to_a_live_link(dashboard: Dashboard, clips: list[Path]) -> No
     name = page.get_by_label("Short name")
     name.fill("short")
     page.get_by_role("button", name="Create", exact=True).click()
-    expect(name).to_have_accessible_description(re.compile("There is already a study called 'short'"))
+    expect(name).to_have_accessible_description(re.compile("A study called 'short'"))
     expect(name).to_be_focused()
     name.fill("robots")
     expect(name).to_have_accessible_description(re.compile(r"URLs and file names\.$"))

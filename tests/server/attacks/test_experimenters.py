@@ -81,7 +81,7 @@ def test_a_pattern_of_many_fields_is_tried_in_no_time(
     answer = experimenter.send(
         "POST", "/studies", {"name": "x", "upload": upload, "levels": {"pattern": pattern}, "own_clips": own}
     )
-    assert (answer.status_code, "does not follow the pattern" in answer.text) == (422, True), answer.text
+    assert (answer.status_code, "does not match the pattern" in answer.text) == (422, True), answer.text
     assert time.process_time() - began < SOON_S
 
 

@@ -106,7 +106,7 @@ def test_a_link_carries_the_group_and_the_address_does_not(
     assert (refused.status_code, refused.json()["error"]["code"]) == (409, "study_full")
     forged = Participant(client, slow).start(query={"group": "fast"})
     assert (forged.status_code, forged.json()["error"]["code"]) == (422, "group_refused")
-    assert "nobody chooses their group" in forged.json()["error"]["message"]
+    assert "participants cannot choose their group" in forged.json()["error"]["message"]
     assert Participant(client, slow).start(query={"group": "slow"}).status_code == 201
     # The link that was made without a group leads nowhere.
     assert client.get(f"/api/links/{study.link_token}").json()["status"] == "closed"
@@ -246,4 +246,4 @@ def test_links_of_a_study_by_link_need_a_group_that_there_is(
     assert experimenter.get(f"/studies/{study.name}").json()["design"]["groups"] == ["slow", "fast"]
     other = add_study(services, tmp_path / "other", BETWEEN, "other")
     refused = experimenter.send("POST", f"/studies/{other.name}/links", {"kind": "general", "group": "fast"})
-    assert "links decide no groups here" in refused.json()["error"]["message"]
+    assert "links do not decide groups in this study" in refused.json()["error"]["message"]

@@ -183,7 +183,7 @@ def test_own_clips_become_a_study_by_a_table(experimenter: Admin) -> None:
     [
         ("speed,mood\nfast,happy", "a column 'file'"),
         ("file,speed\nfast_hapy_1.mp4,fast", "did you mean 'fast_happy_1.mp4'?"),
-        ("file,speed\nfast_happy_1.mp4,fast\nfast_happy_1.mp4,fast", "stands there twice"),
+        ("file,speed\nfast_happy_1.mp4,fast\nfast_happy_1.mp4,fast", "expected each clip once"),
         ("file,speed\nfast_happy_1.mp4,", "has no level of 'speed'"),
         ("file,speed\nfast_happy_1.mp4,fast", "7 clips have no row"),
     ],

@@ -173,5 +173,5 @@ def test_a_thousand_keys_of_three_parts_are_edited() -> None:
 @pytest.mark.parametrize("text", ["\n" * 500_000, "# a\n" * 30_000])
 def test_a_text_that_keeps_the_editor_busy_is_refused_before_it_is_read(text: str) -> None:
     """tomlkit makes an object of each line: 4 s for half a million empty ones, while others wait."""
-    with pytest.raises(InputError, match="edit such a text by hand"):
+    with pytest.raises(InputError, match="edit such a text manually"):
         with_data(text, {"a": 1})
