@@ -158,7 +158,7 @@ def test_a_key_of_twenty_thousand_parts_is_refused_before_it_is_read() -> None:
 def test_many_keys_of_many_parts_are_left_to_the_hand(around: str) -> None:
     keys = [".".join(["a"] * 30) + f".b{number} = 1" for number in range(100)]
     text, began = around.format((", " if "x" in around else "\n").join(keys)), time.process_time()
-    with pytest.raises(InputError, match="by hand"):
+    with pytest.raises(InputError, match="manually"):
         with_data(text, {"title": "t"})
     assert time.process_time() - began < 2.0  # tomlkit takes eight seconds
 
