@@ -98,7 +98,7 @@ def test_a_file_of_before_without_proposals_counts_whole_and_is_told(proposals):
     changed(proposals, lambda document: document.pop("proposed"))
     labels = load_labels(proposals)
     assert by_hand(labels).frames.keys() == labels.frames.keys()
-    assert "keeps no proposals, so that all its 4 frames count as corrected; remove it" in unmarked_note(
+    assert "an earlier version wrote it without proposals, so all its 4 frames count as corrected" in unmarked_note(
         labels
     )
 
@@ -107,7 +107,7 @@ def test_a_file_of_two_eyes_is_refused_for_one(proposals, stimuli, recording, tm
     more = ("--one-eye", "--relabel", proposals)
     code, _, error = stimuli("track", recording.video, "--out", tmp_path / "u.csv", *more)
     assert code == 2
-    assert "holds 18 points a frame, --one-eye expects 9" in error
+    assert "has 18 points per frame, but --one-eye expects 9" in error
 
 
 @pytest.mark.parametrize(
@@ -133,7 +133,7 @@ def test_labels_that_nobody_reviewed_are_told(command, stimuli, recording, tmp_p
     code, _, error = stimuli(*given)
     assert code == 0
     assert "warning: " in error
-    assert "12 of 12 frames are as they were proposed and nobody accepted them; all train as given" in error
+    assert "12 of 12 frames are unreviewed proposals" in error
     changed(labels, lambda document: document.update(proposed={}))
     assert "unreviewed proposals" not in stimuli(*given)[2]
     changed(labels, lambda document: document.pop("proposed"))
