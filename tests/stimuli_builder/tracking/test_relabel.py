@@ -98,9 +98,7 @@ def test_a_file_of_before_without_proposals_counts_whole_and_is_told(proposals):
     changed(proposals, lambda document: document.pop("proposed"))
     labels = load_labels(proposals)
     assert by_hand(labels).frames.keys() == labels.frames.keys()
-    assert "an earlier version wrote it without proposals, so all its 4 frames count as corrected" in unmarked_note(
-        labels
-    )
+    assert "wrote it without proposals, so all its 4 frames count as corrected" in unmarked_note(labels)
 
 
 def test_a_file_of_two_eyes_is_refused_for_one(proposals, stimuli, recording, tmp_path):
