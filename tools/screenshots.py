@@ -189,9 +189,9 @@ def sign_in(page: Page, address: str, settings) -> None:  # type: ignore[no-unty
     with migrated_services(settings) as services:
         _, token = invitations.invite(services.database, "owner", "", None)
     page.goto(f"{address}/admin/invitation#{token}")
-    page.get_by_label("Name to sign in with").fill("ada")
+    page.get_by_label("User name").fill("ada")
     page.locator("input[autocomplete=new-password]").fill(PASSWORD)
-    page.get_by_role("button", name="Make the account").click()
+    page.get_by_role("button", name="Create account").click()
     page.get_by_role("heading", name="Studies").wait_for()
 
 
