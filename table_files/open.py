@@ -150,7 +150,7 @@ def _objects(path: Path) -> list[dict[str, Any]]:
         read = [read]  # lines of JSON, of which there is one
     rows = read if isinstance(read, list) else []
     if not rows or not all(isinstance(row, dict) for row in rows):
-        raise InputError(f"{path.name}: expected a list of objects, one a trial; save the data as CSV")
+        raise InputError(f"{path.name}: expected a list of objects, one per trial; save the data as CSV")
     return rows
 
 

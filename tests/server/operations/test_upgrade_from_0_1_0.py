@@ -55,8 +55,10 @@ def migrated(empty_database_url: str, tmp_path: Path) -> Iterator[Services]:
 
 
 def exported(services: Services, study: str) -> bytes:
+    """The answers in the order of columns that exports had until 0.2, as `--old-order` gives it."""
+    extract = Extract("all", old_order=True)
     with services.database.read() as session:
-        return b"".join(FORMATS["csv"](session, find_study(session, study, OPERATOR, "view"), Extract("all")))
+        return b"".join(FORMATS["csv"](session, find_study(session, study, OPERATOR, "view"), extract))
 
 
 def older_columns_of(content: bytes, header: list[str]) -> bytes:

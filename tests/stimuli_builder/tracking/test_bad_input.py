@@ -264,7 +264,7 @@ def test_accuracy_of_files_that_do_not_belong_together(stimuli, recording, tmp_p
     code, _, error = stimuli("accuracy", other, recording.truth)
     assert code == 2
     assert "compare a track with its own ground truth" in error
-    assert "not a track" in stimuli("accuracy", recording.labels, recording.truth)[2]
+    assert "expected a list of objects" in stimuli("accuracy", recording.labels, recording.truth)[2]
 
 
 @pytest.mark.parametrize(

@@ -130,10 +130,10 @@ def test_eyes_that_stay_are_not_covered_in_a_sharp_picture_or_a_poor_one(spread)
     ("covers", "eyes", "words"),
     [
         ([(0, range(5, 9))], 1, "eye covered, closed tightly or turned away: "),
-        ([(0, range(5, 9))], 2, "left eye covered, shut tightly or turned away: "),
-        ([(1, range(5, 6))], 2, "right eye covered, shut tightly or turned away: "),
-        ([(0, range(5, 9)), (1, range(5, 9))], 2, "both eyes covered, shut tightly or turned away: "),
-        ([(0, range(5, 32)), (1, range(5, 32))], 2, "both eyes covered, shut tightly or turned away: "),
+        ([(0, range(5, 9))], 2, "left eye covered, closed tightly or turned away: "),
+        ([(1, range(5, 6))], 2, "right eye covered, closed tightly or turned away: "),
+        ([(0, range(5, 9)), (1, range(5, 9))], 2, "both eyes covered, closed tightly or turned away: "),
+        ([(0, range(5, 32)), (1, range(5, 32))], 2, "both eyes covered, closed tightly or turned away: "),
     ],
 )
 def test_covers_are_told_however_brief_or_long_and_on_all_eyes_at_once(covers, eyes, words):
@@ -231,7 +231,7 @@ def test_unsteady_eyes_in_strange_surroundings_are_covered(spread):
     seen = looks(0.025, []) | {n: [spread, 0.02] for n in range(10, 25)}
     told = covered_frames(VIDEO, seen, 6, surroundings(others=range(10, 25)))
     assert set(told) == set(range(10, 25))
-    assert all(why.startswith("left eye covered: ") and "surrounds" in why for why in told.values())
+    assert all(why.startswith("left eye covered: ") and "surroundings" in why for why in told.values())
 
 
 def test_a_small_thing_over_one_eye_is_a_cover_in_the_usual_surroundings_too():

@@ -116,7 +116,7 @@ def test_the_actor_has_no_glare_and_with_one_says_over_which_eye(lesson, recordi
         x, y = recording.points[0].reshape(2, 9, 2)[eye].mean(0).round().astype(int).tolist()
         cv2.ellipse(spoilt, (x, y), (45, 25), 0, 0, 360, 255, -1)
         hidden, why = check.of(fit, spoilt)
-        assert why == f"glare over the {name} eye: lids under a highlight are not seen"
+        assert why == f"glare over the {name} eye: lids under a highlight cannot be detected"
         assert hidden[eye] > 0.05
         assert hidden[1 - eye] == 0
 

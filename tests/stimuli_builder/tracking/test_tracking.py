@@ -162,7 +162,7 @@ def test_command_writes_track_preview_and_plot(recording, stimuli, tmp_path):
         "track", recording.video, "--model", model, "--out", out, "--preview", preview, "--plot", plot
     )
     assert (code, error) == (0, "")
-    assert "200 tracked (0 of them doubtful), 0 re-initialised, 0 lost" in said
+    assert "200 tracked (0 of them doubtful), 0 re-initialized, 0 lost" in said
     assert "frames/s fit only" in said
     assert "with decoding" in said
     assert sum(1 for _ in frames(preview)) == 200
