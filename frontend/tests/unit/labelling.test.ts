@@ -203,7 +203,7 @@ describe("label files", () => {
   it.each([
     [withPoint(shape, 3, [700, 100], [900, 480]), "point 4 at (700, 100) is outside the picture of 640 x 480"],
     [[...shape.slice(9), ...shape.slice(0, 9)], "the eyes are swapped"],
-    [withPoint(shape, 5, [at(shape, 0)[0] + 1, at(shape, 0)[1]], SIZE), "canthi 1 and 6 are under 4 px apart"],
+    [withPoint(shape, 5, [at(shape, 0)[0] + 1, at(shape, 0)[1]], SIZE), "canthi 1 and 6 are less than 4 px apart"],
     [withPoint(shape, 1, at(shape, 3), SIZE), "points 2 and 3 cross"],
     [withPoint(shape, 16, [at(shape, 16)[0], at(shape, 16)[1] - 50], SIZE), "lower-lid point 17 lies above the upper lid"],
   ])("refuse shape %# as stimuli does", (wrong, words) => {

@@ -160,7 +160,7 @@ def test_cells_that_are_no_ratings_are_refused(tmp_path, score, said) -> None:
         ("a.sav", "no spss", "is not an SPSS file"),
         ("a.json", "{", "is not JSON"),
         ("a.json", f'[{{"x": {"9" * 5000}}}]', "is not JSON that can be read"),
-        ("a.json", "[1, 2]", "expected a list of objects, one a trial"),
+        ("a.json", "[1, 2]", "expected a list of objects, one per trial"),
         ("a.ods", "x", "files of .ods are not read; save it as .xlsx"),
     ],
 )

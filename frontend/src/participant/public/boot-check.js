@@ -8,7 +8,7 @@
     '<p lang="de">Dieser Browser ist zu alt f\u00fcr die Studie. Bitte \u00f6ffnen Sie den Link in einem aktuellen ' +
     "Chrome, Edge, Firefox oder Safari auf einem Computer.</p>";
   var away =
-    '<h1>The connection failed</h1><p><a href="">Load the page again</a></p>' +
+    '<h1>The connection failed</h1><p><a href="">Reload the page</a></p>' +
     '<p lang="de">Die Verbindung ist ausgefallen. <a href="">Seite neu laden</a></p>';
   function tell(text) {
     var root = document.getElementById("study");
