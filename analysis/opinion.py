@@ -13,6 +13,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from analysis.read.number_columns import numbers, unusual_numbers
+from analysis.read.reading import EXPORT_COLUMNS, answers_that_count
 from analysis.read.text_table import (
     name_lines,
     names_in_order,
@@ -398,7 +399,7 @@ def read_votes(path: Path, item: str, participant: str, rating: str, levels: Seq
     """
     roles = [item, participant, rating]
     refuse_shared_roles(roles)
-    table = read_text_table(path, roles, ("synthetic",))
+    table = read_text_table(path, roles, EXPORT_COLUMNS)
     for name in roles[:2]:
         texts_required(table, name)
     values = numbers(table, rating)
@@ -409,6 +410,10 @@ def read_votes(path: Path, item: str, participant: str, rating: str, levels: Seq
         table.decisions.append(f"{int((~keep).sum())} rows without a rating excluded ({lines})")
     if not keep.any():
         raise InputError(f"{path.name}: column '{rating}' has no rating in any row")
+    keep, left_out = answers_that_count(table.header, table.columns, keep)
+    table.decisions.extend(left_out)
+    if not keep.any():
+        raise InputError(f"{path.name}: there are no usable ratings; {', '.join(left_out)}")
     people, person = np.unique(table.columns[participant].astype(str).to_numpy()[keep], return_inverse=True)
     items = names_in_order(table.columns[item], keep)
     orders, said = given_orders({item: items}, levels)

@@ -9,6 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from analysis.read.number_columns import IN_COVARIATE, numbers, unusual_numbers
+from analysis.read.reading import EXPORT_COLUMNS, answers_that_count
 from analysis.read.text_table import (
     TextTable,
     name_lines,
@@ -67,7 +68,7 @@ def read_long_table(
     """
     needed = [participant, rating, *within, *between, *covariates, *([trial] if trial else [])]
     refuse_shared_roles(needed)
-    table = read_text_table(path, needed, ("synthetic",))
+    table = read_text_table(path, needed, EXPORT_COLUMNS)
     for name in (participant, *within, *between):
         texts_required(table, name, factor=name != participant)
     values = numbers(table, rating)
@@ -88,6 +89,10 @@ def read_long_table(
         keep &= _with_covariate(table, participant, name, given)
     if not keep.any():
         raise InputError(f"{path.name}: no participant has a rating and all covariates")
+    keep, left_out = answers_that_count(table.header, table.columns, keep)
+    table.decisions.extend(left_out)
+    if not keep.any():
+        raise InputError(f"{path.name}: there are no usable ratings; {', '.join(left_out)}")
     rows = table.columns.assign(**{rating: values, **measured})[keep].reset_index(drop=True)
     synthetic = "synthetic" in rows.columns and bool((rows["synthetic"] == "1").any())
     return LongData(rows, path.name, tuple(table.decisions), synthetic, table.header)

@@ -1,5 +1,6 @@
 """Which columns and rows of the server's exports the analysis reads."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -86,6 +87,20 @@ def rows_that_count(rows: pd.DataFrame, keep: NDArray[np.bool_]) -> tuple[NDArra
             decisions.append(f"{out.sum()} {why} excluded")
         keep = keep & ~out
     return keep, decisions
+
+
+_OF_AN_EXPORT = frozenset({"kind", "trial_index", "run", "verdict", "excluded"})
+"""Columns that only the server's own exports have together."""
+
+
+def answers_that_count(
+    header: Sequence[str], rows: pd.DataFrame, keep: NDArray[np.bool_]
+) -> tuple[NDArray[np.bool_], list[str]]:
+    """As `rows_that_count` if the table is an export of the server; anyone else's table keeps all its rows.
+
+    Anyone's column `kind` may be a factor, so the columns of an export are asked for together.
+    """
+    return rows_that_count(rows, keep) if set(header) >= _OF_AN_EXPORT else (keep, [])
 
 
 # Failures of the analysis that are nobody's fault.

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.read.number_columns import numbers
+from analysis.read.reading import EXPORT_COLUMNS, answers_that_count
 from analysis.read.text_table import (
     TextTable,
     name_lines,
@@ -79,7 +80,7 @@ def read_answers(
     named = [name for name in (participant, by) if name]
     roles = [x, response, *named, *([second] if second else [])]
     refuse_shared_roles(roles)
-    table = read_text_table(path, roles, ("synthetic",))
+    table = read_text_table(path, roles, EXPORT_COLUMNS)
     for name in named:
         texts_required(table, name, factor=name == by)
     values, answers = numbers(table, x), _binary(table, response)
@@ -92,6 +93,10 @@ def read_answers(
         table.decisions.append(f"{int((~keep).sum())} rows without stimulus or answer excluded ({lines})")
     if not keep.any():
         raise InputError(f"{path.name}: no row has both '{x}' and '{response}'")
+    keep, left_out = answers_that_count(table.header, table.columns, keep)
+    table.decisions.extend(left_out)
+    if not keep.any():
+        raise InputError(f"{path.name}: there are no usable answers; {', '.join(left_out)}")
     names = [
         None if name is None else table.columns[name].astype(object).to_numpy()[keep]
         for name in (participant, by)

@@ -104,4 +104,4 @@ def test_a_command_on_a_locked_database_ends_in_one_line(
         called = run_server_command(settings, "export", "short", "--out", str(out))
     assert (called.returncode, out.exists()) == (2, False)
     assert called.stderr.count("\n") == 1, called.stderr
-    assert "keeps the database locked" in called.stderr
+    assert "has locked the database" in called.stderr

@@ -166,7 +166,7 @@ def test_alembic_goes_down_to_no_program_that_would_miss_its_views(
         check=False,
     )
     assert called.returncode != 0
-    assert "restore a backup of then with the program of then" in called.stdout + called.stderr
+    assert "restore an old backup with the old program" in called.stdout + called.stderr
     assert "Traceback" not in called.stderr
     assert is_up_to_date(database)
 

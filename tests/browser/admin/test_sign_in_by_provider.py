@@ -56,5 +56,5 @@ def test_a_person_signs_in_by_her_university_and_sees_who_she_is(server: ServerP
     page.get_by_role("button", name="Add ORCID").click()
     page.get_by_label("Your password").last.fill("what an open browser does not know")
     page.get_by_role("button", name="Go to ORCID").click()
-    page.get_by_text("set up a second factor first").wait_for(timeout=PATIENCE_MS)
+    page.get_by_text("Set up a second factor first").wait_for(timeout=PATIENCE_MS)
     assert [text for text in complaints if "ontent Security Policy" in text] == []

@@ -98,7 +98,7 @@ def test_streams_of_all_accounts_together_are_bounded(
     with others[0], others[1], others[2]:
         refused = viewer.get("/studies/short/monitor/stream")
         assert (refused.status_code, refused.json()["error"]["code"]) == (429, "too_many_requests")
-        assert "all are taken" in refused.json()["error"]["message"]
+        assert "are in use" in refused.json()["error"]["message"]
         with services.streams.one(account) as at_once:
             assert not at_once
     assert viewer.get("/studies/short/monitor/stream").text.count("event: monitor") == 1

@@ -99,20 +99,20 @@ def test_thresholds_are_planned_with_the_trials_of_a_series() -> None:
 @pytest.mark.parametrize(
     ("name", "change", "problem"),
     [
-        ("plane-demo", ("", ""), "no conditions whose thresholds could differ"),
+        ("plane-demo", ("", ""), "there are no conditions to compare"),
         ("pairs-demo", ("expected_seconds = 8.0", "pairs_per_person = 4"), "here it is 4 of 6 pairs"),
         (
             "pairs-demo",
             ('{ among = "all", exemplars = "matched" }', FOUR_PAIRS),
-            "every two items are compared",
+            "all pairs of items are compared",
         ),
         ("pairs-demo", ('label = "Character"', 'label = "Character"\nbetween = true'), "different items"),
         (
             "pairs-demo",
             ("expected_seconds = 8.0", 'pairs_per_person = 6\ndealing = { by = "active" }'),
-            "chosen by the answers",
+            "chosen from the answers",
         ),
-        ("threshold-demo", (ASYMMETRIC, ""), "there is one series"),
+        ("threshold-demo", (ASYMMETRIC, ""), "there is only one series"),
     ],
 )
 def test_a_power_that_no_plan_reckons_is_not_shown(name: str, change: tuple[str, str], problem: str) -> None:

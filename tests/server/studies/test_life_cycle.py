@@ -54,7 +54,7 @@ def test_a_copy_can_be_of_an_older_version(experimenter: Admin, study: StudyInDa
 def test_an_archived_study_can_be_read_and_not_changed(experimenter: Admin, study: StudyInDatabase) -> None:
     revision = experimenter.get("/studies/short").json()["summary"]["revision"]
     refused = experimenter.send("PUT", "/studies/short/archive", {"revision": revision, "archived": True})
-    assert (refused.status_code, "close it first" in refused.text) == (409, True)
+    assert (refused.status_code, "Close it first" in refused.text) == (409, True)
     closed = experimenter.send(
         "PUT", "/studies/short/status", {"revision": revision, "status": "closed"}
     ).json()
@@ -63,7 +63,7 @@ def test_an_archived_study_can_be_read_and_not_changed(experimenter: Admin, stud
     assert kept["summary"]["archived_at"] is not None
     revision = kept["summary"]["revision"]
     opened = experimenter.send("PUT", "/studies/short/status", {"revision": revision, "status": "live"})
-    assert (opened.status_code, "take it out again" in opened.text) == (409, True)
+    assert (opened.status_code, "Remove it from the archive" in opened.text) == (409, True)
     assert experimenter.get("/studies/short/data/ratings.csv").status_code == 200
     out = experimenter.send("PUT", "/studies/short/archive", {"revision": revision, "archived": False}).json()
     assert out["summary"]["archived_at"] is None

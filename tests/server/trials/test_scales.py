@@ -99,7 +99,7 @@ def test_each_scale_is_a_row_and_what_does_not_apply_is_no_number(
         ("natural", "4", "0"),
     ]
     assert "`eerie`: Scale: 0 (not) to 100 (very)." in codebook
-    assert "Reverse-keyed: a high answer means little; answers are stored as they were chosen." in codebook
+    assert "Reverse-keyed: a high answer means a low value; answers are stored as chosen." in codebook
 
 
 @pytest.mark.parametrize(

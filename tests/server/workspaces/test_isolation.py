@@ -341,7 +341,7 @@ def test_an_upload_is_its_senders_alone(services: Services, outsiders: dict[str,
 
 def test_an_upload_from_before_uploads_had_senders_is_sent_again(tmp_path: Path) -> None:
     (tmp_path / ("a" * 32)).mkdir()
-    with pytest.raises(NotFound, match="please upload the clips again"):
+    with pytest.raises(NotFound, match="Please upload the clips again"):
         upload_folder(tmp_path, "a" * 32, 1)
 
 

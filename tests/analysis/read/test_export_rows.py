@@ -1,0 +1,56 @@
+"""Commands for any table read the server's own export too: practice and excluded runs do not count."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis.opinion import read_votes
+from analysis.read.long_csv import read_long_table
+from analysis.thresholds.answers import read_answers
+
+HEADER = "run,participant,run_status,trial_index,kind,profile_id,face,stimulus,response,verdict,excluded\n"
+
+
+@pytest.fixture
+def export(tmp_path: Path) -> Path:
+    """Six main trials of three people, two practice trials, and a run that was excluded by hand."""
+    lines = []
+    for person in ("p1", "p2", "p3"):
+        for number, face in enumerate(("a", "b")):
+            excluded = int(person == "p3")
+            lines.append(f"r{person},{person},complete,{number},main,x,{face},{number + 1},1,good,{excluded}")
+    lines += [f"rp1,p1,complete,{number},practice,x,a,1,0,good,0" for number in (7, 8)]
+    file = tmp_path / "export.csv"
+    file.write_text(HEADER + "\n".join(lines) + "\n", encoding="utf-8")
+    return file
+
+
+def said(decisions: tuple[str, ...]) -> str:
+    return " ".join(decisions)
+
+
+def test_anova_and_ranks(export: Path) -> None:
+    data = read_long_table(export, "participant", "response", ["face"])
+    assert len(data.rows) == 4
+    assert set(data.rows["participant"]) == {"p1", "p2"}
+    assert "practice" in said(data.decisions)
+
+
+def test_opinion_and_agreement(export: Path) -> None:
+    votes = read_votes(export, "stimulus", "participant", "response")
+    assert votes.people == ("p1", "p2")
+    assert np.nansum(votes.counts) == 4
+    assert "practice" in said(votes.decisions)
+
+
+def test_thresholds(export: Path) -> None:
+    answers = read_answers(export, "stimulus", "response", participant="participant")
+    assert len(answers.x) == 4
+    assert "practice" in said(answers.decisions)
+
+
+def test_table_of_someone_else_with_a_column_kind_is_left_alone(tmp_path: Path) -> None:
+    file = tmp_path / "mine.csv"
+    file.write_text("id,kind,score\n" + "".join(f"p{n},k{n % 2},{n}\n" for n in range(6)), encoding="utf-8")
+    assert len(read_long_table(file, "id", "score", ["kind"]).rows) == 6
