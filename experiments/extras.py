@@ -9,6 +9,11 @@ EXTRAS: dict[str, tuple[str, ...]] = {
 """Extra -> the modules that it brings."""
 
 
+def install_line(extra: str) -> str:
+    """The command that installs an extra; Palpebra comes as a file, not from a public index."""
+    return f"uv tool install 'FILE.whl[{extra}]'"
+
+
 def missing_extra(module: str) -> str | None:
     """The install line for a module that is not there; None if no extra brings it.
 
@@ -24,12 +29,12 @@ def missing_extra(module: str) -> str | None:
     Examples
     --------
     >>> missing_extra("skia")
-    "this command needs the extra 'render': uv tool install 'palpebra[render]'"
+    "this command needs the extra 'render'; install Palpebra with it: uv tool install 'FILE.whl[render]'"
     >>> missing_extra("antigravity") is None
     True
     """
     top = module.partition(".")[0]
     for extra in ("render", "s3", "dask"):
         if top in EXTRAS[extra]:
-            return f"this command needs the extra '{extra}': uv tool install 'palpebra[{extra}]'"
+            return f"this command needs the extra '{extra}'; install Palpebra with it: {install_line(extra)}"
     return None

@@ -10,11 +10,11 @@ from typing import Annotated
 import typer
 
 from experiments.errors import InputError
-from experiments.extras import EXTRAS
+from experiments.extras import EXTRAS, install_line
 from palpebra.conflicts import foreign_packages
 from palpebra.folders import data_folder, use_folder
 
-UPGRADE = "uv tool upgrade palpebra    (or: pipx upgrade palpebra)"
+UPGRADE = "uv tool install --force NEW.whl    (NEW.whl: the file of the new version)"
 Folder = Annotated[Path | None, typer.Option(help="Folder of the data; your user data folder by default.")]
 
 
@@ -35,7 +35,7 @@ def doctor(folder: Folder = None) -> None:
         typer.echo(f"package '{name}' comes from another project: {place}")
     for extra, modules in EXTRAS.items():
         missing = [module for module in modules if find_spec(module) is None]
-        said = "installed" if not missing else f"not installed: uv tool install 'palpebra[{extra}]'"
+        said = "installed" if not missing else f"not installed: {install_line(extra)}"
         typer.echo(f"extra {extra}: {said}")
     from server.operations.cli import doctor as server_doctor
 

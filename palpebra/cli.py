@@ -1,11 +1,13 @@
 """The command `palpebra`: start the server, try the demo, care for the data; the three programs by name."""
 
+import os
 import sys
 from importlib import import_module, metadata
 
 from experiments.command_groups import lazy_app
 from experiments.command_line import run_command_line
 from palpebra.conflicts import refuse_foreign_packages
+from palpebra.folders import DATA_VARIABLE, default_folder
 
 COMMANDS = {
     "start": (
@@ -63,6 +65,8 @@ def main() -> None:
     if arguments and arguments[0] in PROGRAMS:
         # The program's own command line, so that its help and errors are the same under both names.
         sys.argv = [arguments[0], *arguments[1:]]
+        # The same data as `palpebra` alone uses, not the folder `data` of wherever this is called.
+        os.environ.setdefault(DATA_VARIABLE, str(default_folder()))
         import_module(PROGRAMS[arguments[0]]).main()
         return
     sys.argv = [sys.argv[0], *with_start(arguments)]

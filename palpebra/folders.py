@@ -13,6 +13,11 @@ PORT = 8000
 PORTS_TRIED = 20
 
 
+def default_folder() -> Path:
+    """The user's data folder on this system."""
+    return user_data_path("palpebra", appauthor=False)
+
+
 def data_folder(given: Path | None) -> Path:
     """The folder of the data, made if it is missing.
 
@@ -27,16 +32,17 @@ def data_folder(given: Path | None) -> Path:
     InputError
         The folder cannot be written to.
     """
-    folder = given or Path(os.environ.get(DATA_VARIABLE) or user_data_path("palpebra", appauthor=False))
+    folder = given or Path(os.environ.get(DATA_VARIABLE) or default_folder())
     try:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
         probe = folder / ".can_be_written"
         probe.touch()
         probe.unlink()
     except OSError as error:
-        reason = error.strerror or str(error)
+        is_file = folder.exists() and not folder.is_dir()
+        reason = "a file" if is_file else f"'{error.strerror or error}'"
         raise InputError(
-            f"folder {folder}: expected a writable folder, got '{reason}'; choose another by --folder"
+            f"folder {folder}: expected a writable folder, got {reason}; choose another by --folder"
         ) from error
     return folder.resolve()
 

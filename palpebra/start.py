@@ -130,7 +130,9 @@ def _prepare(place: Path) -> None:
     is_new = not (place / "palpebra.sqlite").exists()
     with migrated_services():
         pass
-    if is_new and (DEMO / "manifest.json").is_file():
+    if is_new and not (DEMO / "manifest.json").is_file():
+        typer.echo("There is no demo study here; `make wheel` builds it.")
+    elif is_new:
         from server.studies.cli import add
 
         add(str(DEMO / "demo.toml"), DEMO, name=DEMO_NAME, open_=True)

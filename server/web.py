@@ -179,6 +179,16 @@ def asset(settings: SettingsDep, site: str, name: str) -> Response:
     raise NotFound(f"There is no file {name[:200]}.")
 
 
+DOCS_NOT_BUILT = """<!doctype html>
+<html lang="en">
+<title>Documentation</title>
+<h1>The documentation is not built here</h1>
+<p>Run <code>make docs</code> in the checkout, then load this page again. You can also read the files in
+its folder <code>docs</code>.</p>
+</html>
+"""
+
+
 @page_router.get("/docs")
 def docs_home() -> RedirectResponse:
     """Pages of the documentation link one another relative to /docs/."""
@@ -190,7 +200,7 @@ def documentation(settings: SettingsDep, name: str) -> Response:
     """A file of the documentation site; a folder shows its index."""
     folder = (settings.frontend_folder / "docs").resolve()
     if not (folder / "index.html").is_file():
-        raise PagesNotBuilt("The documentation is not built; run `make docs`.")
+        return HTMLResponse(DOCS_NOT_BUILT, status_code=503)
     path = _file_within(folder, folder / name) or _file_within(folder, folder / name / "index.html")
     if path is None:
         raise NotFound(f"There is no page {name[:200]} in the documentation.")

@@ -24,6 +24,8 @@ def build_demo() -> None:
     text = re.sub(r"^per_cell = \d+", "per_cell = 2", text, flags=re.MULTILINE)
     text = re.sub(r"^repeats = \d+", "repeats = 1", text, flags=re.MULTILINE)
     text = re.sub(r"^trials = \d+", "trials = 2", text, flags=re.MULTILINE)
+    for old, new in (("about 20 minutes", "about two minutes"), ("etwa 20 Minuten", "etwa zwei Minuten")):
+        text = text.replace(old, new)
     shutil.rmtree(DEMO, ignore_errors=True)
     DEMO.mkdir()
     (DEMO / "demo.toml").write_text(text, encoding="utf-8")

@@ -96,7 +96,7 @@ def test_upgrade_backs_up_first_and_names_both(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     (kept,) = (data / "backups").glob("palpebra-*.tar")
     assert str(kept) in done.stdout
-    assert "uv tool upgrade palpebra" in done.stdout
+    assert "uv tool install --force" in done.stdout
 
 
 def test_database_of_a_newer_version_is_refused(tmp_path: Path) -> None:

@@ -150,4 +150,6 @@ def test_missing_extra_is_one_line_with_the_install_command(installed: Path, tmp
         check=False,
     )
     assert done.returncode == 2
-    assert done.stderr == "error: this command needs the extra 'render': uv tool install 'palpebra[render]'\n"
+    assert done.stderr.count("\n") == 1
+    assert done.stderr.startswith("error: this command needs the extra 'render'; install Palpebra with it: ")
+    assert done.stderr.endswith("uv tool install 'FILE.whl[render]'\n")

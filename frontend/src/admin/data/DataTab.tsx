@@ -52,8 +52,8 @@ function CapsuleCard({ study, origin, series }: { study: string; origin: DataOri
       </Title>
       <Text size="sm" mt={4} mb="md" maw={720}>
         Everything you can share, in one zip: de-identified data, clips, definition, sealed plan, report and software versions, as Psych-DS
-        and RO-Crate. Anyone can regenerate the report with <Code>analysis verify</Code>. Its report is of one data series: the one chosen
-        above, or that of the active version beside the data of every series.
+        and RO-Crate. Anyone can regenerate the report with <Code>analysis verify</Code>. Its report covers one data series: the one chosen
+        above, otherwise that of the active version.
       </Text>
       {mayMake && (
         <Group mb="sm">
@@ -291,8 +291,8 @@ export function DataTab() {
       <Switch
         checked={oldOrder}
         onChange={(event) => setOldOrder(event.currentTarget.checked)}
-        label="Columns in the order of before"
-        description="For programs that read columns by their place. Else what belongs together stands together: the response beside its scale, all of the visit before all of the trial."
+        label="Old column order"
+        description="For programs that read columns by position. The new order keeps related columns together."
       />
       <SealCard study={study} />
       <CapsuleCard study={study} origin={origin === "all" ? "participant" : origin} series={series} />

@@ -430,7 +430,7 @@ function FromShipped({ name, onTaken }: { name: string; onTaken: (message: strin
                       <Anchor component={Link} to={`/studies/${experiment.name}`} underline="always">
                         there already
                       </Anchor>
-                      . Give a short name above for another one of it.
+                      . To create another one, enter a short name above.
                     </Text>
                   ) : experiment.clips_ready ? (
                     <Group mt="auto">
