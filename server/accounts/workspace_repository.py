@@ -44,11 +44,11 @@ MAKING_STUDIES: Final[tuple[Role, ...]] = ("experimenter", "owner")
 def effective_rights(role: Role | None, granted: Iterable[Right]) -> frozenset[Right]:
     """The rights on a study of one with this role in its workspace and these grants.
 
-    >>> sorted(effective(None, ["run"]))
+    >>> sorted(effective_rights(None, ["run"]))
     ['run', 'view']
-    >>> effective("viewer", ["own"]) == frozenset(RIGHTS)
+    >>> effective_rights("viewer", ["own"]) == frozenset(RIGHTS)
     True
-    >>> effective(None, [])
+    >>> effective_rights(None, [])
     frozenset()
     """
     rights = (OF_ROLE[role] if role is not None else frozenset[Right]()) | frozenset(granted)
@@ -60,7 +60,7 @@ def effective_rights(role: Role | None, granted: Iterable[Right]) -> frozenset[R
 def ordered_rights(rights: Collection[Right]) -> list[Right]:
     """Rights in the order in which they are told.
 
-    >>> ordered({"own", "view"})
+    >>> ordered_rights({"own", "view"})
     ['view', 'own']
     """
     return [one for one in RIGHTS if one in rights]

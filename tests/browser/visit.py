@@ -52,7 +52,7 @@ class Visit:
         page = self.page
         for selector, name, press in (
             (".card", "card", ""),
-            (".ruler-line", "ruler check", "text=It is, within"),
+            (".ruler-line", "ruler check", "text=Yes, within"),
             (".blind-field", "distance", "text=Enter the distance"),
             ("input.short", "distance typed", ".primary"),
         ):

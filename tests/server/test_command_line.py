@@ -49,7 +49,7 @@ def test_a_study_from_files_to_data(settings: Settings, services: Services, sour
     people = run_server_command(settings, "export", "short", "--out", str(out))
     assert people.returncode == 0, people.stderr
     assert "short.csv: 0 rows, " in people.stdout.replace("\n", "")
-    assert "nothing of origin participant to export" in people.stderr
+    assert "no data of origin participant to export" in people.stderr
     assert "there are runs: 2 of origin simulated (--origin)" in people.stderr
     assert len(out.read_text(encoding="utf-8").splitlines()) == 1
     exported = run_server_command(settings, "export", "short", "--origin", "simulated", "--out", str(out))
@@ -321,8 +321,8 @@ def test_every_form_of_the_data_page_is_there_on_the_command_line(
     done = run_server_command(settings, "export", "short", "--format", form, "--out", str(out))
     assert done.returncode == 0, done.stderr
     assert out.read_bytes().startswith(begins)
-    told = "the dataset is the folder short/ in the zip: unpack it and give that to a validator"
-    assert (told in done.stdout.splitlines()) is (form == "psych-ds")
+    told = "the dataset is the folder short/ in the zip; to validate it, unpack the zip and check "
+    assert (told in done.stdout.replace("\n", " ")) is (form == "psych-ds")
     unknown = run_server_command(settings, "export", "short", "--format", "jsn", "--out", str(out))
     assert unknown.returncode == 2
     assert "jsn" in unknown.stderr  # and the forms there are, in lines as wide as the terminal

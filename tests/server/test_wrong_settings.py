@@ -13,7 +13,7 @@ WRONG = [
     ("mysql://me:hunter2@host/palpebra", "begins with 'mysql:'"),
     ("postgresql://me:hunter2@host:54x2/palpebra", "got an invalid URL"),
     ("palpebra.sqlite hunter2", "got an invalid URL"),
-    ("postgresql://me:hunter2@host", "without a name"),
+    ("postgresql://me:hunter2@host", "without a database name"),
 ]
 
 

@@ -216,7 +216,7 @@ def test_a_clip_too_large_for_the_window_is_refused(
     Visit(page, server.address).open(study.link_token).begin()
     page.wait_for_selector(".card")
     fit_card(page)
-    page.click("text=It is, within")
+    page.click("text=Yes, within")
     page.wait_for_selector("text=The clip does not fit")
     assert axe_violations(page) == []
 
@@ -230,7 +230,7 @@ def test_zoom_keeps_the_size_and_another_screen_asks_again(
     server.start()
     visit = Visit(page, server.address).open(study.link_token).begin()
     fit_card(page)
-    page.click("text=It is, within")
+    page.click("text=Yes, within")
     visit.instructions().practice()
     page.wait_for_selector(".ready, .attention")
     before = server.rows("SELECT px_per_mm FROM calibrations ORDER BY id")[-1]["px_per_mm"]
@@ -247,7 +247,7 @@ def test_zoom_keeps_the_size_and_another_screen_asks_again(
     page.evaluate(OTHER_REFRESH_RATE)
     page.click(".primary")
     fit_card(page)
-    page.click("text=It is, within")
+    page.click("text=Yes, within")
     visit.trials(most=1)
     assert server.rows_soon(RATED_AT_THE_OTHER_RATE, 1)
 
@@ -300,4 +300,4 @@ def test_a_card_that_nobody_has_touched_and_an_impossible_screen_are_refused(
     page.click("text=It fits")
     page.wait_for_selector("text=your screen would be 91 cm wide")
     fit_card(page)
-    page.wait_for_selector("text=It is, within")
+    page.wait_for_selector("text=Yes, within")

@@ -119,7 +119,7 @@ def test_where_the_study_must_be_asked_a_reload_waits_for_the_server(
     assert page.evaluate("Object.keys(localStorage).filter(key => key.startsWith('palpebra visit'))") == []
     visit.open(study.link_token)
     if policy == "block":
-        page.wait_for_selector("text=must be done in one go")
+        page.wait_for_selector("text=must be completed without interruption")
         assert len(server.rows("SELECT 1 FROM study_runs")) == 1
     else:
         page.wait_for_selector(".page > .tick")

@@ -86,7 +86,7 @@ def test_pairs_by_keyboard(studies: Served, page: Page, tmp_path: Path) -> None:
         assert one == other
         assert len(one) > 0
     said = analysed(studies.server, "pairs", tmp_path)
-    assert "origin participant" in said
+    assert "participant responses, data series 1" in said
     assert "Choices in each pair" in said
 
 

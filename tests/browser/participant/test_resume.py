@@ -79,9 +79,9 @@ def test_a_second_tab_is_told_and_may_take_over(
     visit = Visit(second, server.address).open(link)
     second.wait_for_selector("text=open in another tab")
     assert axe_violations(second) == []
-    second.click("text=Continue here")
+    second.get_by_role("button", name="Continue here").click()
     second.wait_for_selector(".prose")
-    page.wait_for_selector("text=goes on in another tab")
+    page.wait_for_selector("text=continues in another tab")
     assert axe_violations(page) == []
     second.click(".primary")
     assert visit.trials() == 6

@@ -97,7 +97,7 @@ def test_keys_and_mouse_answer_points_and_sliders(server: ServerProcess, tmp_pat
     assert Person(client, Rater(1, 1, {})).take_part(study.link_token)
     client.close()
     said = analysed(server, study.name, tmp_path)
-    assert "origin participant" in said
+    assert "participant responses, data series 1" in said
     assert all(name in said for name in ("Natural", "Eerie", "Reliability of the scales"))
 
 

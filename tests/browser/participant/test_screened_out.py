@@ -101,7 +101,7 @@ def test_a_clip_that_cannot_fit_screens_out_on_request(
     server.start()
     Visit(page, server.address).open(study.link_token).begin()
     fit_card(page)
-    page.click("text=It is, within")
+    page.click("text=Yes, within")
     page.wait_for_selector("text=The clip does not fit")
     assert axe_violations(page) == []
     page.click("text=I have no larger screen")

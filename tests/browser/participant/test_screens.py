@@ -25,7 +25,7 @@ CARD_PX_PER_MM = CARD_PX / 85.6
 def to_the_blind_spot(visit: Visit) -> Page:
     page = visit.begin().page
     fit_card(page)
-    page.click("text=It is, within")
+    page.click("text=Yes, within")
     page.wait_for_selector(".blind-field")
     return page
 

@@ -67,7 +67,7 @@ def test_a_series_goes_on_without_connection_as_far_as_declared(studies: Served,
     page.context.set_offline(True)
     for key in ("ArrowLeft", "n", "y", "2"):
         answer(page, key)
-    page.wait_for_selector("text=There is no connection")
+    page.wait_for_selector("text=You are offline")
     assert axe_violations(page) == []
     page.context.set_offline(False)
     answer(page, "1")

@@ -60,7 +60,7 @@ def test_repeats_that_differ_are_followed_by_one_more_and_all_is_stored(served: 
     assert axe_violations(page) == []
     page.fill(".card-area input", "358")
     page.click("text=It fits")
-    page.click("text=It is, within")
+    page.click("text=Yes, within")
     page.click("text=Enter the distance")
     page.wait_for_selector("input.short")
     page.click(".primary")
@@ -83,10 +83,10 @@ def test_another_person_begins_anew_where_somebody_has_begun(
     page.close()
     second = context.new_page()
     visit = Visit(second, server.address).open(link)
-    second.wait_for_selector("text=Somebody has begun this study on this device")
+    second.wait_for_selector("text=Someone has started this study on this device")
     assert axe_violations(second) == []
     before = len(server.rows("SELECT id FROM study_runs"))
-    second.click("text=Another person takes part")
+    second.click("text=I am another person")
     visit.begin()
     assert len(server.rows("SELECT id FROM study_runs")) == before + 1
 

@@ -71,6 +71,6 @@ def test_a_manner_is_simulated_judged_and_written(
 def test_an_unknown_manner_is_one_clear_line(services: Services, study: StudyInDatabase) -> None:
     called = run_server_command(services.settings, "simulate", study.name, "--as", "htp")
     assert called.returncode != 0
-    assert "no manner 'htp'" in called.stderr
+    assert "there is no behavior 'htp'" in called.stderr
     assert "http" in called.stderr
     assert "Traceback" not in called.stderr

@@ -106,7 +106,7 @@ def test_a_backup_without_its_key_file_opens_no_id_and_says_so(
         assert secret not in keys.read_text()
     again, lines = restored(backup, empty_database_url, tmp_path / "new")
     assert ids(again) == {}
-    assert any(line.startswith(f"no key file ({NAME}): 2 recruiters' ids cannot be read") for line in lines)
+    assert any(line.startswith(f"no key file ({NAME}): 2 recruiters' IDs cannot be read") for line in lines)
     with again.database.read() as session:
         assert session.scalars(select(Study.pseudonym_key)).one() != study_key
         assert [len(key) for key in session.scalars(select(Study.pseudonym_key))] == [64]
@@ -185,7 +185,7 @@ def test_a_changed_secret_key_is_told_in_a_line_and_mended(
         with pytest.raises(InputError, match="server database rewrap OLD_KEY_FILE"):
             known_as(session, run)
     done = run_server_command(settings, "database", "rewrap", str(old))
-    assert done.stdout.startswith("2 keys wrapped anew; 0 are not under that key\n"), done.stderr
+    assert done.stdout.startswith("2 keys re-encrypted; 0 were not encrypted with the old key\n"), done.stderr
     assert sorted(ids(changed).values()) == list(CODES)
     assert run_server_command(settings, "database", "rewrap", str(tmp_path / "none")).returncode == 2
     back_up(services.database, services.settings, services.clips, tmp_path / "b.tar", with_clips=False)

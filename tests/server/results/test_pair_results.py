@@ -82,5 +82,5 @@ def test_a_kind_without_a_summary_says_so(
     with services.database.read() as session:
         number = sum(row["kind"] == "main" for row in comparisons(session))
     assert (shown["kind"], shown["ratings"], shown["participants"]) == ("other", number, 2)
-    assert shown["note"].startswith("Answers of paired comparison trials have no summary here")
+    assert shown["note"].startswith("Answers of paired comparison trials as numbers, by cell")
     assert sum(shown["playback"]["verdicts"].values()) == number

@@ -72,7 +72,7 @@ def test_another_file_of_its_name_is_looked_into_and_keeps_it_from_coming_back(
     assert [file["width_px"] for file in now["files"] if file["name"] == "träge_1.mp4"] == [320]
     refused = leave(experimenter, received["id"], "träge_1.mp4", left_out=False)
     assert refused.status_code == 422
-    assert "has come since" in refused.json()["error"]["message"]
+    assert "was uploaded since" in refused.json()["error"]["message"]
     assert names_of(experimenter, received["id"]).count("träge_1.mp4") == 1
 
 

@@ -122,7 +122,7 @@ def test_times_that_are_rounded_to_a_millisecond_are_even(tmp_path: Path, fps: f
 @pytest.mark.parametrize(
     ("stamps", "expected"),
     [
-        (list(range(400)), "'timestamp' counts frames; expected times: give the recording's rate with --fps"),
+        (list(range(400)), "'timestamp' counts frames; expected times: add the recording's rate with --fps"),
         ([f"2026-11-28T10:00:{n % 60:02d}" for n in range(400)], "'timestamp' is not a number in every row"),
     ],
 )

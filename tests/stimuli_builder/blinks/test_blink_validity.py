@@ -52,7 +52,7 @@ def test_frames_not_valid_stay_unseen_when_times_are_evened(make_known, tmp_path
 @pytest.mark.parametrize(
     ("name", "good", "bad", "message"),
     [
-        ("valid", "yes", "no", "by 1 and 0 .* got 'yes'"),
+        ("valid", "yes", "no", "with 1 or 0 .* got 'yes'"),
         ("success", 0, 0, "no frames are left: remove the column"),
         ("confidence", 98, 12, "between 0 and 1, got 12 to 98"),
     ],
