@@ -410,10 +410,7 @@ def read_votes(path: Path, item: str, participant: str, rating: str, levels: Seq
         table.decisions.append(f"{int((~keep).sum())} rows without a rating excluded ({lines})")
     if not keep.any():
         raise InputError(f"{path.name}: column '{rating}' has no rating in any row")
-    keep, left_out = answers_that_count(table.header, table.columns, keep)
-    table.decisions.extend(left_out)
-    if not keep.any():
-        raise InputError(f"{path.name}: there are no usable ratings; {', '.join(left_out)}")
+    keep = answers_that_count(table, keep, "ratings")
     people, person = np.unique(table.columns[participant].astype(str).to_numpy()[keep], return_inverse=True)
     items = names_in_order(table.columns[item], keep)
     orders, said = given_orders({item: items}, levels)

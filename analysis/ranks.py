@@ -1,7 +1,7 @@
 """Rank tests of one factor: Friedman, Wilcoxon, Kruskal-Wallis, Mann-Whitney and Dunn."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Literal
 
@@ -160,14 +160,14 @@ def rank_between(factor: str, levels: Sequence[str], groups: Sequence[Floats]) -
     ranks = _split(stats.rankdata(together), [len(group) for group in groups])
     chi2 = float(stats.kruskal(*groups).statistic)
     df = len(groups) - 1
-    low, high = _interval(groups, lambda drawn: _epsilon(drawn))
+    low, high = _interval(groups, _epsilon)
     test = RankTest("Kruskal-Wallis", chi2, df, float(stats.chi2.sf(chi2, df)), _epsilon(groups), low, high)
     dunn = _dunn(ranks, together)
     p_dunn = holm(np.array([p for _, p in dunn]))
     pairs = []
     for number, (a, b) in enumerate(combinations(range(len(groups)), 2)):
         pair = _rank_sum(levels[a], levels[b], groups[a], groups[b])
-        pairs.append(_with(pair, dunn_z=dunn[number][0], dunn_p_holm=float(p_dunn[number])))
+        pairs.append(replace(pair, dunn_z=dunn[number][0], dunn_p_holm=float(p_dunn[number])))
     return RankAnalysis(
         factor,
         "between",
@@ -190,7 +190,7 @@ def _friedman(ranks: Floats) -> tuple[float, int, float]:
 
 
 def _kendall_w(ranks: Floats) -> tuple[float, float, float]:
-    people, count = ranks.shape
+    count = ranks.shape[1]
 
     def concordance(drawn: Floats) -> float:
         # Nobody in the draw may tell two levels apart: then there is no concordance to speak of.
@@ -198,21 +198,14 @@ def _kendall_w(ranks: Floats) -> tuple[float, float, float]:
             return 0.0
         return float(_friedman(drawn)[0] / (len(drawn) * (count - 1)))
 
-    random = np.random.default_rng(SEED)
-    draws = [concordance(ranks[random.integers(0, people, people)]) for _ in range(DRAWS)]
-    low, high = np.quantile(draws, (0.025, 0.975))
-    return concordance(ranks), float(low), float(high)
+    return concordance(ranks), *_interval([ranks], lambda drawn: concordance(drawn[0]))
 
 
 def _signed_ranks(first: str, second: str, differences: Floats) -> RankPair:
     changed = differences[differences != 0]
-    random = np.random.default_rng(SEED)
-    draws = [_signed_biserial(random.choice(differences, len(differences))) for _ in range(DRAWS)]
-    low, high = np.quantile(draws, (0.025, 0.975))
+    low, high = _interval([differences], lambda drawn: _signed_biserial(drawn[0]))
     if len(changed) == 0:
-        return RankPair(
-            first, second, len(differences), 0.0, False, 1.0, 1.0, 1.0, 0.0, float(low), float(high)
-        )
+        return RankPair(first, second, len(differences), 0.0, False, 1.0, 1.0, 1.0, 0.0, low, high)
     ranks = stats.rankdata(np.abs(changed))
     v = float(ranks[changed > 0].sum())
     # R's rule: exact only without ties and without zero differences.
@@ -228,8 +221,8 @@ def _signed_ranks(first: str, second: str, differences: Floats) -> RankPair:
         np.nan,
         np.nan,
         _signed_biserial(differences),
-        float(low),
-        float(high),
+        low,
+        high,
     )
 
 
@@ -288,6 +281,7 @@ def _dunn(ranks: Sequence[Floats], together: Floats) -> list[tuple[float, float]
 
 
 def _interval(groups: Sequence[Floats], size: Callable[[list[Floats]], float]) -> tuple[float, float]:
+    # Participants are the rows of a group, so the same draw serves values, differences and rows of ranks.
     random = np.random.default_rng(SEED)
     draws = [size([random.choice(group, len(group)) for group in groups]) for _ in range(DRAWS)]
     low, high = np.quantile(draws, (0.025, 0.975))
@@ -302,13 +296,9 @@ def _plain(values: Floats) -> tuple[float, ...]:
     return tuple(float(value) for value in values)
 
 
-def _with(pair: RankPair, **changed: float) -> RankPair:
-    return RankPair(**{**pair.__dict__, **changed})
-
-
 def _corrected(pairs: Sequence[RankPair]) -> tuple[RankPair, ...]:
     p = np.array([pair.p_value for pair in pairs])
     return tuple(
-        _with(pair, p_holm=float(by_holm), p_bonferroni=float(by_bonferroni))
+        replace(pair, p_holm=float(by_holm), p_bonferroni=float(by_bonferroni))
         for pair, by_holm, by_bonferroni in zip(pairs, holm(p), bonferroni(p), strict=True)
     )

@@ -136,7 +136,7 @@ def test_an_answer_of_a_series(benchmark) -> None:
     cost = {}
     for name in ("threshold-demo", "plane-demo"):
         demo = load_experiment(name)
-        quest.choices(model(demo), (), 1)  # what is reckoned once for all series
+        quest.choices(model(demo), (), 1)  # what is computed once for all series
         cost[name] = cost_of_an_answer_ms(model(demo), 1 + demo.trial.ahead)
     say_ratio(
         "an answer of plane-demo, 4 stimuli chosen",

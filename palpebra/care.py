@@ -12,10 +12,9 @@ import typer
 from experiments.errors import InputError
 from experiments.extras import EXTRAS, install_line
 from palpebra.conflicts import foreign_packages
-from palpebra.folders import data_folder, use_folder
+from palpebra.folders import Folder, data_folder, use_folder
 
 UPGRADE = "uv tool install --force NEW.whl    (NEW.whl: the file of the new version)"
-Folder = Annotated[Path | None, typer.Option(help="Folder of the data; your user data folder by default.")]
 
 
 def register(parent: typer.Typer) -> None:

@@ -3,7 +3,9 @@
 import os
 import socket
 from pathlib import Path
+from typing import Annotated
 
+import typer
 from platformdirs import user_data_path
 
 from experiments.errors import InputError
@@ -11,6 +13,8 @@ from experiments.errors import InputError
 DATA_VARIABLE = "PALPEBRA_DATA_FOLDER"
 PORT = 8000
 PORTS_TRIED = 20
+Folder = Annotated[Path | None, typer.Option(help="Folder of the data; your user data folder by default.")]
+"""The option `--folder`."""
 
 
 def default_folder() -> Path:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from experiments.errors import InputError
-from palpebra.folders import data_folder
+from palpebra.folders import PORT, Folder, data_folder
 
 UNIT = """\
 # Written by `palpebra service`. The server under systemd, as you, with access to its data folder only.
@@ -42,11 +42,9 @@ def register(parent: typer.Typer) -> None:
 
 
 def service(
-    folder: Annotated[
-        Path | None, typer.Option(help="Folder of the data; your user data folder by default.")
-    ] = None,
+    folder: Folder = None,
     domain: Annotated[str, typer.Option(help="Name of the server, such as lab.example.org.")] = "",
-    port: Annotated[int, typer.Option(min=1, max=65535, help="Port behind the proxy.")] = 8000,
+    port: Annotated[int, typer.Option(min=1, max=65535, help="Port behind the proxy.")] = PORT,
     out: Annotated[Path | None, typer.Option(help="File to write; your systemd folder by default.")] = None,
 ) -> None:
     """Write a systemd unit that runs the server, and print the commands that enable it.

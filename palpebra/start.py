@@ -9,13 +9,17 @@ import webbrowser
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 from urllib.parse import quote, urlencode
 
 import typer
 
 from experiments.errors import InputError
-from palpebra.folders import data_folder, free_port, use_folder
+from palpebra.folders import PORT, Folder, data_folder, free_port, use_folder
+
+if TYPE_CHECKING:  # the server is only imported when it starts, so that `palpebra --help` is quick
+    from server.context import Services
+    from server.core.db import Database
 
 DEMO = Path(__file__).resolve().parent / "demo"
 """The demo's declaration and clips; `make wheel` builds them."""
@@ -23,7 +27,6 @@ DEMO_NAME = "demo"
 LOCK = "palpebra.lock"
 SECONDS_TO_START = 60
 
-Folder = Annotated[Path | None, typer.Option(help="Folder for the data; your user data folder by default.")]
 Port = Annotated[
     int | None, typer.Option(min=1, max=65535, help="Port; by default the first free one from 8000 on.")
 ]
@@ -61,29 +64,34 @@ def demo(folder: Folder = None, port: Port = None, no_browser: NoBrowser = False
 
 def first_page(folder: Path) -> str:
     """Path of the first page, with what it needs to know after the `#`, which no server sees."""
+    from server.cli_common import stored_services
+
     known = {"folder": str(folder)}
-    if link := demo_link():
-        known["demo"] = link
-    if invitation := first_invitation():
-        known["invitation"] = invitation
+    with stored_services() as services:
+        if link := demo_link(services):
+            known["demo"] = link
+        if invitation := first_invitation(services.database):
+            known["invitation"] = invitation
     return f"/admin/start#{urlencode(known, quote_via=quote)}"
 
 
 def demo_page(folder: Path) -> str:
     """Path of the demo study's participant page."""
-    link = demo_link()
+    from server.cli_common import stored_services
+
+    with stored_services() as services:
+        link = demo_link(services)
     if link is None:
         raise InputError(f"the demo study was removed from {folder}; choose another folder by --folder")
     return link
 
 
-def demo_link() -> str | None:
+def demo_link(services: "Services") -> str | None:
     """Path of the demo's link for participants; None if this server has no demo."""
-    from server.cli_common import stored_services
     from server.studies.links import general_links, link_url
     from server.studies.repository import open_studies
 
-    with stored_services() as services, services.database.write() as session:
+    with services.database.write() as session:
         for study in open_studies(session):
             if study.name == DEMO_NAME:
                 for link in general_links(session, services.settings.key, study):
@@ -91,24 +99,22 @@ def demo_link() -> str | None:
     return None
 
 
-def first_invitation() -> str | None:
+def first_invitation(database: "Database") -> str | None:
     """The token by which the first account is created; None once there is one."""
     from server.accounts import invitations
     from server.accounts import service as accounts
-    from server.cli_common import stored_services
 
-    with stored_services() as services:
-        with services.database.read() as session:
-            if accounts.accounts_exist(session):
-                return None
-        return invitations.invite(services.database, "owner", "first owner", None)[1]
+    with database.read() as session:
+        if accounts.accounts_exist(session):
+            return None
+    return invitations.invite(database, "owner", "first owner", None)[1]
 
 
 def _serve(folder: Path | None, port: int | None, page: Callable[[Path], str], *, with_browser: bool) -> None:
     place = data_folder(folder)
     chosen = free_port(port)
-    if port is None and chosen != 8000:
-        typer.echo(f"Port 8000 is in use; using {chosen}.")
+    if port is None and chosen != PORT:
+        typer.echo(f"Port {PORT} is in use; using {chosen}.")
     use_folder(place, chosen)
     from server.cli_run import run
 

@@ -63,7 +63,7 @@ UNCHANGED = ("migrations/versions", "frontend/src/api", "stimuli_builder/charact
 """Sources that must stay byte-identical (the cartoon's are hashed into clips) or are generated."""
 BANNED_WORDS = tuple((re.compile(pattern, re.IGNORECASE), better) for pattern, better in BANNED.items())
 BRITISH_WORDS = tuple((re.compile(pattern, re.IGNORECASE), better) for pattern, better in BRITISH.items())
-CODE_BLOCK = re.compile(r"^(\s*)(```|~~~|:::).*?^\1\2", re.MULTILINE | re.DOTALL)
+CODE_BLOCK = re.compile(r"^```.*?^```", re.MULTILINE | re.DOTALL)
 CODE = re.compile(
     r"`[^`\n]*`|\"[^\"\n]*\"|“[^”\n]*”|\]\([^)]*\)|^\[[^\]]+\]: .*"
     r"|--[a-z][a-z-]*|^ *[a-z_]+(?:, [a-z_]+)* : "
@@ -97,7 +97,7 @@ def banned_words_in(
 
 def prose_of(page: str) -> str:
     """A Markdown page without code, tables, pictures, links and headings."""
-    text = re.sub(r"^```.*?^```", "", page, flags=re.MULTILINE | re.DOTALL)
+    text = CODE_BLOCK.sub("", page)
     text = re.sub(r"^(?:\||#|:::|!\[|\[).*$", "", text, flags=re.MULTILINE)
     text = re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", text)
     text = re.sub(r"`([^`]*)`", r"code", text)
@@ -119,12 +119,7 @@ def pages() -> list[Path]:
 
 def without_code_blocks(text: str) -> str:
     """The page with its code blocks blanked, so that lines keep their numbers."""
-    return re.sub(
-        r"^```.*?^```",
-        lambda block: "\n" * block.group(0).count("\n"),
-        text,
-        flags=re.MULTILINE | re.DOTALL,
-    )
+    return CODE_BLOCK.sub(lambda block: "\n" * block.group(0).count("\n"), text)
 
 
 def grade_of(page: Path) -> float | None:

@@ -13,7 +13,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from analysis.read.number_columns import MISSING_MARKS
-from analysis.read.reading import EXPORT_COLUMNS, rows_that_count
+from analysis.read.reading import EXPORT_COLUMNS, answers_that_count
 from analysis.read.text_table import (
     TextTable,
     name_lines,
@@ -105,11 +105,7 @@ def read_comparisons(
     columns = {name: table.columns[name].astype(str).to_numpy() for name in roles}
     _refuse_same(table, columns[left], columns[right])
     outcome, judged = _outcomes(table, columns[left], columns[right], columns[winner], winner, tie)
-    if set(table.header) >= EXPORTED_SIDES:
-        judged, left_out = rows_that_count(table.columns, judged)
-        table.decisions.extend(left_out)
-        if not judged.any():
-            raise InputError(f"{path.name}: there are no usable comparisons; {', '.join(left_out)}")
+    judged = answers_that_count(table, judged, "comparisons", EXPORTED_SIDES)
     items = _items(table.columns[left], table.columns[right], judged)
     orders, said = given_orders({left: items}, levels)
     items = orders.get(left, items)

@@ -89,10 +89,7 @@ def read_long_table(
         keep &= _with_covariate(table, participant, name, given)
     if not keep.any():
         raise InputError(f"{path.name}: no participant has a rating and all covariates")
-    keep, left_out = answers_that_count(table.header, table.columns, keep)
-    table.decisions.extend(left_out)
-    if not keep.any():
-        raise InputError(f"{path.name}: there are no usable ratings; {', '.join(left_out)}")
+    keep = answers_that_count(table, keep, "ratings")
     rows = table.columns.assign(**{rating: values, **measured})[keep].reset_index(drop=True)
     synthetic = "synthetic" in rows.columns and bool((rows["synthetic"] == "1").any())
     return LongData(rows, path.name, tuple(table.decisions), synthetic, table.header)

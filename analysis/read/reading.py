@@ -1,12 +1,13 @@
 """Which columns and rows of the server's exports the analysis reads."""
 
-from collections.abc import Sequence
+from collections.abc import Set
 from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from analysis.read.text_table import TextTable
 from experiments.columns import View, names_of
 from experiments.columns.base import LEVELS, RUN, STUDY
 from experiments.errors import InputError
@@ -94,13 +95,25 @@ _OF_AN_EXPORT = frozenset({"kind", "trial_index", "run", "verdict", "excluded"})
 
 
 def answers_that_count(
-    header: Sequence[str], rows: pd.DataFrame, keep: NDArray[np.bool_]
-) -> tuple[NDArray[np.bool_], list[str]]:
-    """As `rows_that_count` if the table is an export of the server; anyone else's table keeps all its rows.
+    table: TextTable, keep: NDArray[np.bool_], what: str, marks: Set[str] = _OF_AN_EXPORT
+) -> NDArray[np.bool_]:
+    """Of the rows to `keep` (n,) those that count, if the table is an export of the server.
 
-    Anyone's column `kind` may be a factor, so the columns of an export are asked for together.
+    Anyone else's table keeps all its rows: their column `kind` may be a factor, so a table is an export only
+    if it has all the columns `marks`. Each reason that leaves rows out is added to the table's decisions.
+
+    Raises
+    ------
+    InputError
+        An export without any such row; `what` names the rows, such as `ratings`.
     """
-    return rows_that_count(rows, keep) if set(header) >= _OF_AN_EXPORT else (keep, [])
+    if not marks <= set(table.header):
+        return keep
+    keep, left_out = rows_that_count(table.columns, keep)
+    table.decisions.extend(left_out)
+    if not keep.any():
+        raise InputError(f"{table.source}: there are no usable {what}; {', '.join(left_out)}")
+    return keep
 
 
 # Failures of the analysis that are nobody's fault.

@@ -93,10 +93,7 @@ def read_answers(
         table.decisions.append(f"{int((~keep).sum())} rows without stimulus or answer excluded ({lines})")
     if not keep.any():
         raise InputError(f"{path.name}: no row has both '{x}' and '{response}'")
-    keep, left_out = answers_that_count(table.header, table.columns, keep)
-    table.decisions.extend(left_out)
-    if not keep.any():
-        raise InputError(f"{path.name}: there are no usable answers; {', '.join(left_out)}")
+    keep = answers_that_count(table, keep, "answers")
     names = [
         None if name is None else table.columns[name].astype(object).to_numpy()[keep]
         for name in (participant, by)

@@ -334,7 +334,7 @@ export function MonitorTab() {
         ]}
       />
       {snapshot.runs.length === 0 ? (
-        <Text c="dimmed">No runs of origin {snapshot.origin} yet. Whoever opens a link appears here within two seconds.</Text>
+        <Text c="dimmed">No runs of origin {snapshot.origin} yet. Anyone who opens a link appears here within two seconds.</Text>
       ) : (
         <>
           <SimpleGrid cols={{ base: 1, md: 2 }}>
