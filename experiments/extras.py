@@ -9,9 +9,9 @@ EXTRAS: dict[str, tuple[str, ...]] = {
 """Extra -> the modules that it brings."""
 
 
-def install_line(extra: str) -> str:
-    """The command that installs an extra; Palpebra comes as a file, not from a public index."""
-    return f"uv tool install 'FILE.whl[{extra}]'"
+def install_line(extra: str | None = None) -> str:
+    """The command that installs Palpebra, or it with an extra; it comes as a file, not from an index."""
+    return f"uv tool install 'FILE.whl[{extra}]'" if extra else "uv tool install FILE.whl"
 
 
 def missing_extra(module: str) -> str | None:

@@ -4,6 +4,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from experiments.errors import InputError
+from experiments.extras import install_line
 
 PACKAGES = ("server", "analysis", "experiments", "migrations", "table_files", "video_conversion")
 HOME = Path(__file__).resolve().parent.parent
@@ -31,5 +32,5 @@ def refuse_foreign_packages() -> None:
     for name, place in foreign_packages().items():
         raise InputError(
             f"package '{name}': expected Palpebra's, got the one in {place}; install Palpebra in a separate "
-            "environment: uv tool install palpebra"
+            f"environment: {install_line()}"
         )

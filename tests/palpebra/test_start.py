@@ -82,7 +82,8 @@ def test_package_of_another_project_is_named(tmp_path: Path, monkeypatch: pytest
     (tmp_path / "migrations" / "__init__.py").write_text("", encoding="utf-8")
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.delitem(sys.modules, "migrations", raising=False)
-    with pytest.raises(InputError, match="package 'migrations': expected Palpebra's, got the one in"):
+    expected = r"package 'migrations': expected Palpebra's, got the one in .*: uv tool install FILE\.whl$"
+    with pytest.raises(InputError, match=expected):
         refuse_foreign_packages()
 
 
