@@ -1,7 +1,5 @@
 import asyncio
 import threading
-from collections.abc import Callable, Coroutine
-from concurrent.futures import ThreadPoolExecutor
 from itertools import groupby
 from typing import Any
 
@@ -11,14 +9,9 @@ from sqlalchemy.exc import IntegrityError
 
 from server.core.commit import MAX_HEAVY, MAX_LIGHT, GroupCommit
 from server.core.errors import Conflict
+from tests.helpers.waiting import run_in_own_loop
 
 INSERT = text("INSERT INTO clips VALUES (:name, 1, 30, 1, 1, 1, '2026-11-21 00:00:00')")
-
-
-def run_apart(main: Callable[[], Coroutine[Any, Any, Any]]) -> Any:
-    """Run `main` in a thread of its own: the browser tests leave an event loop running in this one."""
-    with ThreadPoolExecutor(max_workers=1) as pool:
-        return pool.submit(lambda: asyncio.run(main())).result()
 
 
 @pytest.fixture
@@ -46,7 +39,7 @@ def test_each_gets_its_own_result_after_the_commit(writers, services) -> None:
 
         return await asyncio.gather(*(one(number) for number in range(50)))
 
-    assert set(run_apart(main)) == stored(services)
+    assert set(run_in_own_loop(main())) == stored(services)
 
 
 def test_a_refusal_reaches_the_one_and_spares_the_others(writers, services) -> None:
@@ -57,7 +50,7 @@ def test_a_refusal_reaches_the_one_and_spares_the_others(writers, services) -> N
         work = [insert("a"), refuse, insert("b")]
         return await asyncio.gather(*(writers.run("k", do) for do in work), return_exceptions=True)
 
-    results = run_apart(main)
+    results = run_in_own_loop(main())
     assert [type(result) for result in results] == [int, Conflict, int]
     assert stored(services) == {"a", "b"}
 
@@ -71,7 +64,7 @@ def test_what_breaks_the_transaction_is_undone_alone(writers, services) -> None:
         work = [insert("a"), fail, insert("a"), insert("b")]
         return await asyncio.gather(*(writers.run("k", do) for do in work), return_exceptions=True)
 
-    results = run_apart(main)
+    results = run_in_own_loop(main())
     assert results[0] == results[3] == 1
     assert isinstance(results[1], RuntimeError)
     assert isinstance(results[2], IntegrityError)
@@ -85,7 +78,7 @@ def test_closing_finishes_what_waits(writers, services) -> None:
         await asyncio.to_thread(writers.close)
         await asyncio.gather(*tasks)
 
-    run_apart(main)
+    run_in_own_loop(main())
     assert len(stored(services)) == 20
 
 
@@ -111,7 +104,7 @@ def test_light_work_passes_heavy_work_however_long_that_has_waited(writers, serv
         occupied.set()
         await asyncio.gather(first, *tasks)
 
-    run_apart(main)
+    run_in_own_loop(main())
     assert [name for name, _ in order] == ["light"] * 3 + ["heavy"] * 6
     transactions = [list(group) for _, group in groupby(order, lambda noted: id(noted[1]))]
     assert [len(group) for group in transactions] == [5, 2, 2]
@@ -131,7 +124,7 @@ def test_heavy_work_gets_its_share_while_light_work_never_ceases(writers, servic
         await asyncio.wait_for(writers.run("k", lambda _: done.append("heavy"), 2 * MAX_HEAVY), 10)
         await asyncio.gather(*raters)
 
-    run_apart(main)
+    run_in_own_loop(main())
     assert done == ["heavy"]
 
 
@@ -147,5 +140,5 @@ def test_postgres_does_light_work_while_heavy_work_waits(writers, services) -> N
         stuck.set()
         await heavy
 
-    run_apart(main)
+    run_in_own_loop(main())
     assert stored(services) == {"light"}

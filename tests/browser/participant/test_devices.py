@@ -63,7 +63,7 @@ def test_a_phone_goes_through_everything_by_tapping(
         tap("text=Larger")
         tap("text=It fits")
     tap("text=Yes, within")
-    page.wait_for_selector("text=in centimetres")  # the blind spot lies outside so small a screen
+    page.wait_for_selector("text=in centimeters")  # the blind spot lies outside so small a screen
     tap(".primary")
     for selector in (".prose ol >> xpath=ancestor::section//button[1]", "text=Continue"):
         tap(selector)

@@ -27,6 +27,7 @@ from server.models import Account, AdminSession
 from tests.helpers.admins import PASSWORD, Admin, fresh_browser
 from tests.helpers.databases import run_server_command
 from tests.helpers.studies import FROM_OWN_PAGE
+from tests.helpers.waiting import run_in_own_loop
 
 SIX = 6
 OTHER = "another quite long one"
@@ -242,7 +243,7 @@ def test_one_hash_at_a_time_and_of_those_who_wait_only_so_many(monkeypatch: pyte
         pool.close()
         return list(answers)
 
-    answers = asyncio.run(flood())
+    answers = run_in_own_loop(flood())
     refused = [answer for answer in answers if isinstance(answer, PasswordsBusy)]
     assert (len(refused), answers.count(None), highest) == (7, 3, 1)
     assert refused[0].status == 503

@@ -15,6 +15,7 @@ from server.participation.clip_bytes import ClipBytes, older_digest
 from server.participation.judgement import digests_judged_later, judge_later
 from tests.helpers.evidence import Watcher
 from tests.helpers.studies import clip_url
+from tests.helpers.waiting import run_in_own_loop
 from tests.server.evidence.conftest import CLIP_S
 
 WRONG = "0" * 64
@@ -213,4 +214,4 @@ def test_the_server_judges_by_itself_once_the_store_is_back(
             while judged(services) != [False] + [True] * 9 or verdict(services) == "likely":
                 await asyncio.sleep(0.02)
 
-    asyncio.run(asyncio.wait_for(serve(), 120))
+    run_in_own_loop(asyncio.wait_for(serve(), 120))

@@ -26,7 +26,7 @@ from server.operations.metrics import exposition
 from server.operations.watched_backups import DrillResult, last_drill, newest_backup
 from tests.helpers.databases import run_server_command
 from tests.helpers.studies import Participant
-from tests.helpers.waiting import until
+from tests.helpers.waiting import run_in_own_loop, until
 
 DAY = timedelta(days=1)
 NOW = datetime(2026, 3, 1, 12, tzinfo=UTC)
@@ -225,7 +225,7 @@ def test_the_server_makes_the_drill_by_itself(
                     return
                 await asyncio.sleep(0.1)
 
-    asyncio.run(serve_until_drilled())
+    run_in_own_loop(serve_until_drilled())
     result = last_drill(watched)
     assert result is not None
     assert result.passed

@@ -15,6 +15,7 @@ from bench.load import divided
 from bench.raters import Tally, begin, prepare, run, stored
 from bench.servers import CLIP_BYTES, LoadServer, load_server, nginx, nginx_program
 from tests.helpers.attacked import api_token
+from tests.helpers.waiting import run_in_own_loop
 
 RATERS, SECONDS, EVERY_S = 4, 3.0, 0.5
 STATUSES = {
@@ -44,7 +45,9 @@ def target(server: LoadServer) -> attack.Target:
     async def token() -> str:
         return await attack.run_of_attacker(server)
 
-    return attack.Target(server.port, server.link_token, owner, asyncio.run(token()), attack.a_clip(server))
+    return attack.Target(
+        server.port, server.link_token, owner, run_in_own_loop(token()), attack.a_clip(server)
+    )
 
 
 def test_the_raters_of_load_rate_and_everything_is_stored(server: LoadServer) -> None:
@@ -77,7 +80,7 @@ def test_each_attack_reaches_the_server(target: attack.Target, name: str) -> Non
     answers: dict[str, int] = {}
     for seconds in (0.5, 4.0, 16.0, 64.0):  # a busy machine answers late, and what is sent is made first
         if not answers:
-            answers = asyncio.run(attack.ATTACKS[name](target, time.monotonic() + seconds))
+            answers = run_in_own_loop(attack.ATTACKS[name](target, time.monotonic() + seconds))
     assert sum(answers.values()) > 0, answers
     if name in STATUSES:
         assert set(answers) <= STATUSES[name]

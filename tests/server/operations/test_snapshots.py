@@ -44,6 +44,7 @@ from server.privacy.ledger import note_erased
 from tests.helpers.admins import Admin
 from tests.helpers.databases import run_server_command
 from tests.helpers.studies import Participant, StudyInDatabase
+from tests.helpers.waiting import run_in_own_loop
 
 NOON = datetime(2026, 11, 24, 12, tzinfo=UTC)
 ON_SQLITE = pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
@@ -169,7 +170,7 @@ class TestSchedule:
                     if snapshots_of(settings):
                         return
 
-        asyncio.run(run())
+        run_in_own_loop(run())
         assert len(snapshots_of(settings)) >= 1
 
     def test_none_are_taken_unasked(self, services: Services) -> None:
@@ -177,7 +178,7 @@ class TestSchedule:
             async with snapshots_taken(services.settings, look_every_s=0.01):
                 await asyncio.sleep(0.1)
 
-        asyncio.run(run())
+        run_in_own_loop(run())
         assert snapshots_of(services.settings) == []
 
 

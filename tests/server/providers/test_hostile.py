@@ -1,6 +1,5 @@
 """Providers whose answers have no end, or not the form of any: over real HTTP, each is refused in a line."""
 
-import asyncio
 import contextlib
 import gzip
 import json
@@ -15,6 +14,7 @@ from server.accounts import provider_protocol
 from server.accounts.provider_protocol import NotRecognised, ProviderAway, ProviderClient, Secrets
 from server.core.errors import ApiError
 from server.core.settings import Provider
+from tests.helpers.waiting import run_in_own_loop
 
 SECRETS = Secrets("a-state", "a-nonce", "a-verifier-" * 5)
 Answer = Callable[[BaseHTTPRequestHandler], None]
@@ -134,7 +134,7 @@ def test_an_answer_without_end_or_form_is_refused(
     hostile.answers |= {"token": content({"id_token": "a.b.c", "token_type": "bearer", "access_token": "x"})}
     hostile.answers[path] = answer
     with pytest.raises((ProviderAway, NotRecognised)) as refused:
-        asyncio.run(client.recognise("a-code", None, SECRETS))
+        run_in_own_loop(client.recognise("a-code", None, SECRETS))
     assert refused.value.status in (401, 503)
 
 
@@ -157,7 +157,7 @@ def test_a_description_of_another_form_is_refused(
 ) -> None:
     hostile.answers[DESCRIPTION] = content(hostile.described(**changes))
     with pytest.raises(ProviderAway):
-        asyncio.run(client.authorization_url(SECRETS))
+        run_in_own_loop(client.authorization_url(SECRETS))
 
 
 @pytest.mark.parametrize(
@@ -171,5 +171,5 @@ def test_tokens_and_keys_of_another_form_sign_nobody_in(
 ) -> None:
     hostile.answers |= {"token": content(token), "keys": content(keys)}
     with pytest.raises(ApiError) as refused:
-        asyncio.run(client.recognise("a-code", None, SECRETS))
+        run_in_own_loop(client.recognise("a-code", None, SECRETS))
     assert refused.value.status in (401, 503)

@@ -25,6 +25,7 @@ from tests.helpers.admins import Admin
 from tests.helpers.databases import run_server_command
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study
 from tests.helpers.tiny_clips import make_clip_folder
+from tests.helpers.waiting import run_in_own_loop
 
 KEPT = SHORT.replace(
     "[session]", "[retention]\nidentifiers_days = 90\nunfinished_days = 30\nanswers_days = 1000\n\n[session]"
@@ -215,7 +216,7 @@ class TestOnSqlite:
                 while state(services)[run] != "unnamed":
                     await asyncio.sleep(0.02)
 
-        asyncio.run(asyncio.wait_for(serve(), 60))
+        run_in_own_loop(asyncio.wait_for(serve(), 60))
 
     def test_the_page_shows_what_is_coming(
         self, client: TestClient, services: Services, kept: StudyInDatabase, owner: Admin
