@@ -9,7 +9,7 @@ from analysis.within.anova import AnovaResult, SumOfSquares, linear_anova
 from analysis.within.between import BetweenDesign, no_groups
 from analysis.within.cell_means import CellTable, name_cells
 from analysis.within.contrast_tests import Contrast, Equivalence, contrasts_of, equivalence, trends
-from analysis.within.marginal_means import MarginalMean, marginal_means
+from analysis.within.estimates import MarginalMean, marginal_means
 from analysis.within.pairwise import Pair, one_factor_pairs, pairs_of, quote_level
 from analysis.within.simple_effects import SimpleEffect, reports_multivariate, simple_effects
 

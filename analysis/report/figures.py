@@ -18,8 +18,7 @@ from analysis.plans.result import Analysis
 from analysis.report.contents import in_words
 from analysis.report.pictures import BESIDE, COLOURS, MARKERS, STYLE, new_figure, wrap_text, write_note
 from analysis.within.anova import AnovaResult
-from analysis.within.estimates import margin_of
-from analysis.within.marginal_means import margin
+from analysis.within.estimates import margin, margin_of
 from experiments.declaration.trial import RatedScale
 from experiments.error_bars import within_participant_errors
 from experiments.kinds.scales import scale_called

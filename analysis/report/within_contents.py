@@ -13,7 +13,7 @@ from analysis.report.within_tables import all_tables, corrected_df, has_spherici
 from analysis.within.effects import Effect
 from analysis.within.multivariate_tests import MultivariateTest
 from analysis.within.simple_effects import SIGNIFICANCE, first_p
-from analysis.within.univariate import UnivariateTest
+from analysis.within.strata import UnivariateTest
 
 # Sentences in APA style, one an effect.
 

@@ -17,7 +17,7 @@ from analysis.report.numbers import (
 from analysis.within.effects import Effect
 from analysis.within.homogeneity import box_test, levene_tests
 from analysis.within.simple_effects import SIGNIFICANCE, first_test
-from analysis.within.univariate import UnivariateTest
+from analysis.within.strata import UnivariateTest
 
 # What the tables of an analysis share: titles, and the cells of a test.
 

@@ -7,9 +7,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.within.between import BetweenDesign, no_groups
+from analysis.within.between import BetweenDesign, no_groups, term_directions
 from analysis.within.contrasts import contrast_scores
-from analysis.within.directions import term_directions
 from analysis.within.effects import Effect, effects_of
 from analysis.within.strata import Hypothesis, above_noise, error_stratum
 from experiments.errors import InputError

@@ -7,9 +7,7 @@ from dataclasses import dataclass, field
 from analysis.within.contrasts import effect_name
 from analysis.within.eta_squared import SizeIntervals
 from analysis.within.multivariate_tests import MultivariateTest, MultivariateTests
-from analysis.within.sphericity import Mauchly
-from analysis.within.strata import Hypothesis
-from analysis.within.univariate import UnivariateTest, univariate_tests
+from analysis.within.strata import Hypothesis, Mauchly, UnivariateTest, univariate_tests
 
 
 @dataclass(frozen=True)

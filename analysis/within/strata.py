@@ -1,14 +1,61 @@
-"""Errors of the sets of within contrasts, and the hypotheses that are tested on each."""
+"""Errors of the sets of within contrasts, how far from spherical they are, and univariate F tests."""
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-
-from analysis.within.sphericity import Mauchly, greenhouse_geisser, huynh_feldt, mauchly_test
+from scipy import special
 
 Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Mauchly:
+    """Mauchly's test of sphericity, chi-square with Box's second-order term (the textbook form)."""
+
+    w: float
+    p_value: float
+
+
+def greenhouse_geisser(eigenvalues: Floats) -> float:
+    r"""Greenhouse and Geisser's :math:`\hat\epsilon = (\mathrm{tr} E)^2 / (q \, \mathrm{tr} E^2)`.
+
+    Parameters
+    ----------
+    eigenvalues : (q,) array
+        Those of E, sums of squares and products of the residuals of q orthonormal contrasts.
+    """
+    return min(1.0, float(eigenvalues.sum()) ** 2 / (len(eigenvalues) * float(eigenvalues @ eigenvalues)))
+
+
+def huynh_feldt(epsilon: float, contrasts: int, df_error: int) -> float:
+    r"""Huynh and Feldt's epsilon, uncapped, with Lecoutre's (1991) correction for groups.
+
+    Notes
+    -----
+    .. math:: \tilde\epsilon = \frac{(\nu + 1) q \hat\epsilon - 2}{q (\nu - q \hat\epsilon)} \tag{1}
+
+    q contrasts, :math:`\nu` error df of participants, :math:`\hat\epsilon` Greenhouse and Geisser's. With
+    :math:`q \hat\epsilon = \nu` (few participants) there is no finite value: NaN.
+    """
+    q, nu = contrasts, df_error
+    room = nu - q * epsilon
+    return ((nu + 1) * q * epsilon - 2) / (q * room) if room > 1e-9 * nu else math.nan
+
+
+def mauchly_test(log_w: float, contrasts: int, df_error: int) -> Mauchly:
+    """Mauchly's test of log W of q contrasts on the error df of participants."""
+    q, nu = contrasts, df_error
+    rho = 1 - (2 * q**2 + q + 2) / (6 * q * nu)
+    chi2, df = -nu * rho * log_w, q * (q + 1) / 2 - 1
+    # R's mauchly.test has 3k for 3q here (k cells); this is the textbook's form, so p differs by up to .003
+    omega = (q + 2) * (q - 1) * (q - 2) * (2 * q**3 + 6 * q**2 + 3 * q + 2) / (288 * (nu * q * rho) ** 2)
+    first, second = float(special.chdtrc(df, chi2)), float(special.chdtrc(df + 4, chi2))
+    return Mauchly(math.exp(log_w), min(max(first + omega * (second - first), 0.0), 1.0))
+
 
 NO_VARIANCE = "the effect and its error are both zero: nothing varies"
 NO_ERROR = "the error is zero: every participant shows the same effect"
@@ -112,3 +159,57 @@ def scaled_svd(residual: Floats) -> tuple[Floats, Floats, Floats] | None:
 def above_noise(squares: Floats, floor: float) -> Floats:
     """Sums of squares, exactly zero where they are no more than rounding noise."""
     return np.where(squares > floor, squares, 0.0)
+
+
+class UnivariateTest(NamedTuple):
+    """Univariate F with sphericity corrections; NaN where undefined (the effect's reason says why).
+
+    `epsilon_hf` is uncapped; `p_hf` and the df of Huynh-Feldt use min(1, epsilon_hf).
+    """
+
+    ss: float
+    ss_error: float
+    df_effect: int
+    df_error: int
+    f_value: float
+    p_value: float
+    epsilon_gg: float
+    p_gg: float
+    epsilon_hf: float
+    p_hf: float
+    df_effect_gg: float
+    df_error_gg: float
+    df_effect_hf: float
+    df_error_hf: float
+
+
+def univariate_tests(hypotheses: Sequence[Hypothesis]) -> list[UnivariateTest]:
+    r"""The univariate test of each hypothesis; p values of all are computed together.
+
+    Notes
+    -----
+    .. math:: F = \frac{SS / (r q)}{SS_e / (q \nu)}
+        \quad\text{on } \epsilon r q \text{ and } \epsilon q \nu \text{ df} \tag{1}
+
+    q contrasts within people, r between them, nu the df of people within groups; epsilon is 1, Greenhouse and
+    Geisser's, or Huynh and Feldt's (`huynh_feldt`), at most 1.
+    """
+    everything = [_f_and_df(h) for h in hypotheses]
+    errors = [h.error for h in hypotheses]
+    columns = np.array(everything, dtype=np.float64).T
+    p_values = special.fdtrc(columns[1::2], columns[2::2], columns[0]).T.tolist()
+    return [
+        UnivariateTest(h.ss, e.ss, df1, df2, f, p, e.epsilon_gg, p_gg, e.epsilon_hf, p_hf, *corrected)
+        for h, e, (f, df1, df2, *corrected), (p, p_gg, p_hf) in zip(
+            hypotheses, errors, everything, p_values, strict=True
+        )
+    ]
+
+
+def _f_and_df(hypothesis: Hypothesis) -> tuple[float, int, int, float, float, float, float]:
+    """F and its df of effect and error: uncorrected, Greenhouse-Geisser's, Huynh-Feldt's."""
+    error = hypothesis.error
+    df1, df2 = hypothesis.rank * error.q, error.q * error.df
+    f_value = (hypothesis.ss / df1) / (error.ss / df2) if error.ss else math.nan
+    gg, hf = error.epsilon_gg, 1.0 if math.isnan(error.epsilon_hf) else min(1.0, error.epsilon_hf)
+    return f_value, df1, df2, gg * df1, gg * df2, hf * df1, hf * df2

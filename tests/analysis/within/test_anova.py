@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from analysis.within.anova import within_anova
-from analysis.within.marginal_means import marginal_means
+from analysis.within.estimates import marginal_means
 from analysis.within.pairwise import one_factor_pairs, pairs_of
 from experiments.error_bars import within_participant_errors
 from experiments.errors import InputError

@@ -11,7 +11,7 @@ from scipy import stats
 from analysis.within.anova import AnovaResult, within_anova
 from analysis.within.cell_means import cell_table
 from analysis.within.effects import Effect
-from analysis.within.marginal_means import marginal_means
+from analysis.within.estimates import marginal_means
 from analysis.within.pairwise import pairs_of
 
 GOLDEN = Path(__file__).parents[2] / "golden" / "r" / "within"

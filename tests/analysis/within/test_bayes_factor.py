@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pingouin import bayesfactor_ttest
 
-from analysis.within.bayes_factor import PRIOR_SCALE, bayes_factor
+from analysis.within.pairwise import PRIOR_SCALE, bayes_factor
 
 
 @pytest.mark.parametrize(("t", "n", "published"), [(2.03, 80, 1.56), (0.69, 100, 10.0)])

@@ -9,8 +9,7 @@ import pytest
 from analysis.read.long_csv import design_of
 from analysis.within.anova import AnovaResult, linear_anova
 from analysis.within.cell_means import cell_table
-from analysis.within.estimates import margin_of
-from analysis.within.marginal_means import means_of
+from analysis.within.estimates import margin_of, means_of
 from analysis.within.pairwise import pairs_of
 from analysis.within.simple_effects import simple_effect
 

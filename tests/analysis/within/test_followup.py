@@ -7,14 +7,12 @@ from scipy import integrate, stats
 from scipy.special import ndtr
 from statsmodels.stats.multitest import multipletests
 
-from analysis.within.adjustments import bonferroni, false_discovery_rate, holm, sidak, tukey
+from analysis.within.adjustments import bonferroni, false_discovery_rate, holm, range_tail, sidak, tukey
 from analysis.within.anova import linear_anova, within_anova
-from analysis.within.bayes_factor import PRIOR_SCALE
 from analysis.within.between import between_design
 from analysis.within.contrast_tests import contrasts_of, equivalence, polynomial_weights, trends
-from analysis.within.pairwise import one_factor_pairs, pairs_of
+from analysis.within.pairwise import PRIOR_SCALE, one_factor_pairs, pairs_of
 from analysis.within.simple_effects import first_p, reports_multivariate, simple_effect, simple_effects
-from analysis.within.studentized_range import range_tail
 from experiments.errors import InputError
 
 RNG = np.random.default_rng(5)
