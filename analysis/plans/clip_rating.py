@@ -7,7 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
+from analysis.plans.multiverse import MAX_RULES, Analyse, Multiverse, multiverse
 from analysis.plans.plan import Plan, PlanRows, prepare, refuse_unknown, where
 from analysis.plans.result import Analysis, analyse_cells, labels_of
 from analysis.read.pool import Pool
@@ -16,11 +18,12 @@ from analysis.read.study_answers import StudyAnswers
 from analysis.report.contents import Contents, Part, Progress, Section, caption, in_words
 from analysis.report.formats import Table
 from analysis.report.json_output import as_data, exclusions_data, left_out, study_data
-from analysis.report.numbers import DASH, fixed
+from analysis.report.numbers import DASH, fixed, p_value, share
 from analysis.report.within_contents import methods_of, part_of
 from analysis.within.anova import AnovaResult, linear_anova
 from analysis.within.between import BetweenDesign, between_design, no_groups
 from analysis.within.cell_means import CellTable, cell_table
+from analysis.within.simple_effects import SIGNIFICANCE
 from experiments.declaration.clip_rating import clip_rating_of
 from experiments.declaration.experiment import Experiment
 from experiments.declaration.trial import RatedScale
@@ -89,7 +92,6 @@ def analyse(prepared: PlanRows, rating: str = "response") -> Analysis:
 
 def further_sections(analysis: Analysis, prepared: PlanRows, progress: Progress) -> tuple[Section, ...]:
     """Sensitivity analyses and the multiverse of one scale: the one `prepared` names, or the only one."""
-    from analysis.plans.multiverse_section import multiverse_section
     from analysis.plans.sensitivity import sensitivity_sections
 
     sections = sensitivity_sections(analysis, progress)
@@ -291,3 +293,68 @@ def _reliability(alpha: dict[str, Any] | None, scales: int, name: str, synthetic
     header = ("Scales", "Items", "alpha", "95% CI", "Ratings")
     table = Table("reliability", caption("Reliability of the scales", name, synthetic), header, (row,), 1)
     return Part((table,), (said,), "Reliability")
+
+
+# What the report says of the multiverse of exclusions.
+
+MULTIVERSE = "Multiverse of exclusions"
+
+
+def multiverse_section(analysis: Analysis, prepared: PlanRows, analyse: Analyse) -> Section:
+    """The section of the report: how far the tests hang on the rules."""
+    if not prepared.experiment.exclusions:
+        return Section(MULTIVERSE, "The experiment declares no exclusion rule, so there is nothing to vary.")
+    from analysis.plans.sensitivity import MAX_RATINGS
+
+    if len(prepared.checked.rows) > MAX_RATINGS:
+        said = f"{len(prepared.checked.rows)} ratings exceed the limit of {MAX_RATINGS}."
+        return Section(MULTIVERSE, f"Not computed: {said}")
+    # matplotlib takes a second to import, which commands that draw nothing need not pay
+    from analysis.report.figures import multiverse_picture
+
+    result = multiverse(prepared, analyse)
+    choices = "every choice among" if len(result.rules) <= MAX_RULES else "leaving out one or all of"
+    text = (
+        f"The tests under {choices} the {len(result.rules)} declared exclusion rules: "
+        f"{len(result.universes)} analyses. Manual exclusions always apply."
+    )
+    if result.n_failed:
+        text += f" {result.n_failed} other choices could not be analyzed."
+    picture = multiverse_picture(analysis, result)
+    return Section(MULTIVERSE, text, (_table(analysis, result),), (picture,))
+
+
+def _table(analysis: Analysis, result: Multiverse) -> Table:
+    p = np.array([universe.p_values for universe in result.universes])
+    sizes = np.array([universe.sizes for universe in result.universes])
+    declared = next(universe for universe in result.universes if universe.declared)
+    rows = tuple(
+        (
+            analysis.labels.effect(factors),
+            p_value(declared.p_values[i]),
+            _range([p_value(value) for value in _ends(p[:, i])]),
+            f"{int((p[:, i] < SIGNIFICANCE).sum())} of {len(p)}",
+            _range([share(value) for value in _ends(sizes[:, i])]),
+        )
+        for i, factors in enumerate(result.effects)
+    )
+    kind = (
+        ("Multivariate tests.")
+        if analysis.multivariate_first
+        else "p with the Greenhouse-Geisser correction."
+    )
+    people = [universe.n_participants for universe in result.universes]
+    header = ("Effect", "p as declared", "p", f"significant at {share(SIGNIFICANCE, 2)}", "partial η²")
+    notes = (f"N = {_range([str(min(people)), str(max(people))])}. {kind}",)
+    title = caption("Tests under other exclusions", analysis.name, analysis.synthetic)
+    return Table("multiverse", title, header, rows, 1, notes)
+
+
+def _ends(values: NDArray[np.float64]) -> tuple[float, float]:
+    """Smallest and largest of the values there are; NaN where there is none."""
+    given = values[np.isfinite(values)]
+    return (float(given.min()), float(given.max())) if given.size else (np.nan, np.nan)
+
+
+def _range(ends: list[str]) -> str:
+    return ends[0] if ends[0] == ends[1] else f"{ends[0]} to {ends[1]}"

@@ -1,11 +1,14 @@
-"""Figures of an analysis, after the paper's 9, 10 and 11: means with within-participant error bars, and
-every participant visible behind them. The same data give the same bytes."""
+"""Figures of reports. The same data give the same bytes.
+
+Those of clip ratings follow the paper's 9, 10 and 11: means with within-participant error bars, and every
+participant visible behind them.
+"""
 
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
-from typing import Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import matplotlib as mpl
 import numpy as np
@@ -14,14 +17,32 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy import special
 
+from analysis.pairs.abilities import Z_95, PairsResult
+from analysis.pairs.findings import PairCount
 from analysis.plans.result import Analysis
-from analysis.report.contents import in_words
-from analysis.report.pictures import BESIDE, COLOURS, MARKERS, STYLE, new_figure, wrap_text, write_note
+from analysis.report.contents import Picture, in_words
+from analysis.report.numbers import fixed
+from analysis.report.pictures import (
+    BESIDE,
+    COLOURS,
+    MARKERS,
+    STYLE,
+    in_both_formats,
+    new_figure,
+    wrap_text,
+    write_note,
+)
+from analysis.traces import LagResult, MeanTrace
 from analysis.within.anova import AnovaResult
 from analysis.within.estimates import margin, margin_of
+from analysis.within.simple_effects import SIGNIFICANCE
 from experiments.declaration.trial import RatedScale
 from experiments.error_bars import within_participant_errors
 from experiments.kinds.scales import scale_called
+
+if TYPE_CHECKING:
+    from analysis.plans.multiverse import Multiverse
+
 
 Floats = NDArray[np.float64]
 
@@ -300,3 +321,237 @@ def _dress(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
     if spec.colour:
         title = wrap_text(analysis.labels.factor(spec.colour), LEGEND_CHARACTERS)
         axes.legend(title=title, frameon=False, fontsize=8, title_fontsize=8, **BESIDE)
+
+
+# Figures of paired comparisons: abilities, and the choices in each pair.
+
+NUMBERED_MAX = 14
+"""More items than this and the shares are colors without numbers."""
+
+
+def draw_abilities(result: PairsResult, synthetic: bool, people: int) -> Picture:
+    """Abilities against their mean with 95% intervals, the ablest on top."""
+    ranked = sorted(result.items, key=lambda item: (-item.rank, item.name))
+    with mpl.rc_context(STYLE):
+        figure = new_figure(7.2, 1.5 + 0.32 * len(ranked))
+        axes = figure.add_subplot()
+        rows = range(len(ranked))
+        axes.axvline(0, color="#999999", linewidth=0.8, zorder=1)
+        axes.errorbar(
+            [item.centred for item in ranked],
+            rows,
+            xerr=[Z_95 * item.se_centred for item in ranked],
+            linestyle="none",
+            marker="o",
+            color=COLOURS[0],
+            capsize=3.2,
+            elinewidth=1.3,
+            markersize=5,
+        )
+        axes.set_yticks(rows, [item.name for item in ranked])
+        axes.set_xlabel(f"Ability relative to the mean, {result.scale}")
+        axes.grid(axis="x", linewidth=0.4, alpha=0.5)
+        axes.set_axisbelow(True)
+        note = f"N = {people}, {result.n_comparisons} comparisons. Bars: 95% intervals, sum-to-zero."
+        write_note(figure, note, synthetic, "comparisons")
+        best = ranked[-1].name
+        alt = f"Abilities of {len(ranked)} cells with 95% intervals; {best} was chosen most often"
+        return Picture("figure-abilities", "Abilities", alt, *in_both_formats(figure))
+
+
+def draw_choices(pairs: Sequence[PairCount], synthetic: bool, people: int) -> Picture:
+    """Share of comparisons in which the row's cell was chosen over the column's, ties as half."""
+    names = list(dict.fromkeys(name for pair in pairs for name in (pair.first, pair.second)))
+    shares = np.full((len(names), len(names)), np.nan)
+    for pair in pairs:
+        one, other = names.index(pair.first), names.index(pair.second)
+        shares[one, other] = (pair.first_chosen + pair.ties / 2) / pair.n
+        shares[other, one] = 1 - shares[one, other]
+    size = len(names)
+    with mpl.rc_context(STYLE):
+        figure = new_figure(7.2, 2.0 + 0.34 * size)
+        axes = figure.add_subplot()
+        drawn = axes.imshow(shares, cmap="PuOr", vmin=0, vmax=1)
+        axes.set_xticks(range(size), names, rotation=30, ha="right")
+        axes.set_yticks(range(size), names)
+        axes.set_xlabel("over")
+        axes.set_ylabel("chosen")
+        for (row, column), share in np.ndenumerate(shares):
+            if np.isfinite(share) and size <= NUMBERED_MAX:
+                ink = "white" if abs(share - 0.5) > 0.3 else "black"
+                axes.text(column, row, f"{share:.2f}", ha="center", va="center", fontsize=8, color=ink)
+        axes.spines[:].set_visible(False)
+        figure.colorbar(drawn, ax=axes, label="share chosen")
+        write_note(figure, f"N = {people}. A tie counts as half a choice for each.", synthetic, "comparisons")
+        alt = "Proportion of comparisons in which the row's cell was chosen over the column's cell"
+        return Picture(
+            "figure-choices",
+            "Choices in each pair",
+            alt,
+            *in_both_formats(figure),
+        )
+
+
+# Figures of continuous ratings: a panel per cell with its blinks marked, and the correlation by lag.
+
+TRACE_COLUMNS = 2
+PANEL_INCHES = 1.9
+MARKS_SHARE = 0.12
+"""Height of the marks of blinks below the ratings, as a share of theirs."""
+
+
+def traces_figure(
+    traces: Sequence[MeanTrace], labels: Sequence[str], earlier_s: float, synthetic: bool
+) -> Picture:
+    """A panel a cell: mean and interval, drawn `earlier_s` earlier than given; a row of marks a clip."""
+    columns = min(TRACE_COLUMNS, len(traces))
+    rows = -(-len(traces) // columns)
+    figure = new_figure(height=PANEL_INCHES * rows + 0.9)
+    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+    low, high = _extent(traces)
+    for panel, trace, label, colour in zip(panels, traces, labels, _colours(traces), strict=False):
+        times = trace.times_s - earlier_s
+        panel.plot(times, trace.mean, color=colour)
+        panel.fill_between(times, trace.ci_low, trace.ci_high, color=colour, alpha=0.2, linewidth=0)
+        _mark_events(panel, trace, low, MARKS_SHARE * (high - low))
+        panel.set_title(label, fontsize=9)
+    for panel in panels[len(traces) :]:
+        panel.set_visible(False)
+    panels[0].set_ylim(low - (MARKS_SHARE + 0.04) * (high - low), high)
+    for panel in panels[::columns]:
+        panel.set_ylabel("Rating")
+    for panel in panels[max(0, len(traces) - columns) : len(traces)]:
+        panel.set_xlabel("Time in the clip in s" + (", less the lag" if earlier_s else ""))
+        panel.tick_params(labelbottom=True)
+    note = f"Mean over people with 95% intervals, drawn {fixed(earlier_s)} s earlier than recorded. "
+    write_note(figure, note + "Marks: blinks, one row per clip.", synthetic, "answers")
+    alt = f"Mean rating over time in {len(traces)} cells, with blinks marked"
+    return _trace_picture(figure, "figure-traces", "Mean traces", alt)
+
+
+def lag_figure(lag: LagResult, synthetic: bool) -> Picture:
+    """Correlation of the ratings' change with blinks, by lag."""
+    figure = new_figure(height=3.4)
+    axes = figure.add_subplot()
+    axes.plot(lag.lags_s, lag.mean, color=COLOURS[0])
+    axes.fill_between(lag.lags_s, lag.ci_low, lag.ci_high, color=COLOURS[0], alpha=0.18, linewidth=0)
+    axes.axvline(lag.lag_s, color=COLOURS[1], linewidth=0.8, linestyle=":")
+    axes.axhline(0, color="#888888", linewidth=0.6)
+    axes.set_xlabel("Time after a blink in s")
+    axes.set_ylabel("Correlation with the rating's change")
+    write_note(figure, f"N = {lag.people}. Dotted: the lag.", synthetic, "answers")
+    alt = f"Correlation of ratings with blinks, greatest at {fixed(lag.lag_s)} s"
+    return _trace_picture(figure, "figure-lag", "Lag", alt)
+
+
+def _colours(traces: Sequence[MeanTrace]) -> list[str]:
+    return [COLOURS[position % len(COLOURS)] for position in range(len(traces))]
+
+
+def _extent(traces: Sequence[MeanTrace]) -> tuple[float, float]:
+    """Lowest and highest value drawn; intervals of one person are not numbers, and not drawn."""
+    values = [
+        float(value)
+        for trace in traces
+        for curve in (trace.mean, trace.ci_low, trace.ci_high)
+        for value in curve[np.isfinite(curve)]
+    ]
+    low, high = min(values), max(values)
+    return (low, high) if high > low else (low - 0.5, high + 0.5)
+
+
+def _mark_events(panel: Any, trace: MeanTrace, below: float, height: float) -> None:
+    clips = [events for events in trace.events_s if events]
+    row = height / max(1, len(clips))
+    for position, events in enumerate(clips):
+        top = below - position * row
+        panel.vlines(events, top - 0.7 * row, top, color="#444444", linewidth=0.9)
+
+
+def _trace_picture(figure: Any, key: str, title: str, alt: str) -> Picture:
+    return Picture(key, title, alt, *in_both_formats(figure))
+
+
+# The figure of a multiverse: p of every effect under every choice of rules, over the rules applied.
+
+SMALLEST_P = 1e-4
+"""Smaller p are drawn here."""
+
+MULTIVERSE_LEGEND, RULE_CHARACTERS = 26, 24
+LINE_INCHES = 0.13
+"""Height of a line of 7 points."""
+
+MAX_EFFECTS = len(COLOURS)
+"""Of more effects those with the smallest p as declared are drawn; the table has all."""
+
+
+def multiverse_picture(analysis: Analysis, result: "Multiverse") -> Picture:
+    """Draw p of the effects above a dot for each rule that was applied; choices ordered by who remains."""
+    order = sorted(result.universes, key=lambda u: (u.n_participants, u.n_ratings, u.applied), reverse=True)
+    with mpl.rc_context(STYLE):
+        p = np.array([universe.p_values for universe in order])
+        drawn = _drawn(p[[universe.declared for universe in order]][0])
+        names = [wrap_text(analysis.labels.effect(result.effects[i]), MULTIVERSE_LEGEND) for i in drawn]
+        rules = [wrap_text(name.replace("_", " "), RULE_CHARACTERS) for name in result.rules]
+        # as high as the lines of the legend, and of the names of rules, need
+        above = max(2.4, LINE_INCHES * 1.25 * sum(_lines(name) for name in names) + 0.3)
+        below = max(0.4, sum(LINE_INCHES * _lines(rule) + 0.1 for rule in rules))
+        figure = new_figure(7.2, above + below + 0.8)
+        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[above, below])
+        _tests(upper, p[:, drawn], names)
+        _rules(lower, np.array([universe.applied for universe in order]), rules)
+        declared = next(at for at, universe in enumerate(order) if universe.declared)
+        for axes in (upper, lower):
+            axes.axvline(declared, color="#999999", linewidth=5, alpha=0.25, zorder=0)
+        low, high = order[-1].n_participants, order[0].n_participants
+        note = f"Each column is one choice of exclusion rules, N from {high} to {low}; shaded: as declared."
+        if len(drawn) < p.shape[1]:
+            note += f" The {len(drawn)} effects of {p.shape[1]} with the smallest p as declared."
+        write_note(figure, note, analysis.synthetic)
+    what = "p of every effect under each choice of the declared exclusion rules"
+    return Picture(
+        "figure-multiverse",
+        "Multiverse of exclusions",
+        what,
+        *in_both_formats(figure),
+    )
+
+
+def _drawn(p_declared: np.ndarray) -> list[int]:
+    """Positions of the effects to draw, in the order of the table."""
+    return sorted(np.argsort(p_declared, kind="stable")[:MAX_EFFECTS].tolist())
+
+
+def _lines(text: str) -> int:
+    return text.count("\n") + 1
+
+
+def _tests(axes: Axes, p: np.ndarray, names: list[str]) -> None:
+    columns = np.arange(len(p))
+    for i, name in enumerate(names):
+        axes.plot(
+            columns,
+            np.maximum(p[:, i], SMALLEST_P),
+            color=COLOURS[i % len(COLOURS)],
+            marker=MARKERS[i % len(MARKERS)],
+            markersize=3.5,
+            linewidth=0.6,
+            label=name,
+        )
+    axes.axhline(SIGNIFICANCE, color="#555555", linewidth=0.8, linestyle="--")
+    axes.set_yscale("log")
+    axes.set_ylim(SMALLEST_P * 0.7, 1.3)
+    ticks = [SMALLEST_P, 0.001, 0.01, SIGNIFICANCE, 0.1, 1]
+    axes.set_yticks(ticks, ["≤ .0001", ".001", ".01", ".05", ".1", "1"])
+    axes.minorticks_off()
+    axes.set_ylabel("p", style="italic")
+    axes.legend(**BESIDE, frameon=False, fontsize=7)
+
+
+def _rules(axes: Axes, applied: np.ndarray, names: list[str]) -> None:
+    column, rule = np.nonzero(applied)
+    axes.plot(column, rule, linestyle="none", marker="o", markersize=3.5, color="#333333")
+    axes.set_yticks(range(len(names)), names, fontsize=7)
+    axes.set_ylim(len(names) - 0.5, -0.5)
+    axes.set_xticks([])
+    axes.spines["bottom"].set_visible(False)

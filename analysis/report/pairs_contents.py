@@ -273,7 +273,7 @@ def numbers(prepared: PlanRows, comparisons: Comparisons, findings: Findings) ->
 def draw_all(findings: Findings, synthetic: bool, people: int) -> tuple[Picture, ...]:
     """Abilities with their intervals, and the share of choices in each pair."""
     # matplotlib takes a second to import, which commands that draw nothing need not pay
-    from analysis.report.pairs_figures import draw_abilities, draw_choices
+    from analysis.report.figures import draw_abilities, draw_choices
 
     choices = draw_choices(findings.pairs, synthetic, people)
     if findings.abilities is None:

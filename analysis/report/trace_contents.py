@@ -131,8 +131,8 @@ def pictures(prepared: PlanRows, traces: Sequence[MeanTrace], lag: LagResult | N
     # matplotlib takes a second to import, which commands that draw nothing need not pay
     import matplotlib as mpl
 
+    from analysis.report.figures import lag_figure, traces_figure
     from analysis.report.pictures import STYLE
-    from analysis.report.trace_figures import lag_figure, traces_figure
 
     earlier_s = lag.lag_s if lag is not None and lag.p < SIGNIFICANCE else 0.0
     labels = [cell_label(prepared, trace.cell) for trace in traces]

@@ -17,6 +17,8 @@ from scipy import special
 
 Floats = NDArray[np.float64]
 
+# The upper tail of the studentized range: equations (1) and (2).
+
 RANGE_NODES, PANEL_NODES, GRID = 128, 24, 801
 NEGLIGIBLE = 30.0
 """What is below exp(-30) times the largest value of an integrand is left out of the integral."""
@@ -120,6 +122,9 @@ def _log_density(x: Floats, df: int) -> Floats:
     """Logarithm of the density of log s at x."""
     constant = np.log(2.0) + df / 2 * np.log(df / 2) - special.gammaln(df / 2)
     return np.asarray(constant + df * x - df * np.exp(2 * x) / 2, dtype=np.float64)
+
+
+# Adjusted p values.
 
 
 def bonferroni(p: Floats) -> Floats:

@@ -238,6 +238,9 @@ def outside(own: Floats, others: Floats) -> Floats:
     return np.asarray(left.T[singular > RANK_RATIO * np.linalg.norm(own, axis=0).max()], dtype=np.float64)
 
 
+# Which directions between participants each term of a design is tested on.
+
+
 def term_directions(design: BetweenDesign, sum_of_squares: int) -> list[Floats]:
     """Orthonormal directions (r, N) in participant space that each term of the design is tested on.
 

@@ -104,6 +104,9 @@ def margin_of(result: AnovaResult, names: Sequence[str]) -> Margin:
     )
 
 
+# Estimated marginal means with their errors.
+
+
 @dataclass(frozen=True)
 class MarginalMean:
     """Mean over participants of one margin's level, its SE and confidence interval on N - p df.

@@ -15,6 +15,8 @@ from analysis.within.anova import AnovaResult
 from analysis.within.contrasts import effect_name
 from analysis.within.estimates import Margin, margin_of
 
+# Bayes factors of t tests with Jeffreys, Zellner and Siow's prior.
+
 PRIOR_SCALE = 2**0.5 / 2
 """Scale r of the Cauchy prior on effect sizes."""
 

@@ -57,6 +57,8 @@ def mauchly_test(log_w: float, contrasts: int, df_error: int) -> Mauchly:
     return Mauchly(math.exp(log_w), min(max(first + omega * (second - first), 0.0), 1.0))
 
 
+# Errors of the sets of within contrasts, and the hypotheses that are tested on each.
+
 NO_VARIANCE = "the effect and its error are both zero: nothing varies"
 NO_ERROR = "the error is zero: every participant shows the same effect"
 SINGULAR_RATIO = 1e-10
@@ -159,6 +161,9 @@ def scaled_svd(residual: Floats) -> tuple[Floats, Floats, Floats] | None:
 def above_noise(squares: Floats, floor: float) -> Floats:
     """Sums of squares, exactly zero where they are no more than rounding noise."""
     return np.where(squares > floor, squares, 0.0)
+
+
+# Univariate F tests, uncorrected and corrected for lack of sphericity.
 
 
 class UnivariateTest(NamedTuple):

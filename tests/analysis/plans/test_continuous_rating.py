@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 
 from analysis.plans.continuous_rating import clips_of
+from analysis.report.figures import traces_figure
 from analysis.report.pictures import STYLE
-from analysis.report.trace_figures import traces_figure
 from analysis.traces import ClipTraces, mean_trace
 from experiments.errors import InputError
 

@@ -4,9 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from analysis.plans.clip_rating import PLAN, READING, analyse, contents
+from analysis.plans.clip_rating import PLAN, READING, analyse, contents, multiverse_section
 from analysis.plans.multiverse import MAX_RULES, multiverse
-from analysis.plans.multiverse_section import multiverse_section
 from analysis.plans.plan import prepare
 from analysis.read.study_answers import load_csv
 from analysis.report.write import write_report

@@ -126,7 +126,7 @@ def test_texts_of_a_figure_are_whole_whatever_their_length() -> None:
 @pytest.mark.parametrize("n_rules", [1, 6])
 def test_labels_of_the_multiverse_figure_are_whole(n_rules: int, monkeypatch: pytest.MonkeyPatch) -> None:
     from analysis.plans.multiverse import Multiverse, Universe
-    from analysis.report import multiverse_figure
+    from analysis.report import figures
 
     analysis = analysed("obk", ["phase", "hour"], [], [])
     effects = tuple(("a long factor name", f"another long factor {k}", "and a third one") for k in range(8))
@@ -138,9 +138,7 @@ def test_labels_of_the_multiverse_figure_are_whole(n_rules: int, monkeypatch: py
         for k in range(n_rules + 1)
     )
     drawn = []
-    monkeypatch.setattr(
-        multiverse_figure, "in_both_formats", lambda figure: drawn.append(figure) or (b"", b"")
-    )
-    multiverse_figure.multiverse_picture(analysis, Multiverse(rules, effects, universes, 0))
+    monkeypatch.setattr(figures, "in_both_formats", lambda figure: drawn.append(figure) or (b"", b""))
+    figures.multiverse_picture(analysis, Multiverse(rules, effects, universes, 0))
     with mpl.rc_context(STYLE):
         assert_texts_are_whole(drawn[0])
