@@ -2,7 +2,7 @@
 
 from experiments.command_groups import command_group
 from experiments.command_line import run_command_line
-from experiments.descriptions import leave_descriptions_out
+from experiments.declaration import leave_descriptions_out
 
 app = command_group(
     "From ratings to tables: within-participant ANOVA, means, pairs, figures and one report.", name="analysis"

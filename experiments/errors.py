@@ -4,10 +4,10 @@ import json
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from table_files.errors import InputError as InputError
-from table_files.errors import counted as counted
-from table_files.errors import did_you_mean as did_you_mean
-from table_files.errors import nearest as nearest
+from table_files import InputError as InputError
+from table_files import counted as counted
+from table_files import did_you_mean as did_you_mean
+from table_files import nearest as nearest
 
 
 def and_others(number: int) -> str:

@@ -9,8 +9,8 @@ from typing import Annotated
 
 import typer
 
+from experiments.command_line import EXTRAS, install_line
 from experiments.errors import InputError
-from experiments.extras import EXTRAS, install_line
 from palpebra.conflicts import foreign_packages
 from palpebra.folders import Folder, data_folder, use_folder
 

@@ -3,8 +3,8 @@
 from importlib.util import find_spec
 from pathlib import Path
 
+from experiments.command_line import install_line
 from experiments.errors import InputError
-from experiments.extras import install_line
 
 PACKAGES = ("server", "analysis", "experiments", "migrations", "table_files", "video_conversion")
 HOME = Path(__file__).resolve().parent.parent

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple, TextIO
 
-from table_files.errors import InputError, counted
+from table_files import InputError, counted
 from table_files.formulas import unguarded_cell
 
 # The encoding, from the bytes alone.

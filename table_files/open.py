@@ -6,9 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from table_files import InputError
 from table_files.cells import Cells, cells_of, text_cells
 from table_files.delimited import NamedRows, delimited_table, text_of
-from table_files.errors import InputError
 
 _SAVE_AS = {
     ".xls": ".xlsx",

@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from table_files import InputError
 from table_files.cells import Cells, cell_text, cells_of
-from table_files.errors import InputError
 
 SPARE_S, BYTES_A_SECOND = 120, 500_000
 """Time for any file, and for its bytes: what takes longer goes in circles in damaged ones."""

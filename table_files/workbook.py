@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from xml.parsers import expat
 from zipfile import BadZipFile, ZipFile, ZipInfo
 
+from table_files import InputError, did_you_mean
 from table_files.cells import Cells, cells_of
-from table_files.errors import InputError, did_you_mean
 
 if TYPE_CHECKING:
     from openpyxl.worksheet.worksheet import Worksheet

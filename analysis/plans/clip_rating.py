@@ -29,8 +29,8 @@ from experiments.declaration.experiment import Experiment
 from experiments.declaration.trial import RatedScale
 from experiments.design import rated_levels
 from experiments.errors import InputError
+from experiments.kinds import scale_called, scales_of
 from experiments.kinds.clip_rating import RATINGS
-from experiments.kinds.scales import scale_called, scales_of
 
 # Ratings of a study: cell means, their tests, and what is computed in addition.
 

@@ -16,7 +16,7 @@ from analysis.report.numbers import DASH, fixed, interval
 from experiments import design
 from experiments.declaration.clip_rating import SCALE_NAME, RatingReference, clip_rating_of
 from experiments.declaration.trial import ClipSpec, RatedScale
-from experiments.kinds.scales import scales_of
+from experiments.kinds import scales_of
 
 METHODS = (
     " DMOS is the mean over participants of their mean rating of a cell shown after its reference. Its 95% "

@@ -15,7 +15,7 @@ from analysis.report.contents import Contents
 from analysis.report.evidence import evidence_section
 from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError, did_you_mean
-from experiments.kinds.scales import scale_called
+from experiments.kinds import scale_called
 from experiments.schema.canonical import definition_sha256
 
 # What the data of a kind of trial can be asked: a file of its name here, with `PLAN`.

@@ -38,7 +38,7 @@ from analysis.within.estimates import margin, margin_of
 from analysis.within.simple_effects import SIGNIFICANCE
 from experiments.declaration.trial import RatedScale
 from experiments.error_bars import within_participant_errors
-from experiments.kinds.scales import scale_called
+from experiments.kinds import scale_called
 
 if TYPE_CHECKING:
     from analysis.plans.multiverse import Multiverse

@@ -16,7 +16,7 @@ from experiments.declaration.experiment import Experiment
 from experiments.declaration.trial import RatedScale
 from experiments.design import rated_levels
 from experiments.errors import InputError, did_you_mean
-from experiments.kinds.scales import scales_of
+from experiments.kinds import scales_of
 
 FOLDER = Path(__file__).parent
 

@@ -20,7 +20,7 @@ from analysis.synthetic.targets import GivenWay, Steps, Targets, TestTarget, mak
 from experiments.declaration.experiment import Experiment
 from experiments.declaration.trial import RatedScale
 from experiments.errors import InputError
-from experiments.kinds.scales import scale_called, scales_of
+from experiments.kinds import scale_called, scales_of
 from experiments.load import SHIPPED, load_experiment
 
 # Means and covariance of the cells that give the wanted figures, and participants drawn from them.

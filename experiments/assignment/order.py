@@ -6,10 +6,10 @@ from itertools import cycle, groupby, islice
 from typing import Literal
 
 from experiments import design
+from experiments.assignment import Shown, Trial
 from experiments.assignment.groups import Seat, cells_of, seat_of
 from experiments.assignment.incomplete_blocks import block_orders
 from experiments.assignment.shares import seen_levels, sees_levels, share
-from experiments.assignment.trial import Shown, Trial
 from experiments.declaration.experiment import Experiment
 from experiments.declaration.trial import BlockSpec, ClipSpec
 

@@ -9,8 +9,7 @@ from itertools import groupby
 from typing import Any, Literal
 
 from experiments.columns.base import CLIP_TABLE, LEVELS, RUN_ALIASES, RUN_JOINS
-from experiments.columns.column import JOINED, Column, ColumnType, names_of
-from experiments.columns.old_order import in_old_order
+from experiments.columns.column import JOINED, Column, ColumnType, in_old_order, names_of
 
 Dialect = Literal["sqlite", "postgresql"]
 MADE_FROM = "made from the columns in experiments"

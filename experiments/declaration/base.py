@@ -5,7 +5,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, StringConstraints
 
-from experiments.descriptions import descriptions_are_read
+from experiments.declaration import descriptions_are_read
 
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,39}$")]
 """A factor, experiment or form name: letters, digits and underscores, at most 40, a letter first."""

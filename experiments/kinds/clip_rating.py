@@ -5,10 +5,10 @@ from dataclasses import replace
 from typing import Literal
 
 from experiments import design
+from experiments.assignment import Shown, Trial
 from experiments.assignment.groups import seat_of
 from experiments.assignment.order import single_clips
 from experiments.assignment.shares import lines, share
-from experiments.assignment.trial import Shown, Trial
 from experiments.columns import base
 from experiments.columns.base import rows_of
 from experiments.columns.column import Column

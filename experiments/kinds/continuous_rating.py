@@ -3,9 +3,9 @@
 import random
 from typing import Literal
 
+from experiments.assignment import Trial
 from experiments.assignment.order import single_clips
 from experiments.assignment.shares import lines as planned
-from experiments.assignment.trial import Trial
 from experiments.columns import base
 from experiments.columns.base import rows_of
 from experiments.columns.column import Column

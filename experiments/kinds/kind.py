@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from experiments.assignment.trial import Compared, Trial
+from experiments.assignment import Compared, Trial
 from experiments.columns.view import View
 from experiments.declaration.base import Declaration
 from experiments.declaration.experiment import Experiment

@@ -8,7 +8,7 @@ from itertools import count
 from math import erf, exp, log2, pi, sqrt
 from math import log as ln
 
-from experiments.assignment.trial import Compared
+from experiments.assignment import Compared
 from experiments.declaration.experiment import Experiment
 from experiments.declaration.paired_comparison import Active, paired_comparison_of
 from experiments.declaration.trial import ClipSpec

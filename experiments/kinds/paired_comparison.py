@@ -6,10 +6,10 @@ from collections.abc import Iterable
 from math import gcd
 from typing import Literal
 
+from experiments.assignment import Compared, Shown, Trial
 from experiments.assignment.groups import groups, name_of, of_group, seat_of
 from experiments.assignment.order import ordered_blocks, with_attention
 from experiments.assignment.shares import expected_slots, said_of_groups
-from experiments.assignment.trial import Compared, Shown, Trial
 from experiments.columns.base import rows_of
 from experiments.columns.column import Column
 from experiments.columns.playback import answer_columns

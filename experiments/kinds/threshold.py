@@ -4,9 +4,9 @@ import random
 from collections.abc import Iterable
 from typing import Literal
 
+from experiments.assignment import Shown, Trial
 from experiments.assignment.groups import groups, name_of, seat_of
 from experiments.assignment.order import ordered_blocks, with_attention
-from experiments.assignment.trial import Shown, Trial
 from experiments.columns import base
 from experiments.columns.base import rows_of
 from experiments.columns.column import Column

@@ -13,8 +13,7 @@ from experiments.columns import Column
 from experiments.declaration.experiment import Experiment
 from experiments.declaration.tables import Creator
 from experiments.design import rated_levels
-from experiments.kinds import KINDS
-from experiments.kinds.scales import scales_of
+from experiments.kinds import KINDS, scales_of
 from experiments.rules import DropFailedPlays, DropSlowTrials, ExcludeIncomplete
 from server.core.values import encode_text, iso
 from server.exports.csv_lines import csv_pieces, zip_pieces

@@ -2,8 +2,8 @@
 
 import json
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from itertools import chain, groupby, islice, product
 from operator import itemgetter
@@ -11,15 +11,14 @@ from typing import Any, Literal
 
 from sqlalchemy.orm import Session
 
-from experiments.columns import RUN_COLUMNS, Column
-from experiments.columns.column import plain_name, unlike
-from experiments.columns.form_columns import FormColumn, form_columns, run_columns
+from experiments.columns.column import Column, in_old_order, plain_name, unlike
+from experiments.columns.runs import FORMS, RUN_COLUMNS
 from experiments.declaration.experiment import Experiment
+from experiments.declaration.forms import Form, FormField, is_empty
 from experiments.declaration.trial import RatedScale
 from experiments.design import rated_levels
 from experiments.errors import InputError
-from experiments.kinds import KINDS
-from experiments.kinds.scales import scales_of
+from experiments.kinds import KINDS, scales_of
 from server.core.values import iso
 from server.exports import repository
 from server.exports.csv_lines import (
@@ -39,6 +38,74 @@ from server.participation.visit_repository import calibrations
 from server.results import runs
 from server.studies.lookup import all_definitions
 from server.studies.series import definition_of_series
+
+# Questionnaire answers as columns: one per question, or one per option if several may be chosen.
+
+PREFIX = "form_"
+"""No other column begins like this, and no factor name can be mistaken for one."""
+
+
+@dataclass(frozen=True)
+class FormColumn:
+    """A column and its answer: that of a form field, or of one option if several may be chosen."""
+
+    column: Column
+    form: str
+    field: str
+    option: str | None = None
+
+    def value(self, answers: Mapping[str, Mapping[str, Any]]) -> Any:
+        """The cell value from a run's answers by form and field; empty if there is no answer."""
+        answer = answers.get(self.form, {}).get(self.field)
+        if is_empty(answer):
+            return ""
+        if self.option is not None:
+            return int(isinstance(answer, list) and self.option in answer)
+        return "; ".join(map(str, answer)) if isinstance(answer, list) else answer
+
+
+def form_columns(definitions: Iterable[Experiment]) -> list[FormColumn]:
+    """The columns of all versions' forms, in order; later versions of a question override earlier ones."""
+    known: dict[tuple[str, str, str | None], FormColumn] = {}
+    for experiment in definitions:
+        language = experiment.languages[0]
+        for form in experiment.forms:
+            for field in form.fields:
+                for column in _of_field(form, field, language):
+                    key = (column.form, column.field, column.option)
+                    known[key] = _united(known.get(key), column)
+    return list(_named(known.values()))
+
+
+def run_columns(forms: Iterable[FormColumn], old_order: bool = False) -> list[Column]:
+    """The columns of the runs CSV of a study with these questions, which replace `FORMS`."""
+    columns: list[Column] = []
+    for column in in_old_order("runs", RUN_COLUMNS) if old_order else RUN_COLUMNS:
+        columns.extend([one.column for one in forms] if column is FORMS else [column])
+    return columns
+
+
+def _of_field(form: Form, field: FormField, language: str) -> Iterator[FormColumn]:
+    asked = field.label.get(language) or next(iter(field.label.values()))
+    for option, column in field.columns(f"{PREFIX}{form.name}_{field.name}", asked, language).items():
+        yield FormColumn(column, form.name, field.name, option)
+
+
+def _united(before: FormColumn | None, after: FormColumn) -> FormColumn:
+    """The later column, plus options that only earlier versions had."""
+    if before is None or not before.column.values:
+        return after
+    values = tuple(dict.fromkeys((*before.column.values, *after.column.values)))
+    labels = tuple({**dict(before.column.labels), **dict(after.column.labels)}.items())
+    return replace(after, column=replace(after.column, values=values, labels=labels))
+
+
+def _named(columns: Iterable[FormColumn]) -> Iterator[FormColumn]:
+    """The columns with unique names (`a_b` with `c` is spelled like `a` with `b_c`)."""
+    taken: set[str] = set()
+    for one in columns:
+        yield replace(one, column=replace(one.column, name=unlike(one.column.name, taken)))
+
 
 # Runs as CSV rows, and everything stored as JSON lines; one run is in memory at a time.
 

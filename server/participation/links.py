@@ -11,7 +11,7 @@ from experiments.assignment.groups import deciding_question
 from experiments.declaration.experiment import Experiment
 from experiments.declaration.tables import Display
 from experiments.errors import did_you_mean
-from experiments.kinds.scales import expected_minutes
+from experiments.kinds import expected_minutes
 from server.core.settings import Settings
 from server.core.values import derived_token, hash_token, new_public_id, new_token, now
 from server.models import NO_SLOT, Link, Study, StudyRun

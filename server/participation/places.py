@@ -6,9 +6,9 @@ from typing import Any
 
 from sqlalchemy.orm import Session
 
+from experiments.assignment import Trial
 from experiments.assignment.groups import name_of, names, seat_of
 from experiments.assignment.order import with_checks
-from experiments.assignment.trial import Trial
 from experiments.declaration.experiment import Experiment
 from experiments.kinds import KINDS
 from server.models import Link, StudyRun

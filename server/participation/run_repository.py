@@ -21,7 +21,7 @@ from sqlalchemy import (
 )
 from sqlalchemy.orm import Session, aliased
 
-from experiments.assignment.trial import Compared
+from experiments.assignment import Compared
 from server.core.values import hash_token, now
 from server.models import (
     NO_SLOT,

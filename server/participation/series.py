@@ -6,7 +6,7 @@ from typing import Any
 
 from sqlalchemy import Connection
 
-from experiments.assignment.trial import Trial
+from experiments.assignment import Trial
 from experiments.declaration.threshold import Stop, ThresholdAnswer, TwoInterval, threshold_of
 from experiments.kinds.threshold_grid import (
     Model,

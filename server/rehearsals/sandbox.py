@@ -13,8 +13,7 @@ from sqlalchemy.orm import Session
 from experiments.assignment.groups import names
 from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError
-from experiments.kinds import KINDS
-from experiments.kinds.scales import expected_minutes
+from experiments.kinds import KINDS, expected_minutes
 from experiments.manifest import Manifest
 from server.accounts.identity import OPERATOR
 from server.app import create_app

@@ -10,7 +10,7 @@ from typing import TypedDict
 from sqlalchemy.orm import Session
 
 from experiments.declaration.trial import RatedScale
-from experiments.kinds.scales import scale_called, scales_of
+from experiments.kinds import scale_called, scales_of
 from server.core.values import now
 from server.models import Study, StudyVersion
 from server.participation.tallies import RT_MS

@@ -6,8 +6,7 @@ from experiments import design
 from experiments.assignment.groups import names
 from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError
-from experiments.kinds import KINDS
-from experiments.kinds.scales import block_sizes, expected_minutes, trials_per_participant
+from experiments.kinds import KINDS, block_sizes, expected_minutes, trials_per_participant
 from experiments.load import DefinitionError, toml_data
 from experiments.wording import unlisted
 from server.accounts.identity import Identity

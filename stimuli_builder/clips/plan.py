@@ -12,8 +12,7 @@ from rich.text import Text
 from experiments import design
 from experiments.declaration.experiment import Experiment
 from experiments.errors import counted
-from experiments.kinds import KINDS
-from experiments.kinds.scales import block_sizes, expected_minutes, trials_per_participant
+from experiments.kinds import KINDS, block_sizes, expected_minutes, trials_per_participant
 from stimuli_builder.clips.exemplars import recorded_order
 
 

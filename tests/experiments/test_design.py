@@ -4,7 +4,7 @@ import pytest
 
 from experiments import design
 from experiments.declaration.rendering import RenderOverrides, RenderSettings
-from experiments.kinds.scales import expected_minutes, trials_per_participant
+from experiments.kinds import expected_minutes, trials_per_participant
 from experiments.load import load_experiment
 
 # design counts of Trutoiu et al. (2011), sections 4.1-4.3

@@ -11,8 +11,8 @@ from experiments.assignment.groups import seat_of
 from experiments.assignment.incomplete_blocks import balanced_blocks
 from experiments.assignment.shares import expected_counts, share, turn_of_last
 from experiments.declaration.experiment import Experiment
+from experiments.kinds import trials_per_participant
 from experiments.kinds.clip_rating import CLIP_RATING
-from experiments.kinds.scales import trials_per_participant
 from experiments.load import DefinitionError, parse_experiment
 from experiments.schema.difference import difference
 from tests.helpers.faces import DEMO, faces

@@ -13,8 +13,8 @@ from experiments.assignment.groups import clips_of, groups, seat_of
 from experiments.assignment.order import ordered_blocks
 from experiments.assignment.shares import expected_counts, list_label, share
 from experiments.declaration.experiment import Experiment
+from experiments.kinds import trials_per_participant
 from experiments.kinds.clip_rating import CLIP_RATING
-from experiments.kinds.scales import trials_per_participant
 from experiments.load import DefinitionError, load_experiment, locate, parse_experiment
 from experiments.schema.canonical import definition_sha256
 from experiments.schema.difference import difference

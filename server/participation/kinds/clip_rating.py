@@ -7,8 +7,8 @@ from typing import Any
 from experiments.declaration.clip_rating import SCALE_NAME, RatingAnswer, ScaleAnswer, clip_rating_of
 from experiments.declaration.experiment import Experiment
 from experiments.declaration.trial import RatedScale
+from experiments.kinds import scales_of
 from experiments.kinds.clip_rating import ShownClipRating
-from experiments.kinds.scales import scales_of
 from server.core.errors import Invalid
 from server.participation.answer_schemas import Part, RatingIn
 from server.participation.kinds import Preference, ServedKind, answer_of, asked_in

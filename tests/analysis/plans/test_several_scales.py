@@ -16,8 +16,8 @@ from analysis.read.study_answers import load_csv
 from analysis.report.contents import in_words
 from analysis.report.write import write_report
 from experiments import design
+from experiments.kinds import scales_of
 from experiments.kinds.clip_rating import RATINGS
-from experiments.kinds.scales import scales_of
 from experiments.load import load_experiment
 from tests.analysis.report.test_latex import well_formed
 from tests.conftest import REPOSITORY

@@ -17,8 +17,8 @@ from analysis.within.anova import within_anova
 from analysis.within.cell_means import cell_table
 from analysis.within.pairwise import one_factor_pairs
 from experiments.errors import InputError
+from experiments.kinds import trials_per_participant
 from experiments.kinds.clip_rating import RATINGS
-from experiments.kinds.scales import trials_per_participant
 from experiments.load import load_experiment
 
 for name in ("test_after_moves", "test_value"):

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments import design
-from experiments.assignment.trial import Compared, Trial
+from experiments.assignment import Compared, Trial
 from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError
 from experiments.kinds.paired_comparison import assign, deal, plan

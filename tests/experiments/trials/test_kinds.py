@@ -14,9 +14,8 @@ from experiments import design
 from experiments.columns import names_of
 from experiments.declaration.any_trial import TRIALS
 from experiments.declaration.experiment import Experiment
-from experiments.kinds import KINDS, reserved_names, views
+from experiments.kinds import KINDS, block_sizes, reserved_names, trials_per_participant, views
 from experiments.kinds.kind import Kind
-from experiments.kinds.scales import block_sizes, trials_per_participant
 from experiments.load import DefinitionError, locate, parse_experiment
 from experiments.schema.canonical import definition_sha256
 from experiments.schema.difference import difference

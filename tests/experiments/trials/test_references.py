@@ -6,8 +6,7 @@ import pytest
 
 from experiments.declaration.experiment import Experiment
 from experiments.declaration.trial import ClipSpec
-from experiments.kinds import KINDS
-from experiments.kinds.scales import trials_per_participant
+from experiments.kinds import KINDS, trials_per_participant
 from experiments.load import DefinitionError, parse_experiment
 from tests.conftest import REPOSITORY
 

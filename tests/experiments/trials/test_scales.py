@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from experiments.errors import InputError
-from experiments.kinds.scales import scale_called, scales_of
+from experiments.kinds import scale_called, scales_of
 from experiments.load import load_experiment
 
 REPOSITORY = Path(__file__).parents[3]

@@ -7,7 +7,7 @@ import pytest
 
 from experiments import design
 from experiments.declaration.experiment import Experiment
-from experiments.kinds.scales import block_sizes
+from experiments.kinds import block_sizes
 from experiments.kinds.threshold import THRESHOLD
 from experiments.kinds.threshold_grid import Point, model, points, seconds, series_of, stimuli
 from experiments.load import DefinitionError, parse_experiment

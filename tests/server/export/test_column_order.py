@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from experiments.columns import RUN_COLUMNS
-from experiments.columns.old_order import OLD_ORDER
+from experiments.columns.column import OLD_ORDER
 from experiments.kinds import views
 from tests.helpers.admins import Admin
 from tests.helpers.golden_databases import REVISIONS, golden_ratings

@@ -6,14 +6,13 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from experiments.columns.form_columns import form_columns
 from experiments.load import parse_experiment
 from server.context import Services
 from server.exports import tables
 from server.exports.csv_lines import rating_rows
 from server.exports.extract import EVERYTHING
 from server.exports.psych_ds import LANGUAGES, script
-from server.exports.tables import cells_of
+from server.exports.tables import cells_of, form_columns
 from server.models import Study
 from tests.conftest import REPOSITORY
 from tests.helpers.admins import Admin

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import Field
 
 from experiments import design
-from experiments.assignment.trial import Shown, Trial
+from experiments.assignment import Shown, Trial
 from experiments.columns import Column, View
 from experiments.columns.base import rows_of
 from experiments.columns.playback import answer_columns

@@ -5,8 +5,8 @@ from typing import Literal
 
 from experiments.declaration.word_choice import WordAnswer, WordChoice, word_choice_of
 
+from experiments.assignment import Trial
 from experiments.assignment.order import single_clips
-from experiments.assignment.trial import Trial
 from experiments.columns import base
 from experiments.columns.base import rows_of
 from experiments.columns.column import Column
