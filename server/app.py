@@ -11,7 +11,7 @@ from starlette.routing import BaseRoute
 
 from server import web
 from server.accounts import endpoints as accounts
-from server.accounts import provider_endpoints, reset_endpoints, workspace_endpoints
+from server.accounts import provider_endpoints, workspace_endpoints
 from server.accounts.audit import note_refusal
 from server.context import open_services, services_of
 from server.core.changes import ChangeNotifier
@@ -30,7 +30,7 @@ from server.privacy.retention import hourly_retention
 from server.rehearsals import endpoints as rehearsals
 from server.request_limits import ConcurrencyLimit, RequestLimits
 from server.results import endpoints as results
-from server.results.counting import results_counted_ahead
+from server.results.kinds import results_counted_ahead
 from server.studies import clip_endpoints, library
 from server.studies import endpoints as studies
 from server.web import RowSecurity, SecurityHeaders
@@ -52,7 +52,7 @@ def _routers() -> tuple[APIRouter, ...]:
         accounts.router,
         accounts.credential_router,
         provider_endpoints.router,
-        reset_endpoints.router,
+        accounts.reset_router,
         accounts.people_router,
         workspace_endpoints.workspace_router,
         workspace_endpoints.grant_router,

@@ -12,8 +12,7 @@ from experiments.command_groups import command_group
 from experiments.errors import InputError
 from experiments.files import whole_file
 from server.accounts import repository
-from server.accounts.audit import export_line
-from server.accounts.audit_verification import verify
+from server.accounts.audit import export_line, verify
 from server.cli_common import out, stored_services
 from server.core.db import Database
 

@@ -1,4 +1,4 @@
-"""Endpoints of signing in and out, of one's own credentials, and of owners over accounts."""
+"""Endpoints of signing in and out, own credentials, forgotten passwords, and owners over accounts."""
 
 from typing import Annotated
 
@@ -6,7 +6,7 @@ from fastapi import APIRouter, BackgroundTasks, Cookie, Header, Query, Request, 
 from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.orm import Session
 
-from server.accounts import audit, credentials, invitations, letters, service, signing_in
+from server.accounts import audit, credentials, invitations, letters, resets, service, signing_in
 from server.accounts.access import (
     COOKIE,
     FreshMyself,
@@ -20,22 +20,28 @@ from server.accounts.access import (
 from server.accounts.credentials import PasswordWork, checked_password, hash_password
 from server.accounts.identity import Identity, NotSignedIn
 from server.accounts.invitations import must_fit, must_prove
+from server.accounts.resets import LetterRequest
 from server.accounts.schemas import (
     AccountOut,
     AuditOut,
     ChangeAccount,
     ChangePassword,
+    ConfirmAddress,
     ConfirmCode,
     ConfirmPassword,
+    ForgottenPassword,
     InvitationOut,
     InvitationState,
     Me,
     MyWorkspace,
     NewAccount,
+    NewAddress,
     NewInvitation,
     NewInvitationOut,
+    NewPassword,
     NewToken,
     NewTokenOut,
+    OwnAddress,
     RecoveryCodes,
     SecondFactorSetup,
     SessionOut,
@@ -46,7 +52,7 @@ from server.accounts.throttle import DEVICE_COOKIE, SignInThrottle, known_device
 from server.accounts.workspaces import own_workspaces
 from server.context import ServicesDep
 from server.core.db import Database
-from server.core.errors import ERROR_RESPONSES
+from server.core.errors import ERROR_RESPONSES, NotFound
 from server.core.requests import DatabaseDep, SettingsDep
 from server.core.settings import Settings
 from server.core.values import Number, now
@@ -417,3 +423,95 @@ def create_token(database: DatabaseDep, me: FreshMyself, body: NewToken) -> NewT
 def revoke_token(database: DatabaseDep, me: Myself, token_id: Number) -> None:
     """Revoke one's own API token."""
     service.revoke_token(database, me, token_id)
+
+
+# Endpoints of reset by mail: forgotten passwords, and the address of the own account.
+
+reset_router = APIRouter(prefix="/api/admin", tags=["account"], responses=ERROR_RESPONSES)
+
+
+async def _count_attempt(sign_ins: SignInThrottle, request: Request, what: str) -> None:
+    address = address_of(request)
+    key = sign_ins.key(what, address, None)
+    await run_in_threadpool(sign_ins.enter, key, address, None)
+
+
+def _must_send(settings: Settings) -> None:
+    if not letters.can_send(settings):
+        raise NotFound("This server does not send email. Ask an owner of the server for a new password.")
+
+
+@reset_router.post("/session/forgotten", status_code=202)
+async def forgot_password(
+    request: Request,
+    services: ServicesDep,
+    body: ForgottenPassword,
+    after: BackgroundTasks,
+    device_cookie: Annotated[str | None, Cookie(alias=DEVICE_COOKIE, include_in_schema=False)] = None,
+) -> None:
+    """Ask for a link by mail for a new password; the answer is the same whether there is such an account."""
+    check_origin(request, services.settings)
+    _must_send(services.settings)
+    await _count_attempt(services.sign_ins, request, "forgotten password")
+    after.add_task(
+        resets.write_to_who_forgot,
+        services.database,
+        services.settings,
+        services.sign_ins,
+        body.name,
+        LetterRequest(address_of(request), device_cookie),
+    )
+
+
+@reset_router.post("/session/new-password", status_code=204)
+async def set_password(
+    request: Request, services: ServicesDep, body: NewPassword, after: BackgroundTasks
+) -> None:
+    """Choose a new password by a link; every session and every API token of the account ends."""
+    check_origin(request, services.settings)
+    await _count_attempt(services.sign_ins, request, "new password")
+    name = await run_in_threadpool(resets.name_of, services.database, body.token)
+    fresh = await services.passwords.run(lambda: hash_password(body.password, name))
+    letter = await run_in_threadpool(resets.set_password, services.database, body.token, fresh)
+    after.add_task(resets.post, services.settings, letter)
+
+
+@reset_router.get("/mail")
+def own_address(database: DatabaseDep, me: Myself) -> OwnAddress:
+    """Where a link for a new password goes."""
+    with database.read() as session:
+        return OwnAddress(address=account_of(session, me).email)
+
+
+@reset_router.put("/mail", status_code=202)
+async def change_address(services: ServicesDep, me: Myself, body: NewAddress, after: BackgroundTasks) -> None:
+    """Enter an address of mail; it is the account's once the link that goes there was opened."""
+    _must_send(services.settings)
+    await must_fit(services.database, services.sign_ins, services.passwords, me, body.password)
+    letter = await run_in_threadpool(
+        resets.ask_to_confirm, services.database, services.settings, me, body.address
+    )
+    after.add_task(resets.post, services.settings, letter)
+
+
+@reset_router.delete("/mail", status_code=204)
+async def remove_address(
+    services: ServicesDep, me: Myself, body: ConfirmPassword, after: BackgroundTasks
+) -> None:
+    """Take the address of mail off one's own account; passwords are then reset by the command line alone."""
+    await must_prove(
+        services.database, services.settings, services.sign_ins, services.passwords, me, body.password
+    )
+    letter = await run_in_threadpool(resets.remove_address, services.database, me)
+    after.add_task(resets.post, services.settings, letter)
+
+
+@reset_router.post("/session/mail", status_code=204)
+async def confirm_address(
+    request: Request, services: ServicesDep, body: ConfirmAddress, after: BackgroundTasks
+) -> None:
+    """Confirm an address of mail by the link that went there; the address before it is told."""
+    check_origin(request, services.settings)
+    await _count_attempt(services.sign_ins, request, "confirm an address")
+    letter = await run_in_threadpool(resets.confirm_address, services.database, body.token)
+    after.add_task(resets.post, services.settings, letter)

@@ -43,13 +43,12 @@ from server.core.locks import Locks
 from server.core.settings import Settings
 from server.core.storage import ClipStore
 from server.core.values import now
-from server.exports.extract import Extract
 from server.exports.psych_ds import Folder, dataset_folder
-from server.exports.schemas import CapsuleOut, NewCapsule
+from server.exports.schemas import CapsuleOut, Extract, NewCapsule
 from server.exports.seals import page as seal_page
 from server.exports.seals import seal_of
 from server.models import Job, Study, StudyVersion
-from server.results import job_repository
+from server.results import repository
 from server.results.jobs import begin_job, in_background, is_under_way, job_state, note, run_analysis
 from server.results.methods import MethodsFigures, methods_figures, paragraph_of, read_results, write_beside
 from server.studies.lookup import definition_of, find_study
@@ -368,9 +367,9 @@ def capsules(
 ) -> list[CapsuleOut]:
     """Every finished capsule of a study among its latest attempts, newest first."""
     study = find_study(session, name, identity, "view")
-    every = job_repository.jobs(session, study, "capsule")
-    listed = every[: job_repository.LISTED] + [
-        job for job in every[job_repository.LISTED :] if job.status == "done"
+    every = repository.jobs_of(session, study, "capsule")
+    listed = every[: repository.LISTED_JOBS] + [
+        job for job in every[repository.LISTED_JOBS :] if job.status == "done"
     ]
     return [_capsule_out(settings, locks, job) for job in listed]
 
@@ -378,7 +377,7 @@ def capsules(
 def capsule_file(settings: Settings, session: Session, name: str, identity: Identity, public_id: str) -> Path:
     """The zip of a finished capsule; NotFound where there is none."""
     study = find_study(session, name, identity, "export")
-    job = job_repository.find_job(session, study, "capsule", public_id)
+    job = repository.find_job(session, study, "capsule", public_id)
     path = _zip_of(settings, public_id)
     if job is None or job.status != "done" or not path.is_file():
         raise NotFound(
@@ -393,12 +392,12 @@ def remove(
     """Delete a capsule for good; NotFound where there is none, Conflict while it is made."""
     with database.write() as session:
         study = find_study(session, name, identity, "run")
-        job = job_repository.find_job(session, study, "capsule", public_id)
+        job = repository.find_job(session, study, "capsule", public_id)
         if job is None:
             raise NotFound("There is no such capsule. Reload the page to see the current list.")
         if is_under_way(locks, job):
             raise Conflict("This capsule is still being made. You can delete it when it is finished.")
-        job_repository.remove_job(session, study, "capsule", public_id)
+        repository.remove_job(session, study, "capsule", public_id)
         record(session, identity, "capsule removed", "study", name, capsule=public_id)
     _zip_of(settings, public_id).unlink(missing_ok=True)
 
@@ -408,14 +407,12 @@ def remove_old(database: Database, settings: Settings, locks: Locks, name: str) 
     oldest = now() - timedelta(days=settings.capsule_keep_days)
     with database.write() as session:
         study = find_study(session, name, OPERATOR, "view")
-        ended = [
-            job for job in job_repository.jobs(session, study, "capsule") if not is_under_way(locks, job)
-        ]
+        ended = [job for job in repository.jobs_of(session, study, "capsule") if not is_under_way(locks, job)]
         recent = [job for job in ended if job.created_at >= oldest]
         surplus = [job for job in recent if job.status == "done"][settings.capsules_kept :]
         gone = [job.public_id for job in ended if job not in recent or job in surplus]
         for public_id in gone:
-            job_repository.remove_job(session, study, "capsule", public_id)
+            repository.remove_job(session, study, "capsule", public_id)
             record(session, OPERATOR, "capsule removed", "study", name, capsule=public_id)
     for public_id in gone:
         _zip_of(settings, public_id).unlink(missing_ok=True)

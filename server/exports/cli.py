@@ -20,10 +20,10 @@ from server.accounts.identity import OPERATOR
 from server.cli_common import out, stored_services
 from server.core.values import encode_text
 from server.exports.capsules import CapsuleContents, CapsuleOrigin, build_capsule
-from server.exports.extract import ExportOrigin, Extract
 from server.exports.formats import CSV_FORMATS, FORMATS, Format, row_count, spreadsheet_pieces
 from server.exports.psych_ds import LANGUAGES, script
 from server.exports.repository import runs_by_origin
+from server.exports.schemas import ExportOrigin, Extract
 from server.exports.seals import page, seal_of, seal_plan
 from server.results import methods as methods_service
 from server.studies.lookup import find_study

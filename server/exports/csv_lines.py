@@ -17,8 +17,8 @@ from experiments.errors import InputError
 from experiments.kinds import KINDS
 from server.core.values import encode_text
 from server.exports import repository
-from server.exports.extract import Extract
 from server.exports.repository import Rows, Runs
+from server.exports.schemas import Extract
 from server.models import Study
 from server.studies.lookup import active_definition, all_definitions
 from table_files.formulas import csv_lines, csv_text

@@ -24,7 +24,6 @@ from server.core.requests import DatabaseDep, SettingsDep
 from server.core.values import Number, encode_text
 from server.exports import capsules as capsule_service
 from server.exports import reports as report_service
-from server.exports.extract import EVERYTHING, ExportOrigin, Extract
 from server.exports.formats import (
     CONVERSIONS,
     FORMATS,
@@ -37,7 +36,15 @@ from server.exports.formats import (
     write_table,
 )
 from server.exports.psych_ds import ScriptLanguage, script
-from server.exports.schemas import CapsuleOut, NewCapsule, NewReport, ReportOut
+from server.exports.schemas import (
+    EVERYTHING,
+    CapsuleOut,
+    ExportOrigin,
+    Extract,
+    NewCapsule,
+    NewReport,
+    ReportOut,
+)
 from server.exports.seals import page, people_begun, seal_of, seal_plan
 from server.models import Right
 from server.participation.identity_keys import UnreadableError

@@ -18,7 +18,7 @@ from experiments.errors import InputError
 from server.core.values import encode_text, now
 from server.exports import psych_ds, repository, tables
 from server.exports.csv_lines import check_whole, csv_pieces, rating_count, rating_pieces
-from server.exports.extract import Extract
+from server.exports.schemas import Extract
 from server.exports.tables import ExportTable, answers_table, cells_of, runs_table, wide_table
 from server.models import Study
 from server.studies.lookup import active_definition, all_definitions

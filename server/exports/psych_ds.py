@@ -17,8 +17,8 @@ from experiments.kinds import KINDS, scales_of
 from experiments.rules import DropFailedPlays, DropSlowTrials, ExcludeIncomplete
 from server.core.values import encode_text, iso
 from server.exports.csv_lines import csv_pieces, zip_pieces
-from server.exports.extract import Extract
 from server.exports.repository import first_start
+from server.exports.schemas import Extract
 from server.exports.tables import (
     ExportTable,
     answers_table,

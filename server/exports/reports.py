@@ -18,12 +18,11 @@ from server.core.locks import Locks
 from server.core.settings import Settings
 from server.core.values import now
 from server.exports.csv_lines import csv_pieces, rating_table
-from server.exports.extract import Extract
 from server.exports.formats import runs_csv
-from server.exports.schemas import NewReport, ReportOut
+from server.exports.schemas import Extract, NewReport, ReportOut
 from server.exports.seals import seal_of
 from server.models import Job
-from server.results import job_repository
+from server.results import repository
 from server.results.jobs import begin_job, in_background, job_state, note, run_analysis
 from server.results.methods import methods_of, read_results, write
 from server.studies.lookup import find_study
@@ -62,7 +61,7 @@ def reports(
 ) -> list[ReportOut]:
     """The latest reports of a study."""
     study = find_study(session, name, identity, "view")
-    return [report_out(settings, locks, job) for job in job_repository.latest_jobs(session, study, "report")]
+    return [report_out(settings, locks, job) for job in repository.latest_jobs(session, study, "report")]
 
 
 def report_out(settings: Settings, locks: Locks, job: Job) -> ReportOut:
@@ -104,7 +103,7 @@ def report_file(
     Its tables have rows of single persons (means of each, exclusions), so it takes the right of downloads.
     """
     study = find_study(session, name, identity, "export")
-    job = job_repository.find_job(session, study, "report", public_id)
+    job = repository.find_job(session, study, "report", public_id)
     if job is None or file not in report_out(settings, locks, job).files:
         raise NotFound("There is no such report, or it does not contain this file.")
     return report_folder(settings, public_id) / file

@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session
 
 from experiments.columns import View, names_of
 from server.core.db import SIGNING_KEY
-from server.exports.extract import EVERYTHING, Extract
+from server.exports.schemas import EVERYTHING, Extract
 from server.models import (
     AuditEntry,
     FormAnswer,

@@ -30,8 +30,8 @@ from server.exports.csv_lines import (
     rating_table,
     view_of,
 )
-from server.exports.extract import Extract
 from server.exports.repository import run_count
+from server.exports.schemas import Extract
 from server.models import NO_SLOT, Study, StudyRun
 from server.participation.judgement import judge_run
 from server.participation.visit_repository import calibrations

@@ -9,8 +9,7 @@ from sqlalchemy.orm import Session
 
 from experiments.errors import InputError
 from server.accounts import repository as accounts
-from server.accounts.audit import SECOND_FACTOR_SET_UP, record
-from server.accounts.audit_verification import entries_under_key, reseal, verify
+from server.accounts.audit import SECOND_FACTOR_SET_UP, entries_under_key, record, reseal, verify
 from server.accounts.credentials import rewrap_secret
 from server.accounts.identity import OPERATOR
 from server.accounts.repository import hold_chain

@@ -22,11 +22,10 @@ from server.core.db import Database
 from server.core.locks import LONGEST_S
 from server.core.settings import Settings
 from server.exports.csv_lines import csv_pieces, rating_table
-from server.exports.extract import Extract
 from server.exports.formats import runs_csv
+from server.exports.schemas import Extract
 from server.exports.tables import answers_table, runs_table
 from server.models import Study
-from server.rehearsals import repository
 from server.rehearsals.http import JsonClient, RefusedRequest, running_server
 from server.rehearsals.person import Person, link_and_raters
 from server.rehearsals.schemas import (
@@ -44,6 +43,7 @@ from server.rehearsals.schemas import (
     Step,
     example_of,
 )
+from server.results import replay_repository
 from server.results.jobs import run_analysis
 from server.studies.creation import add_version, create_study, planned_experiment
 from server.studies.lookup import find_study
@@ -131,7 +131,7 @@ def _take_part(address: str, token: str, rater: Any) -> None:
 def _rehearsal_result(
     session: Session, study: Study, experiment: Experiment, order: Order
 ) -> RehearsalResult:
-    runs = repository.runs(session, study)
+    runs = replay_repository.runs_of_study(session, study)
     people = [
         RehearsedPerson(
             number=number,
@@ -145,7 +145,7 @@ def _rehearsal_result(
     return RehearsalResult(
         participants=order.participants,
         complete=sum(run.status == "complete" for run in runs),
-        answers=repository.number_of_answers(session, study),
+        answers=replay_repository.number_of_answers(session, study),
         expected_minutes=expected_minutes(experiment),
         people=people,
         columns=_columns(session, study),
@@ -158,7 +158,7 @@ def _rehearsal_result(
 
 def _trials(session: Session, run: int) -> list[RehearsedTrial]:
     trials: list[RehearsedTrial] = []
-    for index, kind, block, cell, exemplar in repository.trials(session, run):
+    for index, kind, block, cell, exemplar in replay_repository.trials_of_run(session, run):
         if not trials or trials[-1].trial_index != index:
             trials.append(RehearsedTrial(trial_index=index, kind=kind, block=block, clips=[]))
         if cell is not None:
@@ -219,7 +219,7 @@ def _power(experiment: Experiment, folder: Path, seed: int) -> tuple[Power | Non
 
 
 def main() -> None:
-    """`python -m server.rehearsals FOLDER`: rehearse, with a line of JSON a step on standard output."""
+    """`python -m server.rehearsals.sandbox FOLDER`: rehearse, with JSON lines on stdout."""
 
     def say(share: float, step: str) -> None:
         print(Step(share=share, step=step).model_dump_json(), flush=True)  # noqa: T201
@@ -229,3 +229,7 @@ def main() -> None:
     except (InputError, OSError, subprocess.SubprocessError) as error:
         print(Step(problem=str(error)[:500]).model_dump_json(), flush=True)  # noqa: T201
         sys.exit(1)
+
+
+if __name__ == "__main__":
+    main()

@@ -37,7 +37,7 @@ from server.rehearsals.schemas import (
     RehearsalResult,
     Step,
 )
-from server.results import job_repository
+from server.results import repository
 from server.results.jobs import begin_job, in_background, is_under_way, job_state, note
 from server.studies.lookup import active_version, find_study
 
@@ -63,9 +63,9 @@ def start(
         record(session, identity, "rehearsal asked for", "study", name, **order.model_dump())
         session.flush()
         rehearsal = _out(locks, job)
-        before = [one.public_id for one in job_repository.jobs(session, study, "rehearsal") if one is not job]
+        before = [one.public_id for one in repository.jobs_of(session, study, "rehearsal") if one is not job]
         for public_id in before:
-            job_repository.remove_job(session, study, "rehearsal", public_id)
+            repository.remove_job(session, study, "rehearsal", public_id)
     for public_id in before:
         shutil.rmtree(_folder(settings, public_id), ignore_errors=True)
     in_background(database, locks, rehearsal.id, partial(_run, database, settings, name, rehearsal.id, order))
@@ -75,7 +75,7 @@ def start(
 def latest(locks: Locks, session: Session, name: str, identity: Identity) -> RehearsalOut | None:
     """The rehearsal of a study; None where there is none."""
     study = find_study(session, name, identity, "view")
-    jobs = job_repository.latest_jobs(session, study, "rehearsal")
+    jobs = repository.latest_jobs(session, study, "rehearsal")
     return _out(locks, jobs[0]) if jobs else None
 
 
@@ -85,7 +85,7 @@ def result(
     """What a rehearsal showed; NotFound while there is nothing."""
     study = find_study(session, name, identity, "view")
     path = _folder(settings, public_id) / RESULT
-    if job_repository.find_job(session, study, "rehearsal", public_id) is None or not path.is_file():
+    if repository.find_job(session, study, "rehearsal", public_id) is None or not path.is_file():
         raise NotFound(
             "There is no such rehearsal, or it is not finished. Reload the page to see its progress."
         )
@@ -121,7 +121,7 @@ def cancel(
     """End a rehearsal that waits or goes on, with all that it started; one that is over stays as it is."""
     with database.write() as session:
         study = find_study(session, name, identity, "run")
-        job = job_repository.find_job(session, study, "rehearsal", public_id)
+        job = repository.find_job(session, study, "rehearsal", public_id)
         if job is None:
             raise NotFound("There is no such rehearsal. Reload the page.")
         if not is_under_way(locks, job):
@@ -177,7 +177,7 @@ def _run(database: Database, settings: Settings, name: str, public_id: str, orde
 
 def _status(database: Database, public_id: str) -> str | None:
     with database.read() as session:
-        return job_repository.status_of(session, public_id)
+        return repository.status_of(session, public_id)
 
 
 def _write_inputs(database: Database, name: str, folder: Path, order: NewRehearsal) -> None:
@@ -231,7 +231,7 @@ def _guard(group: int, folder: Path, over: threading.Event) -> None:
 
 
 def _program(folder: Path) -> list[str]:
-    return [sys.executable, "-m", "server.rehearsals", str(folder)]
+    return [sys.executable, "-m", "server.rehearsals.sandbox", str(folder)]
 
 
 def _kill(group: int) -> None:

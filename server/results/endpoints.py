@@ -21,7 +21,7 @@ from server.core.requests import DatabaseDep, SettingsDep
 from server.core.values import Number
 from server.participation.run_schemas import Origin
 from server.privacy.erasures import erase
-from server.results import counting
+from server.results import kinds
 from server.results import methods as methods_service
 from server.results import monitor as monitor_service
 from server.results import replay as replay_service
@@ -75,13 +75,13 @@ def get_results(
 
     def count() -> tuple[Revision, AnyResults]:
         with services.database.read() as session:
-            return counting.counted_results(
+            return kinds.counted_results(
                 session, find_study(session, study, identity, "view"), origin, series, scale
             )
 
     with services.database.read() as session:
         known = find_study(session, study, identity, "view")
-        pool, _, revision = counting.pool_and_revision(session, known, origin, series, scale)
+        pool, _, revision = kinds.pool_and_revision(session, known, origin, series, scale)
     counted = services.results.get(pool, revision, count)
     headers = {"etag": counted.etag, "cache-control": "private, no-cache"}
     if if_none_match == counted.etag:

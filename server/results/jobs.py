@@ -21,8 +21,8 @@ from server.core.errors import ApiError, Conflict
 from server.core.locks import LONGEST_S, Locks
 from server.core.values import new_public_id, now
 from server.models import Job, Study
-from server.results import job_repository
-from server.results.job_repository import JobKind
+from server.results import repository
+from server.results.repository import JobKind
 
 # Run `analysis run` as a process of its own: the server carries no numerics.
 
@@ -76,8 +76,8 @@ def begin_job(
     in_the_way: str,
 ) -> Job:
     """A new job that waits; Conflict with the words `in_the_way` where one of its kind is under way."""
-    job_repository.lock_study(session, study)  # two that ask at once would each see none under way
-    if any(is_under_way(locks, job) for job in job_repository.latest_jobs(session, study, kind)):
+    repository.lock_study(session, study)  # two that ask at once would each see none under way
+    if any(is_under_way(locks, job) for job in repository.latest_jobs(session, study, kind)):
         raise Conflict(in_the_way)
     job = Job(
         public_id=new_public_id(),
@@ -137,7 +137,7 @@ def job_state(locks: Locks, job: Job, stopped: str) -> dict[str, Any]:
 def note(database: Database, public_id: str, **values: Any) -> None:
     """Write how far a job is, or how it ended; one that has ended stays as it is."""
     with database.write() as session:
-        job = job_repository.job_called(session, public_id)
+        job = repository.job_called(session, public_id)
         if job is not None and job.status in UNDER_WAY:
             for name, value in values.items():
                 setattr(job, name, value)

@@ -1,4 +1,4 @@
-"""Reads of what was shown in a run, and of what was answered to it."""
+"""What was shown in a run and what was answered, for the replay and for rehearsals."""
 
 from collections.abc import Collection
 from datetime import datetime
@@ -13,12 +13,15 @@ from server.models import (
     Clip,
     Rating,
     RunEvent,
+    Study,
     StudyRun,
     TrialClip,
     VersionClip,
     View,
     ViewClip,
 )
+
+# Reads of what was shown in a run, and of what was answered to it.
 
 HEARTBEAT = "heartbeat"
 
@@ -126,3 +129,49 @@ def px_per_mm_at(session: Session, run: StudyRun, moment: datetime) -> float | N
         Calibration.study_run_id == run.id, Calibration.saved_at <= moment
     )
     return session.scalar(query.order_by(Calibration.id.desc()).limit(1))
+
+
+# What simulated people left in the sandbox.
+
+
+class TrialRow(NamedTuple):
+    """A clip of a trial; a trial without clips has one row without a cell."""
+
+    trial_index: int
+    kind: str
+    block: str
+    cell: str | None
+    exemplar: int | None
+
+
+def runs_of_study(session: Session, study: Study) -> list[StudyRun]:
+    """The runs of a study in the order they began."""
+    return list(session.scalars(select(StudyRun).where(StudyRun.study_id == study.id).order_by(StudyRun.id)))
+
+
+def trials_of_run(session: Session, run: int) -> list[TrialRow]:
+    """The trials of a run in order, each with its clips."""
+    query = (
+        select(
+            AssignedTrial.trial_index,
+            AssignedTrial.kind,
+            AssignedTrial.block_label,
+            VersionClip.cell,
+            VersionClip.exemplar,
+        )
+        .outerjoin(
+            TrialClip,
+            (TrialClip.study_run_id == AssignedTrial.study_run_id)
+            & (TrialClip.trial_index == AssignedTrial.trial_index),
+        )
+        .outerjoin(VersionClip, VersionClip.id == TrialClip.version_clip_id)
+        .where(AssignedTrial.study_run_id == run)
+        .order_by(AssignedTrial.trial_index, TrialClip.position)
+    )
+    return [TrialRow(*row) for row in session.execute(query)]
+
+
+def number_of_answers(session: Session, study: Study) -> int:
+    """Stored answers of a study."""
+    query = select(func.count()).select_from(Rating).join(StudyRun, StudyRun.id == Rating.study_run_id)
+    return session.scalar(query.where(StudyRun.study_id == study.id)) or 0

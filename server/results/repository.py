@@ -1,15 +1,16 @@
-"""What the results page reads: the runs of a pool, and what their results depend on."""
+"""What the results page reads: the runs of a pool and what their results depend on; background jobs."""
 
 from collections.abc import Iterable
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
-from sqlalchemy import ColumnElement, Select, and_, case, func, select
+from sqlalchemy import ColumnElement, Select, and_, case, delete, func, select
 from sqlalchemy.orm import Session
 
 from experiments.checks import CHECK_CELL
 from server.models import (
     AssignedTrial,
     Clip,
+    Job,
     Rating,
     SeriesAnswer,
     SeriesTrial,
@@ -21,6 +22,8 @@ from server.models import (
 )
 from server.results.cache import Revision
 from server.results.summary import Trace
+
+# What the results page reads: the runs of a pool, and what their results depend on.
 
 
 class Pool(NamedTuple):
@@ -208,3 +211,47 @@ def large_origins(session: Session, answers: int) -> list[tuple[str, str]]:
         .order_by(Study.id, StudyRun.origin)
     )
     return [(name, origin) for name, origin in session.execute(query)]
+
+
+# The jobs that build reports and capsules and rehearse studies, as the database keeps them.
+
+JobKind = Literal["report", "capsule", "rehearsal"]
+LISTED_JOBS = 20
+
+
+def lock_study(session: Session, study: Study) -> None:
+    """Make others who ask for a job of this study wait until this transaction ends."""
+    session.execute(select(Study.id).where(Study.id == study.id).with_for_update(key_share=True))
+
+
+def latest_jobs(session: Session, study: Study, kind: JobKind) -> list[Job]:
+    """The latest jobs of a kind for a study, newest first."""
+    return jobs_of(session, study, kind)[:LISTED_JOBS]
+
+
+def jobs_of(session: Session, study: Study, kind: JobKind) -> list[Job]:
+    """Every job of a kind for a study, newest first."""
+    query = select(Job).where(Job.study_id == study.id, Job.kind == kind)
+    return list(session.scalars(query.order_by(Job.id.desc())))
+
+
+def find_job(session: Session, study: Study, kind: JobKind, public_id: str) -> Job | None:
+    """The job of a kind for a study with this public id."""
+    of_study = (Job.study_id == study.id, Job.kind == kind, Job.public_id == public_id)
+    return session.scalar(select(Job).where(*of_study))
+
+
+def job_called(session: Session, public_id: str) -> Job | None:
+    """The job with this public id, of whatever study, kept from others until the transaction ends."""
+    return session.scalar(select(Job).where(Job.public_id == public_id).with_for_update())
+
+
+def status_of(session: Session, public_id: str) -> str | None:
+    """How far the job with this public id is; None where there is none any more."""
+    return session.scalar(select(Job.status).where(Job.public_id == public_id))
+
+
+def remove_job(session: Session, study: Study, kind: JobKind, public_id: str) -> None:
+    """Forget a job; its files are its own part's to remove."""
+    of_study = (Job.study_id == study.id, Job.kind == kind, Job.public_id == public_id)
+    session.execute(delete(Job).where(*of_study))

@@ -15,7 +15,7 @@ from server.core.requests import DatabaseDep, SettingsDep
 from server.core.settings import Settings
 from server.core.values import Number, now
 from server.models import Link
-from server.studies import creation, definitions, series, service
+from server.studies import creation, series, service
 from server.studies.launch_checks import launch_checks, refuse_recruiter
 from server.studies.links import (
     LinkOptions,
@@ -70,13 +70,13 @@ def list_experiments(settings: SettingsDep, _identity: Viewer) -> list[ShippedEx
 @router.post("/definitions/check")
 def check_definition(_identity: Viewer, body: DefinitionText) -> DefinitionCheck:
     """Check a definition: every problem with its line and the nearest right name, or what it expands to."""
-    return definitions.check(body.toml)
+    return service.check_definition(body.toml)
 
 
 @router.post("/definitions/edit")
 def edit_definition(_identity: Viewer, body: EditDefinition) -> EditedDefinition:
     """Write changed data into a definition: its comments, order and form stay. Nothing is stored."""
-    return definitions.edit(body)
+    return service.edit_definition(body)
 
 
 @router.get("/studies")
@@ -118,7 +118,7 @@ def add_version(services: ServicesDep, identity: Writer, study: str, body: NewVe
 def judge_version(database: DatabaseDep, identity: Viewer, study: str, body: DefinitionText) -> JudgedEdit:
     """Say, before a changed definition is saved, what changes and whether a new data series would begin."""
     with database.read() as session:
-        return definitions.judge_edit(session, study, body.toml, identity)
+        return service.judge_edit(session, study, body.toml, identity)
 
 
 @router.get("/studies/{study}/versions/{number}", response_class=PlainTextResponse)

@@ -4,18 +4,136 @@ tomlkit counts a comment above `[[forms]]` to the table before it. Where element
 comments go with the element that they stand above.
 """
 
+import json
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import tomlkit
 from tomlkit.container import Container
 from tomlkit.exceptions import TOMLKitError
-from tomlkit.items import AoT, Array, Comment, Table, Whitespace
+from tomlkit.items import AoT, Array, Comment, InlineTable, Item, Table, Whitespace
 
 from experiments.errors import InputError
 from experiments.load import MAX_DEPTH, DefinitionError, is_deeper, sum_of_cubes, toml_data
-from server.studies import toml_items
+
+# New values as TOML: a table of its own, or within a line where it is short.
+
+MAX_INLINE = 120
+"""Longest table, as JSON, that is written within a line."""
+Closed = TypeVar("Closed")
+
+
+def are_tables(value: Any) -> bool:
+    """Whether a value is a list of tables."""
+    return isinstance(value, list) and bool(value) and all(isinstance(item, Mapping) for item in value)
+
+
+def is_inline(table: Any) -> bool:
+    """Whether `table` is written within one line, so that what is put into it has to be."""
+    return isinstance(table, InlineTable)
+
+
+def fresh_item(value: Any, in_line: bool = False, top: bool = False) -> Item:
+    """A new value as it is best read: a table of its own, or within a line where it is short."""
+    if in_line:
+        return inline_item(value)
+    if isinstance(value, Mapping):
+        return fresh_table(value) if top or not _is_short(value) else inline_item(value)
+    if are_tables(value) and not _are_rows(value):
+        tables = tomlkit.aot()
+        for element in value:
+            tables.append(fresh_table(element))
+        return close(tables)
+    return inline_item(value)
+
+
+def fresh_table(value: Mapping[str, Any]) -> Table:
+    """A table with a header of its own: short keys first, tables after them."""
+    table = tomlkit.table()
+    later = {key: inner for key, inner in value.items() if not isinstance(fresh_item(inner), Table | AoT)}
+    for key, inner in later.items():
+        table.append(key, fresh_item(inner))
+    if later or not value:
+        table.add(tomlkit.nl())
+    for key, inner in value.items():
+        if key not in later:
+            table.append(key, fresh_item(inner))
+    return close(table)
+
+
+def close(item: Closed) -> Closed:
+    """Without the blank lines that tomlkit puts above tables: here each table ends with one."""
+    if isinstance(item, AoT):
+        for table in item.body:
+            close(table)
+    elif isinstance(item, Table):
+        item.trivia.indent = ""
+        for _, inner in item.value.body:
+            close(inner)
+    return item
+
+
+def _is_short(value: Any) -> bool:
+    written = json.dumps(value, ensure_ascii=False)
+    return len(written) <= MAX_INLINE and "\\n" not in written
+
+
+def _are_rows(value: Sequence[Mapping[str, Any]]) -> bool:
+    """Whether elements are as small as an option or a level: a line each."""
+    return all(len(element) <= 3 and _is_short(element) for element in value)
+
+
+def inline_item(value: Any) -> Item:
+    """A value that stands behind its key; a list of tables takes a line an element."""
+    if isinstance(value, Mapping):
+        table = tomlkit.inline_table()
+        for key, inner in value.items():
+            table.append(key, inline_item(inner))
+        return table
+    if isinstance(value, list):
+        array = tomlkit.array()
+        for inner in value:
+            array.append(inline_item(inner))
+        spread_elements(array)
+        return array
+    if isinstance(value, str):
+        return _text(value)
+    item: Item = tomlkit.item(value)
+    return item
+
+
+def _text(value: str) -> Item:
+    """Text of several lines begins below its quotes, as one writes it by hand."""
+    if "\n" not in value:
+        return tomlkit.string(value)
+    written = tomlkit.string(value, multiline=True).as_string()
+    # A line break right after the quotes does not count; tomlkit has put one where the text begins with one.
+    below = written if value.startswith("\n") else f'"""\n{written[3:]}'
+    return tomlkit.value(below)
+
+
+def spread_elements(array: Array) -> None:
+    """Give each element a line, where it is a table or the array is long."""
+    array.multiline(any(isinstance(item, Mapping) for item in array) or len(array.as_string()) > MAX_INLINE)
+
+
+def fresh_document(data: Mapping[str, Any]) -> tomlkit.TOMLDocument:
+    """A whole text: short keys first, tables after them, a blank line between."""
+    document = tomlkit.document()
+    items = {key: fresh_item(value, top=True) for key, value in data.items()}
+    for later in (False, True):
+        for key, value in items.items():
+            if isinstance(value, Table | AoT) is later:
+                document.append(key, value)
+        if not later:
+            document.add(tomlkit.nl())
+    for value in items.values():
+        close(value)
+    return document
+
+
+# Write changed data into a TOML text: what did not change keeps its form, its order and its comments.
 
 TOO_DEEP = "lists or tables are nested too deeply; correct the text first"
 IDENTITY = ("name", "value", "rule", "kind")
@@ -58,7 +176,7 @@ def with_data(text: str, data: Mapping[str, Any]) -> str:
     except RecursionError as error:
         raise InputError(TOO_DEEP) from error
     # Tables written out of order are beyond tomlkit's editing: the whole is then written afresh.
-    return tomlkit.dumps(toml_items.fresh_document(edited))
+    return tomlkit.dumps(fresh_document(edited))
 
 
 def _refuse_too_many(*said: Any) -> None:
@@ -117,9 +235,9 @@ def _merge(table: Any, edited: Mapping[str, Any]) -> None:
 
 def _add(table: Any, key: str, value: Any) -> None:
     top = isinstance(table, tomlkit.TOMLDocument)
-    item = toml_items.item(value, toml_items.is_inline(table), top)
+    item = fresh_item(value, is_inline(table), top)
     table[key] = item
-    toml_items.close(item)
+    close(item)
     if top and isinstance(item, Table):
         item.trivia.indent = "\n"
 
@@ -148,7 +266,7 @@ def _change(table: Any, key: str, value: Any) -> None:
     old = table[key]
     if isinstance(value, Mapping) and isinstance(old, Mapping):
         _merge(old, value)
-    elif isinstance(old, AoT) and toml_items.are_tables(value):
+    elif isinstance(old, AoT) and are_tables(value):
         tables, lead = _merged_tables(old, value)
         container = table if isinstance(table, Container) else getattr(table, "value", None)
         before = _item_before(container, key) if isinstance(container, Container) else None
@@ -157,7 +275,7 @@ def _change(table: Any, key: str, value: Any) -> None:
     elif isinstance(old, Array) and isinstance(value, list):
         _merge_array(old, value)
     else:
-        table[key] = toml_items.item(value, toml_items.is_inline(table))
+        table[key] = fresh_item(value, is_inline(table))
 
 
 def _known_again(old: Sequence[Any], edited: Sequence[Any]) -> list[int | None]:
@@ -198,7 +316,7 @@ def _merged_tables(old: AoT, edited: Sequence[Mapping[str, Any]]) -> tuple[AoT, 
     leads: list[list[Any]] = []
     for number, value in zip(known, edited, strict=True):
         if number is None:
-            table, lead = toml_items.table(value), []
+            table, lead = fresh_table(value), []
             _take_tail(table)
         else:
             table, lead = tables[number], above[number]
@@ -208,7 +326,7 @@ def _merged_tables(old: AoT, edited: Sequence[Mapping[str, Any]]) -> tuple[AoT, 
     body = list(fresh.body)
     for table, lead in zip(body, [*leads[1:], above[-1]], strict=True):
         _give_tail(table, lead or [Whitespace("\n")])
-    return toml_items.close(fresh), leads[0]
+    return close(fresh), leads[0]
 
 
 def _last_container(item: Any) -> Container | None:
@@ -253,14 +371,14 @@ def _merge_array(array: Array, edited: list[Any]) -> None:
     if kept != sorted(kept) or not kept:
         array.clear()
         for value in edited:
-            array.append(toml_items.inline_item(value))
-        toml_items.spread_elements(array)
+            array.append(inline_item(value))
+        spread_elements(array)
         return
     for number in reversed(range(len(array))):
         if number not in kept:
             del array[number]
     for index, (origin, value) in enumerate(zip(known, edited, strict=True)):
         if origin is None:
-            array.insert(index, toml_items.inline_item(value))
+            array.insert(index, inline_item(value))
         elif not _is_same(_plain_value(array[index]), value):
-            array[index] = toml_items.inline_item(value)
+            array[index] = inline_item(value)

@@ -99,7 +99,7 @@ class UploadPreparation:
         return waiting
 
     def _work(self) -> None:
-        command = [sys.executable, "-m", "server.transcoding", str(self.root)]
+        command = [sys.executable, "-m", "server.transcoding.worker", str(self.root)]
         with self._lock:
             if self._closed.is_set() or not self.root.is_dir():
                 return

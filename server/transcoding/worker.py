@@ -1,4 +1,4 @@
-"""The process that looks into uploaded videos and converts them: `python -m server.transcoding FOLDER`."""
+"""The process that converts uploaded videos: `python -m server.transcoding.worker FOLDER`."""
 
 import os
 import select
@@ -169,7 +169,7 @@ def end_with_parent(parent: int) -> None:
             os._exit(1)
 
 
-# The process that looks into uploaded videos and converts them: `python -m server.transcoding FOLDER`.
+# The process that looks into uploaded videos and converts them: `python -m server.transcoding.worker FOLDER`.
 #
 # A decoder reads what strangers may have made, in a process for one account's files. While no other account
 # waits, it does short files one after the other until its turn is over, since a process for each takes longer
@@ -470,3 +470,7 @@ def main() -> None:
     stand_back()
     signal.signal(signal.SIGTERM, lambda _number, _frame: sys.exit(0))
     work(Path(sys.argv[1]))
+
+
+if __name__ == "__main__":
+    main()

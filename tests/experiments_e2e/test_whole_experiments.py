@@ -16,8 +16,8 @@ from experiments.load import FOLDER
 from server.app import create_app
 from server.context import Services
 from server.core.settings import Settings
-from server.exports.extract import Extract
 from server.exports.formats import ratings_csv
+from server.exports.schemas import Extract
 from server.models import Rating, Study, StudyRun
 from server.rehearsals.http import JsonClient, running_server
 from server.rehearsals.person import Person, Rater

@@ -12,8 +12,8 @@ from sqlalchemy import text
 from server.accounts.identity import OPERATOR
 from server.cli_common import migrated_services
 from server.core.settings import Settings
-from server.exports.extract import Extract
 from server.exports.formats import FORMATS
+from server.exports.schemas import Extract
 from server.studies.lookup import find_study
 from tests.experiments.additions.whole import KEY
 from tools.reference import data_dictionary

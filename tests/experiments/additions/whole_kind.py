@@ -16,8 +16,8 @@ from server.app import create_app
 from server.context import open_services
 from server.core.migrate import upgrade
 from server.core.settings import Settings
-from server.exports.extract import Extract
 from server.exports.formats import FORMATS
+from server.exports.schemas import Extract
 from server.rehearsals.person import Person, Rater
 from server.results.kinds import summary_of
 from server.results.repository import Pool

@@ -20,8 +20,8 @@ from server.app import create_app
 from server.context import Services, open_services
 from server.core.migrate import newest_revision, upgrade
 from server.core.settings import Settings
-from server.exports.extract import Extract
 from server.exports.formats import FORMATS
+from server.exports.schemas import Extract
 from server.operations.backup import back_up
 from server.operations.copying import copy_database
 from server.rehearsals.person import Person, link_and_raters

@@ -6,8 +6,8 @@ import io
 import pytest
 
 from server.context import Services
-from server.exports.extract import Extract
 from server.exports.formats import ratings_csv
+from server.exports.schemas import Extract
 from server.models import Study
 from tests.helpers.studies import Participant
 

@@ -14,8 +14,8 @@ from experiments.kinds.continuous_rating import CONTINUOUS_RATING
 from server.context import Services
 from server.exports import csv_lines
 from server.exports.csv_lines import ExportBrokenOff, csv_pieces, rating_table
-from server.exports.extract import EVERYTHING, Extract
 from server.exports.formats import ratings_csv
+from server.exports.schemas import EVERYTHING, Extract
 from server.models import Rating, Study, StudyRun, VersionClip
 from server.rehearsals.person import Person, Rater
 from tests.conftest import REPOSITORY

@@ -6,8 +6,8 @@ from typing import Any
 from experiments.kinds.clip_rating import RATINGS
 from server.context import Services
 from server.exports.csv_lines import rating_rows
-from server.exports.extract import EVERYTHING
 from server.exports.formats import ratings_csv
+from server.exports.schemas import EVERYTHING
 from server.models import Study
 from tests.helpers.studies import Participant
 

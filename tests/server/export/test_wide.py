@@ -10,8 +10,8 @@ from experiments.load import parse_experiment
 from server.context import Services
 from server.exports import tables
 from server.exports.csv_lines import rating_rows
-from server.exports.extract import EVERYTHING
 from server.exports.psych_ds import LANGUAGES, script
+from server.exports.schemas import EVERYTHING
 from server.exports.tables import cells_of, form_columns
 from server.models import Study
 from tests.conftest import REPOSITORY

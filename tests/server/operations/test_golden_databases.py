@@ -16,8 +16,8 @@ from server.app import create_app
 from server.context import Services, open_services
 from server.core.migrate import current_revision, newest_revision, upgrade
 from server.core.settings import Settings
-from server.exports.extract import Extract
 from server.exports.formats import FORMATS
+from server.exports.schemas import Extract
 from server.operations.restore import restore
 from server.studies.lookup import find_study
 from tests.helpers.admins import signed_in

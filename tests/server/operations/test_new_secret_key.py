@@ -9,7 +9,7 @@ import pytest
 from sqlalchemy import select, text
 
 from server.accounts import service, signing_in
-from server.accounts.audit_verification import Verdict, verify
+from server.accounts.audit import Verdict, verify
 from server.accounts.credentials import PasswordCheck, secret_of
 from server.accounts.identity import Identity
 from server.context import Services, open_services

@@ -19,8 +19,8 @@ from server.app import create_app
 from server.context import Services, open_services
 from server.core.migrate import current_revision, downgrade, newest_revision, upgrade
 from server.core.settings import Settings
-from server.exports.extract import Extract
 from server.exports.formats import FORMATS
+from server.exports.schemas import Extract
 from server.models import StudyRun
 from server.participation import returning
 from server.studies.lookup import find_study

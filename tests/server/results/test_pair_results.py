@@ -77,7 +77,8 @@ def test_a_level_is_compared_with_other_levels_only(results: dict[str, Any], ser
 def test_a_kind_without_a_summary_says_so(
     answered: None, services: Services, viewer: Admin, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("server.results.counting.summary_of", lambda _: kinds.summary_of("of_the_future"))
+    without_a_file = kinds.summary_of("of_the_future")
+    monkeypatch.setattr("server.results.kinds.summary_of", lambda _: without_a_file)
     shown = viewer.get("/studies/short/results").json()
     with services.database.read() as session:
         number = sum(row["kind"] == "main" for row in comparisons(session))

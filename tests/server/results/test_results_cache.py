@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from server.context import Services
-from server.results import cache, counting, service
+from server.results import cache, kinds, service
 from server.results.cache import ResultsCache, Revision
 from tests.helpers.admins import Admin
 from tests.helpers.studies import Participant
@@ -74,12 +74,12 @@ def test_results_of_many_answers_are_counted_before_anybody_asks(
 ) -> None:
     participant.agree().rate_all()
     kept = viewer.client.app.state.services.results  # type: ignore[attr-defined]
-    counting.count_ahead(services.database, kept, lambda: False)
+    kinds.count_ahead(services.database, kept, lambda: False)
     assert counts == []  # so few are counted while a page loads
-    monkeypatch.setattr(counting, "MANY_ANSWERS", 1)
-    counting.count_ahead(services.database, kept, lambda: True)
+    monkeypatch.setattr(kinds, "MANY_ANSWERS", 1)
+    kinds.count_ahead(services.database, kept, lambda: True)
     assert counts == []  # the server stops
-    counting.count_ahead(services.database, kept, lambda: False)
+    kinds.count_ahead(services.database, kept, lambda: False)
     assert counts == ["participant"]
     assert viewer.get(RESULTS).json()["participants"] == 1
     assert counts == ["participant"]

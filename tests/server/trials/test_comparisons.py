@@ -9,8 +9,8 @@ import pytest
 from fastapi.testclient import TestClient
 
 from server.context import Services
-from server.exports.extract import Extract
 from server.exports.formats import FORMATS
+from server.exports.schemas import Extract
 from server.models import RunTally, Study
 from server.participation.tallies import tally_of, unpack_answer
 from server.participation.tally_pools import Recount

@@ -15,8 +15,8 @@ from analysis.plans.plan import plan_of, study_contents
 from analysis.read.study_answers import load_csv
 from experiments.kinds.continuous_rating import CONTINUOUS_RATING
 from server.context import Services
-from server.exports.extract import ExportOrigin, Extract
 from server.exports.formats import FORMATS
+from server.exports.schemas import ExportOrigin, Extract
 from server.models import Study
 from server.participation.kinds.continuous_rating import LAG_S
 from server.rehearsals.person import Person, Rater

@@ -15,8 +15,8 @@ from experiments.manifest import Manifest
 from server.app import create_app
 from server.context import Services
 from server.core.migrate import current_revision, downgrade, newest_revision
-from server.exports.extract import Extract
 from server.exports.formats import FORMATS
+from server.exports.schemas import Extract
 from server.models import Study, View
 from server.participation.tally_pools import Recount
 from server.rehearsals.http import JsonClient, running_server

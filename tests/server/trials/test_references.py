@@ -12,8 +12,8 @@ from typer.testing import CliRunner
 
 from analysis.cli import app
 from server.context import Services
-from server.exports.extract import Extract
 from server.exports.formats import FORMATS
+from server.exports.schemas import Extract
 from server.models import Study, StudyRun
 from server.participation import rating_repository
 from server.rehearsals.person import Person, Rater

@@ -12,8 +12,8 @@ from fastapi.testclient import TestClient
 from sqlalchemy import text
 
 from server.context import Services
-from server.exports.extract import Extract
 from server.exports.formats import FORMATS, row_count
+from server.exports.schemas import Extract
 from server.models import Rating, Study
 from server.rehearsals.person import Person, Rater
 from tests.helpers.admins import Admin

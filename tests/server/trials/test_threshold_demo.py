@@ -12,8 +12,8 @@ from analysis.cli import app
 from experiments.errors import InputError
 from experiments.load import load_experiment
 from server.context import Services
-from server.exports.extract import Extract
 from server.exports.formats import FORMATS
+from server.exports.schemas import Extract
 from server.models import Study
 from server.rehearsals.person import Truth, truth_of
 from tests.conftest import REPOSITORY

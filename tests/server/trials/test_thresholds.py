@@ -9,8 +9,8 @@ import pytest
 from fastapi.testclient import TestClient
 
 from server.context import Services
-from server.exports.extract import Extract
 from server.exports.formats import FORMATS
+from server.exports.schemas import Extract
 from server.models import SeriesAnswer, SeriesOffer, Study, StudyRun, View
 from server.participation import quest, series
 from server.participation.versions import Versions

@@ -37,8 +37,8 @@ from server.app import create_app  # noqa: E402
 from server.context import open_services  # noqa: E402
 from server.core.migrate import upgrade  # noqa: E402
 from server.core.settings import Settings  # noqa: E402
-from server.exports.extract import Extract  # noqa: E402
 from server.exports.formats import FORMATS  # noqa: E402
+from server.exports.schemas import Extract  # noqa: E402
 from server.rehearsals.person import Person, Rater  # noqa: E402
 from server.results.kinds import summary_of  # noqa: E402
 from server.results.repository import Pool  # noqa: E402

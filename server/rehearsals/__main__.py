@@ -1,5 +1,0 @@
-"""`python -m server.rehearsals FOLDER`: rehearse what the folder declares, then end."""
-
-from server.rehearsals.sandbox import main
-
-main()
