@@ -24,7 +24,7 @@ from bench.harness import say
 from experiments.load import load_experiment
 from stimuli_builder.characters import level_video
 from stimuli_builder.characters.atlas import SHIPPED, decode_picture, load_atlas
-from stimuli_builder.characters.writing import write_picture
+from stimuli_builder.characters.declaration import write_picture
 from stimuli_builder.clips.characters import find_character, shipped_names
 from stimuli_builder.clips.curves import ClipCurve
 from stimuli_builder.clips.design_clips import Options, planned_clips

@@ -44,8 +44,8 @@ import pandas as pd
 from scipy.signal import find_peaks
 
 from bench.harness import run_part
-from stimuli_builder.blinks.events.candidates import depth_of
-from stimuli_builder.blinks.events.generated import CLOSED_EYE_S, GeneratedSeries, Motion, generate
+from bench.lid_event_training import GeneratedSeries, Motion, generate
+from stimuli_builder.blinks.events.candidates import CLOSED_EYE_S, depth_of
 from stimuli_builder.blinks.events.recognise import recognise
 from stimuli_builder.blinks.events.rules import LidEvent
 from stimuli_builder.blinks.labelling import label_blinks

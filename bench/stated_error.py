@@ -22,8 +22,8 @@ from scipy.stats import beta
 
 from bench.harness import RECORDINGS
 from stimuli_builder.actor.recording import Actor, ActorOptions, label_points, truth_points
-from stimuli_builder.environments import cache_folder
 from stimuli_builder.tracking.certainty import DOUBTFUL_SHARE, lid_offsets
+from stimuli_builder.tracking.detector.mesh import cache_folder
 from stimuli_builder.tracking.labelfree import label_free_lesson
 from stimuli_builder.tracking.labels import Labels, load_labels
 from stimuli_builder.tracking.learn import lesson_from

@@ -470,8 +470,8 @@ def build_library(
 
     Example: stimuli profiles build --data recordings --out library
     """
+    from stimuli_builder.blinks.library import LIBRARY_FOLDER, RECORDINGS_FILE, read_recordings
     from stimuli_builder.blinks.library.build import recorded_profiles, write_model, write_profiles
-    from stimuli_builder.blinks.library.load import LIBRARY_FOLDER, RECORDINGS_FILE, read_recordings
 
     folder = out or LIBRARY_FOLDER
     if not folder.is_dir():

@@ -9,7 +9,7 @@ import typer
 
 from experiments.command_groups import command_group
 from experiments.errors import InputError
-from stimuli_builder.characters.retired import load_retired, restore
+from stimuli_builder.characters.atlas import load_retired, restore
 from stimuli_builder.clips.characters import SHIPPED_FOLDER, geometry, shipped_names
 
 BAKERS = "palpebra.bakers"

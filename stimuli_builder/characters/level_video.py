@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from experiments.errors import InputError
 from stimuli_builder.characters.colour import FORMAT, frame_planes, picture_of, planes_of
-from stimuli_builder.characters.declaration import REPAIR, Picture
-from stimuli_builder.characters.writing import write_bytes_declared
+from stimuli_builder.characters.declaration import REPAIR, Picture, write_bytes_declared
 
 QUANTISER = 21
 """x264's constant quantiser of ten-bit planes: with 22 `alder@7` has 48.1 dB or more."""

@@ -13,7 +13,7 @@ from experiments.declaration.experiment import Experiment
 from experiments.declaration.rendering import RenderSettings
 from experiments.errors import InputError
 from experiments.manifest import MANIFEST_NAME, CheckClip, Manifest
-from stimuli_builder.characters.writing import write_bytes
+from stimuli_builder.characters.declaration import write_bytes
 from stimuli_builder.checks.jobs import CheckJob
 from stimuli_builder.clips.characters import geometry
 from stimuli_builder.clips.curves import generator

@@ -10,7 +10,7 @@ from experiments.declaration.experiment import Experiment
 from experiments.kinds import KINDS
 from experiments.manifest import MANIFEST_NAME, Manifest
 from experiments.schema.canonical import definition_sha256
-from stimuli_builder.characters.writing import write_bytes
+from stimuli_builder.characters.declaration import write_bytes
 from stimuli_builder.checks import plan as checks
 from stimuli_builder.checks.plan import planned_checks
 from stimuli_builder.clips.design_clips import Options, PlannedClip, planned_clips

@@ -5,7 +5,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from experiments.errors import InputError, did_you_mean
-from stimuli_builder.characters.retired import load_retired
+from stimuli_builder.characters.atlas import load_retired
 from stimuli_builder.clips.geometry import Character, Geometry
 
 SHIPPED_FOLDER = Path(__file__).resolve().parent.parent / "characters" / "data"

@@ -82,8 +82,8 @@ def clip_command(
     barcode: Annotated[bool, typer.Option("--test-barcode", help="Draw each frame's number.")] = False,
 ) -> None:
     """Render one clip."""
+    from stimuli_builder.clips.design_clips import SingleClip, render_single
     from stimuli_builder.clips.exemplars import reading_note
-    from stimuli_builder.clips.single import SingleClip, render_single
 
     if out.suffix.lower() != ".mp4":
         raise InputError(f"--out: expected a name ending in .mp4, got '{out.name}'; clips are H.264 in MP4")

@@ -1,7 +1,7 @@
 """Every clip of an experiment before anything is rendered: its cell, its blink, its job."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -11,15 +11,27 @@ from blink_engine import Event, Law, Parameters, Performance, StateChange, defau
 from blink_engine.speech import Speech, seed_of_speaker, speech_events, speech_states
 from experiments import design
 from experiments.declaration.experiment import Experiment
-from experiments.declaration.rendering import RenderSettings
+from experiments.declaration.rendering import PROFILES, RenderSettings
 from experiments.declaration.trial import ClipSpec
-from experiments.errors import InputError
+from experiments.errors import InputError, did_you_mean
+from experiments.files import whole_file
+from stimuli_builder.blinks.library import load_library
 from stimuli_builder.blinks.profile import PROFILE_FPS
 from stimuli_builder.clips.characters import DRAWN, fingerprint, geometry
-from stimuli_builder.clips.curves import DECIMALS, Array, ClipCurve, Timing, clip_curve, generator, shown_by
-from stimuli_builder.clips.exemplars import exemplar
+from stimuli_builder.clips.curves import (
+    DECIMALS,
+    Array,
+    ClipCurve,
+    Timing,
+    amplitude_of,
+    clip_curve,
+    generator,
+    samples_per_frame,
+    shown_by,
+)
+from stimuli_builder.clips.exemplars import Exemplar, exemplar, of_declared_length
 from stimuli_builder.clips.geometry import Geometry, Movement
-from stimuli_builder.clips.jobs import ClipJob, Look
+from stimuli_builder.clips.jobs import ClipJob, Look, render
 from stimuli_builder.performance.run import LOWER_IN_MM, LOWER_UP_MM, speech_of
 
 # A clip of living eyes: the blink engine's lids over many seconds, as a curve at 300 fps.
@@ -279,3 +291,62 @@ def _encoder() -> str:
     from stimuli_builder.clips.encode import encoder_signature
 
     return encoder_signature()
+
+
+# One clip outside any experiment.
+
+
+@dataclass(frozen=True)
+class SingleClip:
+    """What `stimuli clip` was asked for; `profile` may also be the name of a shipped recording."""
+
+    settings: RenderSettings
+    profile: str
+    exemplar: int = 1
+    seed: int = 2011
+    clip_frames: int | None = None
+    barcode: bool = False
+
+
+@dataclass(frozen=True)
+class RenderedClip:
+    """A clip that was written."""
+
+    curve: ClipCurve
+    frames: int
+    onset_frame: int
+
+
+def render_single(clip: SingleClip, out: Path) -> RenderedClip:
+    """Render one clip into `out`, whole or not at all."""
+    settings = clip.settings
+    character = geometry(settings.character)
+    check_look(settings, character)
+    shown = _blink(clip)
+    timing = Timing.drawn(settings.fps, shown.phase_samples, clip.seed, clip.profile, clip.exemplar)
+    curve = clip_curve(shown.profile, timing, settings.lower_lid, clip.clip_frames)
+    curve, _ = shown_by(curve, settings, character.lower_range_mm)
+    job = ClipJob(look_of(settings, Options(barcode=clip.barcode)), curve)
+    with whole_file(out) as temporary:
+        temporary.write_bytes(render(job))
+    return RenderedClip(curve, job.frames, int(curve.onset_sample / samples_per_frame(settings.fps)))
+
+
+def _blink(clip: SingleClip) -> Exemplar:
+    settings = clip.settings
+    if clip.profile in PROFILES or clip.profile.endswith(".csv"):
+        chosen = settings.model_copy(update={"profile": clip.profile})
+        return exemplar(chosen, clip.profile, clip.exemplar, clip.seed)
+    shipped = {p.profile_id: p for paired in (False, True) for p in load_library(paired=paired)}
+    if clip.profile not in shipped:
+        names = [*PROFILES, *shipped]
+        raise InputError(f"there is no blink profile '{clip.profile}'{did_you_mean(clip.profile, names)}")
+    profile = shipped[clip.profile]
+    profile = of_declared_length(profile, settings)
+    if settings.eyes == "separate" and profile.closure_other is None:
+        raise InputError(
+            f"profile {clip.profile} shows one eye; --eyes separate needs a profile of both eyes"
+        )
+    if settings.eyes == "alike":
+        profile = replace(profile, closure_other=None)
+    return Exemplar(amplitude_of(profile, settings.amplitude), repeated=False, phase_samples=0)

@@ -17,7 +17,7 @@ from experiments.files import whole_file
 from experiments.manifest import MADE_ELSEWHERE, MANIFEST_NAME, Clip, Manifest
 from experiments.own_clips import FIRST_FIELD, Placed, check_factorial, check_names, levels_of, one_form
 from experiments.schema.canonical import definition_sha256
-from stimuli_builder.characters.writing import write_bytes
+from stimuli_builder.characters.declaration import write_bytes
 from stimuli_builder.clips.folder import manifest_text, program_version
 from video_conversion.prepare import prepare
 from video_conversion.prepared import VIDEO_ENDINGS, Prepared, clip_name

@@ -16,7 +16,7 @@ from PIL import Image, ImageDraw, ImageFont, ImageOps
 
 from experiments.files import whole_file, whole_text
 from experiments.manifest import Clip, Manifest
-from stimuli_builder.characters.writing import write_bytes
+from stimuli_builder.characters.declaration import write_bytes
 from stimuli_builder.clips.characters import find_character, geometry, shipped_names
 from stimuli_builder.clips.curves import samples_per_frame
 

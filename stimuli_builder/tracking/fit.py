@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stimuli_builder.tracking import kernels
-from stimuli_builder.tracking.light import light_between
 from stimuli_builder.tracking.model import CoupledModel
 from stimuli_builder.tracking.sampling_kernels import grey_spreads
+from stimuli_builder.tracking.stillness import light_between
 from stimuli_builder.video import Picture
 
 # What the compiled fit is given: named arrays of the mesh, of the model, and buffers.

@@ -15,7 +15,6 @@ from stimuli_builder.tracking.certainty import (
 )
 from stimuli_builder.tracking.fit import Fit, Fitter
 from stimuli_builder.tracking.glare import GlareCheck
-from stimuli_builder.tracking.light import Light
 from stimuli_builder.tracking.mesh import reduced_points, restored_points, same_picture, shows_something
 from stimuli_builder.tracking.model import CoupledModel
 from stimuli_builder.tracking.search import Faults, Finder
@@ -28,7 +27,7 @@ from stimuli_builder.tracking.shapes import (
     widths,
     with_border,
 )
-from stimuli_builder.tracking.stillness import Stillness
+from stimuli_builder.tracking.stillness import Light, Stillness
 from stimuli_builder.tracking.table import Status, TrackedFrame
 from stimuli_builder.video import Picture
 

@@ -25,9 +25,17 @@ from face_baking.pose_motion import pose_between
 from face_baking.renderer import Shot
 from face_baking.scene import FaceScene
 from stimuli_builder.characters.colour import linear_to_srgb, srgb_to_linear
-from stimuli_builder.characters.declaration import Declaration, Level, LowerLid, LowerLidPose, PictureOrFrame
+from stimuli_builder.characters.declaration import (
+    Declaration,
+    Level,
+    LowerLid,
+    LowerLidPose,
+    PictureOrFrame,
+    write_bytes,
+    write_declaration,
+    write_picture,
+)
 from stimuli_builder.characters.level_video import write_level_video
-from stimuli_builder.characters.writing import write_bytes, write_declaration, write_picture
 
 STUDIO_EV = 0.15
 STEADY_CODE = 0.03

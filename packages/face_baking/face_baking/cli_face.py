@@ -18,7 +18,7 @@ from face_baking.identity import (
 from face_baking.kit import load_facekit
 from face_baking.plan import Samples, closures_of
 from face_baking.renderer import DEVICES, load_light
-from stimuli_builder.characters.retired import next_version
+from stimuli_builder.characters.atlas import next_version
 
 
 def bake_face(

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from stimuli_builder.environments import run_step, uv
+from stimuli_builder.tracking.detector.mesh import run_step, uv
 
 BPY_VERSION = "5.0.1"
 PYTHON_VERSION = "3.11"

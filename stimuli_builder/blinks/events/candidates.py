@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,13 @@ from scipy.signal import find_peaks
 
 from stimuli_builder.blinks.profile import OPEN_PERCENTILE, Array
 from stimuli_builder.blinks.series import box_filter
+
+Kind = Literal["blink", "squint", "gaze_shift", "closed_eye"]
+KINDS: tuple[Kind, ...] = ("blink", "squint", "gaze_shift", "closed_eye")
+CLASSES = (*KINDS, "nothing")
+"""What a dip of a series may be."""
+CLOSED_EYE_S = 0.5
+"""A closed phase of half a second or more is a closed eye, not a blink."""
 
 # The course of the lid about a dip, as means over spans of time that grow away from its deepest frame.
 

@@ -5,13 +5,12 @@ from dataclasses import dataclass, replace
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.files import whole_file
 from stimuli_builder.blinks.events.candidates import (
+    CLASSES,
     COURSE,
     FEATURES,
     SHALLOWEST,
@@ -23,7 +22,6 @@ from stimuli_builder.blinks.events.candidates import (
     find_candidates,
     span_means,
 )
-from stimuli_builder.blinks.events.generated import CLASSES
 from stimuli_builder.blinks.profile import Array
 from stimuli_builder.blinks.series import BlinkSeries
 from stimuli_builder.blinks.times import runs
@@ -63,33 +61,16 @@ class Network:
 
 @cache
 def shipped_network(path: Path) -> Network:
-    """One of the networks that ship, `FIRST_LOOK` or `SECOND_LOOK`, made by `train.py` in the same folder."""
+    """One of the networks that ship, `FIRST_LOOK` or `SECOND_LOOK`, made by `bench/lid_event_training.py`."""
     return stored_network(path)
 
 
 def stored_network(path: Path) -> Network:
-    """Read a network that `store` wrote."""
+    """Read a network that `bench/lid_event_training.py` wrote."""
     with np.load(path, allow_pickle=False) as stored:
         count = sum(name.startswith("weights") for name in stored)
         layers = tuple((stored[f"weights{n}"] / TICKS, stored[f"offsets{n}"] / TICKS) for n in range(count))
         return Network(tuple(stored["kinds"].tolist()), stored["mean"], stored["spread"], layers)
-
-
-def store(network: Network, path: Path, **about: str | int | Sequence[str]) -> None:
-    """Write a network, its weights rounded to ten-thousandths, and the text `about` it, as npz."""
-    arrays: dict[str, Any] = {name: np.array(value) for name, value in about.items()}
-    arrays |= {"kinds": np.array(network.kinds), "mean": network.mean, "spread": network.spread}
-    for number, (weights, offsets) in enumerate(network.layers):
-        arrays |= {f"weights{number}": _ticks(weights), f"offsets{number}": _ticks(offsets)}
-    with whole_file(path) as temporary:
-        np.savez_compressed(temporary, **arrays)
-
-
-def _ticks(values: Array) -> NDArray[np.int16] | NDArray[np.int32]:
-    whole = np.rint(values * TICKS)
-    if np.abs(whole).max() < 2**15:
-        return whole.astype(np.int16)
-    return whole.astype(np.int32)
 
 
 # Gapless pieces of lid series, their dips, and what a first look at each dip says of it.

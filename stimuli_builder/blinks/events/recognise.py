@@ -7,6 +7,8 @@ import numpy as np
 
 from stimuli_builder.blinks.columns import eye_pair
 from stimuli_builder.blinks.events.candidates import (
+    CLASSES,
+    CLOSED_EYE_S,
     LEVELS,
     RIPPLE,
     Candidate,
@@ -14,7 +16,6 @@ from stimuli_builder.blinks.events.candidates import (
     candidate_at,
     level_crossing,
 )
-from stimuli_builder.blinks.events.generated import CLASSES, CLOSED_EYE_S
 from stimuli_builder.blinks.events.network import Piece, looked_at, partners, second_look
 from stimuli_builder.blinks.events.rules import (
     Asymmetry,

@@ -6,8 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from stimuli_builder.blinks.events.candidates import Candidate
-from stimuli_builder.blinks.events.generated import CLASSES, CLOSED_EYE_S
+from stimuli_builder.blinks.events.candidates import CLASSES, CLOSED_EYE_S, Candidate
 from stimuli_builder.blinks.events.network import Piece
 from stimuli_builder.blinks.profile import OPEN_PERCENTILE, Array
 from stimuli_builder.blinks.series import box_filter

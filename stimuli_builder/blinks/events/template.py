@@ -194,7 +194,7 @@ class Timing:
 
 @cache
 def shipped_forms() -> Forms:
-    """The template that ships, made by `measure_template.py` in the same folder."""
+    """The template that ships, measured by `bench/lid_event_training.py`."""
     document = json.loads(FORMS.read_text(encoding="utf-8"))
     return Forms(*(np.array(document[name]) for name in ("closing", "opening", "log_s", "log_sd")))
 

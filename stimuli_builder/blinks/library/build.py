@@ -12,7 +12,7 @@ from stimuli_builder.blinks.blink_model import BlinkModel
 from stimuli_builder.blinks.both_eyes import all_profiles
 from stimuli_builder.blinks.extract import blinks_of
 from stimuli_builder.blinks.labelling import LabelOptions, preset
-from stimuli_builder.blinks.library.load import LIBRARY_FOLDER, Recording
+from stimuli_builder.blinks.library import LIBRARY_FOLDER, Recording
 from stimuli_builder.blinks.profile import BlinkProfile, write_profile_table
 from stimuli_builder.blinks.series import read_series
 

@@ -11,7 +11,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from experiments.load import load_experiment
 from experiments.manifest import Manifest
-from stimuli_builder.characters.writing import write_example_character
+from stimuli_builder.characters.declaration import write_example_character
 from stimuli_builder.clips.build import Machines, build
 from stimuli_builder.clips.design_clips import Options
 from stimuli_builder.clips.preview import write_preview

@@ -7,8 +7,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from bench.lid_event_training import Motion, course, plan
 from stimuli_builder.blinks.both_eyes import asymmetry_lines
-from stimuli_builder.blinks.events.generated import Motion, course, plan
 from stimuli_builder.blinks.events.recognise import RecognisedEvents, recognise
 from stimuli_builder.blinks.extract import blinks_of
 from stimuli_builder.blinks.labelling import LabelOptions

@@ -4,9 +4,8 @@ from pathlib import Path
 import pytest
 
 from experiments.errors import InputError
-from stimuli_builder.blinks.library import LIBRARY_FOLDER, load_library
+from stimuli_builder.blinks.library import LIBRARY_FOLDER, load_library, read_recordings
 from stimuli_builder.blinks.library.build import recorded_profiles, write_model, write_profiles
-from stimuli_builder.blinks.library.load import read_recordings
 
 
 def test_the_library_ships_eighteen_profiles_of_nine_blinks_and_three_tracked_ones():

@@ -6,10 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from bench.lid_event_training import Motion, course, generate, true_kinds
 from stimuli_builder.blinks.events.candidates import COURSE, courses, depth_of, find_candidates
-from stimuli_builder.blinks.events.generated import Motion, course, generate
 from stimuli_builder.blinks.events.recognise import recognise
-from stimuli_builder.blinks.events.train import true_kinds
 from stimuli_builder.blinks.extract import blinks_of
 from stimuli_builder.blinks.labelling import DEFAULT_OPTIONS
 from stimuli_builder.blinks.series import BlinkSeries, read_series

@@ -5,14 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bench.lid_event_training import CLASSES, store
 from stimuli_builder.blinks.events.candidates import FEATURES
-from stimuli_builder.blinks.events.generated import CLASSES
 from stimuli_builder.blinks.events.network import (
     CONTEXT,
     FIRST_LOOK,
     SECOND_LOOK,
     Network,
-    store,
     stored_network,
 )
 

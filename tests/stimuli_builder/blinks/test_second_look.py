@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
+from bench.lid_event_training import CLASSES, Motion, course, generate, labelled_features
 from stimuli_builder.blinks.events.candidates import FEATURES
-from stimuli_builder.blinks.events.generated import CLASSES, Motion, course, generate
 from stimuli_builder.blinks.events.network import CONTEXT, contexts, looked_at
-from stimuli_builder.blinks.events.train import labelled_features
 from stimuli_builder.blinks.profile import Array
 from stimuli_builder.blinks.series import BlinkSeries
 

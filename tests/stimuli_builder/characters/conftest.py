@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from stimuli_builder.characters.writing import write_example_character
+from stimuli_builder.characters.declaration import write_example_character
 
 
 @pytest.fixture

@@ -10,8 +10,13 @@ from hypothesis import strategies as st
 from experiments.errors import InputError
 from stimuli_builder.characters.atlas import load_atlas
 from stimuli_builder.characters.colour import level_weights, linear_to_srgb, srgb_to_linear
-from stimuli_builder.characters.declaration import declaration_toml, read_declaration
-from stimuli_builder.characters.writing import CROP, draw_crop, write_example_character
+from stimuli_builder.characters.declaration import (
+    CROP,
+    declaration_toml,
+    draw_crop,
+    read_declaration,
+    write_example_character,
+)
 from tests.helpers.lower_lid_change import lower_lid_change
 
 

@@ -7,9 +7,16 @@ from pathlib import Path
 import pytest
 
 from experiments.errors import InputError
-from stimuli_builder.characters import retired
-from stimuli_builder.characters.atlas import SHIPPED, load_atlas
-from stimuli_builder.characters.retired import ROOT, Retired, load_retired, next_version, restore
+from stimuli_builder.characters import atlas
+from stimuli_builder.characters.atlas import (
+    ROOT,
+    SHIPPED,
+    Retired,
+    load_atlas,
+    load_retired,
+    next_version,
+    restore,
+)
 from stimuli_builder.clips.characters import find_character
 
 FOLDER = "pictures/old"
@@ -54,7 +61,7 @@ def repository(tiny_character: Path, tmp_path: Path, monkeypatch: pytest.MonkeyP
     git("rm", "-rq", "pictures")
     git("commit", "-qm", "without")
     old = Retired(label="old", commit=commit, folder=FOLDER, sha256=load_atlas(tiny_character).fingerprint())
-    monkeypatch.setattr(retired, "load_retired", lambda: {"old": old})
+    monkeypatch.setattr(atlas, "load_retired", lambda: {"old": old})
     return clone
 
 

@@ -10,8 +10,8 @@ from stimuli_builder.checks.jobs import OWN_LOOK_QP, first_blink, first_eye
 from stimuli_builder.clips.curves import ClipCurve
 from stimuli_builder.clips.design_clips import Options, look_of
 from stimuli_builder.clips.encode import encode_clip
+from stimuli_builder.clips.face_movement import kept_levels
 from stimuli_builder.clips.frames import FramePainter
-from stimuli_builder.clips.kept_levels import kept_levels
 from tests.stimuli_builder.checks.solvers import decoded
 
 Maker = Callable[[int, float, float, np.random.Generator], ClipCurve]

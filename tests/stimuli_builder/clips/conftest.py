@@ -7,7 +7,7 @@ import pytest
 
 from experiments.declaration.experiment import Experiment
 from experiments.load import load_experiment
-from stimuli_builder.characters.writing import write_example_character
+from stimuli_builder.characters.declaration import write_example_character
 from stimuli_builder.clips.build import Machines, Report, build
 from stimuli_builder.clips.design_clips import Options
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from experiments.errors import InputError
 from stimuli_builder.characters.atlas import load_atlas
 from stimuli_builder.characters.colour import encode_srgb
-from stimuli_builder.characters.writing import write_example_character
+from stimuli_builder.characters.declaration import write_example_character
 from stimuli_builder.clips.characters import find_character
 from stimuli_builder.clips.curves import ClipCurve
 from stimuli_builder.clips.frames import FramePainter, read_barcode

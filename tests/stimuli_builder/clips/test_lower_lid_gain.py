@@ -7,9 +7,8 @@ import pytest
 
 from experiments.errors import InputError
 from experiments.load import locate, parse_experiment
-from stimuli_builder.clips.design_clips import Options, PlannedClip, planned_clips
+from stimuli_builder.clips.design_clips import Options, PlannedClip, SingleClip, planned_clips, render_single
 from stimuli_builder.clips.folder import moved_mm
-from stimuli_builder.clips.single import SingleClip, render_single
 
 EXP3 = locate("exp3").read_text(encoding="utf-8")
 

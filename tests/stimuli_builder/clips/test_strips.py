@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from stimuli_builder.characters.writing import write_example_character
+from stimuli_builder.characters.declaration import write_example_character
 from stimuli_builder.clips.preview import SIZE_PX, STEPS, strip, strip_names, write_strips
 
 

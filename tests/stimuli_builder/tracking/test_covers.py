@@ -10,9 +10,8 @@ import pytest
 from experiments.errors import InputError
 from stimuli_builder.characters.atlas import SHIPPED, load_atlas
 from stimuli_builder.characters.colour import linear_to_srgb
-from stimuli_builder.environments import cache_folder
 from stimuli_builder.tracking.detector.detection import contour_spread
-from stimuli_builder.tracking.detector.mesh import FaceMesh
+from stimuli_builder.tracking.detector.mesh import FaceMesh, cache_folder
 from stimuli_builder.tracking.fit import Fitter
 from stimuli_builder.tracking.labelfree import label_free_lesson
 from stimuli_builder.tracking.model import TrainingOptions

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from stimuli_builder.actor.recording import Actor, ActorOptions, write_truth, write_video
-from stimuli_builder.environments import cache_folder
+from stimuli_builder.tracking.detector.mesh import cache_folder
 from stimuli_builder.tracking.labelfree import label_free_lesson
 from stimuli_builder.tracking.model import TrainingOptions
 from stimuli_builder.tracking.shapes import widths

@@ -10,11 +10,11 @@ import pytest
 from experiments.errors import InputError
 from stimuli_builder.characters.atlas import SHIPPED, load_atlas
 from stimuli_builder.characters.colour import linear_to_srgb
-from stimuli_builder.environments import cache_folder
 from stimuli_builder.tracking.detector.detection import Detection
 from stimuli_builder.tracking.detector.mesh import (
     SAME_FACE,
     FaceMesh,
+    cache_folder,
     in_both,
     open_detector,
     unmirrored_face,

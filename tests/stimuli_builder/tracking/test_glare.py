@@ -8,7 +8,7 @@ import pytest
 
 from stimuli_builder.characters.atlas import SHIPPED, load_atlas
 from stimuli_builder.characters.colour import linear_to_srgb
-from stimuli_builder.environments import cache_folder
+from stimuli_builder.tracking.detector.mesh import cache_folder
 from stimuli_builder.tracking.fit import Fitter
 from stimuli_builder.tracking.glare import (
     BETWEEN,

@@ -13,10 +13,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.errors import InputError
-from stimuli_builder.environments import cache_folder, ensure_environment
 from stimuli_builder.tracking.certainty import lid_difference, lid_offsets, with_errors
 from stimuli_builder.tracking.detector.detection import along, eye_points
-from stimuli_builder.tracking.detector.mesh import FACES_ASKED, MeshClient, open_detector, spread_out
+from stimuli_builder.tracking.detector.mesh import (
+    FACES_ASKED,
+    MeshClient,
+    cache_folder,
+    ensure_environment,
+    open_detector,
+    spread_out,
+)
 from stimuli_builder.tracking.labelfree import (
     FACE_SHARE,
     label_free_lesson,

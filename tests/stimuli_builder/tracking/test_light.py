@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from stimuli_builder.tracking.fit import Fitter
-from stimuli_builder.tracking.light import Light, light_between
 from stimuli_builder.tracking.shapes import widths
+from stimuli_builder.tracking.stillness import Light, light_between
 from stimuli_builder.tracking.tracker import Tracker
 
 EYE_PX = 60

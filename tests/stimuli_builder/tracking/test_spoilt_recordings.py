@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from experiments.errors import InputError
-from stimuli_builder.environments import cache_folder
+from stimuli_builder.tracking.detector.mesh import cache_folder
 from stimuli_builder.tracking.model import save_model
 from stimuli_builder.tracking.survey import survey
 from stimuli_builder.tracking.track import track_video
