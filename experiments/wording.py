@@ -1,4 +1,4 @@
-"""The texts of a study: their languages, whether consent mentions flicker, unfilled placeholders."""
+"""The texts of a study: their languages, unfilled placeholders, what consent says of flicker, time, pay."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -269,3 +269,72 @@ def untranslated(declared: Experiment) -> dict[str, list[str]]:
         if lacking:
             missing[language] = lacking
     return missing
+
+
+# What a consent text promises: whom to contact, how long it takes, what is paid.
+
+_CONTACT = re.compile(r"[^\s@<>]+@[^\s@<>]+\.\w{2,}|https?://\S+|\+?\d[\d ()/-]{6,}\d")
+_MINUTES = re.compile(
+    r"(\d+)(?:\s*(?:-|–|to|bis|à|a|do|tot)\s*(\d+))?\s*(?:min(?:ut)?\w*\b|分)", re.IGNORECASE
+)
+_SIGNS = {"£": "£", "gbp": "£", "pound": "£", "$": "$", "usd": "$", "dollar": "$"} | {
+    "€": "€", "eur": "€", "euro": "€"
+}  # fmt: skip
+_UNIT = r"(£|\$|€|GBP|USD|EUR|pound|dollar|euro)"
+_PAY = re.compile(rf"{_UNIT}\s?(\d+(?:[.,]\d{{1,2}})?)|(\d+(?:[.,]\d{{1,2}})?)\s?{_UNIT}s?\b", re.IGNORECASE)
+_PAY_SIGN_LAST = re.compile(r"(\d+(?:[.,]\d{1,2})?)\s?([£$€])")
+_HOURLY = re.compile(
+    r"^\s*(?:per hour|an hour|/ ?h\b|/ ?hour|pro stunde|/ ?stunde|par heure|por hora)", re.IGNORECASE
+)
+LEAST_HOURLY_PAY = {"£": 6.0, "$": 8.0, "€": 7.0}
+"""Below this, recruiters such as Prolific refuse a study (its minimum of 2024: £6 or $8 an hour)."""
+MINUTES_TOLERANCE = 1.5
+"""A stated time is wrong if it differs from the expected time by more than this factor."""
+
+
+class StatedPay(NamedTuple):
+    """An amount of money in a text.
+
+    Attributes
+    ----------
+    sign : str
+        Of the currency: "£", "$" or "€".
+    hourly : bool
+        Whether the text says that it is paid per hour.
+    """
+
+    amount: float
+    sign: str
+    hourly: bool
+
+
+def silent_on_contact(experiment: Experiment) -> list[str]:
+    """Languages whose consent has no e-mail address, telephone number or web address."""
+    return [one for one in experiment.languages if not _CONTACT.search(experiment.texts[one].consent)]
+
+
+def stated_minutes(text: str) -> int | None:
+    """The longest time in minutes that a text mentions; None if it mentions none.
+
+    >>> stated_minutes("10 to 15 minutes."), stated_minutes("Dauer: 20 Minuten"), stated_minutes("short")
+    (15, 20, None)
+    """
+    found = [int(number) for match in _MINUTES.finditer(text) for number in match.groups() if number]
+    return max(found, default=None)
+
+
+def stated_pay(text: str) -> StatedPay | None:
+    """The first amount of money that a text mentions; None if it mentions none.
+
+    >>> stated_pay("You receive £2.50."), stated_pay("Sie erhalten 12 € pro Stunde")
+    (StatedPay(amount=2.5, sign='£', hourly=False), StatedPay(amount=12.0, sign='€', hourly=True))
+    """
+    matches = [match for pattern in (_PAY, _PAY_SIGN_LAST) if (match := pattern.search(text))]
+    if not matches:
+        return None
+    match = min(matches, key=lambda one: one.start())
+    parts = [part for part in match.groups() if part]
+    number = next(part for part in parts if part[0].isdigit())
+    unit = next(part for part in parts if not part[0].isdigit())
+    hourly = _HOURLY.match(text[match.end() :]) is not None
+    return StatedPay(float(number.replace(",", ".")), _SIGNS[unit.lower()], hourly)

@@ -69,6 +69,7 @@ def _routers() -> tuple[APIRouter, ...]:
         exports.seal_router,
         exports.router,
         exports.report_router,
+        rehearsals.launch_router,
         rehearsals.router,
         exports.capsule_router,
         results.methods_router,

@@ -1,4 +1,4 @@
-"""The dress rehearsal of a study: simulated people in a sandbox, and what they would leave behind."""
+"""Before a study goes live: the checklist, and the dress rehearsal with simulated people in a sandbox."""
 
 from fastapi import APIRouter
 from fastapi.responses import FileResponse
@@ -10,6 +10,16 @@ from server.core.requests import DatabaseDep, SettingsDep
 from server.exports.reports import REPORT_POLICY
 from server.rehearsals import service
 from server.rehearsals.schemas import NewRehearsal, RehearsalOut, RehearsalResult
+from server.studies.schemas import LaunchCheck
+
+launch_router = APIRouter(prefix="/api/admin", tags=["studies"], responses=ERROR_RESPONSES)
+
+
+@launch_router.get("/studies/{study}/launch-checks")
+def list_launch_checks(services: ServicesDep, identity: Viewer, study: str) -> list[LaunchCheck]:
+    """What to look at before the study goes live."""
+    return service.preflight(services, study, identity)
+
 
 router = APIRouter(
     prefix="/api/admin/studies/{study}/rehearsals", tags=["studies"], responses=ERROR_RESPONSES

@@ -1,4 +1,4 @@
-"""Dress rehearsals: begun in the background, kept until the next one of the study."""
+"""Before a study goes live: dress rehearsals in the background, the latest of which is kept; the checklist."""
 
 import atexit
 import os
@@ -19,12 +19,15 @@ from sqlalchemy.orm import Session
 from experiments.files import json_text
 from server.accounts.audit import record
 from server.accounts.identity import OPERATOR, Identity
+from server.context import Services
 from server.core.db import Database
 from server.core.errors import NotFound
 from server.core.locks import LONGEST_S, Locks, file_lock
 from server.core.settings import Settings
 from server.core.values import now
-from server.models import Job
+from server.exports.seals import people_begun, seal_of
+from server.models import Job, Study
+from server.operations.doctor import Finding, backups, data_folder, public_address
 from server.rehearsals.schemas import (
     DEFINITION,
     MANIFEST,
@@ -39,7 +42,9 @@ from server.rehearsals.schemas import (
 )
 from server.results import repository
 from server.results.jobs import begin_job, in_background, is_under_way, job_state, note
+from server.studies.launch_checks import launch_checks
 from server.studies.lookup import active_version, find_study
+from server.studies.schemas import LaunchCheck
 
 _KEPT_VARIABLES = ("PATH", "LANG", "LC_ALL", "HOME", "TMPDIR", "VIRTUAL_ENV", "PYTHONPATH")
 """What the sandbox gets of the environment: no address of a database, no key, no setting."""
@@ -238,3 +243,92 @@ def _kill(group: int) -> None:
     """End the rehearsal with all that it started: an analysis would go on without it."""
     with suppress(ProcessLookupError, PermissionError):
         os.killpg(group, signal.SIGKILL)
+
+
+# The checklist before a study goes live: its declaration, rehearsal and plan, and the server.
+
+
+def preflight(services: Services, name: str, identity: Identity) -> list[LaunchCheck]:
+    """Everything that speaks against opening the active version of a study, blocking findings first."""
+    with services.database.read() as session:
+        findings = launch_checks(session, name, identity)
+        study = find_study(session, name, identity, "view")
+        findings += [*_plan(session, study), *_rehearsal(session, study)]
+    return sorted([*findings, *_server(services)], key=lambda finding: not finding.blocks)
+
+
+def _plan(session: Session, study: Study) -> Iterator[LaunchCheck]:
+    """A plan that can still be sealed."""
+    if seal_of(session, study) is None and not people_begun(session, study):
+        yield LaunchCheck(
+            kind="plan",
+            blocks=False,
+            text="The analysis plan is not sealed. It can be sealed only before the first participant, under "
+            "Data. Without a seal, the report cannot list deviations.",
+            page="data",
+        )
+
+
+def _rehearsal(session: Session, study: Study) -> Iterator[LaunchCheck]:
+    """A version that simulated people have not gone through to its end."""
+    jobs = repository.latest_jobs(session, study, "rehearsal")
+    number = active_version(session, study).number
+    if any(job.status == "done" and job.parameters.get("version") == number for job in jobs):
+        return
+    if not jobs:
+        what = "No rehearsal was made."
+    elif jobs[0].status == "failed":
+        what = f"The last rehearsal failed: {jobs[0].message}."
+    elif jobs[0].status == "done":
+        what = (
+            f"The last rehearsal was of version {jobs[0].parameters.get('version')}, not of version {number}."
+        )
+    else:
+        what = "The last rehearsal is not finished."
+    text = f"{what} Rehearse with simulated people to see orders, columns, the report and the power."
+    yield LaunchCheck(kind="rehearsal", blocks=False, text=text, page="rehearsal")
+
+
+_OF_SERVER = {
+    "data folder": "disk",
+    "shared folder": "disk",
+    "backups": "backups",
+    "public address": "address",
+}
+"""Findings of `server doctor` that matter for a study, and the kind of their check."""
+
+
+def _server(services: Services) -> Iterator[LaunchCheck]:
+    """A full disk, old backups, an address that participants cannot reach."""
+    for examine in (data_folder, backups, public_address):
+        for finding in examine(services):
+            kind = _OF_SERVER.get(finding.subject)
+            if kind is not None and finding.verdict != "ok":
+                yield _of_finding(kind, finding)
+    if services.settings.is_local:
+        yield LaunchCheck(
+            kind="address",
+            blocks=False,
+            text=f"Links begin with {services.settings.public_url}, which opens only on this machine. Set "
+            "PALPEBRA_PUBLIC_URL before you send links to people on other machines.",
+            page="server",
+        )
+    if not _has_backups(services.settings):
+        yield LaunchCheck(
+            kind="backups",
+            blocks=False,
+            text="Backups are not monitored: PALPEBRA_BACKUP_FOLDER is not set. Set it, and run "
+            "`server backup` every day.",
+            page="server",
+        )
+
+
+def _of_finding(kind: str, finding: Finding) -> LaunchCheck:
+    # Folders of the server are nothing for people of a study: the doctor names them to its operator.
+    state = finding.state.rpartition(", ")[2] if kind == "disk" else finding.state
+    text = f"{finding.subject.capitalize()}: {state}. {finding.advice[:1].upper()}{finding.advice[1:]}."
+    return LaunchCheck(kind=kind, blocks=False, text=text, page="server")
+
+
+def _has_backups(settings: Settings) -> bool:
+    return bool(settings.backup_folder)

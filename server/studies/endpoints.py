@@ -16,7 +16,7 @@ from server.core.settings import Settings
 from server.core.values import Number, now
 from server.models import Link
 from server.studies import creation, series, service
-from server.studies.launch_checks import launch_checks, refuse_recruiter
+from server.studies.launch_checks import refuse_recruiter
 from server.studies.links import (
     LinkOptions,
     link_in_use,
@@ -43,7 +43,6 @@ from server.studies.schemas import (
     EditedDefinition,
     JudgedEdit,
     Label,
-    LaunchCheck,
     LinkOut,
     LinkPage,
     NewLinks,
@@ -134,13 +133,6 @@ def change_status(database: DatabaseDep, identity: Writer, study: str, body: Cha
     with database.write() as session:
         service.change_status(session, study, body.revision, body.status, identity)
     return get_study(database, identity, study)
-
-
-@router.get("/studies/{study}/launch-checks")
-def list_launch_checks(database: DatabaseDep, identity: Viewer, study: str) -> list[LaunchCheck]:
-    """What to look at before the study goes live."""
-    with database.read() as session:
-        return launch_checks(session, study, identity)
 
 
 @router.put("/studies/{study}/settings")

@@ -6,12 +6,24 @@ The same checks hold for whatever reaches participants later: a new version of a
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
+from experiments.kinds.scales import expected_minutes
 from sqlalchemy.orm import Session
 
 from experiments.declaration.experiment import Experiment
+from experiments.errors import counted
 from experiments.level_leaks import reported_leaks
 from experiments.manifest import Manifest
-from experiments.wording import silent_on_flicker, suggested_sentence, unfilled_texts, untranslated
+from experiments.wording import (
+    LEAST_HOURLY_PAY,
+    MINUTES_TOLERANCE,
+    silent_on_contact,
+    silent_on_flicker,
+    stated_minutes,
+    stated_pay,
+    suggested_sentence,
+    unfilled_texts,
+    untranslated,
+)
 from server.accounts.identity import Identity
 from server.core.errors import Conflict
 from server.models import Study, StudyVersion
@@ -20,7 +32,7 @@ from server.participation.judgement import guessed_throughout
 from server.participation.recruiter import Recruiter, stored_recruiter
 from server.studies import repository
 from server.studies.lookup import active_version, definition_of, find_study, version_numbered
-from server.studies.schemas import LaunchCheck
+from server.studies.schemas import LaunchCheck, LaunchPage
 
 MAX_TEXTS_NAMED = 3
 
@@ -34,22 +46,29 @@ class NotReady(Conflict):
 class LaunchState(NamedTuple):
     """What participants of a live study meet: its declaration, clips, recruiters and links."""
 
+    study: Study
     version: StudyVersion
     experiment: Experiment
     recruiter: Recruiter | None
     of_links: list[Recruiter]
     has_personal_links: bool
+    is_tried: bool
+    """Whether somebody completed this version as a preview, in a pilot or live."""
+
+    @property
+    def consents(self) -> dict[str, str]:
+        """Language -> consent text."""
+        return {one: self.experiment.texts[one].consent for one in self.experiment.languages}
 
 
 Check = Callable[[LaunchState], Iterator[LaunchCheck]]
 
 
 def launch_checks(session: Session, name: str, identity: Identity) -> list[LaunchCheck]:
-    """What speaks against opening the active version of a study, blocking findings first."""
+    """What its declaration, clips and recruiter say against opening the active version of a study."""
     study = find_study(session, name, identity, "view")
     launch = _to_launch(session, study, active_version(session, study))
-    findings = [finding for check in (*_BLOCKING, *_ADVISING) for finding in check(launch)]
-    return sorted(findings, key=lambda finding: not finding.blocks)
+    return [finding for check in (*_BLOCKING, *_ADVISING) for finding in check(launch)]
 
 
 def refuse_unready(session: Session, study: Study) -> None:
@@ -84,18 +103,22 @@ def refuse_recruiter(study: Study, recruiter: Recruiter | None, page: str) -> No
 
 def _to_launch(session: Session, study: Study, version: StudyVersion) -> LaunchState:
     return LaunchState(
+        study,
         version,
         definition_of(version),
         stored_recruiter(study.recruiter) if study.recruiter else None,
         [stored_recruiter(declared) for declared in repository.recruiters_of_links(session, study)],
         repository.has_personal_links(session, study),
+        repository.is_completed(session, version),
     )
 
 
 def _placeholders(launch: LaunchState) -> Iterator[LaunchCheck]:
     """Texts that still have marks such as [Title]."""
     for text in unfilled_texts(launch.experiment):
-        yield LaunchCheck(kind="placeholders", blocks=text.certain, text=str(text))
+        yield LaunchCheck(
+            kind="placeholders", blocks=text.certain, text=str(text), page="build", path=text.path
+        )
 
 
 def _completion_codes(launch: LaunchState) -> Iterator[LaunchCheck]:
@@ -105,7 +128,8 @@ def _completion_codes(launch: LaunchState) -> Iterator[LaunchCheck]:
     for recruiter, page in recruiters:
         if _code_is_random(recruiter):
             text = _CODE_NEEDED.format(page=page)
-            yield LaunchCheck(kind="completion_code", blocks=True, text=text)
+            where: LaunchPage = "links" if page == "Links" else "settings"
+            yield LaunchCheck(kind="completion_code", blocks=True, text=text, page=where, path="recruitment")
             return
 
 
@@ -124,9 +148,8 @@ def _levels_told_apart(launch: LaunchState) -> Iterator[LaunchCheck]:
     """Levels that raters can recognize by something other than the factor."""
     manifest = Manifest.model_validate(launch.version.manifest)
     for sentence in reported_leaks(manifest.clips):
-        yield LaunchCheck(
-            kind="levels_told_apart", blocks=False, text=f"{sentence[:1].upper()}{sentence[1:]}."
-        )
+        text = f"{sentence[:1].upper()}{sentence[1:]}."
+        yield LaunchCheck(kind="levels_told_apart", blocks=False, text=text, page="clips")
 
 
 def _translations(launch: LaunchState) -> Iterator[LaunchCheck]:
@@ -140,6 +163,8 @@ def _translations(launch: LaunchState) -> Iterator[LaunchCheck]:
             blocks=False,
             text=f"Participants who choose the language {language} read {named}{more} in {first}: "
             f"{'this text has' if len(paths) == 1 else 'these texts have'} no translation.",
+            page="build",
+            path=paths[0],
         )
 
 
@@ -154,6 +179,8 @@ def _recruiter(launch: LaunchState) -> Iterator[LaunchCheck]:
                 "SONA or MTurk, choose it under Settings first. Until then, links from these services are "
                 "refused."
             ),
+            page="settings",
+            path="recruitment",
         )
     if launch.recruiter is not None and launch.recruiter.kind == "sona" and not launch.recruiter.redirect_url:
         yield LaunchCheck(
@@ -163,6 +190,8 @@ def _recruiter(launch: LaunchState) -> Iterator[LaunchCheck]:
                 "SONA grants credit through its completion URL, but none is set. Enter SONA's completion "
                 "URL under Settings, or grant credit manually."
             ),
+            page="settings",
+            path="recruitment",
         )
 
 
@@ -175,6 +204,8 @@ def _flicker(launch: LaunchState) -> Iterator[LaunchCheck]:
             text="Motion checks show flickering dots, but the consent text does not mention flicker "
             f"({', '.join(languages)}). Some people are sensitive to flicker. Add a sentence such as "
             f'"{suggested_sentence(languages[0])}"',
+            page="build",
+            path=f"texts.{languages[0]}.consent",
         )
 
 
@@ -190,7 +221,122 @@ def _person_checks(launch: LaunchState) -> Iterator[LaunchCheck]:
                 "online recruitment under Build, Checks and exclusions. It adds two motion checks and one "
                 "attention question."
             ),
+            page="build",
+            path="evidence",
         )
+
+
+def _contact(launch: LaunchState) -> Iterator[LaunchCheck]:
+    """Consent texts that name nobody to turn to."""
+    if languages := silent_on_contact(launch.experiment):
+        yield _of_consent(
+            "contact",
+            languages[0],
+            f"The consent text ({', '.join(languages)}) has no e-mail address, telephone number or link. "
+            "Participants need a contact for questions and for withdrawing their data. Add one.",
+        )
+
+
+def _time(launch: LaunchState) -> Iterator[LaunchCheck]:
+    """Consent texts that say nothing of the time, or another time than the design takes."""
+    expected = expected_minutes(launch.experiment)
+    expected_time = counted(max(1, round(expected)), "minute")
+    for language, text in launch.consents.items():
+        stated = stated_minutes(text)
+        if stated is None:
+            what = f"does not say how long participation takes. Expected: about {expected_time}. Add it."
+        elif expected > MINUTES_TOLERANCE * stated or stated > MINUTES_TOLERANCE * max(expected, 5):
+            what = (
+                f"says {stated} minutes, but the design takes about {expected_time} without forms and "
+                "calibration. Correct the text or the design."
+            )
+        else:
+            continue
+        yield _of_consent("time", language, f"The consent text (language {language}) {what}")
+        return
+
+
+def _pay(launch: LaunchState) -> Iterator[LaunchCheck]:
+    """Pay that is not stated although people are recruited for it, or that is too low for the time."""
+    minutes = expected_minutes(launch.experiment)
+    paying = any(
+        one is not None and one.kind in ("prolific", "mturk") for one in (launch.recruiter, *launch.of_links)
+    )
+    for language, text in launch.consents.items():
+        pay = stated_pay(text)
+        if pay is None:
+            if paying:
+                what = "The consent text does not say what participants are paid. Add the amount."
+                yield _of_consent("pay", language, what)
+                return
+            continue
+        hourly = pay.amount if pay.hourly else pay.amount * 60 / max(minutes, 1)
+        if hourly < LEAST_HOURLY_PAY[pay.sign]:
+            yield _of_consent(
+                "pay",
+                language,
+                f"{pay.sign}{pay.amount:.2f} for about {counted(max(1, round(minutes)), 'minute')} is {pay.sign}{hourly:.2f} per "
+                f"hour. Recruiters expect at least {pay.sign}{LEAST_HOURLY_PAY[pay.sign]:.0f} per hour. "
+                "Raise the pay or shorten the design.",
+            )
+            return
+
+
+def _of_consent(kind: str, language: str, text: str) -> LaunchCheck:
+    return LaunchCheck(kind=kind, blocks=False, text=text, page="build", path=f"texts.{language}.consent")
+
+
+def _clip_size(launch: LaunchState) -> Iterator[LaunchCheck]:
+    """Clips shown pixel by pixel that are larger than the smallest window in which the study begins."""
+    manifest, display = Manifest.model_validate(launch.version.manifest), launch.experiment.display
+    scaled = display.calibrate != "off"
+    if scaled and manifest.inter_ocular_px:
+        return
+    unsized = [clip for clip in manifest.clips if not (scaled and clip.width_mm)]
+    width = max((clip.width_px for clip in unsized), default=0)
+    height = max((clip.height_px for clip in unsized), default=0)
+    if width > display.minimum_width_px or height > display.minimum_height_px:
+        yield LaunchCheck(
+            kind="clip_size",
+            blocks=False,
+            text=(
+                f"Clips are up to {width} x {height} pixels, but the study starts in windows from "
+                f"{display.minimum_width_px} x {display.minimum_height_px} pixels, where they are cut off. "
+                "Increase the minimum width and height, or use smaller clips."
+            ),
+            page="build",
+            path="display.minimum_width_px",
+        )
+
+
+def _running(launch: LaunchState) -> Iterator[LaunchCheck]:
+    """A study that nobody can begin, or that does not stop by itself."""
+    study, planned = launch.study, launch.experiment.participants
+    if study.paused:
+        text = "The study is paused, so nobody can begin. Turn the pause off."
+        yield LaunchCheck(kind="paused", blocks=False, text=text, page="settings", path="running")
+    if study.quota is None:
+        text = (
+            f"No limit is set, so the study goes on until you close it. The design plans {planned} "
+            "participants. Set the number of complete runs after which it closes."
+        )
+        yield LaunchCheck(kind="quota", blocks=False, text=text, page="settings", path="running")
+    elif study.quota < planned:
+        text = (
+            f"The study closes after {study.quota} complete runs, but the design plans {planned} "
+            "participants. Correct one of them."
+        )
+        yield LaunchCheck(kind="quota", blocks=False, text=text, page="settings", path="running")
+
+
+def _tried(launch: LaunchState) -> Iterator[LaunchCheck]:
+    """A version that nobody has gone through."""
+    if not launch.is_tried:
+        text = (
+            f"Nobody has completed version {launch.version.number} yet, not even as a preview. "
+            "Go through it once as a participant."
+        )
+        yield LaunchCheck(kind="not_tried", blocks=False, text=text, page="preview")
 
 
 _BLOCKING: tuple[Check, ...] = (_placeholders, _completion_codes)
@@ -199,6 +345,12 @@ _ADVISING: tuple[Check, ...] = (
     _recruiter,
     _person_checks,
     _flicker,
+    _contact,
+    _time,
+    _pay,
     _translations,
     _levels_told_apart,
+    _clip_size,
+    _running,
+    _tried,
 )

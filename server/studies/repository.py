@@ -104,6 +104,12 @@ def run_count(session: Session, study: Study) -> int:
     return session.scalar(select(func.count()).where(StudyRun.study_id == study.id, _OF_PEOPLE)) or 0
 
 
+def is_completed(session: Session, version: StudyVersion) -> bool:
+    """Whether a person completed this version, as a preview too."""
+    query = select(StudyRun.id).where(StudyRun.version_id == version.id, StudyRun.status == "complete")
+    return session.scalar(query.where(StudyRun.origin != "simulated").limit(1)) is not None
+
+
 def run_count_of_series(session: Session, study: Study, series: int) -> int:
     """Runs of a data series but previews."""
     query = (

@@ -279,12 +279,17 @@ class ChangeSettings(RequestBody):
     recruiter: Recruiter | None
 
 
+LaunchPage = Literal["build", "clips", "rehearsal", "links", "data", "settings", "preview", "server"]
+
+
 class LaunchCheck(BaseModel):
     """Something to look at before a study goes live."""
 
     kind: str = Field(description="What was checked.")
     blocks: bool = Field(description="The study cannot go live like this.")
     text: str = Field(description="What was found and what to do, in a sentence.")
+    page: LaunchPage = Field(description="The page on which it can be fixed.")
+    path: str = Field(default="", description="The key of the declaration, or the part of the settings.")
 
 
 class SeriesOut(BaseModel):

@@ -85,6 +85,19 @@ export const launchChecksQuery = (study: string) =>
     queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/launch-checks", { params: { path: { study } } })),
   });
 
+/** Every clip tried in this browser; its progress is under the key with "progress" at its end. */
+export const clipCheckQuery = (study: string, version: number) =>
+  queryOptions({
+    queryKey: ["clip check", study, version],
+    queryFn: async ({ client, signal, queryKey }) => {
+      const clips = await client.query(clipsQuery(study));
+      const { checkClips } = await import("./clips/examine");
+      return checkClips(study, clips, (progress) => client.setQueryData([...queryKey, "progress"], progress), signal);
+    },
+    staleTime: Infinity,
+    retry: false,
+  });
+
 export const clipsQuery = (study: string) =>
   queryOptions({
     queryKey: ["clips", study],

@@ -333,11 +333,6 @@ export interface paths {
   };
   put: operations["change_status"];
  };
- "/api/admin/studies/{study}/launch-checks": {
-  parameters: {
-  };
-  get: operations["list_launch_checks"];
- };
  "/api/admin/studies/{study}/settings": {
   parameters: {
   };
@@ -561,6 +556,11 @@ export interface paths {
   parameters: {
   };
   get: operations["get_report_file"];
+ };
+ "/api/admin/studies/{study}/launch-checks": {
+  parameters: {
+  };
+  get: operations["list_launch_checks"];
  };
  "/api/admin/studies/{study}/rehearsals/latest": {
   parameters: {
@@ -1712,6 +1712,10 @@ export interface components {
    kind: string;
    blocks: boolean;
    text: string;
+   /** @enum {string} */
+   page: "build" | "clips" | "rehearsal" | "links" | "data" | "settings" | "preview" | "server";
+   /** @default  */
+   path?: string;
   };
   LeaveOut: {
    file: string;
@@ -6630,39 +6634,6 @@ export interface operations {
    };
   };
  };
- list_launch_checks: {
-  parameters: {
-   path: {
-    study: string;
-   };
-  };
-  responses: {
-   200: {
-    headers: {
-     [name: string]: unknown;
-    };
-    content: {
-     "application/json": components["schemas"]["LaunchCheck"][];
-    };
-   };
-   422: {
-    headers: {
-     [name: string]: unknown;
-    };
-    content: {
-     "application/json": components["schemas"]["ErrorBody"];
-    };
-   };
-   "4XX": {
-    headers: {
-     [name: string]: unknown;
-    };
-    content: {
-     "application/json": components["schemas"]["ErrorBody"];
-    };
-   };
-  };
- };
  change_settings: {
   parameters: {
    path: {
@@ -8327,6 +8298,39 @@ export interface operations {
    200: {
     headers: {
      [name: string]: unknown;
+    };
+   };
+   422: {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["ErrorBody"];
+    };
+   };
+   "4XX": {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["ErrorBody"];
+    };
+   };
+  };
+ };
+ list_launch_checks: {
+  parameters: {
+   path: {
+    study: string;
+   };
+  };
+  responses: {
+   200: {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["LaunchCheck"][];
     };
    };
    422: {

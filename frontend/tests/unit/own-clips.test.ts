@@ -1,5 +1,8 @@
 import { describe, expect, it } from "vitest";
+import { clipFindings, factsOf, pictureProblems, repeatedFiles } from "../../src/admin/clips/examine";
 import { sizeRemark } from "../../src/admin/clips/UploadClips";
+import { languageFindings, summaryOf } from "../../src/admin/studies/Preflight";
+import { nextStep } from "../../src/admin/studies/StatusBadge";
 import {
   declaredPattern,
   factorsOfTable,
@@ -78,5 +81,90 @@ describe("sizes of clips", () => {
   it("are no matter where all are one, or not known", () => {
     expect(sizeRemark([wide("a.mp4"), wide("b.mp4"), { name: "c.mp4", width_px: null, height_px: null }])).toBeNull();
     expect(sizeRemark([])).toBeNull();
+  });
+});
+
+describe("what the frames of a clip show", () => {
+  const plain = (level: number) => Array.from({ length: 64 }, (_, at) => (at % 4 === 3 ? 255 : level));
+  const striped = (level: number) => plain(level).map((value, at) => (at % 4 !== 3 && at % 8 < 4 ? value + 40 : value));
+  const kinds = (...samples: number[][]) => pictureProblems(samples).map(({ kind }) => kind);
+
+  it("is nothing where every frame has one color, and nothing at first where the first one has", () => {
+    expect(kinds(plain(10), plain(90), plain(200))).toEqual(["blank"]);
+    expect(kinds(plain(10), striped(90), striped(120))).toEqual(["begins_blank"]);
+  });
+
+  it("is no motion where all frames are the same but for the noise of a codec, or where there is one", () => {
+    expect(kinds(striped(90), striped(92), striped(89))).toEqual(["still"]);
+    expect(kinds(striped(90))).toEqual(["still"]);
+    expect(kinds(striped(90), striped(91), striped(130))).toEqual([]);
+  });
+});
+
+describe("the checklist", () => {
+  const finding = (kind: string, blocks = false) => ({ kind, blocks, text: kind, page: "build" as const, path: "" });
+
+  it("has one line for each kind of problem with the first files", () => {
+    const clips = ["a", "b", "c", "d", "e"].map((name) => ({
+      file: `${name}.mp4`,
+      problems: [{ kind: "undecodable" as const, detail: "no track" }],
+    }));
+    const [line, ...others] = clipFindings([...clips, { file: "f.mp4", problems: [] }]);
+    expect(others).toEqual([]);
+    expect(line?.blocks).toBe(true);
+    expect(line?.text).toBe(
+      "5 clips do not play in the participant page: a.mp4 (no track), b.mp4 (no track), c.mp4 (no track), d.mp4 (no track) and 1 more. Export the clip again as H.264 in MP4.",
+    );
+  });
+
+  it("names cells that show the same file, but not exemplars of one cell that do", () => {
+    const clip = (clip_sha256: string, cell: string) => ({ clip_sha256, cell, file: `${clip_sha256}.mp4` });
+    expect(repeatedFiles([clip("1", "a"), clip("1", "a"), clip("2", "b")])).toEqual([]);
+    const [line] = repeatedFiles([clip("1", "a"), clip("1", "b"), clip("2", "b")]);
+    expect(line?.text).toContain("1 clip is the same file in several cells: a and b.");
+    expect(line?.blocks).toBe(false);
+  });
+
+  it("says what the clips have in common, or how far they differ", () => {
+    const clip = (clip_sha256: string, frames: number, fps = 30) => ({ clip_sha256, frames, fps, width_px: 960, height_px: 360 });
+    expect(factsOf([clip("1", 45), clip("2", 45)])).toBe("2 clips: 1.50 s, 960 x 360 pixels, 30 frames per second");
+    expect(factsOf([clip("1", 45), clip("2", 60, 29.97)])).toBe(
+      "2 clips: 1.50 to 2.00 s, 960 x 360 pixels, 29.97 to 30.00 frames per second",
+    );
+  });
+
+  it("counts what keeps a study from going live apart from what is to be checked", () => {
+    expect(summaryOf([])).toBe("Nothing speaks against going live.");
+    expect(summaryOf([finding("a")])).toBe("1 thing to check. None of them prevents going live.");
+    expect(summaryOf([finding("a", true), finding("b", true), finding("c")])).toBe("2 to fix before it goes live, 1 to check.");
+  });
+
+  it("names languages in which the page has no words, or unreviewed ones", () => {
+    expect(languageFindings(["en"])).toEqual([]);
+    expect(languageFindings(["en", "de-AT", "tlh"]).map(({ text }) => text)).toEqual([
+      expect.stringContaining("in English for"),
+      expect.stringContaining("not reviewed by a speaker"),
+    ]);
+  });
+});
+
+describe("the next step of a study", () => {
+  const study = { status: "draft" as const, paused: false, archived_at: null, complete: 3, quota: null };
+  const check = (kind: string, blocks = false) => ({ kind, blocks, text: "", page: "build" as const, path: "" });
+
+  it("is to fix what blocks, to preview, to rehearse, then to open it", () => {
+    const all = [check("placeholders", true), check("not_tried"), check("rehearsal")];
+    expect(nextStep(study, all)).toEqual({ text: "Fix 1 thing on the checklist.", page: "" });
+    expect(nextStep(study, all.slice(1)).text).toContain("Preview");
+    expect(nextStep(study, all.slice(2)).page).toBe("/rehearsal");
+    expect(nextStep(study, []).text).toContain("pilot");
+  });
+
+  it("follows the status afterwards", () => {
+    expect(nextStep({ ...study, status: "pilot" }, []).page).toBe("/results");
+    expect(nextStep({ ...study, status: "live", quota: 20 }, []).text).toBe("Watch the participants: 3 of 20 complete.");
+    expect(nextStep({ ...study, status: "live", paused: true }, []).page).toBe("/settings");
+    expect(nextStep({ ...study, status: "closed" }, []).page).toBe("/data");
+    expect(nextStep({ ...study, archived_at: "2026-01-01" }, []).page).toBe("/settings");
   });
 });

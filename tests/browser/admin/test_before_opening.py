@@ -1,17 +1,26 @@
 """What the pages say before a study goes live, and of clips that nobody can see."""
 
+import hashlib
 import os
+import re
+from collections.abc import Callable
 from pathlib import Path
 
+import av
 import pytest
 from fastapi.testclient import TestClient
 from playwright.sync_api import Page, expect
 
+from experiments.load import parse_experiment
+from experiments.manifest import Clip, Manifest
 from server.app import create_app
 from server.cli_common import migrated_services
 from server.models import Study
+from server.studies.creation import add_version, create_study, store_clips
 from tests.browser.admin.conftest import Dashboard
+from tests.browser.visit import axe_violations
 from tests.helpers.studies import SHORT, Participant, add_study
+from tests.helpers.tiny_clips import encoded_video, make_clip_folder
 from tests.server.monitor.test_failing_clips import take_part
 
 pytestmark = pytest.mark.browser
@@ -80,3 +89,141 @@ def test_links_of_recruiters_are_offered_once_a_recruiter_is_set(dashboard: Dash
     expect(opened).to_contain_text("first choose the service under")
     expect(opened).not_to_contain_text("PROLIFIC_PID")
     picture(page, "opened")
+
+
+FAULTY = DRAFT.replace('name = "unfilled"', 'name = "faulty"').replace(', de = "sehr"', "")
+Content = Callable[[], bytes]
+
+
+def spoiled() -> bytes:
+    """A clip whose pictures are rubbish behind a sound head."""
+    video = encoded_video(4, 30)
+    start = video.index(b"mdat") + 4
+    return video[:start] + bytes(len(video) - start)
+
+
+def shown(folder: Path, brightness: tuple[int, ...], stripes: tuple[bool, ...]) -> bytes:
+    """A clip of plain frames, some with stripes."""
+    path = folder / f"{brightness}{stripes}.mp4"
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("libx264", rate=30, options={"bf": "0", "crf": "18"})
+        stream.width, stream.height, stream.pix_fmt = 256, 96, "yuv420p"
+        for number, (level, striped) in enumerate(zip(brightness, stripes, strict=True)):
+            frame = av.VideoFrame(256, 96, "gray")
+            row = bytes(level + (60 if striped and x // 16 % 2 else 0) for x in range(256))
+            frame.planes[0].update(row * 96)
+            frame.pts = number
+            container.mux(stream.encode(frame.reformat(format="yuv420p")))
+        container.mux(stream.encode(None))
+    return path.read_bytes()
+
+
+@pytest.fixture(scope="module")
+def faulty(dashboard: Dashboard, tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """The files of a draft with a fault in each of its eight clips, in the order of the faults."""
+    folder = tmp_path_factory.mktemp("faulty")
+    experiment = parse_experiment(FAULTY)
+    manifest = make_clip_folder(experiment, folder)
+    made = {
+        "undecodable": (spoiled(), {}),
+        "missing": (encoded_video(4, 30) + b"\0\0\0\x08free", {}),
+        "different": (encoded_video(4, 30) + b"\0\0\0\x09free1", {"frames": 9}),
+        "other rate": (encoded_video(4, 15), {}),
+        "still": (shown(folder, (80,) * 4, (True,) * 4), {}),
+        "blank": (shown(folder, (80, 90, 100, 110), (False,) * 4), {}),
+        "begins blank": (shown(folder, (80,) * 4, (False, True, True, True)), {}),
+        "repeated": (shown(folder, (80,) * 4, (True,) * 4), {}),
+    }
+    clips: list[Clip] = []
+    for clip, (content, changes) in zip(manifest.clips, made.values(), strict=True):
+        sha256 = hashlib.sha256(content).hexdigest()
+        file = f"{sha256[:16]}.mp4"
+        (folder / file).write_bytes(content)
+        rest = 0.0 if clip.levels["speed"] == "slow" else 0.1
+        own = {"file": file, "sha256": sha256, "bytes": len(content), "closure": (0.0, 1.0, rest)}
+        clips.append(clip.model_copy(update=own | changes))
+    manifest = Manifest.model_validate(manifest.model_copy(update={"clips": tuple(clips)}).model_dump())
+    with migrated_services(dashboard.server.settings) as services:
+        store_clips(services.clips, manifest, folder)
+        with services.database.write() as session:
+            study = create_study(session, experiment.name, experiment, None)
+            add_version(session, study, FAULTY, experiment, manifest, None)
+        services.clips.remove(clips[1].sha256)
+    return [clip.file for clip in clips]
+
+
+def named_faults(files: list[str]) -> dict[str, str]:
+    """Each planted fault, and what the checklist says of it."""
+    return {
+        "a clip that does not decode": rf"1 clip does not play in the participant page: {files[0]}",
+        "a clip that is lost": rf"1 clip is missing on the server: {files[1]}",
+        "a clip of other frames": rf"1 clip is not as stored: {files[2]} \(expected 9 frames",
+        "a clip of another rate": rf"1 clip plays at another rate than recorded: {files[3]}",
+        "a clip without motion": rf"1 clip shows no motion: {files[4]}",
+        "a clip of nothing": rf"1 clip shows nothing: {files[5]}",
+        "a clip that begins with nothing": rf"1 clip begins with an empty picture: {files[6]}",
+        "one file in two cells": r"1 clip is the same file in several cells",
+        "levels told apart": r"level 'fast' of 'speed' can be recognized by",
+        "placeholders": r"texts\.en\.consent .*\[Title\]",
+        "no contact": r"has no e-mail address",
+        "no time": r"does not say how long",
+        "a missing translation": r"trial\.scale\.high",
+        "no recruiter": r"No recruiter is set",
+        "no limit": r"No limit is set",
+        "no sealed plan": r"plan is not sealed",
+        "no rehearsal": r"No rehearsal was made",
+        "nobody tried it": r"Nobody has completed version 1",
+        "no backups": r"Backups are not monitored",
+        "a local address": r"opens only on this machine",
+        "an unreviewed language": r"not reviewed by a speaker",
+    }
+
+
+def test_planted_faults_are_named_before_a_study_goes_live(dashboard: Dashboard, faulty: list[str]) -> None:
+    page = dashboard.open("/studies/faulty")
+    page.get_by_role("button", name="Set live").click()
+    dialog = page.get_by_role("dialog")
+    expect(dialog.get_by_text("All clips were tried.")).to_be_visible()
+    lines = dialog.get_by_role("listitem").all_inner_texts()
+    faults = named_faults(faulty)
+    missed = [name for name, words in faults.items() if not any(re.search(words, line) for line in lines)]
+    assert missed == []
+    assert len(faults) >= 15
+    expect(dialog.get_by_text(re.compile(r"^4 to fix before it goes live, \d+ to check"))).to_be_visible()
+    expect(dialog.get_by_role("button", name="Set live")).to_be_disabled()
+    picture(page, "faulty-dialog")
+    dialog.get_by_role("button", name="Cancel").click()
+
+
+def test_the_checklist_of_the_studys_page_leads_to_where_each_fault_is_fixed(
+    dashboard: Dashboard, faulty: list[str]
+) -> None:
+    page = dashboard.open("/studies/faulty")
+    checklist = page.get_by_role("group", name="Before it goes live")
+    checklist.get_by_role("button", name="Try the clips").click()
+    expect(checklist.get_by_text("All clips were tried.")).to_be_visible()
+    assert axe_violations(page) == []
+    picture(page, "faulty-page")
+    for words, link, address in (
+        ("texts.en.consent", "Build, Texts", "build?section=texts"),
+        ("No limit is set", "Settings", "settings"),
+        ("plan is not sealed", "Data", "data"),
+        ("No rehearsal was made", "Rehearsal", "rehearsal"),
+        ("shows no motion", "Clips", "clips"),
+    ):
+        line = checklist.get_by_role("listitem").filter(has_text=words).first
+        expect(line.get_by_role("link", name=link)).to_have_attribute("href", re.compile(re.escape(address)))
+
+
+def test_every_page_of_a_study_says_its_step_and_what_comes_next(
+    dashboard: Dashboard, faulty: list[str], failing: str
+) -> None:
+    for path in ("", "/build", "/clips", "/links", "/settings", "/monitor"):
+        page = dashboard.open(f"/studies/faulty{path}")
+        steps = page.get_by_role("list", name="Steps of the study")
+        expect(steps.locator("[aria-current=step]")).to_have_text("Draft")
+        expect(page.get_by_role("link", name="Fix 1 thing on the checklist.")).to_be_visible()
+    page = dashboard.open("/studies/short")
+    steps = page.get_by_role("list", name="Steps of the study")
+    expect(steps.locator("[aria-current=step]")).to_have_text("Live")
+    expect(page.get_by_role("link", name="Watch the participants: 3 complete.")).to_be_visible()

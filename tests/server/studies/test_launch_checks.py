@@ -10,7 +10,7 @@ from experiments.level_leaks import reported_leaks
 from experiments.manifest import Manifest
 from server.context import Services
 from server.core.settings import Settings
-from server.models import Study, StudyVersion
+from server.models import Job, Study, StudyVersion
 from tests.helpers.admins import Admin
 from tests.helpers.databases import run_server_command
 from tests.helpers.motion_checks import checked
@@ -172,3 +172,106 @@ def test_the_switch_for_online_recruitment_is_what_is_recommended(
     add_study(services, tmp_path / "clips", text, status="draft")
     assert recruiting(owner, {"kind": "prolific", "code_complete": "C1"}).status_code == 200
     assert advice(owner, "person_checks") == advice(owner, "flicker") == []
+
+
+FIT = (
+    "# Ratings of clips\n\nParticipation takes about 5 minutes. You receive £1.50. "
+    "Questions: Ada Lovelace, ada@example.org."
+)
+READY = SHORT.replace(CONSENT, f'"{FIT}"'.replace("\n", "\\n")).replace(
+    '"Einverstanden?"', '"Dauer: 5 Minuten. Sie erhalten 1,50 €. Fragen: ada@example.org."'
+)
+READY = READY.replace('languages = ["en", "de"]', 'languages = ["en", "de"]\nparticipants = 20')
+
+
+def changed(text: str, old: str, new: str) -> str:
+    assert old in text
+    return text.replace(old, new)
+
+
+SMALL_WINDOWS = '[display]\ncalibrate = "off"\nminimum_width_px = 1\n'
+DECLARED_FAULTS = {
+    "a title to fill in": ("placeholders", "# Ratings of clips", "# [Title]", "texts.en.consent"),
+    "a doubtful mark": ("placeholders", "Ada Lovelace", "<name>", "texts.en.consent"),
+    "a mark in a question": ("placeholders", '"Age"', '"TODO"', "forms.1.fields.1.label.en"),
+    "no contact": ("contact", "Ada Lovelace, ada@example.org", "ask us", "texts.en.consent"),
+    "no time": ("time", "about 5 minutes", "not long", "texts.en.consent"),
+    "far too little time": ("time", "about 5 minutes", "60 minutes", "texts.en.consent"),
+    "low pay": ("pay", "£1.50", "5 pence to £0.05", "texts.en.consent"),
+    "low pay per hour": ("pay", "£1.50", "£3 per hour", "texts.en.consent"),
+    "a text without translation": ("translations", ', de = "sehr"', "", "trial.scale.high"),
+    "small windows": ("clip_size", "[trial]\n", f"{SMALL_WINDOWS}[trial]\n", "display"),
+}
+
+
+@pytest.mark.parametrize("fault", DECLARED_FAULTS)
+def test_a_planted_fault_of_the_declaration_is_named_with_its_place(
+    owner: Admin, services: Services, tmp_path: Path, fault: str
+) -> None:
+    kind, old, new, path = DECLARED_FAULTS[fault]
+    add_study(services, tmp_path / "fine", READY, name="fine", status="draft")
+    add_study(services, tmp_path / "clips", changed(READY, old, new), status="draft")
+
+    def of_kind(name: str) -> list[Any]:
+        return [one for one in owner.get(f"/studies/{name}/launch-checks").json() if one["kind"] == kind]
+
+    fine = of_kind("fine")
+    (found,) = [one for one in of_kind("short") if one not in fine]
+    assert found["page"] == "build"
+    assert found["path"].startswith(path)
+
+
+def add_rehearsal(services: Services, status: str, version: int, message: str = "") -> None:
+    with services.database.write() as session:
+        study = session.query(Study).one()
+        made = {"public_id": "rehearsal", "parameters": {"version": version}, "message": message}
+        session.add(Job(study_id=study.id, kind="rehearsal", status=status, **made))
+
+
+def test_planted_faults_of_settings_plan_rehearsal_and_server_are_named_until_they_are_fixed(
+    owner: Admin, services: Services, tmp_path: Path
+) -> None:
+    add_study(services, tmp_path / "clips", READY, status="draft")
+
+    def kinds() -> set[str]:
+        return {one["kind"] for one in owner.get("/studies/short/launch-checks").json()}
+
+    assert {"quota", "recruiter", "plan", "rehearsal", "not_tried", "backups", "address"} <= kinds()
+    revision = owner.get("/studies/short").json()["summary"]["revision"]
+    body: dict[str, Any] = {"revision": revision, "paused": True, "quota": 3, "recruiter": None}
+    assert owner.send("PUT", "/studies/short/settings", body).status_code == 200
+    (quota,) = advice(owner, "quota")
+    assert "closes after 3 complete runs, but the design plans 20 participants" in quota
+    assert "paused" in kinds()
+    body |= {"revision": revision + 1, "paused": False, "quota": 20}
+    assert owner.send("PUT", "/studies/short/settings", body).status_code == 200
+    assert owner.send("POST", "/studies/short/seal", {}).status_code == 201
+    add_rehearsal(services, "done", version=1)
+    assert not {"paused", "quota", "plan", "rehearsal"} & kinds()
+    with services.database.write() as session:
+        session.query(Job).delete()
+    add_rehearsal(services, "failed", version=1, message="out of memory")
+    (rehearsal,) = advice(owner, "rehearsal")
+    assert "The last rehearsal failed: out of memory." in rehearsal
+
+
+def test_a_completed_preview_is_a_trial_of_the_version(
+    owner: Admin, client: TestClient, services: Services, tmp_path: Path
+) -> None:
+    study = add_study(services, tmp_path / "clips", READY, status="draft")
+    assert advice(owner, "not_tried")
+    person = Participant(client, study.link("preview")).agree()
+    person.answer_all()
+    assert person.request("POST", "/complete").status_code == 200
+    assert advice(owner, "not_tried") == []
+
+
+def test_a_full_disk_is_named(
+    owner: Admin, services: Services, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    add_study(services, tmp_path / "clips", READY, status="draft")
+    assert advice(owner, "disk") == []
+    monkeypatch.setattr("server.operations.doctor.LEAST_FREE_BYTES", 1 << 60)
+    (disk,) = advice(owner, "disk")
+    assert "GB free" in disk
+    assert "free disk space" in disk.lower()

@@ -11,11 +11,11 @@ import { useState } from "react";
 import { Design, TomlText } from "../studies/Design";
 import { TurnedAway } from "../studies/StatusBadge";
 import { useChange } from "../ui/useChange";
-import type { Data } from "./data";
+import type { Data, Section } from "./data";
 import { Field } from "./fields/Field";
 import { Forms, Texts } from "./Forms";
 import { forgetWork } from "./kept";
-import { EXPERIMENT, type Section, sectionOf, SECTIONS } from "./schema";
+import { EXPERIMENT, sectionOf, SECTIONS } from "./schema";
 import { TrialPreview } from "./TrialPreview";
 import { type Builder, BuilderContext, useBuilder, useBuilderHere } from "./useBuilder";
 

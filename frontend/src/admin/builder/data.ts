@@ -146,3 +146,67 @@ function ofForms(data: Data, key: string, rule: Path): string[] {
   const field = fields.find((one) => textAt(one, ["name"]) === chosen["field"]);
   return key === "screening.refused" ? listAt(field, ["options"]).map((option) => textAt(option, ["value"])) : [];
 }
+
+// The pages of the builder, and the keys of the declaration on each.
+
+export interface Section {
+  id: string;
+  label: string;
+  about: string;
+  keys: readonly string[];
+}
+
+export const NAMED: readonly Section[] = [
+  {
+    id: "study",
+    label: "Study",
+    about: "What the study is called, where it comes from, and in which languages people may take part.",
+    keys: ["name", "title", "participant_title", "source", "version", "participants", "languages"],
+  },
+  {
+    id: "factors",
+    label: "Factors and clips",
+    about:
+      "The factors and their levels form the cells of the design. Each cell has as many clips as exemplars. Tables and figures keep this order.",
+    keys: ["factors", "exemplars", "render"],
+  },
+  { id: "trial", label: "Trial", about: "What a trial shows and asks.", keys: ["trial"] },
+  {
+    id: "order",
+    label: "Practice and order",
+    about: "Practice, blocks, counterbalancing, and who sees which clips.",
+    keys: ["practice", "blocks", "assignment", "groups"],
+  },
+  {
+    id: "forms",
+    label: "Questionnaires",
+    about: "Pages of questions before and after the trials. Answers become columns of the runs.",
+    keys: ["forms"],
+  },
+  { id: "texts", label: "Texts", about: "The pages that participants read, in Markdown, in each language.", keys: ["texts"] },
+  {
+    id: "screen",
+    label: "Screen and playback",
+    about: "Size and background of the clips, device requirements, and when a play counts.",
+    keys: ["display", "playback", "session"],
+  },
+  {
+    id: "rules",
+    label: "Checks and exclusions",
+    about: "Attention and motion checks, screening, warnings, and exclusions from the analysis.",
+    keys: ["attention", "evidence", "screening", "warnings", "exclusions"],
+  },
+  { id: "analysis", label: "Analysis", about: "The analysis plan, fixed before data collection.", keys: ["analysis"] },
+  {
+    id: "dataset",
+    label: "Retention and sharing",
+    about: "How long personal data are kept, and the license for shared data.",
+    keys: ["retention", "dataset"],
+  },
+];
+
+/** The page on which the key at the beginning of a path is edited, of those that have a name. */
+export function namedSection(path: string): Section | undefined {
+  const [key = ""] = path.split(".");
+  return NAMED.find((section) => section.keys.includes(key));
+}

@@ -1,7 +1,7 @@
 /** The declaration's JSON schema, and which editor a key of it gets. */
 
 import declared from "../../api/declaration.json";
-import { labelOf } from "./data";
+import { labelOf, NAMED, type Section } from "./data";
 
 export interface Schema {
   $ref?: string;
@@ -224,63 +224,7 @@ export function helpOf(schema: Schema): string {
     .trim();
 }
 
-// The pages of the builder, and the keys of the declaration on each.
-
-export interface Section {
-  id: string;
-  label: string;
-  about: string;
-  keys: readonly string[];
-}
-
-const NAMED: readonly Section[] = [
-  {
-    id: "study",
-    label: "Study",
-    about: "What the study is called, where it comes from, and in which languages people may take part.",
-    keys: ["name", "title", "participant_title", "source", "version", "participants", "languages"],
-  },
-  {
-    id: "factors",
-    label: "Factors and clips",
-    about:
-      "The factors and their levels form the cells of the design. Each cell has as many clips as exemplars. Tables and figures keep this order.",
-    keys: ["factors", "exemplars", "render"],
-  },
-  { id: "trial", label: "Trial", about: "What a trial shows and asks.", keys: ["trial"] },
-  {
-    id: "order",
-    label: "Practice and order",
-    about: "Practice, blocks, counterbalancing, and who sees which clips.",
-    keys: ["practice", "blocks", "assignment", "groups"],
-  },
-  {
-    id: "forms",
-    label: "Questionnaires",
-    about: "Pages of questions before and after the trials. Answers become columns of the runs.",
-    keys: ["forms"],
-  },
-  { id: "texts", label: "Texts", about: "The pages that participants read, in Markdown, in each language.", keys: ["texts"] },
-  {
-    id: "screen",
-    label: "Screen and playback",
-    about: "Size and background of the clips, device requirements, and when a play counts.",
-    keys: ["display", "playback", "session"],
-  },
-  {
-    id: "rules",
-    label: "Checks and exclusions",
-    about: "Attention and motion checks, screening, warnings, and exclusions from the analysis.",
-    keys: ["attention", "evidence", "screening", "warnings", "exclusions"],
-  },
-  { id: "analysis", label: "Analysis", about: "The analysis plan, fixed before data collection.", keys: ["analysis"] },
-  {
-    id: "dataset",
-    label: "Retention and sharing",
-    about: "How long personal data are kept, and the license for shared data.",
-    keys: ["retention", "dataset"],
-  },
-];
+// The pages of the builder, with those that the declaration's schema adds.
 
 const placed = new Set(NAMED.flatMap((section) => section.keys));
 const further = Object.keys(EXPERIMENT.properties ?? {}).filter((key) => !placed.has(key));

@@ -197,6 +197,11 @@ function Received({ upload, received }: { upload: Upload; received: Schemas["Upl
         </Alert>
       )}
       {size !== null && <Alert color="yellow">{size}</Alert>}
+      {upload.remarks.map((remark) => (
+        <Alert key={remark} color="yellow">
+          {remark}
+        </Alert>
+      ))}
       {!received.has_manifest && <FileTable files={inOrder(files)} leftOut={received.left_out} upload={upload} />}
     </Stack>
   );

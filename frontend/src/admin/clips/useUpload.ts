@@ -3,6 +3,7 @@
 import { api, Refused, type Schemas, unwrap } from "../api";
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
+import type { ClipProblem } from "./examine";
 
 // Files on their way to the server: in small requests, so that a broken line costs little and goes on where it broke.
 
@@ -112,66 +113,34 @@ async function replaceFile(id: string, name: string, file: File): Promise<Schema
 
 type UploadedFile = Schemas["UploadedFile"];
 
-/** By the hash of a clip: why it does not play, or null where it does. Clips stay as they are, so this does too. */
-const known = new Map<string, string | null>();
-
-/** Most clips are H.264, High profile. */
-const H264: VideoDecoderConfig = { codec: "avc1.640028", codedWidth: 960, codedHeight: 360 };
-
 interface Tried {
   /** By the name of a file: why its clip does not play. */
   problems: ReadonlyMap<string, string>;
   /** False where this browser has no decoder that could tell. */
   canTell: boolean;
+  /** What else is odd about clips that play, a sentence each. */
+  remarks: readonly string[];
 }
-
-const clipKey = ({ sha256, fps, frames }: UploadedFile) => `${String(sha256)} ${String(fps)} ${String(frames)}`;
 
 /** Decode every clip, one after the other; those that could not be fetched are not judged. */
 async function tryClips(upload: string, files: readonly UploadedFile[], signal: AbortSignal): Promise<Tried> {
+  const { clipFindings, decodesH264, examineClip } = await import("./examine");
   const problems = new Map<string, string>();
-  if (!(await decodesH264())) return { problems, canTell: false };
+  if (!(await decodesH264())) return { problems, canTell: false, remarks: [] };
+  const doubtful: { file: string; problems: readonly ClipProblem[] }[] = [];
   for (const file of files) {
     if (signal.aborted) break;
     if (file.state !== "ready" || file.sha256 == null) continue;
-    const key = clipKey(file);
-    if (!known.has(key)) {
-      const answer = await fetch(`/api/admin/uploads/${upload}/clips/${file.sha256}`, { signal }).catch(() => null);
-      if (!answer?.ok) continue;
-      known.set(key, await problemOf(await answer.arrayBuffer(), file));
-    }
-    const problem = known.get(key);
-    if (problem != null) problems.set(file.name, problem);
+    const { name, sha256, fps = null, frames = null, width_px = null, height_px = null } = file;
+    const address = `/api/admin/uploads/${upload}/clips/${sha256}`;
+    const faults = await examineClip({ file: name, sha256, address, fps, frames, width_px, height_px }, signal);
+    const problem = faults?.find(({ kind }) => kind === "undecodable" || kind === "different");
+    if (problem !== undefined) problems.set(name, problem.detail);
+    else if (faults !== null) doubtful.push({ file: name, problems: faults });
   }
-  return { problems, canTell: true };
+  const remarks = clipFindings(doubtful).filter(({ kind }) => kind !== "clip_missing");
+  return { problems, canTell: true, remarks: remarks.map(({ text }) => text) };
 }
-
-async function decodesH264(): Promise<boolean> {
-  if (!("VideoDecoder" in globalThis)) return false;
-  return VideoDecoder.isConfigSupported(H264).then(
-    ({ supported }) => supported === true,
-    () => false,
-  );
-}
-
-async function problemOf(bytes: ArrayBuffer, file: UploadedFile): Promise<string | null> {
-  // The video reader is loaded when clips are there, not with the page.
-  const { decodeClip } = await import("../../participant/playback/decode");
-  try {
-    const clip = await decodeClip(bytes, file.fps ?? null);
-    const isKept = "bitmaps" in clip;
-    const frames = isKept ? clip.bitmaps.length : clip.frames;
-    if (isKept) clip.bitmaps.forEach((bitmap) => bitmap.close());
-    else clip.close();
-    const [expected, got] = [shapeOf(file.frames, file.width_px, file.height_px), shapeOf(frames, clip.width, clip.height)];
-    return expected === got ? null : `expected ${expected}, got ${got}`;
-  } catch (error) {
-    return String(error);
-  }
-}
-
-const shapeOf = (frames: unknown, width: unknown, height: unknown) =>
-  `${String(frames)} frames of ${String(width)} x ${String(height)} pixels`;
 
 /** The upload with the clips that do not play among those unusable. */
 function withTried(upload: Schemas["UploadOut"], tried: Tried | undefined): Schemas["UploadOut"] {
@@ -201,6 +170,8 @@ export interface Upload {
   last: Schemas["UploadOut"] | null;
   /** Whether the clips that came play in this browser; null until all have been tried. */
   plays: "all" | "not all" | "unknown" | null;
+  /** What is odd about clips that play: blank, still, of another rate. */
+  remarks: readonly string[];
   fps: number | null;
   askFps: (fps: number | null) => void;
   send: (files: readonly File[]) => void;
@@ -306,6 +277,7 @@ export function useUpload(purpose: string): Upload {
     received: settled && !gone && received.data ? withTried(received.data, tried.data) : null,
     last: id === null || gone || !received.data ? null : withTried(received.data, tried.data),
     plays: playsOf(tried),
+    remarks: tried.data?.remarks ?? [],
     fps: received.data?.fps ?? fps,
     askFps: (asked) => {
       setFps(asked);

@@ -1,10 +1,15 @@
-import { Accordion, Code, Stack } from "@mantine/core";
+import { Accordion, Card, Code, Stack, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useParams } from "@tanstack/react-router";
-import { studyQuery } from "../api";
-import { Answer } from "../ui/Answer";
+import { type Schemas, studyQuery } from "../api";
+import { Answer, onDemand } from "../ui/Answer";
 import { Design } from "./Design";
 import { TurnedAway } from "./StatusBadge";
+
+const Preflight = onDemand(async () => (await import("./Preflight")).Preflight);
+
+/** A study that people can still be kept from: its checklist stands on its first page. */
+const isAhead = ({ status, archived_at }: Schemas["StudySummary"]) => (status === "draft" || status === "pilot") && archived_at === null;
 
 export function DesignTab() {
   const { study = "" } = useParams({ strict: false });
@@ -12,8 +17,16 @@ export function DesignTab() {
     <Answer of={useQuery(studyQuery(study))}>
       {(detail) => (
         <Stack>
+          {isAhead(detail.summary) && (
+            <Card withBorder id="before">
+              <Title order={2} size="h4" mb="sm">
+                Before it goes live
+              </Title>
+              <Preflight study={study} />
+            </Card>
+          )}
           <Design design={detail.design} />
-          <TurnedAway design={detail.design} />
+          {!isAhead(detail.summary) && <TurnedAway design={detail.design} />}
           <Accordion variant="contained">
             <Accordion.Item value="toml">
               <Accordion.Control>Definition (TOML)</Accordion.Control>

@@ -1,7 +1,10 @@
-/** A study's status, and whom its design turns away. */
+/** A study's status, its step between draft and live with what comes next, and whom its design turns away. */
 
-import { Badge, Text } from "@mantine/core";
-import type { Schemas } from "../api";
+import { Badge, Group, Text } from "@mantine/core";
+import { useQuery } from "@tanstack/react-query";
+import { Link } from "@tanstack/react-router";
+import { launchChecksQuery, type Schemas } from "../api";
+import { counted } from "../ui/format";
 
 const COLOURS = { draft: "gray.7", pilot: "indigo.8", live: "teal.9", closed: "dark.4" };
 
@@ -12,4 +15,73 @@ export function StatusBadge({ status }: { status: Schemas["StudySummary"]["statu
 /** Devices that can take no part, said before somebody sends them a link. */
 export function TurnedAway({ design }: { design: Schemas["DesignOut"] | undefined }) {
   return design?.turned_away ? <Text size="sm">{design.turned_away}</Text> : null;
+}
+
+// Where a study stands between draft and live, and what comes next.
+
+const STEPS = [
+  ["draft", "Draft"],
+  ["preview", "Preview"],
+  ["pilot", "Pilot"],
+  ["live", "Live"],
+] as const;
+
+interface Next {
+  text: string;
+  /** The page on which it is done; null where the buttons above do it. */
+  page: "" | "/rehearsal" | "/results" | "/monitor" | "/settings" | "/data" | null;
+}
+
+/** What to do next with a study, by its status and what its checklist says. */
+export function nextStep(
+  summary: Pick<Schemas["StudySummary"], "status" | "paused" | "archived_at" | "complete" | "quota">,
+  checks: readonly Schemas["LaunchCheck"][],
+): Next {
+  const { status, paused, archived_at, complete, quota } = summary;
+  if (archived_at !== null) return { text: "This study is in the archive. Restore it under Settings to change it.", page: "/settings" };
+  if (status === "closed") return { text: "Build the report and download the data.", page: "/data" };
+  const fix = checks.filter(({ blocks }) => blocks).length;
+  const has = (kind: string) => checks.some((check) => check.kind === kind);
+  if (status !== "live" && fix > 0) return { text: `Fix ${counted(fix, "thing")} on the checklist.`, page: "" };
+  if (paused) return { text: "The study is paused. Let participants begin under Settings.", page: "/settings" };
+  if (status === "live")
+    return {
+      text: `Watch the participants: ${String(complete)}${quota === null ? "" : ` of ${String(quota)}`} complete.`,
+      page: "/monitor",
+    };
+  if (status === "pilot")
+    return { text: `Look at the results of the pilot (${String(complete)} complete), then set the study live.`, page: "/results" };
+  if (has("not_tried")) return { text: "Preview the study as a participant.", page: null };
+  if (has("rehearsal")) return { text: "Rehearse the study with simulated people.", page: "/rehearsal" };
+  return { text: "Open the study as a pilot, or set it live.", page: null };
+}
+
+export function StudySteps({ summary }: { summary: Schemas["StudySummary"] }) {
+  const checks = useQuery(launchChecksQuery(summary.name)).data;
+  const tried = checks !== undefined && !checks.some(({ kind }) => kind === "not_tried");
+  const now = summary.status === "draft" ? (tried ? 1 : 0) : summary.status === "pilot" ? 2 : 3;
+  const next = checks === undefined ? null : nextStep(summary, checks);
+  return (
+    <Group gap="md" justify="space-between" className="study-steps">
+      <ol aria-label="Steps of the study">
+        {STEPS.map(([step, label], index) => (
+          <li key={step} className={index < now ? "done" : ""} aria-current={index === now ? "step" : undefined}>
+            {step === "live" && summary.status === "closed" ? "Closed" : label}
+          </li>
+        ))}
+      </ol>
+      {next !== null && (
+        <Text size="sm">
+          <b>Next:</b>{" "}
+          {next.page === null ? (
+            next.text
+          ) : (
+            <Link to={`/studies/$study${next.page}`} params={{ study: summary.name }}>
+              {next.text}
+            </Link>
+          )}
+        </Text>
+      )}
+    </Group>
+  );
 }

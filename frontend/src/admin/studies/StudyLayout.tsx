@@ -1,12 +1,12 @@
 /** The frame of a study's pages: its name, status and tabs, and the buttons that open and close it. */
 
-import { Button, Code, CopyButton, Group, Modal, Stack, Text, Alert, Tabs, Title } from "@mantine/core";
+import { Button, Card, Code, CopyButton, Group, Modal, Stack, Text, Alert, Tabs, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { Link, Outlet, useLocation, useNavigate, useParams } from "@tanstack/react-router";
-import { api, unwrap, studyQuery, type Schemas, launchChecksQuery } from "../api";
+import { api, unwrap, studyQuery, type Schemas, clipCheckQuery, launchChecksQuery } from "../api";
 import { Answer, onDemand } from "../ui/Answer";
 import { addressFor, RECRUITER_NAMES } from "./recruiting";
-import { TurnedAway, StatusBadge } from "./StatusBadge";
+import { TurnedAway, StatusBadge, StudySteps } from "./StatusBadge";
 import { useState, useEffect, useRef } from "react";
 import { keptWork, otherWork } from "../builder/kept";
 import { ConfirmButton } from "../ui/ConfirmButton";
@@ -96,7 +96,7 @@ function Address({ label, url }: { label: string; url: string }) {
   );
 }
 
-const BeforeOpening = onDemand(async () => (await import("./BeforeOpening")).BeforeOpening);
+const Preflight = onDemand(async () => (await import("./Preflight")).Preflight);
 
 type Status = Schemas["StudySummary"]["status"];
 const NEXT: Record<Status, Status[]> = { draft: ["pilot", "live"], pilot: ["draft", "live", "closed"], live: ["closed"], closed: ["live"] };
@@ -121,8 +121,10 @@ function StatusButtons({ summary }: { summary: Schemas["StudySummary"] }) {
       then: (detail) => setOpened(isOpen(detail.summary.status)),
     },
   );
-  // Loaded by what the dialog shows; the server refuses for the same reasons.
-  const isBlocked = useQuery({ ...launchChecksQuery(summary.name), enabled: false }).data?.some(({ blocks }) => blocks) ?? false;
+  // Loaded by what the dialog shows; the server refuses for the same reasons, but it cannot try the clips.
+  const checks = useQuery({ ...launchChecksQuery(summary.name), enabled: false }).data;
+  const clips = useQuery({ ...clipCheckQuery(summary.name, summary.version), enabled: false });
+  const isBlocked = [...(checks ?? []), ...(clips.data?.findings ?? [])].some(({ blocks }) => blocks);
   const preview = useChange(
     () =>
       unwrap(
@@ -145,10 +147,15 @@ function StatusButtons({ summary }: { summary: Schemas["StudySummary"] }) {
           question={`${WORDS[status][1]}${keptWork(summary.name) === null && otherWork(summary.name).length === 0 ? "" : " Unsaved work in the builder is not included."}`}
           confirm={WORDS[status][0]}
           harmless={status !== "closed"}
-          blocked={status === "live" && isBlocked}
+          blocked={status === "live" && (isBlocked || clips.isFetching || (clips.data === undefined && clips.error === null))}
+          wide={isOpen(status)}
           onConfirm={() => change.mutate(status)}
         >
-          {isOpen(status) && <BeforeOpening study={summary.name} status={status} />}
+          {isOpen(status) && (
+            <Card withBorder mt="sm">
+              <Preflight study={summary.name} atOnce={status === "live"} />
+            </Card>
+          )}
         </ConfirmButton>
       ))}
       {opened && <OpenedDialog study={summary.name} onClose={() => setOpened(false)} />}
@@ -213,6 +220,7 @@ export function StudyLayout() {
             </div>
             {summary.rights.includes("run") && summary.archived_at === null && <StatusButtons summary={summary} />}
           </Group>
+          <StudySteps summary={summary} />
           <FailingClips study={study} />
           <Tabs
             value={current}

@@ -14,17 +14,29 @@ interface Props extends ButtonProps {
   harmless?: boolean;
   /** True where something named below the question has to be done first. */
   blocked?: boolean;
+  /** How wide the dialog is: "lg" where it shows more than the question. */
+  wide?: boolean;
   onConfirm: () => void;
 }
 
-export function ConfirmButton({ label, question, children, confirm, harmless = false, blocked = false, onConfirm, ...button }: Props) {
+export function ConfirmButton({
+  label,
+  question,
+  children,
+  confirm,
+  harmless = false,
+  blocked = false,
+  wide = false,
+  onConfirm,
+  ...button
+}: Props) {
   const [opened, { open, close }] = useDisclosure(false);
   return (
     <>
       <Button variant="default" {...button} onClick={open}>
         {label}
       </Button>
-      <Modal opened={opened} onClose={close} title={label} closeButtonProps={{ "aria-label": "Close" }}>
+      <Modal opened={opened} onClose={close} title={label} size={wide ? "lg" : "md"} closeButtonProps={{ "aria-label": "Close" }}>
         <Text>{question}</Text>
         {children}
         <Group justify="flex-end" mt="md">

@@ -1,0 +1,172 @@
+/** The checklist before a study goes live: what is wrong, where, and the way there; its clips are tried in this browser. */
+
+import { Badge, Button, Group, Progress, Stack, Text } from "@mantine/core";
+import { useQuery } from "@tanstack/react-query";
+import { Link } from "@tanstack/react-router";
+import { reviewed } from "../../i18n/reviewed";
+import { SHIPPED } from "../../i18n";
+import { clipCheckQuery, launchChecksQuery, type Schemas, studyQuery } from "../api";
+import { namedSection } from "../builder/data";
+import type { ClipCheck, ClipProgress } from "../clips/examine";
+import { Answer, ErrorAlert } from "../ui/Answer";
+import { counted, languageName } from "../ui/format";
+import { TurnedAway } from "./StatusBadge";
+
+type Finding = Schemas["LaunchCheck"];
+
+interface Props {
+  study: string;
+  /** Try the clips at once: the study is about to be opened. */
+  atOnce?: boolean;
+}
+
+export function Preflight({ study, atOnce = false }: Props) {
+  const detail = useQuery(studyQuery(study)).data;
+  const checks = useQuery(launchChecksQuery(study));
+  const version = detail?.summary.version ?? 0;
+  const clips = useQuery({ ...clipCheckQuery(study, version), enabled: atOnce && version > 0 });
+  return (
+    <Answer of={checks}>
+      {(checked) => {
+        const findings = [...checked, ...languageFindings(detail?.definition.languages ?? []), ...(clips.data?.findings ?? [])];
+        return (
+          <Stack gap="sm" role="group" aria-label="Before it goes live">
+            <Text fw={600}>{summaryOf(findings)}</Text>
+            <Findings study={study} findings={findings} />
+            <ClipsTried study={study} version={version} check={clips} />
+            <TurnedAway design={detail?.design} />
+          </Stack>
+        );
+      }}
+    </Answer>
+  );
+}
+
+/** "2 to fix before it goes live, 5 to check". */
+export function summaryOf(findings: readonly Finding[]): string {
+  const fix = findings.filter(({ blocks }) => blocks).length;
+  const look = findings.length - fix;
+  if (findings.length === 0) return "Nothing speaks against going live.";
+  if (fix === 0) return `${counted(look, "thing")} to check. None of them prevents going live.`;
+  return `${String(fix)} to fix before it goes live${look > 0 ? `, ${String(look)} to check` : ""}.`;
+}
+
+/** Languages of the study in which the page itself has no words, or words that nobody has read. */
+export function languageFindings(languages: readonly string[]): Finding[] {
+  const of = (tag: string) => [tag, tag.slice(0, 2)].find((one) => SHIPPED.includes(one));
+  const named = (tags: readonly string[]) => tags.map((tag) => languageName(tag)).join(", ");
+  const missing = languages.filter((tag) => of(tag) === undefined);
+  const unread = languages.filter((tag) => {
+    const shipped = of(tag);
+    return shipped !== undefined && !(shipped in reviewed);
+  });
+  const finding = (text: string): Finding => ({ kind: "page_language", blocks: false, text, page: "settings", path: "languages" });
+  return [
+    ...(missing.length > 0 ? [finding(`Buttons and hints of the participant page are in English for ${named(missing)}.`)] : []),
+    ...(unread.length > 0
+      ? [finding(`Buttons and hints in ${named(unread)} were not reviewed by a speaker. Have them read before people take part.`)]
+      : []),
+  ];
+}
+
+function Findings({ study, findings }: { study: string; findings: readonly Finding[] }) {
+  const sorted = [...findings].sort((a, b) => Number(b.blocks) - Number(a.blocks));
+  if (sorted.length === 0) return null;
+  return (
+    <ul className="checklist">
+      {sorted.map((finding) => (
+        <li key={`${finding.kind} ${finding.text}`}>
+          <Badge color={finding.blocks ? "red.9" : "gray.7"}>{finding.blocks ? "fix" : "check"}</Badge>
+          <Text size="sm" className="wrap-anywhere">
+            {finding.text} <Where study={study} finding={finding} />
+          </Text>
+        </li>
+      ))}
+    </ul>
+  );
+}
+
+const PAGES = {
+  build: { to: "/studies/$study/build", label: "Build", right: "edit" },
+  settings: { to: "/studies/$study/settings", label: "Settings", right: "run" },
+  links: { to: "/studies/$study/links", label: "Links", right: "run" },
+  data: { to: "/studies/$study/data", label: "Data", right: "export" },
+  clips: { to: "/studies/$study/clips", label: "Clips", right: "view" },
+  rehearsal: { to: "/studies/$study/rehearsal", label: "Rehearsal", right: "view" },
+} as const;
+
+/** The way to where a finding is fixed; nothing where that is no page of the study, or not open to this account. */
+function Where({ study, finding: { page, path } }: { study: string; finding: Finding }) {
+  const rights = useQuery(studyQuery(study)).data?.summary.rights ?? [];
+  if (page === "preview" || page === "server") return null;
+  const { to, label, right } = PAGES[page];
+  if (!rights.includes(right)) return null;
+  const section = page === "build" ? namedSection(path ?? "") : undefined;
+  return (
+    <Link to={to} params={{ study }} search={section === undefined ? {} : { section: section.id }}>
+      {section === undefined ? label : `${label}, ${section.label}`}
+    </Link>
+  );
+}
+
+interface ClipsTriedProps {
+  study: string;
+  version: number;
+  check: { data: ClipCheck | undefined; error: Error | null; isFetching: boolean; refetch: () => unknown };
+}
+
+/** How the trial of the clips stands: begun by a button here, at once where the study is about to be opened. */
+function ClipsTried({ study, version, check }: ClipsTriedProps) {
+  const progress = useQuery<ClipProgress>({
+    queryKey: [...clipCheckQuery(study, version).queryKey, "progress"],
+    queryFn: () => ({ done: 0, of: 0 }),
+    enabled: false,
+  }).data;
+  if (check.isFetching) {
+    const { done, of } = progress ?? { done: 0, of: 0 };
+    return (
+      <Stack gap={4} role="status" aria-label="Clips">
+        <Group justify="space-between">
+          <Text size="sm" className="number">
+            Trying the clips in this browser: {done} of {of}
+          </Text>
+          <Button
+            size="compact-xs"
+            variant="default"
+            onClick={() => void import("../clips/examine").then(({ skipRest }) => skipRest(study))}
+          >
+            Skip the rest
+          </Button>
+        </Group>
+        <Progress value={of === 0 ? 0 : (100 * done) / of} aria-label="Clips tried" />
+      </Stack>
+    );
+  }
+  if (check.error !== null) return <ErrorAlert error={check.error} retry={() => void check.refetch()} />;
+  const button = (label: string) => (
+    <Button size="compact-sm" variant="default" onClick={() => void check.refetch()}>
+      {label}
+    </Button>
+  );
+  const { data } = check;
+  if (data === undefined) {
+    return (
+      <Group gap="xs">
+        {button("Try the clips")}
+        <Text size="sm" c="dimmed">
+          Each clip is decoded in this browser, as for participants.
+        </Text>
+      </Group>
+    );
+  }
+  if (!data.canTell) return null;
+  return (
+    <Group gap="xs" role="status" aria-label="Clips">
+      <Text size="sm">
+        {data.done === data.of ? "All clips were tried. " : `${String(data.done)} of ${String(data.of)} clips were tried. `}
+        {data.facts}.
+      </Text>
+      {data.done < data.of && button("Try all clips")}
+    </Group>
+  );
+}
