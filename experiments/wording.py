@@ -319,8 +319,8 @@ def stated_minutes(text: str) -> int | None:
     >>> stated_minutes("10 to 15 minutes."), stated_minutes("Dauer: 20 Minuten"), stated_minutes("short")
     (15, 20, None)
     """
-    found = [int(number) for match in _MINUTES.finditer(text) for number in match.groups() if number]
-    return max(found, default=None)
+    minutes = [int(number) for match in _MINUTES.finditer(text) for number in match.groups() if number]
+    return max(minutes, default=None)
 
 
 def stated_pay(text: str) -> StatedPay | None:

@@ -1,4 +1,4 @@
-"""Before a study goes live: dress rehearsals in the background, the latest of which is kept; the checklist."""
+"""Before a study goes live: its checklist, and dress rehearsals in the background; the latest is kept."""
 
 import atexit
 import os

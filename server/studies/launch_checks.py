@@ -6,11 +6,11 @@ The same checks hold for whatever reaches participants later: a new version of a
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
-from experiments.kinds.scales import expected_minutes
 from sqlalchemy.orm import Session
 
 from experiments.declaration.experiment import Experiment
 from experiments.errors import counted
+from experiments.kinds import expected_minutes
 from experiments.level_leaks import reported_leaks
 from experiments.manifest import Manifest
 from experiments.wording import (
@@ -259,6 +259,7 @@ def _time(launch: LaunchState) -> Iterator[LaunchCheck]:
 def _pay(launch: LaunchState) -> Iterator[LaunchCheck]:
     """Pay that is not stated although people are recruited for it, or that is too low for the time."""
     minutes = expected_minutes(launch.experiment)
+    time = counted(max(1, round(minutes)), "minute")
     paying = any(
         one is not None and one.kind in ("prolific", "mturk") for one in (launch.recruiter, *launch.of_links)
     )
@@ -275,8 +276,8 @@ def _pay(launch: LaunchState) -> Iterator[LaunchCheck]:
             yield _of_consent(
                 "pay",
                 language,
-                f"{pay.sign}{pay.amount:.2f} for about {counted(max(1, round(minutes)), 'minute')} is {pay.sign}{hourly:.2f} per "
-                f"hour. Recruiters expect at least {pay.sign}{LEAST_HOURLY_PAY[pay.sign]:.0f} per hour. "
+                f"{pay.sign}{pay.amount:.2f} for about {time} is {pay.sign}{hourly:.2f} per hour. "
+                f"Recruiters expect at least {pay.sign}{LEAST_HOURLY_PAY[pay.sign]:.0f} per hour. "
                 "Raise the pay or shorten the design.",
             )
             return
