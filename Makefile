@@ -66,11 +66,13 @@ format: setup-test ## rewrite Python and TypeScript in the house format
 	@cd frontend && npm run --silent format
 
 RESOLVE = $(BIN)/uv pip compile -q --upgrade --universal --generate-hashes --no-header --no-annotate --python-version 3.11 pyproject.toml
+# A checkout and the image have all that needs no account elsewhere.
+RUN_EXTRAS = --extra track --extra render --extra deploy --extra parquet
 lock: ## resolve the Python dependencies again, with hashes: what runs, what tests and servers add
 	@mkdir -p build
 	@$(RESOLVE) --all-extras --group dev -o build/all.lock
-	@$(RESOLVE) -c build/all.lock --extra track --extra render -o requirements.lock
-	@$(RESOLVE) -c build/all.lock --extra track --extra render --extra s3 -o build/server.lock
+	@$(RESOLVE) -c build/all.lock $(RUN_EXTRAS) -o requirements.lock
+	@$(RESOLVE) -c build/all.lock $(RUN_EXTRAS) --extra s3 -o build/server.lock
 	@$(BIN)/python tools/split_locks.py build/all.lock requirements.lock requirements-dev.lock
 	@$(BIN)/python tools/split_locks.py build/server.lock requirements.lock deploy/s3.lock
 	@$(BIN)/python tools/check_lock_files.py

@@ -12,6 +12,8 @@ from experiments.errors import InputError, expectation, wrong_value
 EXTRAS: dict[str, tuple[str, ...]] = {
     "track": ("numba", "cv2"),
     "render": ("numba", "cv2", "skia", "webrtcvad"),
+    "deploy": ("psycopg",),
+    "parquet": ("fastparquet",),
     "s3": ("boto3",),
     "dask": ("distributed",),
 }
@@ -43,7 +45,7 @@ def missing_extra(module: str) -> str | None:
     True
     """
     top = module.partition(".")[0]
-    for extra in ("render", "s3", "dask"):
+    for extra in ("render", "deploy", "parquet", "s3", "dask"):
         if top in EXTRAS[extra]:
             return f"this command needs the extra '{extra}'; install Palpebra with it: {install_line(extra)}"
     return None

@@ -9,7 +9,6 @@ from contextlib import asynccontextmanager, suppress
 from types import FrameType
 from typing import Any
 
-import psycopg
 from sqlalchemy import text
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -33,6 +32,8 @@ def heard_changes(database: Database, look_s: float) -> Iterator[int]:
 
     Where the connection is cut, or there is none, psycopg's error is raised.
     """
+    import psycopg  # only where the database is PostgreSQL
+
     address = kept_alive(database.url).set(drivername="postgresql")
     url = address.render_as_string(hide_password=False)
     with psycopg.connect(url, autocommit=True) as connection:
@@ -106,6 +107,8 @@ class Changes:
             self._ends.wait(EVERY_S)
 
     def _listen(self) -> None:
+        import psycopg
+
         while not self._ends.is_set():
             try:
                 for number in heard_changes(self._database, LOOK_S):

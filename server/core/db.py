@@ -8,12 +8,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import psycopg
 from sqlalchemy import Connection, create_engine, event
 from sqlalchemy.dialects import registry
 from sqlalchemy.dialects.sqlite.pysqlite import SQLiteDialect_pysqlite
 from sqlalchemy.engine import URL, Engine, make_url
-from sqlalchemy.exc import ArgumentError, DBAPIError
+from sqlalchemy.exc import ArgumentError, DBAPIError, OperationalError
 from sqlalchemy.exc import TimeoutError as PoolTimeout
 from sqlalchemy.orm import Session
 from sqlalchemy.pool import Pool
@@ -274,10 +273,12 @@ def is_away(error: BaseException) -> bool:
         return True
     if not isinstance(error, DBAPIError):
         return False
-    if isinstance(error.orig, psycopg.OperationalError):
+    # By its attribute, because psycopg is not installed where only SQLite is used.
+    cause = error.orig
+    if isinstance(error, OperationalError) and cause is not None and hasattr(cause, "sqlstate"):
         # No code: no connection. Classes 08, 53, 57: connection broken, no resources, server shutting down;
         # 40: rolled back for the sake of another transaction.
-        code = error.orig.sqlstate
+        code: str | None = cause.sqlstate
         return code is None or code[:2] in ("08", "40", "53", "57")
     return error.connection_invalidated or _sqlite_code(error) in SQLITE_AWAY
 

@@ -10,6 +10,7 @@ from datetime import timedelta
 from pathlib import Path
 from typing import Protocol
 
+from filelock import FileLock, Timeout
 from sqlalchemy import Connection, NullPool, create_engine, text
 from sqlalchemy.exc import DBAPIError
 
@@ -30,29 +31,37 @@ def file_lock(path: Path, *, wait: bool = True) -> Iterator[None]:
     BlockingIOError
         Another process holds it, and `wait` is false.
     """
-    import fcntl  # not on every system that the rest of the server runs on
-
     path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("a") as lock:
-        path.chmod(0o600)
-        fcntl.flock(lock, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+    try:
+        held = _lock_of_file(path).acquire(timeout=-1 if wait else 0)
+    except Timeout as error:
+        raise BlockingIOError(f"another process holds {path}") from error
+    with held:
+        path.chmod(0o600)  # the file may be older than this rule
         yield
 
 
 def is_left(path: Path) -> bool:
     """Whether a lock file is there and no process holds it: its process ended before its work."""
-    try:
-        lock = path.open("rb")
-    except FileNotFoundError:
+    if not path.is_file():
         return False
-    import fcntl
+    try:
+        with _lock_of_file(path).acquire(timeout=0):
+            return True
+    except Timeout:
+        return False
 
-    with lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return False
-    return True
+
+def _lock_of_file(path: Path) -> FileLock:
+    # Never a soft lock: that is a file's presence, which outlives a process that was killed.
+    return FileLock(
+        path,
+        mode=0o600,
+        poll_interval=0.02,
+        thread_local=False,
+        fallback_to_soft=False,
+        preserve_lock_file=True,
+    )
 
 
 # Locks that PostgreSQL keeps for all processes of a server: each ends with the process that holds it.

@@ -4,6 +4,7 @@ import os
 import socket
 import subprocess
 import sys
+import urllib.request
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,9 @@ from palpebra.cli import with_start
 from palpebra.conflicts import refuse_foreign_packages
 from palpebra.folders import data_folder, free_port
 from palpebra.start import only_server_of
+from server.core.settings import Settings
+from tests.helpers.ports import free_port as unused_port
+from tests.helpers.waiting import until
 
 
 def palpebra(*arguments: str, folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -137,3 +141,27 @@ def test_service_writes_a_unit(tmp_path: Path) -> None:
     text = out.read_text(encoding="utf-8")
     assert f"Environment=PALPEBRA_DATA_FOLDER={tmp_path / 'data'}" in text
     assert "PALPEBRA_PUBLIC_URL=https://lab.example.org" in text
+
+
+def test_server_starts_without_extras_and_without_what_only_unix_has(tmp_path: Path) -> None:
+    port = unused_port()
+    program = Path(__file__).with_name("without_unix.py")
+    command = [sys.executable, program, "--folder", tmp_path / "data", "--port", str(port), "--no-browser"]
+    with subprocess.Popen(
+        command, env={**os.environ, "HOME": str(tmp_path)}, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+    ) as process:
+        try:
+            until(lambda: answers(port, "/readyz") or process.poll() is not None)
+            assert answers(port, "/readyz"), process.stdout and process.stdout.read().decode()
+            assert answers(port, "/admin/") or not Settings().frontend_folder.is_dir()
+        finally:
+            process.terminate()
+
+
+def answers(port: int, path: str) -> bool:
+    """Whether the server answers a request with 200."""
+    try:
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}{path}", timeout=5) as answer:
+            return bool(answer.status == 200)
+    except OSError:
+        return False
