@@ -1,7 +1,6 @@
 """Where data are kept, and which port is free: decided once, before the server reads its settings."""
 
 import os
-import socket
 from pathlib import Path
 from typing import Annotated
 
@@ -59,25 +58,16 @@ def free_port(wanted: int | None) -> int:
     InputError
         The wanted port is in use, or none of the next ones is free.
     """
+    from server.cli_run import why_not_free  # slow to import: only where a server starts
+
     ports = [wanted] if wanted else range(PORT, PORT + PORTS_TRIED)
     for port in ports:
-        if _is_free(port):
+        if why_not_free("127.0.0.1", port) is None:
             return port
     tried = f"port {wanted} is" if wanted else f"ports {PORT} to {PORT + PORTS_TRIED - 1} are"
     raise InputError(f"{tried} in use; choose a free one by --port")
 
 
-def _is_free(port: int) -> bool:
-    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind(("127.0.0.1", port))
-        except OSError:
-            return False
-    return True
-
-
-def use_folder(folder: Path, port: int = PORT) -> None:
+def use_folder(folder: Path) -> None:
     """Set the environment that the server reads its settings from."""
     os.environ[DATA_VARIABLE] = str(folder)
-    os.environ.setdefault("PALPEBRA_PUBLIC_URL", f"http://localhost:{port}")

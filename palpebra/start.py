@@ -18,12 +18,13 @@ from experiments.errors import InputError
 from palpebra.folders import PORT, Folder, data_folder, free_port, use_folder
 
 if TYPE_CHECKING:  # the server is only imported when it starts, so that `palpebra --help` is quick
-    from server.context import Services
-    from server.core.db import Database
+    from server.cli_run import Welcome
 
 DEMO = Path(__file__).resolve().parent / "demo"
 """The demo's declaration and clips; `make wheel` builds them."""
 DEMO_NAME = "demo"
+DEMOS = (DEMO_NAME, "exp3")
+"""Studies that the first page offers to try: that of the package, or that of `make run`."""
 LOCK = "palpebra.lock"
 SECONDS_TO_START = 60
 
@@ -62,65 +63,62 @@ def demo(folder: Folder = None, port: Port = None, no_browser: NoBrowser = False
     _serve(folder, port, demo_page, with_browser=not no_browser)
 
 
-def first_page(folder: Path) -> str:
-    """Path of the first page, with what it needs to know after the `#`, which no server sees."""
-    from server.cli_common import stored_services
+def first_page(welcome: "Welcome", folder: Path) -> str:
+    """Path of the first page, with what it needs to know after the `#`, which no server sees.
 
+    Parameters
+    ----------
+    welcome : Welcome
+        Links of open studies, and the invitation for the first account.
+    folder : Path
+        The data folder; the page names it.
+    """
     known = {"folder": str(folder)}
-    with stored_services() as services:
-        if link := demo_link(services):
-            known["demo"] = link
-        if invitation := first_invitation(services.database):
-            known["invitation"] = invitation
+    if link := demo_link(welcome):
+        known["demo"] = link
+    if welcome.invitation:
+        known["invitation"] = welcome.invitation
     return f"/admin/start#{urlencode(known, quote_via=quote)}"
 
 
-def demo_page(folder: Path) -> str:
-    """Path of the demo study's participant page."""
-    from server.cli_common import stored_services
+def demo_page(welcome: "Welcome", folder: Path) -> str:
+    """Path of the demo study's participant page.
 
-    with stored_services() as services:
-        link = demo_link(services)
+    Raises
+    ------
+    InputError
+        The demo study was removed.
+    """
+    link = demo_link(welcome)
     if link is None:
         raise InputError(f"the demo study was removed from {folder}; choose another folder by --folder")
     return link
 
 
-def demo_link(services: "Services") -> str | None:
+def demo_link(welcome: "Welcome") -> str | None:
     """Path of the demo's link for participants; None if this server has no demo."""
-    from server.studies.links import general_links, link_url
-    from server.studies.repository import open_studies
-
-    with services.database.write() as session:
-        for study in open_studies(session):
-            if study.name == DEMO_NAME:
-                for link in general_links(session, services.settings.key, study):
-                    return link_url("", services.settings.key, link.public_id)
-    return None
+    paths = {link.study: link.path for link in welcome.links}
+    return next((paths[name] for name in DEMOS if name in paths), None)
 
 
-def first_invitation(database: "Database") -> str | None:
-    """The token by which the first account is created; None once there is one."""
-    from server.accounts import invitations
-    from server.accounts import service as accounts
-
-    with database.read() as session:
-        if accounts.accounts_exist(session):
-            return None
-    return invitations.invite(database, "owner", "first owner", None)[1]
-
-
-def _serve(folder: Path | None, port: int | None, page: Callable[[Path], str], *, with_browser: bool) -> None:
+def _serve(
+    folder: Path | None, port: int | None, page: Callable[["Welcome", Path], str], *, with_browser: bool
+) -> None:
     place = data_folder(folder)
     chosen = free_port(port)
     if port is None and chosen != PORT:
         typer.echo(f"Port {PORT} is in use; using {chosen}.")
-    use_folder(place, chosen)
-    from server.cli_run import run
+    use_folder(place)
+    os.environ.setdefault("PALPEBRA_PUBLIC_URL", f"http://localhost:{chosen}")
+    from server.cli_common import stored_services
+    from server.cli_run import make_welcome, print_links, run
 
     with only_server_of(place):
         _prepare(place)
-        address = f"http://localhost:{chosen}{page(place)}"
+        with stored_services() as services:
+            welcome, public_url = make_welcome(services), services.settings.public_url
+        address = f"http://localhost:{chosen}{page(welcome, place)}"
+        print_links(welcome, public_url)
         typer.echo(f"Data folder: {place}")
         typer.echo(f"Open {address}")
         typer.echo("Stop with Ctrl-C.")
@@ -133,7 +131,7 @@ def _prepare(place: Path) -> None:
     """Create or upgrade the database, and add the demo study to a new one."""
     from server.cli_common import migrated_services
 
-    is_new = not (place / "palpebra.sqlite").exists()
+    is_new = not (os.environ.get("DATABASE_URL") or (place / "palpebra.sqlite").exists())
     with migrated_services():
         pass
     if is_new and not (DEMO / "manifest.json").is_file():

@@ -6,7 +6,7 @@ import socket
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import typer
 import uvicorn
@@ -16,9 +16,9 @@ from server.accounts import invitations
 from server.accounts import service as accounts
 from server.accounts.endpoints import invitation_url
 from server.cli_common import migrated_services, out
-from server.core.db import Database
+from server.context import Services
 from server.core.logs import logging_configuration
-from server.core.settings import Settings, close_to_others
+from server.core.settings import Settings, close_to_others, note_address
 from server.operations.metrics import MULTIPROCESS_VARIABLE
 from server.privacy.ledger import begin_ledger
 from server.protocol import BoundedHttp
@@ -28,6 +28,7 @@ from server.studies.repository import open_studies
 GRACE_S = 20
 WORKER_START_S = 60
 """A worker silent for so long is replaced; on a busy machine starting alone takes more than the usual 5 s."""
+PUBLIC_URL = "PALPEBRA_PUBLIC_URL"
 TRUSTED_PROXIES = "FORWARDED_ALLOW_IPS"
 """Addresses of proxies whose X-Forwarded-For is believed; uvicorn reads it. None are without it."""
 KEEP_ALIVE_S = 75
@@ -55,13 +56,16 @@ def run(
     Example: server run --host 0.0.0.0 --port 8000 --workers 2
     """
     _check_free(host, port)
+    # For this process and its workers; else they would take the URL of the start before.
+    os.environ.setdefault(PUBLIC_URL, f"http://localhost:{port}")
     settings = Settings()
+    note_address(settings)
     with migrated_services(settings) as services:
         close_to_others(settings)
         begin_ledger(settings)
         services.settings.key  # noqa: B018 - made now, once, before workers ask for it
         if welcome:
-            _welcome(services.database, services.settings)
+            _print_welcome(services)
     # No access log: it would write every participant's internet address.
     with _shared_counts(workers):
         uvicorn.run(
@@ -97,34 +101,75 @@ def _shared_counts(workers: int) -> Iterator[None]:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def _check_free(host: str, port: int) -> None:
+def why_not_free(host: str, port: int) -> OSError | None:
+    """Why nothing can listen on a port; None if it is free."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     with socket.socket(family, socket.SOCK_STREAM) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind((host, port))
         except OSError as error:
-            reason = error.strerror or str(error)
-            if isinstance(error, socket.gaierror):
-                raise InputError(
-                    f"cannot listen on '{host}' ({reason}); choose another address with --host"
-                ) from error
-            raise InputError(
-                f"cannot listen on {host}:{port} ({reason}); "
-                "choose another port with --port (with make: PORT=8001 make run)"
-            ) from error
+            return error
+    return None
 
 
-def _welcome(database: Database, settings: Settings) -> None:
-    """Print where to go: participant links of open studies, the admin site, the first owner's link."""
-    with database.write() as session:
-        for study in open_studies(session):
-            for link in general_links(session, settings.key, study):
-                url = link_url(settings.public_url, settings.key, link.public_id)
-                group = f", {link.group_name}" if link.group_name else ""
-                out.print(f"{study.name} ({study.status}{group}): {url}")
-        first = not accounts.accounts_exist(session)
-    out.print(f"admin site: {settings.public_url}/admin/")
-    if first:
-        _, token = invitations.invite(database, "owner", "first owner", None)
-        out.print(f"create the first account (link works once): {invitation_url(settings.public_url, token)}")
+def _check_free(host: str, port: int) -> None:
+    error = why_not_free(host, port)
+    if error is None:
+        return
+    reason = error.strerror or str(error)
+    if isinstance(error, socket.gaierror):
+        raise InputError(
+            f"cannot listen on '{host}' ({reason}); choose another address with --host"
+        ) from error
+    raise InputError(
+        f"cannot listen on {host}:{port} ({reason}); "
+        "choose another port with --port (with make: PORT=8001 make run)"
+    ) from error
+
+
+class StudyLink(NamedTuple):
+    """The path of an open study's link for participants."""
+
+    study: str
+    status: str
+    group: str | None
+    path: str
+
+
+class Welcome(NamedTuple):
+    """Where to go once the server runs."""
+
+    links: list[StudyLink]
+    invitation: str | None
+    """Token that creates the first account; None once there is an account."""
+
+
+def make_welcome(services: Services) -> Welcome:
+    """The links of open studies, and an invitation for the first owner while there is no account."""
+    key = services.settings.key
+    with services.database.write() as session:
+        links = [
+            StudyLink(study.name, study.status, link.group_name, link_url("", key, link.public_id))
+            for study in open_studies(session)
+            for link in general_links(session, key, study)
+        ]
+        is_first = not accounts.accounts_exist(session)
+    invite = invitations.invite(services.database, "owner", "first owner", None)[1] if is_first else None
+    return Welcome(links, invite)
+
+
+def print_links(welcome: Welcome, public_url: str) -> None:
+    """Print the participant links of open studies."""
+    for link in welcome.links:
+        group = f", {link.group}" if link.group else ""
+        out.print(f"{link.study} ({link.status}{group}): {public_url}{link.path}")
+
+
+def _print_welcome(services: Services) -> None:
+    welcome, public_url = make_welcome(services), services.settings.public_url
+    print_links(welcome, public_url)
+    out.print(f"admin site: {public_url}/admin/")
+    if welcome.invitation:
+        url = invitation_url(public_url, welcome.invitation)
+        out.print(f"create the first account (link works once): {url}")

@@ -82,13 +82,12 @@ def main() -> None:
     DATA.mkdir(parents=True, exist_ok=True)
     port = os.environ.get("PORT", "8000")
     os.environ["PALPEBRA_DATA_FOLDER"] = str(DATA)
-    os.environ.setdefault("PALPEBRA_PUBLIC_URL", f"http://localhost:{port}")
     call("server", "database", "upgrade")
     stamp_text, made = sources(), studies_made()
     for study in STUDIES:
         prepare(study, stamp_text, made)
     draw_strips(stamp_text)
-    os.execv(BIN / "server", ["server", "run", "--port", port, "--welcome"])
+    os.execv(BIN / "palpebra", ["palpebra", "--folder", str(DATA), "--port", port, "--no-browser"])
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from datetime import timedelta
 from email.utils import parseaddr
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple, Self
+from typing import Annotated, Any, Literal, NamedTuple, Self
 from urllib.parse import urlsplit
 
 from pydantic import (
@@ -203,6 +203,12 @@ class Provider(_DeclaredTable):
         return self.client_secret_file.read_text(encoding="utf-8").strip()
 
 
+def note_address(settings: "Settings") -> None:
+    """Store the server's URL in its data folder, for the links that commands print."""
+    settings.data_folder.mkdir(parents=True, exist_ok=True)
+    (settings.data_folder / ADDRESS_FILE).write_text(f"{settings.public_url}\n", encoding="utf-8")
+
+
 def is_safe(address: str) -> bool:
     """True for https, and for http that does not leave this machine."""
     parts = urlsplit(address)
@@ -215,6 +221,8 @@ def is_safe(address: str) -> bool:
 
 KEY_LENGTH_MIN = 32
 """Characters of a secret key that somebody sets; the ones that are made here have 64."""
+ADDRESS_FILE = "address"
+"""File of the data folder with the URL of the server that was started last."""
 REPOSITORY = Path(__file__).resolve().parents[2]
 
 
@@ -250,7 +258,11 @@ class Settings(BaseSettings):
         default=20, ge=1, description="Maximum number of database connections per worker."
     )
     public_url: str = Field(
-        default="http://localhost:8000", description="URL under which participants reach the server."
+        default="http://localhost:8000",
+        description=(
+            "URL under which participants reach the server. If it is not set, `server run` uses "
+            "http://localhost and its port, and commands use that of the last start."
+        ),
     )
     secret_key: str = Field(
         default="",
@@ -467,6 +479,19 @@ class Settings(BaseSettings):
         if self.smtp_host and not self.mail_from:
             raise ValueError("PALPEBRA_MAIL_FROM is required if PALPEBRA_SMTP_HOST is set")
         return self
+
+    @model_validator(mode="before")
+    @classmethod
+    def _address_of_the_server(cls, values: dict[str, Any]) -> dict[str, Any]:
+        """Commands print links for the port and the domain with which the server was last started."""
+        if "public_url" in values:
+            return values
+        folder = Path(values.get("data_folder") or cls.model_fields["data_folder"].default)
+        try:
+            noted = (folder / ADDRESS_FILE).read_text(encoding="utf-8").strip()
+        except (OSError, UnicodeDecodeError):
+            return values
+        return {**values, "public_url": noted} if noted.startswith(("http://", "https://")) else values
 
     @field_validator("public_url")
     @classmethod

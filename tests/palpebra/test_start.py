@@ -154,6 +154,10 @@ def test_server_starts_without_extras_and_without_what_only_unix_has(tmp_path: P
             until(lambda: answers(port, "/readyz") or process.poll() is not None)
             assert answers(port, "/readyz"), process.stdout and process.stdout.read().decode()
             assert answers(port, "/admin/") or not Settings().frontend_folder.is_dir()
+            link = palpebra(
+                "server", "admin", "link", folder=tmp_path, PALPEBRA_DATA_FOLDER=f"{tmp_path}/data"
+            )
+            assert link.stdout.startswith(f"http://localhost:{port}/admin/invitation#")
         finally:
             process.terminate()
 
