@@ -24,7 +24,7 @@ COPY table_files table_files
 COPY video_conversion video_conversion
 COPY analysis analysis
 COPY migrations migrations
-RUN PALPEBRA_WHEEL_WITHOUT=docs,demo venv/bin/python -m pip install --no-cache-dir --disable-pip-version-check --no-deps .
+RUN PALPEBRA_WHEEL_WITHOUT=docs,demo,https venv/bin/python -m pip install --no-cache-dir --disable-pip-version-check --no-deps .
 RUN mkdir data backups
 
 FROM python:3.11.14-slim

@@ -7,7 +7,7 @@ import urllib.error
 import urllib.request
 import webbrowser
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 from urllib.parse import quote, urlencode
@@ -28,6 +28,8 @@ DEMOS = (DEMO_NAME, "exp3")
 LOCK = "palpebra.lock"
 SECONDS_TO_START = 60
 
+Page = Callable[["Welcome", Path], str]
+"""From the links and the data folder to the path that the browser opens."""
 Port = Annotated[
     int | None, typer.Option(min=1, max=65535, help="Port; by default the first free one from 8000 on.")
 ]
@@ -101,15 +103,39 @@ def demo_link(welcome: "Welcome") -> str | None:
     return next((paths[name] for name in DEMOS if name in paths), None)
 
 
-def _serve(
-    folder: Path | None, port: int | None, page: Callable[["Welcome", Path], str], *, with_browser: bool
-) -> None:
+def _serve(folder: Path | None, port: int | None, page: Page, *, with_browser: bool) -> None:
     place = data_folder(folder)
     chosen = free_port(port)
     if port is None and chosen != PORT:
         typer.echo(f"Port {PORT} is in use; using {chosen}.")
-    use_folder(place)
     os.environ.setdefault("PALPEBRA_PUBLIC_URL", f"http://localhost:{chosen}")
+    serve_folder(place, chosen, page, with_browser=with_browser)
+
+
+def serve_folder(
+    place: Path,
+    port: int,
+    page: Page,
+    *,
+    with_browser: bool = False,
+    around: Callable[[], AbstractContextManager[None]] = nullcontext,
+) -> None:
+    """Prepare the data folder, print where to go, and serve until stopped.
+
+    Parameters
+    ----------
+    place : pathlib.Path
+        The data folder.
+    port : int
+        A free port.
+    page : callable
+        The path of the page to open, from the links and the data folder.
+    with_browser : bool
+        Whether to open that page.
+    around : callable
+        Returns what runs beside the server, such as a proxy.
+    """
+    use_folder(place)
     from server.cli_common import stored_services
     from server.cli_run import make_welcome, print_links, run
 
@@ -117,14 +143,17 @@ def _serve(
         _prepare(place)
         with stored_services() as services:
             welcome, public_url = make_welcome(services), services.settings.public_url
-        address = f"http://localhost:{chosen}{page(welcome, place)}"
+        # A browser on this machine; under a domain, the address that everybody uses.
+        local = public_url if public_url.startswith("https://") else f"http://localhost:{port}"
+        address = local + page(welcome, place)
         print_links(welcome, public_url)
         typer.echo(f"Data folder: {place}")
         typer.echo(f"Open {address}")
         typer.echo("Stop with Ctrl-C.")
-        if with_browser:
-            threading.Thread(target=_open_when_ready, args=(address, chosen), daemon=True).start()
-        run(port=chosen)
+        with around():
+            if with_browser:
+                threading.Thread(target=_open_when_ready, args=(address, port), daemon=True).start()
+            run(port=port)
 
 
 def _prepare(place: Path) -> None:

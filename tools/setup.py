@@ -181,7 +181,7 @@ def frontend_sources() -> list[Path]:
 
 
 # Each package, and the sign that it is there: a program on the PATH, or a library (lib...).
-BROWSERS = {
+TEST_PROGRAMS = {
     "chromium": ("chromium", "chromium-browser", "google-chrome"),
     "firefox-esr": ("firefox-esr", "firefox"),
     # Firefox decodes H.264 with the system's libavcodec, which its package only recommends.
@@ -189,6 +189,9 @@ BROWSERS = {
     # The bench of what reaches the screen: a display whose frame buffer can be read, and its keyboard.
     "xvfb": ("Xvfb",),
     "libxtst6": ("libXtst.so",),
+    # The proxies of a deployment.
+    "caddy": ("caddy",),
+    "nginx-light": ("nginx",),
 }
 
 
@@ -201,13 +204,13 @@ def is_there(sign: str) -> bool:
     return sign in subprocess.run([ldconfig, "-p"], capture_output=True, text=True, check=False).stdout
 
 
-def provide_browsers() -> None:
-    """Install Chromium and Firefox for the tests: by apt as root, else say what is missing."""
-    for package, signs in BROWSERS.items():
+def provide_test_programs() -> None:
+    """Install browsers and proxies for the tests: by apt as root, else say what is missing."""
+    for package, signs in TEST_PROGRAMS.items():
         if any(is_there(sign) for sign in signs):
             continue
         if shutil.which("apt-get") and os.geteuid() == 0:
-            say(f"installing {package} (system package, for the browser tests)")
+            say(f"installing {package} (system package, for the tests)")
             call("apt-get", "update", "-qq")
             call("apt-get", "install", "-y", "-qq", "--no-install-recommends", package)
         else:
@@ -238,7 +241,7 @@ def main() -> None:
     if with_tests:  # Sphinx is a test package: `make run` alone serves no documentation site
         step("docs", docs_sources(), build_docs, FRONTEND / "dist" / "docs" / "index.html")
     if purpose == "test":
-        provide_browsers()
+        provide_test_programs()
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ PARTS = {
     "admin": "frontend/dist/admin/index.html",
     "participant": "frontend/dist/participant/index.html",
     "docs": "frontend/dist/docs/index.html",
+    "https": "deploy/Caddyfile",
     "demo": "palpebra/demo/manifest.json",
 }
 """Part -> a file that is there once it is built."""
@@ -34,5 +35,7 @@ class CustomBuildHook(BuildHookInterface[Any]):
             raise FileNotFoundError(
                 f"expected built pages and the demo, but {said} is missing; run `make wheel`"
             )
-        for site in sorted(parts.keys() - {"demo"}):
+        if "https" in parts:
+            build_data["force_include"][str(root / parts["https"])] = "palpebra/Caddyfile"
+        for site in sorted(parts.keys() - {"demo", "https"}):
             build_data["force_include"][str(root / "frontend" / "dist" / site)] = f"palpebra/pages/{site}"

@@ -1,6 +1,7 @@
 """`palpebra` with what can go wrong at a start: one clear line each, and nothing changes."""
 
 import os
+import re
 import socket
 import subprocess
 import sys
@@ -125,22 +126,24 @@ def test_programs_keep_their_own_command_lines(tmp_path: Path) -> None:
     assert "analysis anova [OPTIONS]" in done.stdout
 
 
-def test_service_writes_a_unit(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("options", "line"),
+    [
+        ([], "start --no-browser --port 8000"),
+        (["--domain", "lab.example.org"], "serve --domain lab.example.org --port 8000"),
+        (["--domain", "lab.example.org", "--own-proxy"], "start --no-browser --port 8000"),
+    ],
+)
+def test_service_writes_a_unit(tmp_path: Path, options: list[str], line: str) -> None:
     out = tmp_path / "palpebra.service"
-    done = palpebra(
-        "service",
-        "--folder",
-        str(tmp_path / "data"),
-        "--domain",
-        "lab.example.org",
-        "--out",
-        str(out),
-        folder=tmp_path,
-    )
+    given = ["--folder", str(tmp_path / "data"), "--out", str(out), *options]
+    done = palpebra("service", "install", *given, folder=tmp_path)
     assert done.returncode == 0, done.stderr
     text = out.read_text(encoding="utf-8")
     assert f"Environment=PALPEBRA_DATA_FOLDER={tmp_path / 'data'}" in text
-    assert "PALPEBRA_PUBLIC_URL=https://lab.example.org" in text
+    assert re.search(rf"^ExecStart=.*palpebra {line}$", text, re.MULTILINE)
+    assert ("PALPEBRA_PUBLIC_URL=https://lab.example.org" in text) == ("--own-proxy" in options)
+    assert ("CAP_NET_BIND_SERVICE" in text) == ("serve" in line)
 
 
 def test_server_starts_without_extras_and_without_what_only_unix_has(tmp_path: Path) -> None:
