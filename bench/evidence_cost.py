@@ -20,7 +20,7 @@ import psutil
 from bench.harness import with_children
 from server.cli_common import migrated_services
 from server.core.values import now
-from server.participation.clip_bytes import clip_digest, clip_hash
+from server.participation.clip_hashes import clip_digest, clip_hash
 from server.rehearsals.http import JsonClient
 from server.rehearsals.person import Person, Rater
 from tests.browser.server_process import ServerProcess

@@ -28,7 +28,7 @@ from pathlib import Path
 from typing import Any
 
 from server.core.values import now
-from server.participation.clip_bytes import clip_digest, clip_hash
+from server.participation.clip_hashes import clip_digest, clip_hash
 from server.participation.intake import evidence_key, issue, ticket
 from server.rehearsals.http import JsonClient, RefusedRequest
 from server.rehearsals.person import Person, Rater

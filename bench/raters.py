@@ -121,7 +121,7 @@ class Connection:
         form = isinstance(body, bytes)
         content = body if form else json.dumps(body).encode() if body is not None else b""
         kind = "application/x-www-form-urlencoded" if form else "application/json"
-        as_page = f"accept: application/json;clips=hash\r\nauthorization: Bearer {self.token}\r\n"
+        as_page = f"accept: application/json\r\nauthorization: Bearer {self.token}\r\n"
         token = as_page if self.token else ""
         head = (
             f"{method} {path} HTTP/1.1\r\nhost: localhost\r\ncontent-length: {len(content)}\r\n"

@@ -17,7 +17,7 @@ from server.core.locks import Locks, open_locks
 from server.core.settings import Settings
 from server.core.storage import ClipStore, FolderStore, open_s3
 from server.core.values import now
-from server.participation.clip_bytes import ClipBytes
+from server.participation.clip_hashes import ClipHashes
 from server.participation.intake import Intake
 from server.participation.versions import Versions
 from server.results.cache import ResultsCache
@@ -88,7 +88,7 @@ def open_services(settings: Settings, *, rehearses: bool = False) -> Services:
         passwords=PasswordWork(),
         stopping=Stopping(),
         results=ResultsCache(),
-        intake=Intake(settings, ClipBytes(clips), rehearses=rehearses),
+        intake=Intake(settings, ClipHashes(clips), rehearses=rehearses),
         resume_codes=RateLimit(RESUME_CODES_PER_MINUTE, name="resume codes", shared=shared),
         preparing=UploadPreparation(settings.upload_folder, locks),
         providers=Providers(settings),

@@ -424,7 +424,7 @@ class RunTally(Base):
     answers : str
         Packed, by scale, as JSON.
     clip_ms, newest_clip_ms : float
-        Of the answers' evidence, in ms: `server.participation.clip_bytes.ClipTime`.
+        Of the answers' evidence, in ms: `server.participation.clip_hashes.ClipTime`.
     first_issued_at, newest_issued_at, last_received_at : datetime or None
         Of the same.
     """

@@ -19,7 +19,7 @@ from pydantic import (
 )
 
 from experiments.checks import CheckName
-from experiments.declaration.clip_rating import MAX_FRAMES_LOGGED, SCALE_NAME
+from experiments.declaration.clip_rating import MAX_FRAMES_LOGGED
 from experiments.kinds import AnyAnswer
 
 # What pages measure of clips and views: bounded numbers and names.
@@ -420,10 +420,7 @@ def _count_unknown(data: Any, unknown: Set[Path]) -> None:
 
 # Decision 0501: An answer is a union over the kinds.
 class RatingIn(BaseModel):
-    """One play of one trial with its answer, whose `kind` is that of the study's trials.
-
-    Pages of before send a rating as `response`, a whole number or null.
-    """
+    """One play of one trial with its answer, whose `kind` is that of the study's trials."""
 
     trial_index: Count
     play: Annotated[int, Field(ge=1, le=100)] = 1
@@ -444,21 +441,6 @@ class RatingIn(BaseModel):
     def _whatever_was_measured(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
         """A number that no browser can have measured is unknown, and counted; the answer is stored."""
         return validate_measured(data, handler, _MEASURED, _count_unknown)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _of_an_older_page(cls, data: Any) -> Any:
-        """The answer with its kind: older pages send `response`, null beside the answer to a pair."""
-        if not isinstance(data, dict) or "response" not in data:
-            return data
-        if data.get("answer") is None:
-            rated = {SCALE_NAME: {"response": data["response"]}}
-            return {**data, "answer": {"kind": "clip_rating", "answers": rated}}
-        if data["response"] is not None:
-            raise ValueError(f"expected an answer alone, got the response {data['response']!r:.40} beside it")
-        if isinstance(data["answer"], dict):
-            return {**data, "answer": {"kind": "paired_comparison", **data["answer"]}}
-        return data
 
 
 class RefusedRecord(BaseModel):

@@ -53,7 +53,7 @@ from server.participation.run_schemas import (
     StageChange,
     Unsupported,
 )
-from server.participation.trial_list import finished_for_page, follow, next_trials
+from server.participation.trial_list import follow, next_trials
 from server.participation.versions import Versions
 
 # The participant's side of the API: links, runs, forms, events. A run's token is its only credential.
@@ -135,7 +135,7 @@ def get_run(services: ServicesDep, request: Request, token: RunToken) -> RunStat
             state = runs.run_state(
                 services.settings, services.versions, services.intake, session, token, moment
             )
-    return finished_for_page(services.database, services.versions, request, token, state)
+    return json_response(state)
 
 
 @router.put("/run/consent")
@@ -169,7 +169,7 @@ def put_form(services: ServicesDep, request: Request, token: RunToken, name: str
         answer = runs.save_form(
             services.settings, services.versions, services.intake, session, token, name, form.answers, moment
         )
-    return finished_for_page(services.database, services.versions, request, token, answer)
+    return json_response(answer)
 
 
 @router.put("/run/stage")
@@ -261,12 +261,7 @@ async def put_rating(
         saved = RatingSaved(receipt=receipt, next=following)
     else:
         saved, left_out["next"] = RatingSaved(receipt=receipt), True
-    status = 201 if is_new else 200
-    if saved.next is None:
-        return json_response(saved, status, left_out)
-    return await run_in_threadpool(
-        finished_for_page, services.database, services.versions, request, token, saved, status, left_out
-    )
+    return json_response(saved, 201 if is_new else 200, left_out)
 
 
 @rating_router.post("/run/refused", status_code=202)

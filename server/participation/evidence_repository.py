@@ -110,25 +110,6 @@ def has_refusals(session: Session, run: StudyRun) -> bool:
     return session.scalar(query.limit(1)) is not None
 
 
-def has_older_runs(session: Session, since: datetime) -> bool:
-    """Whether people's runs of before there was evidence began after `since`."""
-    people = StudyRun.origin.in_(("participant", "pilot"))
-    query = select(StudyRun.id).where(StudyRun.evidence == "none", StudyRun.started_at > since, people)
-    return session.scalar(query.limit(1)) is not None
-
-
-def awaits_views_without_tickets(session: Session, since: datetime) -> bool:
-    """Whether pages may be open that were loaded before views had tickets.
-
-    There are people's runs of such pages, and the first run of a newer page began after `since`.
-    """
-    people = select(StudyRun.id).where(StudyRun.origin.in_(("participant", "pilot"))).limit(1)
-    if session.scalar(people.where(StudyRun.view_tickets.is_(False))) is None:
-        return False
-    newer = people.where(StudyRun.view_tickets.is_(True), StudyRun.started_at <= since)
-    return session.scalar(newer) is None
-
-
 class StoredAnswer(NamedTuple):
     """An answer with its trial, whether that has a clip, and its evidence, None where it brought none.
 

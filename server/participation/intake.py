@@ -17,7 +17,7 @@ from server.core.limits import RateLimit
 from server.core.settings import Settings
 from server.participation import evidence_repository
 from server.participation.answer_schemas import RatingEvidence
-from server.participation.clip_bytes import ClipBytes, clip_digest, older_digest
+from server.participation.clip_hashes import ClipHashes, clip_digest
 from server.participation.refusals import (
     ClipsOutlastTickets,
     DigestDiffers,
@@ -201,7 +201,7 @@ class Intake:
         Set where answers may be stored whose digests could not be checked: at first, since nothing is known.
     """
 
-    def __init__(self, settings: Settings, clips: ClipBytes, *, rehearses: bool = False) -> None:
+    def __init__(self, settings: Settings, clips: ClipHashes, *, rehearses: bool = False) -> None:
         self._settings, self.clips, self.rehearses = settings, clips, rehearses
         self.refuses = settings.evidence == "refuse"
         self.unchecked = threading.Event()
@@ -300,25 +300,14 @@ class Intake:
         )
 
     def _is_right(self, answer: Answer, given: RatingEvidence) -> bool | None:
+        """Whether the digest is that of the clips; None where they are not at hand yet."""
         hashes = [self.clips.hash_at_once(sha256, size) for sha256, size in answer.clips]
         at_hand = [one for one in hashes if one is not None]
         if len(at_hand) < len(hashes):
             return None
-        right = True if clip_digest(given.ticket, *at_hand) == given.digest else self._is_older(answer, given)
-        if right is False:
+        if clip_digest(given.ticket, *at_hand) != given.digest:
             raise DigestDiffers("Expected the digest of this trial's clip, got another; nothing is stored.")
-        return right
-
-    def _is_older(self, answer: Answer, given: RatingEvidence) -> bool | None:
-        """Whether the digest is right as a page makes it that was open before the last upgrade.
-
-        None where the clips' bytes are not at hand: then nothing can be said.
-        """
-        clips = [self.clips.at_once(sha256, size) for sha256, size in answer.clips]
-        at_hand = [one for one in clips if one is not None]
-        if len(at_hand) < len(clips):
-            return None
-        return older_digest(given.ticket, b"".join(at_hand)) == given.digest
+        return True
 
 
 def _in_time(connection: Connection, answer: Answer, batch: Batch, before: ClipTime) -> bool:

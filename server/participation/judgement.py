@@ -1,12 +1,10 @@
 """The judgement on stored runs, and on digests that could not be checked at once."""
 
 import asyncio
-import hmac
 import logging
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager
-from hashlib import sha256 as by_sha256
 from itertools import groupby
 
 from sqlalchemy import Connection
@@ -21,7 +19,7 @@ from server.core.db import Database
 from server.core.values import hash_token, now
 from server.models import StudyRun
 from server.participation import evidence_repository, rating_repository
-from server.participation.clip_bytes import ClipBytes, clip_digest
+from server.participation.clip_hashes import ClipHashes, clip_digest
 from server.participation.evidence import NOT_JUDGED, JudgedAnswer, Judgement, comparable_answer, judge
 from server.participation.evidence_repository import WaitingClip
 from server.participation.intake import Intake
@@ -126,7 +124,7 @@ def judge_waiting(database: Database, intake: Intake, token: str) -> None:
         intake.unchecked.set()
 
 
-def judge_later(database: Database, clips: ClipBytes, stopped: Callable[[], bool] = lambda: False) -> int:
+def judge_later(database: Database, clips: ClipHashes, stopped: Callable[[], bool] = lambda: False) -> int:
     """Judge the digests of all runs, and those that are over anew; return how many answers stay unchecked.
 
     Parameters
@@ -140,7 +138,7 @@ def judge_later(database: Database, clips: ClipBytes, stopped: Callable[[], bool
     return sum(_judge_run_later(database, clips, run, away) for run in runs if not stopped())
 
 
-def _judge_run_later(database: Database, clips: ClipBytes, run_id: int, away: set[str]) -> int:
+def _judge_run_later(database: Database, clips: ClipHashes, run_id: int, away: set[str]) -> int:
     with database.read() as session:
         waiting = evidence_repository.waiting_of_run(session.connection(), run_id)
     judged = _judge_digests(clips, waiting, time.monotonic() + LATER_LIMIT_S, away)
@@ -171,7 +169,7 @@ def _key_of(clip: WaitingClip) -> AnswerKey:
 
 
 def _judge_digests(
-    clips: ClipBytes, waiting: Iterable[WaitingClip], limit: float, away: set[str]
+    clips: ClipHashes, waiting: Iterable[WaitingClip], limit: float, away: set[str]
 ) -> dict[AnswerKey, bool]:
     """Whether the digest of each answer is right, of those whose clips were had by `limit`.
 
@@ -201,20 +199,13 @@ def _store_judged(connection: Connection, judged: Mapping[AnswerKey, bool]) -> d
     }
 
 
-def _is_right(clips: ClipBytes, shown: Sequence[WaitingClip], limit: float) -> bool | None:
-    """Whether an answer's digest is that of its clips, also as older pages make it; None: not to be had."""
+def _is_right(clips: ClipHashes, shown: Sequence[WaitingClip], limit: float) -> bool | None:
+    """Whether an answer's digest is that of its clips; None: they are not to be had."""
     hashes = [clips.hash_now(clip.sha256, clip.bytes, limit) for clip in shown]
     at_hand = [one for one in hashes if one is not None]
     if len(at_hand) < len(hashes):
         return None
-    ticket, digest = shown[0].ticket, shown[0].digest
-    if clip_digest(ticket, *at_hand) == digest:
-        return True
-    older = hmac.new(ticket.encode(), digestmod=by_sha256)
-    for clip in shown:
-        if not clips.feed(clip.sha256, clip.bytes, older.update, limit):
-            return None
-    return older.hexdigest() == digest
+    return clip_digest(shown[0].ticket, *at_hand) == shown[0].digest
 
 
 # Digests that wait for the clip store are judged while the server runs, once the store answers again.

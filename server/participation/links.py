@@ -18,7 +18,6 @@ from server.models import NO_SLOT, Link, Study, StudyRun
 from server.participation import identity_repository as identities
 from server.participation import places, returning, run_repository
 from server.participation.current_run import checked_device, screens_devices
-from server.participation.evidence_repository import awaits_views_without_tickets, has_older_runs
 from server.participation.identity_keys import ParticipantIdentity
 from server.participation.intake import ENFORCED_ORIGINS, Intake
 from server.participation.places import assign_slot
@@ -40,11 +39,6 @@ from server.participation.run_schemas import Gates, LinkedStudy, LinkState, Orig
 from server.participation.versions import LoadedVersion, Versions
 
 RUN_PURPOSE = "run"
-OLD_PAGES_ACCEPTED = timedelta(hours=48)
-"""How long after the last run of before there was evidence a page of that time may begin another.
-
-Also: how long after the first run whose views bring tickets a page without them may.
-"""
 SEED_BITS = 53  # so that a seed survives JSON in every program
 _REFUSALS = {
     "expired": (LinkExpired, "This link has expired; please ask the person who invited you for a new one."),
@@ -230,7 +224,7 @@ def _new_run(
     token = derived_token(settings.key, RUN_PURPOSE, public_id)
     recruiter = recruiter_of(link)
     identifier = returning.settled_id(session, link, recruiter, start.query)
-    evidence = _evidence(intake, session, origin, start)
+    evidence = _evidence(intake, origin, start)
     run = StudyRun(
         public_id=public_id,
         study_id=study.id,
@@ -250,7 +244,7 @@ def _new_run(
         evidence=evidence,
         # The study's recruiter may be another one later.
         recruiter=recruiter.kind if identifier and not link.synthetic else "",
-        view_tickets=_view_tickets(session, evidence, start),
+        view_tickets=start.view_tickets or evidence == "asked",
     )
     run_repository.add_all(session, [run])
     if start.query:
@@ -265,19 +259,7 @@ def _new_run(
     return run, token
 
 
-def _evidence(
-    intake: Intake, session: Session, origin: Origin, start: RunStart
-) -> Literal["none", "older", "asked"]:
-    """Whether evidence is asked for: not from a page that was open when this server learned to ask."""
-    if start.evidence:
-        return "asked"
-    if origin not in ENFORCED_ORIGINS and not intake.rehearses:
-        return "none"
-    return "older" if has_older_runs(session, now() - OLD_PAGES_ACCEPTED) else "asked"
-
-
-def _view_tickets(session: Session, evidence: str, start: RunStart) -> bool:
-    """Whether views are to bring tickets: all do but those of a page that was open before views had any."""
-    if start.view_tickets or evidence != "asked":
-        return start.view_tickets
-    return not awaits_views_without_tickets(session, now() - OLD_PAGES_ACCEPTED)
+def _evidence(intake: Intake, origin: Origin, start: RunStart) -> Literal["none", "asked"]:
+    """Whether evidence is asked for: of people always, of others where their page brings it."""
+    enforced = origin in ENFORCED_ORIGINS or intake.rehearses
+    return "asked" if start.evidence or enforced else "none"

@@ -1,11 +1,8 @@
 """A run's trials as the page gets them, and what an answer changes of those to come."""
 
 import logging
-from collections.abc import Iterator, Mapping
 from typing import Any
 
-from fastapi import Request
-from fastapi.responses import JSONResponse
 from sqlalchemy.orm import Session
 
 from experiments.assignment.order import motion_checks_by_block
@@ -13,8 +10,6 @@ from experiments.checks import CHECK_KINDS, CheckName
 from experiments.declaration.experiment import Experiment
 from experiments.kinds import KINDS
 from server.core.db import Database
-from server.core.errors import Answer, json_response
-from server.core.storage import clip_address
 from server.models import StudyRun
 from server.participation import run_repository, series
 from server.participation.answer_schemas import NextTrials, Receipt, SeriesPosition, TrialClip, TrialInfo
@@ -157,54 +152,6 @@ def follow(database: Database, versions: Versions, token: str) -> Outlook | None
     except Exception:
         log.exception("the series of a run could not be followed; its page goes on with what it has")
         return None
-
-
-# Answers with trials, as the page that asked reads them.
-#
-# A page says that it knows where a clip is from its hash (`clips=hash` in Accept). One that was open before
-# the server learned this says nothing, and is told of each clip's address and size.
-
-KNOWS_ADDRESSES = "clips=hash"
-_OLD_PAGE_SIZE = ("width_px", "height_px", "width_mm")
-
-
-def finished_for_page(
-    database: Database,
-    versions: Versions,
-    request: Request,
-    token: str,
-    answer: Answer,
-    status: int = 200,
-    exclude: Any = None,
-) -> Answer:
-    """The answer as a response, with addresses and sizes of clips where the page does not know them."""
-    if KNOWS_ADDRESSES in request.headers.get("accept", ""):
-        return json_response(answer, status, exclude)
-    content = answer.model_dump(mode="json", exclude=exclude)
-    if trials := list(_trials(content)):
-        with database.read() as session:
-            loaded = versions.get(session, find_run(session, token).version_id)
-        clips = {clip.sha256: clip for clip in loaded.clips.values()}
-        for trial in trials:
-            _tell_all(trial, clips, loaded)
-    return JSONResponse(content, status)  # type: ignore[return-value]
-
-
-def _trials(content: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    """The trials of a run, of the run within an answer to a form, or of those that follow a rating."""
-    for told in (content, content.get("run"), content.get("next")):
-        if told:
-            yield from told.get("trials", ())
-
-
-def _tell_all(trial: dict[str, Any], clips: Mapping[str, PlacedClip], loaded: LoadedVersion) -> None:
-    first = clips.get(trial["clip_sha256"])
-    trial["clip_url"], trial["bytes"] = (clip_address(first.sha256), first.bytes) if first else (None, None)
-    for told in trial["clips"]:
-        clip = clips[told["clip_sha256"]]
-        told["clip_url"] = clip_address(clip.sha256)
-        told.update((name, getattr(clip, name)) for name in _OLD_PAGE_SIZE)
-        told["inter_ocular_px"] = loaded.inter_ocular_px
 
 
 # What the page is told of a study's motion checks: questions and choices, never an answer.

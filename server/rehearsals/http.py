@@ -17,8 +17,6 @@ from server.protocol import BoundedHttp
 
 TIMEOUT_S = 60.0
 START_TIMEOUT_S = 30.0
-ACCEPTED = "application/json;clips=hash"
-"""What the participant's page says that it reads."""
 
 
 class RefusedRequest(Exception):
@@ -80,7 +78,7 @@ class JsonClient:
 
     def send(self, method: str, path: str, body: Any = None) -> None:
         """Send a request without waiting for the answer."""
-        headers = {"accept": ACCEPTED, "content-type": "application/json", **self.headers}
+        headers = {"accept": "application/json", "content-type": "application/json", **self.headers}
         if self.token:
             headers["authorization"] = f"Bearer {self.token}"
         text = json.dumps(body) if body is not None else None

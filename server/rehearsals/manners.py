@@ -21,7 +21,7 @@ from server.core.repository import run_called
 from server.core.settings import Settings
 from server.core.storage import clip_address
 from server.core.values import now
-from server.participation.clip_bytes import clip_digest, clip_hash
+from server.participation.clip_hashes import clip_digest, clip_hash
 from server.participation.evidence import VERDICTS
 from server.participation.judgement import judge_run
 from server.rehearsals.http import JsonClient, RefusedRequest, running_server

@@ -9,7 +9,7 @@ import pytest
 from server.context import SIMULATED_TIME, Services, open_services
 from server.core.settings import Settings
 from server.core.values import now
-from server.participation.clip_bytes import clip_digest, clip_hash
+from server.participation.clip_hashes import clip_digest, clip_hash
 from tests.helpers.studies import Participant, clip_url
 
 

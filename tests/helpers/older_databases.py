@@ -1,9 +1,7 @@
 """The databases of version 0.1.0 (tests/golden/databases), loaded into either kind of database."""
 
 import gzip
-import json
 from pathlib import Path
-from typing import Any
 
 import psycopg
 from sqlalchemy.engine import make_url
@@ -36,12 +34,6 @@ def opened(url: str) -> Database:
 def older_ratings_csv(study: str) -> bytes:
     """The ratings of a study as that program exported them."""
     return _golden(f"{study}.ratings.csv.gz")
-
-
-def older_requests() -> dict[str, list[dict[str, Any]]]:
-    """What that program's page sent: `before` the copy, `after` it, and its `outbox`."""
-    requests: dict[str, list[dict[str, Any]]] = json.loads(_golden("requests.json.gz"))
-    return requests
 
 
 def _golden(name: str) -> bytes:

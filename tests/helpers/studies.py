@@ -11,13 +11,13 @@ from fastapi import FastAPI
 from fastapi.testclient import TestClient
 from starlette.testclient import TestClient as StarletteClient
 
+from experiments.declaration.clip_rating import SCALE_NAME
 from experiments.declaration.experiment import Experiment
 from experiments.load import parse_experiment
 from server.app import create_app
 from server.context import Services
 from server.core.values import derived_token
 from server.models import Link, Study
-from server.rehearsals.http import ACCEPTED
 from server.studies.creation import add_version, create_study, store_clips
 from server.studies.links import PURPOSE, LinkKind, create_link
 from tests.helpers.tiny_clips import make_clip_folder
@@ -148,7 +148,6 @@ class Participant:
     def __init__(self, client: StarletteClient, link: str) -> None:
         self.client, self.link = client, link
         self.client_id = str(uuid.uuid4())
-        self.accepted = ACCEPTED
         self.token = ""
         self.run_id = ""
 
@@ -161,8 +160,8 @@ class Participant:
         return response
 
     def request(self, method: str, path: str, body: Any = None) -> Any:
-        """A request with the run token, which says as the page does what it reads."""
-        headers = {"authorization": f"Bearer {self.token}", "accept": self.accepted}
+        """A request with the run token."""
+        headers = {"authorization": f"Bearer {self.token}", "accept": "application/json"}
         return self.client.request(method, f"/api/run{path}", json=body, headers=headers)
 
     def state(self) -> Any:
@@ -180,7 +179,7 @@ class Participant:
     ) -> Any:
         """Send one rating; `changes` replace parts of the body, `playback` those of the play."""
         playback = {**good_playback(trial), **changes.pop("playback", {})}
-        body = {"trial_index": trial["trial_index"], "play": 1, "response": response, "rt": 700.5}
+        body = {"trial_index": trial["trial_index"], "play": 1, "answer": rated(response), "rt": 700.5}
         body |= {"time_elapsed": 1000.0 * (trial["trial_index"] + 1), "playback": playback} | changes
         return self.request("PUT", f"/ratings/{rating_id or uuid.uuid4()}", body)
 
@@ -201,6 +200,11 @@ class Participant:
                     int(word) for word in (trial["prompt"] or "").replace("*", " ").split() if word.isdigit()
                 ]
                 assert self.rate(trial, *asked[:1]).status_code == 201
+
+
+def rated(response: float | None) -> dict[str, Any]:
+    """The answer to a trial with one scale."""
+    return {"kind": "clip_rating", "answers": {SCALE_NAME: {"response": response}}}
 
 
 def clip_url(trial: Any) -> str:

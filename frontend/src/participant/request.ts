@@ -34,8 +34,7 @@ export interface RequestOptions {
 }
 
 export async function request(method: string, path: string, options: RequestOptions = {}): Promise<Answer> {
-  // The server tells a page that does not say so where each clip is.
-  const headers: Record<string, string> = { Accept: "application/json;clips=hash" };
+  const headers: Record<string, string> = { Accept: "application/json" };
   if (options.token) headers["Authorization"] = `Bearer ${options.token}`;
   if (options.body !== undefined) headers["Content-Type"] = "application/json";
   const init: RequestInit = { method, headers, cache: "no-store", signal: AbortSignal.timeout(options.timeout_ms ?? 10_000) };

@@ -6,17 +6,16 @@ from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
-from sqlalchemy import select, text
+from sqlalchemy import select
 
 from server.context import Services
 from server.core.values import now
 from server.models import AnswerEvidence, RunEvent, StudyRun
-from server.participation.clip_bytes import older_digest
 from server.participation.evidence_repository import has_refusals
 from server.participation.intake import FALSE_ANSWERS_PER_MINUTE
 from server.participation.judgement import judge_run
 from tests.helpers.evidence import Watcher
-from tests.helpers.studies import Participant, StudyInDatabase, clip_url
+from tests.helpers.studies import StudyInDatabase
 from tests.server.evidence.conftest import CLIP_S
 
 SHOWN_S = CLIP_S + 1.0
@@ -151,14 +150,6 @@ def test_a_digest_of_another_clip_or_none_is_refused(watcher: Watcher) -> None:
     assert watcher.answer(first).status_code == 201
 
 
-def test_a_page_from_before_an_upgrade_is_taken_with_the_digest_of_the_bytes(watcher: Watcher) -> None:
-    trial = with_clips(watcher.state())[0]
-    watcher.wait(SHOWN_S)
-    given = watcher.evidence(trial)
-    given["digest"] = older_digest(given["ticket"], watcher.client.get(clip_url(trial)).content)
-    assert watcher.answer(trial, given).status_code == 201
-
-
 def test_tickets_of_another_run_and_tampered_ones_are_refused(
     watcher: Watcher, client: TestClient, study: StudyInDatabase
 ) -> None:
@@ -185,18 +176,6 @@ def test_false_answers_are_limited_without_touching_others(
     trials = with_clips(other.state())
     other.wait(SHOWN_S)
     assert other.answer(trials[0]).status_code == 201
-
-
-def test_a_page_from_before_the_upgrade_begins_without_evidence(
-    client: TestClient, study: StudyInDatabase, services: Services
-) -> None:
-    assert Participant(client, study.link_token).start().status_code == 201
-    with services.database.write() as session:
-        session.execute(text("UPDATE study_runs SET evidence = 'none'"))
-    page = Participant(client, study.link_token).agree()
-    assert all(page.rate(trial).status_code == 201 for trial in page.state()["trials"])
-    assert page.state()["tickets"] is None
-    assert rows(services) == []
 
 
 def begun(watcher: Watcher, trial: Any) -> dict[str, Any]:

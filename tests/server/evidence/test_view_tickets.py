@@ -10,12 +10,9 @@ from fastapi.testclient import TestClient
 from sqlalchemy import select
 
 from server.context import Services
-from server.core.values import now
 from server.models import Clip, RunEvent, StudyRun, View
 from server.participation import evidence_repository
 from server.participation.evidence_repository import ANSWER, VIEW, has_refusals
-from server.participation.intake import FALSE_ANSWERS_PER_MINUTE
-from server.participation.judgement import judge_run
 from tests.helpers.evidence import Watcher
 from tests.helpers.studies import StudyInDatabase
 from tests.server.evidence.conftest import CLIP_S
@@ -290,71 +287,7 @@ def test_a_view_that_a_reload_broke_off_ends_by_the_new_tickets(watcher: Watcher
     assert [row.clip_ms for row in stored(services)] == [None]
 
 
-def past_run(
-    client: TestClient,
-    study: StudyInDatabase,
-    services: Services,
-    hours: float,
-    *,
-    view_tickets: bool = False,
-) -> str:
-    """The public id of a run that began so long ago."""
-    run_id = Watcher(client, study.link_token).begin(view_tickets=True).run_id
-    with services.database.write() as session:
-        run = session.query(StudyRun).filter_by(public_id=run_id).one()
-        run.view_tickets, run.started_at = view_tickets, now() - timedelta(hours=hours)
-    return run_id
-
-
-@pytest.mark.parametrize(
-    ("older", "newer", "told"),
-    [(False, None, "422 ticket_missing"), (True, None, ""), (True, 47, ""), (True, 49, "422 ticket_missing")],
-    ids=["none was open", "no newer page yet", "within two days", "later"],
-)
-def test_pages_without_tickets_for_views_are_taken_for_two_days_after_an_upgrade(
-    client: TestClient,
-    study: StudyInDatabase,
-    services: Services,
-    older: bool,
-    newer: float | None,
-    told: str,
-) -> None:
-    if older:
-        past_run(client, study, services, hours=100)
-    if newer is not None:
-        past_run(client, study, services, newer, view_tickets=True)
+def test_a_view_without_a_ticket_is_refused(client: TestClient, study: StudyInDatabase) -> None:
     page = Watcher(client, study.link_token).begin()
     answer = send(page, view_of(page, with_clips(page.state())[0], evidence=None))
-    assert (code(answer) if told else answer.status_code) == (told or 200)
-
-
-def test_a_page_from_before_the_upgrade_sends_views_without_tickets(
-    client: TestClient, study: StudyInDatabase, services: Services
-) -> None:
-    """Its answers bring tickets, its views do not: all are taken, and the run is judged by its answers."""
-    before = past_run(client, study, services, hours=1)
-    page = Watcher(client, study.link_token).begin()
-    for trial in page.state()["trials"]:
-        if trial["clip_sha256"]:
-            view = view_of(page, trial)
-            del view["evidence"]
-            assert send(page, view).status_code == 200
-        page.wait(SHOWN_S)
-        assert page.answer(trial).status_code == 201
-    assert {view.issued_at for view in stored(services)} == {None}
-    with services.database.read() as session:
-        [run] = session.scalars(select(StudyRun).where(StudyRun.public_id != before))
-        assert not run.view_tickets
-        assert not has_refusals(session, run)
-        assert judge_run(session, run).signals.tickets == 1
-
-
-def test_false_views_are_limited_without_touching_others(
-    watcher: Watcher, client: TestClient, study: StudyInDatabase
-) -> None:
-    trial = with_clips(watcher.state())[0]
-    false = view_of(watcher, trial, evidence=None)
-    answers = [code(send(watcher, false)) for _ in range(2 * FALSE_ANSWERS_PER_MINUTE)]
-    assert set(answers) == {"422 ticket_missing", "429 too_many_requests"}
-    other = Watcher(client, study.link_token).begin(view_tickets=True)
-    assert send(other, view_of(other, with_clips(other.state())[0])).status_code == 200
+    assert code(answer) == "422 ticket_missing"

@@ -10,7 +10,7 @@ from fastapi.testclient import TestClient
 from experiments.load import locate
 from server.context import Services
 from tests.helpers.admins import Admin
-from tests.helpers.studies import Participant, StudyInDatabase, add_study
+from tests.helpers.studies import Participant, StudyInDatabase, add_study, rated
 
 
 def take_part(person: Participant, cannot_show: Collection[str], trials: int = 99) -> list[str]:
@@ -34,7 +34,7 @@ def unplayed(person: Participant, trial: Any, play: int = 1) -> None:
     event |= {"data": {"clip_sha256": trial["clip_sha256"], "reason": "Decoding error"}}
     assert person.request("POST", "/events", {"events": [event]}).status_code < 300
     none = {"method": "none", "clip_sha256": None, "drawn": None}
-    body = {"trial_index": trial["trial_index"], "play": play, "response": None, "rt": None, "playback": none}
+    body = {"trial_index": trial["trial_index"], "play": play, "answer": rated(None), "playback": none}
     stored = person.request("PUT", f"/ratings/{uuid.uuid4()}", body)
     assert stored.status_code == 201, stored.text
 

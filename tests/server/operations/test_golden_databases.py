@@ -5,20 +5,27 @@ import gzip
 import io
 import json
 import sqlite3
+import uuid
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
+from sqlalchemy import select
 
 from server.accounts.identity import OPERATOR
 from server.app import create_app
 from server.context import Services, open_services
 from server.core.migrate import current_revision, newest_revision, upgrade
 from server.core.settings import Settings
+from server.core.values import derived_token
 from server.exports.formats import FORMATS
 from server.exports.schemas import Extract
+from server.models import Rating, Study, StudyRun
 from server.operations.restore import restore
+from server.participation import returning
+from server.participation.links import RUN_PURPOSE
 from server.studies.lookup import find_study
 from tests.helpers.admins import signed_in
 from tests.helpers.databases import BACKENDS
@@ -31,6 +38,7 @@ from tests.helpers.golden_databases import (
     golden_ratings,
     load_golden_database,
 )
+from tests.helpers.studies import Participant
 
 both = pytest.mark.parametrize("empty_database_url", BACKENDS, indirect=True)
 each = pytest.mark.parametrize("revision", REVISIONS)
@@ -126,3 +134,35 @@ def test_every_visit_opens_on_its_page(revision: str, tmp_path: Path) -> None:
     services.database.close()
     assert len(statuses) > 60
     assert {path: status for path, status in statuses.items() if status >= 500} == {}
+
+
+@each
+def test_a_page_left_open_over_the_upgrade_delivers_its_outbox(
+    revision: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of the visit left half-way: what was kept is stored, once."""
+    url = f"sqlite:///{tmp_path / 'golden.sqlite'}"
+    load_golden_database(revision, url)
+    services = opened(url, tmp_path)
+    upgrade(services.database)
+    of_run = select(StudyRun).join(Study).where(Study.name == "short", StudyRun.status == "active")
+    with services.database.read() as session:
+        run = session.scalars(of_run.where(StudyRun.consented_at.is_not(None))).one()
+        arrived = session.scalars(select(Rating).where(Rating.study_run_id == run.id)).all()
+        token, left_at = derived_token(services.settings.key, RUN_PURPOSE, run.public_id), run.last_seen_at
+    # The files are of a fixed day, and a visit may be taken up again for 72 hours: it is still that day.
+    monkeypatch.setattr(returning, "now", lambda: left_at + timedelta(hours=1))
+    with TestClient(create_app(services.settings)) as client:
+        page = Participant(client, "")
+        page.token = token
+        kept = {str(uuid.uuid4()): trial for trial in page.state()["trials"] if not trial["answered"]}
+        for status in (201, 200):
+            for name, trial in kept.items():
+                assert page.rate(trial, rating_id=name, play=trial["plays_done"] + 1).status_code == status
+        event = {"id": str(uuid.uuid4()), "type": "online", "data": {}}
+        assert page.request("POST", "/events", {"events": [event]}).status_code == 200
+        assert all(trial["answered"] for trial in page.state()["trials"])
+    with services.database.read() as session:
+        stored = session.scalars(select(Rating).where(Rating.study_run_id == run.id)).all()
+        assert len(stored) == len(arrived) + len(kept) > len(arrived)
+    services.database.close()

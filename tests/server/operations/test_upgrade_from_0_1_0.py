@@ -1,28 +1,21 @@
-"""What version 0.1.0 (commit c84c2e8) stored, exported and sent, under the program of today."""
+"""What version 0.1.0 (commit c84c2e8) stored and exported, under the program of today."""
 
 import csv
 import io
-import json
 import re
 from collections.abc import Iterator
-from datetime import timedelta
 from pathlib import Path
-from typing import Any
 
 import pytest
-from fastapi.testclient import TestClient
-from sqlalchemy import select, text
+from sqlalchemy import text
 from sqlalchemy.exc import DBAPIError
 
 from server.accounts.identity import OPERATOR
-from server.app import create_app
 from server.context import Services, open_services
 from server.core.migrate import current_revision, downgrade, newest_revision, upgrade
 from server.core.settings import Settings
 from server.exports.formats import FORMATS
 from server.exports.schemas import Extract
-from server.models import StudyRun
-from server.participation import returning
 from server.studies.lookup import find_study
 from tests.helpers.databases import BACKENDS
 from tests.helpers.older_databases import (
@@ -30,7 +23,6 @@ from tests.helpers.older_databases import (
     STUDIES,
     load_older_database,
     older_ratings_csv,
-    older_requests,
 )
 
 both = pytest.mark.parametrize("empty_database_url", BACKENDS, indirect=True)
@@ -96,59 +88,6 @@ def raw_names(exported: bytes, older: bytes) -> tuple[bytes, dict[str, set[str]]
     stream = io.StringIO()
     csv.writer(stream, lineterminator="\n").writerows(tables[0])
     return stream.getvalue().encode(), pseudonyms
-
-
-def send(client: TestClient, item: dict[str, Any], body: Any) -> Any:
-    headers = item.get("headers") or {"authorization": f"Bearer {item['token']}"}
-    return client.request(item["method"], item["path"], json=body, headers=headers)
-
-
-@both
-def test_a_page_left_open_over_the_upgrade_loses_nothing(migrated: Services) -> None:
-    requests = older_requests()
-    count = text("SELECT count(*) FROM ratings WHERE study = 'browser'")
-    with TestClient(create_app(migrated.settings)) as client:
-        for item in requests["before"]:
-            if "/ratings/" in item["path"]:  # acknowledged before the upgrade, and sent once more
-                again = send(client, item, json.loads(item["body"]))
-                assert again.status_code == 200
-                older, found = json.loads(item["answer"])["receipt"], again.json()["receipt"]
-                same = ("rating_id", "saved_at", "verdict", "rule", "again", "status")
-                assert {name: found[name] for name in same} == {name: older[name] for name in same}
-        for item in requests["after"]:
-            answer = send(client, item, json.loads(item["body"]))
-            assert answer.status_code == item["status"], answer.text
-            older, found = json.loads(item["answer"])["receipt"], answer.json()["receipt"]
-            if "verdict" in older:  # that page did not tell how evenly its clock ran
-                older |= {"verdict": "uncertain", "rule": "no_clock_record"}
-            assert found == older | {"saved_at": found["saved_at"]}
-        for item in requests["outbox"]:
-            body = {"events": [item["body"]]} if item["kind"] == "event" else item["body"]
-            assert send(client, item, body).status_code in (200, 201)
-    with migrated.database.read() as session:
-        assert session.scalar(count) == 2 + 2 + 1
-
-
-@both
-def test_a_page_left_open_over_the_upgrade_is_told_of_its_clips(
-    migrated: Services, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Its trials hold all that they held: that page reads the address of a clip, and reckons none."""
-    item = older_requests()["before"][0]
-    assert (item["method"], item["path"]) == ("GET", "/api/run")
-    with migrated.database.read() as session:
-        begun = session.scalars(select(StudyRun.started_at)).all()
-    # The copy is of a fixed day, and a visit may be taken up again for 72 hours: it is still that day.
-    monkeypatch.setattr(returning, "now", lambda: max(begun) + timedelta(hours=1))
-    with TestClient(create_app(migrated.settings)) as client:
-        answer = send(client, item, None)
-    assert answer.status_code == 200, answer.text
-    of_answers = ("plays_done", "plays_wanted", "answered")
-    older, told = json.loads(item["answer"])["trials"], answer.json()["trials"]
-    assert len(older) == len(told) == 7
-    for before, trial in zip(older, told, strict=True):
-        shown = {name: value for name, value in before.items() if name not in of_answers}
-        assert {name: trial[name] for name in shown} == shown
 
 
 @both

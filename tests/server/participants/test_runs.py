@@ -50,20 +50,6 @@ def test_clips_are_where_the_page_is_told(client: TestClient, participant: Parti
     assert hashlib.sha256(content).hexdigest() == trial["clip_sha256"]
 
 
-def test_a_page_of_before_addresses_followed_from_hashes_gets_its_clips(
-    client: TestClient, participant: Participant
-) -> None:
-    """It was open over the upgrade, and says what a browser says by itself."""
-    participant.agree().accepted = "application/json"
-    for trial in participant.state()["trials"]:
-        assert bool(trial["clips"]) == bool(trial["clip_url"])
-        for clip in trial["clips"]:
-            content = client.get(clip["clip_url"]).content
-            assert hashlib.sha256(content).hexdigest() == clip["clip_sha256"]
-            assert (clip["width_px"], clip["inter_ocular_px"]) == (trial["width_px"], 128)
-            assert (trial["clip_url"], trial["bytes"]) == (clip["clip_url"], len(content))
-
-
 def test_the_answer_to_a_start_is_short(participant: Participant) -> None:
     """It grows with each trial: 166 of them are 91 KB, 16 KB gzipped."""
     trials = participant.agree().state()["trials"]

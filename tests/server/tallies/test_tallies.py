@@ -19,7 +19,7 @@ from server.participation.tallies import Play, Tally, TallyEntry, tally_of, unpa
 from server.participation.tally_pools import Recount
 from tests.helpers.admins import Admin
 from tests.helpers.databases import run_server_command
-from tests.helpers.studies import Participant, good_playback
+from tests.helpers.studies import Participant, good_playback, rated
 
 small = st.integers(0, 2**18 - 1)
 values = st.integers(-100_000, 134_217_000).map(lambda units: units / 1000)
@@ -127,7 +127,7 @@ def test_ratings_of_one_run_at_once_are_all_counted(participant: Participant, se
     trials = [trial for trial in participant.agree().state()["trials"] if trial["kind"] != "attention"]
 
     def save(trial: Any) -> None:
-        body = {"trial_index": trial["trial_index"], "response": 4, "playback": good_playback(trial)}
+        body = {"trial_index": trial["trial_index"], "answer": rated(4), "playback": good_playback(trial)}
         rating = RatingIn.model_validate(body)
         with services.database.write_connection() as connection:
             _save(services, connection, participant.token, rating)

@@ -106,16 +106,6 @@ def test_the_same_again_is_stored_once_and_another_answer_refused(judge: Partici
     assert codes == [201, 200, 409]
 
 
-def test_an_answer_of_a_page_from_before_kinds_is_stored_once(judge: Participant, services: Services) -> None:
-    trial, name = mains(judge)[0], str(uuid.uuid4())
-    older = {"response": None, "answer": {"winner": "left", "arrangement": "side_by_side"}}
-    first = compare(judge, trial, None, name, **older)
-    assert first.status_code == 201, first.text
-    assert compare(judge, trial, "left", name).status_code == 200
-    (row,) = stored(services)
-    assert (row["winner"], row["arrangement"]) == ("left", "side_by_side")
-
-
 @pytest.mark.parametrize(
     ("changes", "code"),
     [
@@ -124,8 +114,6 @@ def test_an_answer_of_a_page_from_before_kinds_is_stored_once(judge: Participant
         ({"answer": {**LEFT, "more": "x"}}, "invalid"),
         ({"answer": None}, "invalid"),
         ({"answer": {**LEFT, "kind": "no_such_kind"}}, "invalid"),
-        ({"response": 3}, "invalid"),
-        ({"answer": None, "response": 3}, "answer_of_other_kind"),
         ({"answer": {"kind": "clip_rating", "answers": {"x": {"response": 3}}}}, "answer_of_other_kind"),
     ],
 )

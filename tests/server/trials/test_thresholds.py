@@ -87,14 +87,6 @@ def test_an_answer_chooses_the_next_trials_of_its_series(observer: Participant, 
     assert row["threshold_sd"] > 0
 
 
-def test_a_page_open_over_the_upgrade_is_told_where_the_next_clips_are(observer: Participant) -> None:
-    observer.accepted = "*/*"
-    following = answer(observer, of_series(observer.state(), 0)[0], "yes").json()["next"]["trials"]
-    addresses = [[f"/clips/{clip['clip_sha256']}.mp4" for clip in trial["clips"]] for trial in following]
-    assert [[clip["clip_url"] for clip in trial["clips"]] for trial in following] == addresses
-    assert all(addresses)
-
-
 def test_yes_leads_to_lower_stimuli_than_no(client: TestClient, study: StudyInDatabase) -> None:
     values = {}
     for chosen in ("yes", "no"):

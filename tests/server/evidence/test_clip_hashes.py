@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from server.participation.clip_bytes import ClipBytes, clip_hash
+from server.participation.clip_hashes import ClipHashes, clip_hash
 
 CLIPS = {f"{number:064x}": bytes([number]) * 1000 for number in range(30)}
 
@@ -28,14 +28,14 @@ def far() -> FarStore:
 
 
 @pytest.fixture
-def clips(far: FarStore) -> Iterator[ClipBytes]:
-    opened = ClipBytes(far)  # type: ignore[arg-type]
+def clips(far: FarStore) -> Iterator[ClipHashes]:
+    opened = ClipHashes(far)  # type: ignore[arg-type]
     yield opened
     opened.close()
 
 
 def test_all_clips_of_a_version_are_hashed_once_when_tickets_are_issued(
-    far: FarStore, clips: ClipBytes
+    far: FarStore, clips: ClipHashes
 ) -> None:
     sizes = [(sha256, len(clip)) for sha256, clip in CLIPS.items()]
     for _ in range(3):
@@ -52,23 +52,7 @@ def test_all_clips_of_a_version_are_hashed_once_when_tickets_are_issued(
     assert set(far.reads.values()) == {1}
 
 
-def test_a_clip_that_comes_while_it_is_asked_for_is_read_once(
-    far: FarStore, clips: ClipBytes, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    sha256, looked = next(iter(CLIPS)), clips._in_memory
-
-    def look_too_early(wanted: str) -> bytes | None:
-        before = looked(wanted)
-        clips._read(wanted, 1000)
-        return before
-
-    monkeypatch.setattr(clips, "_in_memory", look_too_early)
-    assert clips.at_once(sha256, 1000) == CLIPS[sha256]
-    assert clips._fetching == set()
-    assert far.reads[sha256] == 1
-
-
-def test_a_clip_that_is_not_prepared_is_on_its_way_after_the_first_question(clips: ClipBytes) -> None:
+def test_a_clip_that_is_not_prepared_is_on_its_way_after_the_first_question(clips: ClipHashes) -> None:
     sha256 = next(iter(CLIPS))
     assert clips.hash_at_once(sha256, 1000) is None
     limit = time.monotonic() + 30
@@ -77,23 +61,16 @@ def test_a_clip_that_is_not_prepared_is_on_its_way_after_the_first_question(clip
     assert clips.hash_at_once(sha256, 1000) == clip_hash(CLIPS[sha256])
 
 
-def test_a_large_clip_is_hashed_in_pieces_and_not_kept(
-    far: FarStore, clips: ClipBytes, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("server.participation.clip_bytes.MAX_CLIP_BYTES", 999)
+def test_a_clip_is_read_once(far: FarStore, clips: ClipHashes) -> None:
     sha256, limit = next(iter(CLIPS)), time.monotonic() + 30
     clips.prepare(1, [(sha256, 1000)])
     while clips.hash_at_once(sha256, 1000) is None and time.monotonic() < limit:
         time.sleep(0.01)
     assert clips.hash_at_once(sha256, 1000) == clip_hash(CLIPS[sha256])
-    assert clips.at_once(sha256, 1000) is None
     assert far.reads == {sha256: 1}
 
 
-def test_a_clip_cut_off_by_its_store_has_no_hash(
-    far: FarStore, clips: ClipBytes, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("server.participation.clip_bytes.MAX_CLIP_BYTES", 999)
+def test_a_clip_cut_off_by_its_store_has_no_hash(far: FarStore, clips: ClipHashes) -> None:
     sha256 = next(iter(CLIPS))
     clips.prepare(1, [(sha256, 1001)])
     clips.close()
@@ -110,6 +87,6 @@ def test_a_clip_is_read_until_the_limit_and_no_longer() -> None:
             while True:
                 yield b"0"
 
-    clips = ClipBytes(EndlessStore())  # type: ignore[arg-type]
+    clips = ClipHashes(EndlessStore())  # type: ignore[arg-type]
     assert clips.hash_now("0" * 64, 1000, time.monotonic() + 0.05) is None
     clips.close()
