@@ -74,7 +74,7 @@ def otree(count: int) -> Iterator[OTree]:
     _install()
     with tempfile.TemporaryDirectory(prefix="palpebra-otree-") as name:
         folder, port = Path(name), free_port()
-        _project(folder)
+        write_project(folder)
         path = f"{ENVIRONMENT / 'bin'}{os.pathsep}{os.environ['PATH']}"
         environment = {**os.environ, "OTREE_PRODUCTION": "1", "PATH": path}
         program = str(ENVIRONMENT / "bin" / "otree")
@@ -108,7 +108,8 @@ def _install() -> None:
         raise UnavailableError(f"oTree {VERSION} does not install here: {said[:90]}") from error
 
 
-def _project(folder: Path) -> None:
+def write_project(folder: Path) -> None:
+    """Write the files of a study with one rating per page."""
     for name in ("_static", "_templates", "ratings"):
         (folder / name).mkdir()
     (folder / "settings.py").write_text(SETTINGS)
