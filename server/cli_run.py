@@ -19,6 +19,7 @@ from server.cli_common import migrated_services, out
 from server.context import Services
 from server.core.logs import logging_configuration
 from server.core.settings import Settings, close_to_others, note_address
+from server.operations.doctor import late_entry
 from server.operations.metrics import MULTIPROCESS_VARIABLE
 from server.privacy.ledger import begin_ledger
 from server.protocol import BoundedHttp
@@ -61,6 +62,7 @@ def run(
     settings = Settings()
     note_address(settings)
     with migrated_services(settings) as services:
+        _check_clock(services)
         close_to_others(settings)
         begin_ledger(settings)
         services.settings.key  # noqa: B018 - made now, once, before workers ask for it
@@ -126,6 +128,12 @@ def _check_free(host: str, port: int) -> None:
         f"cannot listen on {host}:{port} ({reason}); "
         "choose another port with --port (with make: PORT=8001 make run)"
     ) from error
+
+
+def _check_clock(services: Services) -> None:
+    late = late_entry(services)
+    if late and not services.settings.ignore_clock:
+        raise InputError(f"{late}; set the clock (if that entry is wrong: PALPEBRA_IGNORE_CLOCK=true)")
 
 
 class StudyLink(NamedTuple):

@@ -315,6 +315,10 @@ class Settings(BaseSettings):
         default=24.0, gt=0, description="Hours until the answers of a preview are deleted."
     )
     session_hours: float = Field(default=12.0, gt=0, description="Hours an experimenter stays signed in.")
+    ignore_clock: bool = Field(
+        default=False,
+        description="Start although the clock of this machine is behind entries of the database.",
+    )
     session_idle_minutes: float = Field(
         default=120.0,
         gt=0,

@@ -202,6 +202,26 @@ def python(_services: Services) -> Iterator[Finding]:
     )
 
 
+def late_entry(services: Services) -> str | None:
+    """How far the machine's clock is behind the database; None if it is not.
+
+    An hour is allowed: clocks are set forward and back by less than that.
+    """
+    with services.database.read() as session:
+        newest = repository.newest_entry(session)
+    if newest is None or newest <= now() + timedelta(hours=1):
+        return None
+    shown, stored = f"{now():%Y-%m-%d %H:%M}", f"{newest:%Y-%m-%d %H:%M}"
+    return f"the clock of this machine shows {shown} UTC, but the newest entry of the database is from {stored} UTC"
+
+
+def clock(services: Services) -> Iterator[Finding]:
+    """The clock is not behind what was stored, else times and their order would be wrong."""
+    late = late_entry(services)
+    advice = "set the clock" if late else ""
+    yield Finding("clock", "failed" if late else "ok", late or "not behind the database", advice)
+
+
 def data_folder(services: Services) -> Iterator[Finding]:
     """The data folder can be written and has room, and so can the one that hosts share."""
     yield from _folder("data folder", services.settings.data_folder, "PALPEBRA_DATA_FOLDER")
@@ -422,6 +442,7 @@ def tokens(services: Services) -> Iterator[Finding]:
 
 CHECKS: tuple[Callable[[Services], Iterator[Finding]], ...] = (
     python,
+    clock,
     data_folder,
     file_modes,
     secret_key,

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 from sqlalchemy import Connection, Engine, func, or_, select, text
 from sqlalchemy.orm import Session
 
-from server.models import Account, ApiToken, Clip, Link, Study, StudyRun
+from server.models import Account, ApiToken, AuditEntry, Clip, Link, Study, StudyRun
 
 
 class RunCount(NamedTuple):
@@ -101,3 +101,8 @@ def session_is_kept(engine: Engine) -> bool:
         first.commit()
         second.scalar(process)
         return bool(first.scalar(process) == before)
+
+
+def newest_entry(session: Session) -> datetime | None:
+    """Time of the newest entry of the audit log; None if it is empty."""
+    return session.scalar(select(func.max(AuditEntry.at)))

@@ -12,9 +12,12 @@ from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 from server.app import create_app
 from server.context import Services, open_services
 from server.core.settings import Settings, close_to_others
+from server.core.values import now
+from server.models import AuditEntry
 from server.operations.doctor import CHECKS, Finding, examine, ledger
 from server.privacy.ledger import erasures_in_ledger, ledger_path, note_erased
 from tests.helpers.databases import run_server_command
+from tests.helpers.ports import free_port
 from tests.helpers.studies import StudyInDatabase
 
 
@@ -162,3 +165,15 @@ def request_through(
     services.settings.data_folder.mkdir(exist_ok=True)
     app = ProxyHeadersMiddleware(create_app(services.settings), list(named))
     assert TestClient(app, client=peer).get("/healthz", headers=headers).status_code == 200
+
+
+def test_clock_behind_the_database_stops_the_start(services: Services, study: StudyInDatabase) -> None:
+    with services.database.write() as session:
+        session.add(AuditEntry(actor="clock", action="test", at=now() + timedelta(days=2)))
+    found = by_subject(services)["clock"]
+    assert found.verdict == "failed"
+    assert "but the newest entry of the database is from" in found.state
+    done = run_server_command(services.settings, "run", "--port", str(free_port()))
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: the clock of this machine shows ")
+    assert done.stderr.endswith("set the clock (if that entry is wrong: PALPEBRA_IGNORE_CLOCK=true)\n")
