@@ -212,7 +212,10 @@ def late_entry(services: Services) -> str | None:
     if newest is None or newest <= now() + timedelta(hours=1):
         return None
     shown, stored = f"{now():%Y-%m-%d %H:%M}", f"{newest:%Y-%m-%d %H:%M}"
-    return f"the clock of this machine shows {shown} UTC, but the newest entry of the database is from {stored} UTC"
+    return (
+        f"the clock of this machine shows {shown} UTC, "
+        f"but the newest entry of the database is from {stored} UTC"
+    )
 
 
 def clock(services: Services) -> Iterator[Finding]:
