@@ -1,4 +1,4 @@
-"""Rank tests of one factor: Friedman, Wilcoxon, Kruskal-Wallis, Mann-Whitney and Dunn."""
+"""Rank tests of one factor, or against a value."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -16,6 +16,8 @@ Floats = NDArray[np.float64]
 DRAWS = 2000
 """Draws of participants for the interval of an effect size."""
 SEED = 53
+Bounds = tuple[float, float] | None
+Side = Literal["two-sided", "greater", "less"]
 EXACT_MAX = 50
 """Without ties the exact distribution is used below this many participants, as in R."""
 
@@ -64,6 +66,10 @@ class RankPair:
         95% percentile interval over resampled participants.
     dunn_z, dunn_p_holm : float or None
         Dunn's z on the ranks of all levels, and its p; None within participants.
+    conover_t, conover_p_holm : float or None
+        Conover's t on the ranks of all levels, and its p; None of one sample, and where ranks leave no error.
+    p_equivalence : float or None
+        The greater of two one-sided p values of the same test against the bounds, where bounds are given.
     """
 
     first: str
@@ -79,25 +85,28 @@ class RankPair:
     r_high: float
     dunn_z: float | None = None
     dunn_p_holm: float | None = None
+    conover_t: float | None = None
+    conover_p_holm: float | None = None
+    p_equivalence: float | None = None
 
 
 @dataclass(frozen=True)
 class RankAnalysis:
     """Everything `analysis ranks` knows of a table."""
 
-    factor: str
-    design: Literal["within", "between"]
+    factor: str | None
+    design: Literal["within", "between", "against"]
     levels: tuple[str, ...]
     medians: tuple[float, ...]
     mean_ranks: tuple[float, ...]
     n: tuple[int, ...]
-    test: RankTest
+    test: RankTest | None
     pairs: tuple[RankPair, ...]
-    dropped: tuple[str, ...] = field(default=())
+    equivalence_bounds: Bounds = None
     decisions: tuple[str, ...] = field(default=())
 
 
-def rank_within(factor: str, levels: Sequence[str], values: Floats) -> RankAnalysis:
+def rank_within(factor: str, levels: Sequence[str], values: Floats, bounds: Bounds = None) -> RankAnalysis:
     """Friedman's test and Wilcoxon's signed-rank test of each pair.
 
     Parameters
@@ -107,6 +116,8 @@ def rank_within(factor: str, levels: Sequence[str], values: Floats) -> RankAnaly
         Names of the columns of `values`.
     values : ndarray
         (participants, levels).
+    bounds : (float, float), optional
+        Bounds of equivalence of each difference.
 
     Raises
     ------
@@ -121,7 +132,7 @@ def rank_within(factor: str, levels: Sequence[str], values: Floats) -> RankAnaly
     ranks = np.apply_along_axis(stats.rankdata, 1, values)
     test = RankTest("Friedman", *_friedman(ranks), *_kendall_w(ranks))
     pairs = [
-        _signed_ranks(levels[a], levels[b], values[:, a] - values[:, b])
+        _signed_ranks(levels[a], levels[b], values[:, a] - values[:, b], bounds)
         for a, b in combinations(range(count), 2)
     ]
     return RankAnalysis(
@@ -132,11 +143,53 @@ def rank_within(factor: str, levels: Sequence[str], values: Floats) -> RankAnaly
         _plain(ranks.mean(axis=0)),
         (people,) * count,
         test,
-        _corrected(pairs),
+        _corrected(_with_conover(pairs, _conover_within(ranks))),
+        bounds,
     )
 
 
-def rank_between(factor: str, levels: Sequence[str], groups: Sequence[Floats]) -> RankAnalysis:
+def rank_against(
+    factor: str | None, levels: Sequence[str], groups: Sequence[Floats], value: float, bounds: Bounds = None
+) -> RankAnalysis:
+    """Wilcoxon's signed-rank test of each level (or of everybody) against a value.
+
+    Parameters
+    ----------
+    factor : str or None
+    levels : sequence of str
+    groups : sequence of ndarray
+        One value per participant of each level.
+    value : float
+    bounds : (float, float), optional
+
+    Raises
+    ------
+    InputError
+        A level at which everybody's value is the one tested against.
+    """
+    for name, group in zip(levels, groups, strict=True):
+        if np.all(group == value):
+            raise InputError(f"every value of {name} is {value:g}; there is nothing to rank")
+    pairs = [
+        _signed_ranks(name, f"{value:g}", group - value, bounds)
+        for name, group in zip(levels, groups, strict=True)
+    ]
+    return RankAnalysis(
+        factor,
+        "against",
+        tuple(levels),
+        tuple(float(np.median(group)) for group in groups),
+        (),
+        tuple(len(group) for group in groups),
+        None,
+        _corrected(pairs),
+        bounds,
+    )
+
+
+def rank_between(
+    factor: str, levels: Sequence[str], groups: Sequence[Floats], bounds: Bounds = None
+) -> RankAnalysis:
     """Kruskal and Wallis's test, Mann and Whitney's test and Dunn's test of each pair.
 
     Parameters
@@ -146,6 +199,7 @@ def rank_between(factor: str, levels: Sequence[str], groups: Sequence[Floats]) -
         Names of the groups.
     groups : sequence of ndarray
         One value per participant of each group.
+    bounds : (float, float), optional
 
     Raises
     ------
@@ -166,7 +220,7 @@ def rank_between(factor: str, levels: Sequence[str], groups: Sequence[Floats]) -
     p_dunn = holm(np.array([p for _, p in dunn]))
     pairs = []
     for number, (a, b) in enumerate(combinations(range(len(groups)), 2)):
-        pair = _rank_sum(levels[a], levels[b], groups[a], groups[b])
+        pair = _rank_sum(levels[a], levels[b], groups[a], groups[b], bounds)
         pairs.append(replace(pair, dunn_z=dunn[number][0], dunn_p_holm=float(p_dunn[number])))
     return RankAnalysis(
         factor,
@@ -176,7 +230,8 @@ def rank_between(factor: str, levels: Sequence[str], groups: Sequence[Floats]) -
         tuple(float(rank.mean()) for rank in ranks),
         tuple(len(group) for group in groups),
         test,
-        _corrected(pairs),
+        _corrected(_with_conover(pairs, _conover_between(ranks, chi2))),
+        bounds,
     )
 
 
@@ -201,29 +256,49 @@ def _kendall_w(ranks: Floats) -> tuple[float, float, float]:
     return concordance(ranks), *_interval([ranks], lambda drawn: concordance(drawn[0]))
 
 
-def _signed_ranks(first: str, second: str, differences: Floats) -> RankPair:
+def _signed_ranks(first: str, second: str, differences: Floats, bounds: Bounds) -> RankPair:
     changed = differences[differences != 0]
     low, high = _interval([differences], lambda drawn: _signed_biserial(drawn[0]))
+    equal = _equivalent(bounds, lambda bound, side: _wilcoxon(differences - bound, side)[0])
     if len(changed) == 0:
-        return RankPair(first, second, len(differences), 0.0, False, 1.0, 1.0, 1.0, 0.0, low, high)
-    ranks = stats.rankdata(np.abs(changed))
-    v = float(ranks[changed > 0].sum())
-    # R's rule: exact only without ties and without zero differences.
-    exact = len(changed) == len(differences) < EXACT_MAX and len(set(ranks)) == len(ranks)
-    done = stats.wilcoxon(changed, correction=not exact, method="exact" if exact else "approx")
+        alike = RankPair(first, second, len(differences), 0.0, False, 1.0, 1.0, 1.0, 0.0, low, high)
+        return replace(alike, p_equivalence=equal)
+    v = float(stats.rankdata(np.abs(changed))[changed > 0].sum())
+    p, exact = _wilcoxon(differences)
     return RankPair(
         first,
         second,
         len(differences),
         v,
         exact,
-        float(done.pvalue),
+        p,
         np.nan,
         np.nan,
         _signed_biserial(differences),
         low,
         high,
+        p_equivalence=equal,
     )
+
+
+def _wilcoxon(differences: Floats, side: Side = "two-sided") -> tuple[float, bool]:
+    """p of the signed-rank test, and whether it is exact."""
+    changed = differences[differences != 0]
+    if len(changed) == 0:
+        return 1.0, False
+    # R's rule: exact only without ties and without zero differences.
+    untied = len(np.unique(np.abs(changed))) == len(changed)
+    exact = untied and len(changed) == len(differences) < EXACT_MAX
+    how: Literal["exact", "approx"] = "exact" if exact else "approx"
+    done = stats.wilcoxon(changed, correction=not exact, method=how, alternative=side)
+    return float(done.pvalue), exact
+
+
+def _equivalent(bounds: Bounds, one_sided: Callable[[float, Side], float]) -> float | None:
+    """Two one-sided tests: above the lower bound, and below the upper one."""
+    if bounds is None:
+        return None
+    return max(one_sided(bounds[0], "greater"), one_sided(bounds[1], "less"))
 
 
 def _signed_biserial(differences: Floats) -> float:
@@ -234,24 +309,31 @@ def _signed_biserial(differences: Floats) -> float:
     return float((ranks[changed > 0].sum() - ranks[changed < 0].sum()) / ranks.sum())
 
 
-def _rank_sum(first: str, second: str, a: Floats, b: Floats) -> RankPair:
-    tied = len(np.unique(np.concatenate([a, b]))) < len(a) + len(b)
-    exact = not tied and len(a) < EXACT_MAX and len(b) < EXACT_MAX
-    done = stats.mannwhitneyu(a, b, method="exact" if exact else "asymptotic")
+def _rank_sum(first: str, second: str, a: Floats, b: Floats, bounds: Bounds) -> RankPair:
+    statistic, p, exact = _mann_whitney(a, b)
     low, high = _interval([a, b], lambda drawn: _biserial(drawn[0], drawn[1]))
     return RankPair(
         first,
         second,
         len(a) + len(b),
-        float(done.statistic),
+        statistic,
         exact,
-        float(done.pvalue),
+        p,
         np.nan,
         np.nan,
         _biserial(a, b),
         low,
         high,
+        p_equivalence=_equivalent(bounds, lambda bound, side: _mann_whitney(a - bound, b, side)[1]),
     )
+
+
+def _mann_whitney(a: Floats, b: Floats, side: Side = "two-sided") -> tuple[float, float, bool]:
+    """U of the first group, its p, and whether that is exact."""
+    tied = len(np.unique(np.concatenate([a, b]))) < len(a) + len(b)
+    exact = not tied and len(a) < EXACT_MAX and len(b) < EXACT_MAX
+    done = stats.mannwhitneyu(a, b, method="exact" if exact else "asymptotic", alternative=side)
+    return float(done.statistic), float(done.pvalue), exact
 
 
 def _biserial(a: Floats, b: Floats) -> float:
@@ -278,6 +360,42 @@ def _dunn(ranks: Sequence[Floats], together: Floats) -> list[tuple[float, float]
         z = float((ranks[a].mean() - ranks[b].mean()) / error)
         tested.append((z, 2 * float(stats.norm.sf(abs(z)))))
     return tested
+
+
+Conover = tuple[list[float], int] | None
+"""t of each pair and their df; None where the ranks leave no error."""
+
+
+def _conover_within(ranks: Floats) -> Conover:
+    # Conover (1999), equation 5.8.10: sums of ranks, and the part of the ranks' squares that levels leave.
+    people, count = ranks.shape
+    sums, df = ranks.sum(axis=0), (people - 1) * (count - 1)
+    error = 2 * (people * float((ranks**2).sum()) - float((sums**2).sum())) / df
+    if error <= 1e-9:
+        return None
+    return [float(sums[a] - sums[b]) / error**0.5 for a, b in combinations(range(count), 2)], df
+
+
+def _conover_between(ranks: Sequence[Floats], chi2: float) -> Conover:
+    # Conover and Iman (1979): Dunn's error, less the part of the ranks' variance that the groups explain.
+    every, count = np.concatenate(list(ranks)), len(ranks)
+    df = len(every) - count
+    left = float(every.var(ddof=1)) * (len(every) - 1 - chi2) / max(df, 1)
+    if df < 1 or left <= 1e-9:
+        return None
+    pairs = [(ranks[a], ranks[b]) for a, b in combinations(range(count), 2)]
+    return [float((a.mean() - b.mean()) / (left * (1 / len(a) + 1 / len(b))) ** 0.5) for a, b in pairs], df
+
+
+def _with_conover(pairs: Sequence[RankPair], conover: Conover) -> list[RankPair]:
+    if conover is None:
+        return list(pairs)
+    t, df = conover
+    p = holm(2 * stats.t.sf(np.abs(t), df))
+    return [
+        replace(pair, conover_t=one, conover_p_holm=float(by_holm))
+        for pair, one, by_holm in zip(pairs, t, p, strict=True)
+    ]
 
 
 def _interval(groups: Sequence[Floats], size: Callable[[list[Floats]], float]) -> tuple[float, float]:

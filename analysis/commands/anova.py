@@ -11,6 +11,7 @@ from analysis.commands.output import (
     LevelsOption,
     VerifyOption,
     check_folder,
+    equivalence_bounds,
     names_in,
     progress_spinner,
     save_json,
@@ -127,7 +128,7 @@ def anova(
             rating=rating,
             synthetic=data.synthetic,
             two_factor_pairs=two_factor_pairs,
-            equivalence_bounds=_bounds(equivalence),
+            equivalence_bounds=equivalence_bounds(equivalence),
             planned_contrasts=[_contrast(text) for text in contrast or ()],
             decisions=data.decisions,
         )
@@ -143,20 +144,6 @@ def anova(
     if out is not None:
         save_report(contents, out, with_r=verify_with_r)
     show(contents)
-
-
-def _bounds(text: str | None) -> tuple[float, float] | None:
-    if text is None:
-        return None
-    try:
-        given = [float(part) for part in text.split(",")]
-    except ValueError:
-        given = []
-    if len(given) == 1:
-        given = [-abs(given[0]), abs(given[0])]
-    if len(given) != 2 or not given[0] < 0 < given[1]:
-        raise InputError(f"--equivalence should be like 0.5 or -0.3,0.5, got '{text}'")
-    return given[0], given[1]
 
 
 def _contrast(text: str) -> tuple[str, list[float]]:

@@ -162,3 +162,18 @@ def scale_bounds(text: str | None) -> tuple[float, float] | None:
     if not bounds[0] < bounds[1]:
         raise InputError(f"--scale should be like 1:7, got '{text}'")
     return bounds
+
+
+def equivalence_bounds(text: str | None) -> tuple[float, float] | None:
+    """Bounds of equivalence from 0.5 or -0.3,0.5; None where none were given."""
+    if text is None:
+        return None
+    try:
+        given = [float(part) for part in text.split(",")]
+    except ValueError:
+        given = []
+    if len(given) == 1:
+        given = [-abs(given[0]), abs(given[0])]
+    if len(given) != 2 or not given[0] < 0 < given[1]:
+        raise InputError(f"--equivalence should be like 0.5 or -0.3,0.5, got '{text}'")
+    return given[0], given[1]

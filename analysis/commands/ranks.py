@@ -1,69 +1,184 @@
-"""`analysis ranks`: rank tests of one factor."""
+"""`analysis ranks` and `analysis t-test`: tests of one factor, or of one sample."""
 
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from analysis.commands.output import JsonOption, LevelsOption, save_json, scale_bounds, show_tables
+from analysis.commands.output import (
+    JsonOption,
+    LevelsOption,
+    equivalence_bounds,
+    save_json,
+    scale_bounds,
+    show_tables,
+    show_text,
+)
 from experiments.errors import InputError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+FileArgument = Annotated[Path, typer.Argument(help="CSV file, one row per trial (or one per cell).")]
+ParticipantOption = Annotated[str, typer.Option(help="Column that names the participant.")]
+RatingOption = Annotated[str, typer.Option(help="Column with the rating.")]
+WithinOption = Annotated[str | None, typer.Option(help="Column of a factor within participants.")]
+BetweenOption = Annotated[str | None, typer.Option(help="Column of a factor between participants.")]
+ScaleOption = Annotated[str | None, typer.Option(help="Ends of the scale, e.g. 1:7.")]
+AgainstOption = Annotated[
+    float | None,
+    typer.Option(help="Test against this value: all participants, or those of each level of a factor."),
+]
+EquivalenceOption = Annotated[
+    str | None,
+    typer.Option(help="Bounds of equivalence of each difference, in rating units: 0.5 or -0.3,0.5."),
+]
+
+
+@dataclass(frozen=True)
+class _Levels:
+    """Participants' means: one array per level, or of everybody under the name of the rating."""
+
+    factor: str | None
+    names: tuple[str, ...]
+    values: "list[NDArray[np.float64]]"
+    decisions: tuple[str, ...]
+    synthetic: bool
 
 
 def register_ranks(app: typer.Typer) -> None:
-    """Add the command to `app`."""
+    """Add the commands to `app`."""
     app.command(name="ranks")(ranks)
+    app.command(name="t-test")(t_test)
 
 
 def ranks(
-    file: Annotated[Path, typer.Argument(help="CSV file, one row per trial (or one per cell).")],
-    participant: Annotated[str, typer.Option(help="Column that names the participant.")],
-    rating: Annotated[str, typer.Option(help="Column with the rating.")],
-    within: Annotated[str | None, typer.Option(help="Column of a factor within participants.")] = None,
-    between: Annotated[str | None, typer.Option(help="Column of a factor between participants.")] = None,
-    scale: Annotated[str | None, typer.Option(help="Ends of the scale, e.g. 1:7.")] = None,
+    file: FileArgument,
+    participant: ParticipantOption,
+    rating: RatingOption,
+    within: WithinOption = None,
+    between: BetweenOption = None,
+    against: AgainstOption = None,
+    equivalence: EquivalenceOption = None,
+    scale: ScaleOption = None,
     levels: LevelsOption = None,
     json: JsonOption = None,
 ) -> None:
     """Rank tests of one factor: Friedman and Wilcoxon, or Kruskal-Wallis, Mann-Whitney and Dunn.
 
     Trials are first averaged to one value per participant and level. Pairs are corrected by Holm and
-    Bonferroni.
+    Bonferroni. Conover's tests of the pairs are added.
 
     Examples:
 
       analysis ranks ratings.csv --participant id --rating score --within face
 
       analysis ranks ratings.csv --participant id --rating score --between group --json ranks.json
-    """
-    from analysis.ranks import rank_between, rank_within
-    from analysis.read.long_csv import read_long_table
-    from analysis.report.rank_tables import levels_table, pairs_table
-    from analysis.within.cell_means import cell_table
-    from analysis.within.level_codes import in_given_order
 
-    if (within is None) == (between is None):
-        raise InputError("expected one factor: either --within COLUMN or --between COLUMN")
-    factor = within or between or ""
-    columns = ([factor], []) if within else ([], [factor])
-    data = read_long_table(file, participant, rating, columns[0], None, scale_bounds(scale), columns[1])
-    rows, ordered = in_given_order(data.rows, levels or ())
-    if within:
-        cells = cell_table(rows, participant, rating, [factor])
-        result = rank_within(factor, cells.levels[0], cells.y)
-        result = replace(result, dropped=tuple(one.participant for one in cells.dropped))
+      analysis ranks ratings.csv --participant id --rating score --against 4 --equivalence 0.5
+    """
+    import numpy as np
+
+    from analysis.ranks import rank_against, rank_between, rank_within
+    from analysis.report.rank_tables import levels_table, pairs_table
+
+    data = _levels_of(file, (participant, rating), (within, between), scale, levels)
+    bounds = equivalence_bounds(equivalence)
+    if against is not None:
+        result = rank_against(data.factor, data.names, data.values, against, bounds)
+    elif within:
+        result = rank_within(within, data.names, np.column_stack(data.values), bounds)
+    elif between:
+        result = rank_between(between, data.names, data.values, bounds)
     else:
-        means = rows.groupby([factor, participant], observed=True, sort=False)[rating].mean()
-        given = rows[factor].dtype
-        names = list(given.categories) if hasattr(given, "categories") else sorted(set(rows[factor]))
-        names = [name for name in names if name in set(rows[factor])]
-        result = rank_between(factor, names, [means[name].to_numpy(dtype=float) for name in names])
-    result = replace(result, decisions=(*data.decisions, *ordered))
+        raise InputError("expected a factor (--within or --between COLUMN), or a value (--against 4)")
+    result = replace(result, decisions=data.decisions)
     save_json(json, asdict(result), data.synthetic)
     for decision in result.decisions:
         typer.echo(f"- {decision}")
-    if result.dropped:
-        typer.echo(f"- left out, without a rating at every level: {', '.join(result.dropped)}")
-    show_tables(
-        levels_table(result, file.stem, data.synthetic), pairs_table(result, file.stem, data.synthetic)
-    )
+    named = (result, file.stem, data.synthetic)
+    show_tables(*([levels_table(*named)] if result.test else []), pairs_table(*named))
+
+
+def t_test(
+    file: FileArgument,
+    participant: ParticipantOption,
+    rating: RatingOption,
+    within: WithinOption = None,
+    between: BetweenOption = None,
+    against: AgainstOption = None,
+    equivalence: EquivalenceOption = None,
+    scale: ScaleOption = None,
+    levels: LevelsOption = None,
+    json: JsonOption = None,
+) -> None:
+    """t tests without equal variances: Welch's ANOVA, Games and Howell's pairs, one sample, equivalence.
+
+    Trials are first averaged to one value per participant (and level, with --within). Pairs within
+    participants are paired t tests: use analysis anova.
+
+    Examples:
+
+      analysis t-test ratings.csv --participant id --rating score --between group
+
+      analysis t-test ratings.csv --participant id --rating score --against 4
+
+      analysis t-test ratings.csv --participant id --rating score --between group --against 0 \
+          --equivalence 0.5
+    """
+    from analysis.report.rank_tables import mean_tests_table, means_text
+    from analysis.t_tests import compare_groups, compare_with_value
+
+    if against is None and within:
+        raise InputError(
+            "--within needs --against VALUE here; pairs of levels within participants are in analysis anova"
+        )
+    data = _levels_of(file, (participant, rating), (within, between), scale, levels)
+    bounds = equivalence_bounds(equivalence)
+    if against is not None:
+        result = compare_with_value(data.factor, data.names, data.values, against, bounds)
+    elif between:
+        result = compare_groups(between, data.names, data.values, bounds)
+    else:
+        raise InputError("expected groups (--between COLUMN), or a value (--against 4)")
+    result = replace(result, decisions=data.decisions)
+    save_json(json, asdict(result), data.synthetic)
+    for decision in result.decisions:
+        typer.echo(f"- {decision}")
+    show_text(means_text(result, file.stem, data.synthetic))
+    show_tables(mean_tests_table(result, file.stem, data.synthetic))
+
+
+def _levels_of(
+    file: Path,
+    columns: tuple[str, str],
+    factors: tuple[str | None, str | None],
+    scale: str | None,
+    levels: list[str] | None,
+) -> _Levels:
+    """Read participants' means of each level of a factor within or between them, or of everybody."""
+    from analysis.read.long_csv import design_of, read_long_table
+    from analysis.within.cell_means import cell_table
+    from analysis.within.level_codes import in_given_order
+
+    within, between = ([name] if name else [] for name in factors)
+    if within and between:
+        raise InputError("expected one factor: either --within COLUMN or --between COLUMN")
+    data = read_long_table(file, *columns, within, None, scale_bounds(scale), between)
+    rows, ordered = in_given_order(data.rows, levels or ())
+    cells = cell_table(rows, *columns, within)
+    decisions = [*data.decisions, *ordered]
+    if cells.dropped:
+        gone = ", ".join(one.participant for one in cells.dropped)
+        decisions.append(f"excluded because a level has no rating: {gone}")
+    names: tuple[str, ...] = cells.levels[0] if within else (columns[1],)
+    y = cells.y.reshape(len(cells.participants), -1)
+    values = [y[:, k] for k in range(len(names))]
+    if between:
+        groups = design_of(rows, columns[0], cells.participants, between, [])
+        names = groups.levels[0]
+        values = [y[groups.codes[:, 0] == k, 0] for k in range(len(names))]
+    return _Levels(factors[0] or factors[1], names, values, tuple(decisions), data.synthetic)

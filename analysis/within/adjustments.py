@@ -61,7 +61,7 @@ def range_tail(w: Floats, means: int) -> Floats:
     return np.asarray(means * np.sum(inside * half * weights, axis=1), dtype=np.float64)
 
 
-def studentized_range_tail(q: float, means: int, df: int) -> float:
+def studentized_range_tail(q: float, means: int, df: float) -> float:
     r"""P(Q > q) of the range of `means` means over a standard error on `df` degrees of freedom.
 
     Parameters
@@ -70,7 +70,7 @@ def studentized_range_tail(q: float, means: int, df: int) -> float:
         Studentized range, >= 0.
     means : int
         Number of means k, >= 2.
-    df : int
+    df : float
         Degrees of freedom :math:`\nu`, >= 1.
 
     Returns
@@ -96,7 +96,7 @@ def studentized_range_tail(q: float, means: int, df: int) -> float:
     return float(min(1.0, np.sum(values * (half * weights).ravel())))
 
 
-def _extent(q: float, means: int, df: int) -> tuple[float, float, float]:
+def _extent(q: float, means: int, df: float) -> tuple[float, float, float]:
     """Where the outer integrand's bound begins to count, has its mode and ceases, in log s.
 
     The grid is made finer until it sees the peak: with many df it is narrow.
@@ -118,7 +118,7 @@ def _legendre(number: int) -> tuple[Floats, Floats]:
     return np.polynomial.legendre.leggauss(number)
 
 
-def _log_density(x: Floats, df: int) -> Floats:
+def _log_density(x: Floats, df: float) -> Floats:
     """Logarithm of the density of log s at x."""
     constant = np.log(2.0) + df / 2 * np.log(df / 2) - special.gammaln(df / 2)
     return np.asarray(constant + df * x - df * np.exp(2 * x) / 2, dtype=np.float64)
@@ -154,7 +154,7 @@ def false_discovery_rate(p: Floats) -> Floats:
     return np.where(np.isnan(p), np.nan, stepped)
 
 
-def tukey(t: Floats, means: int, df: int) -> Floats:
+def tukey(t: Floats, means: int, df: float) -> Floats:
     r"""Tukey's honest significant difference of t statistics (m,) among `means` means on `df` error df.
 
     The upper tail of the studentized range at :math:`q = \sqrt 2 |t|` (see `studentized_range_tail`).

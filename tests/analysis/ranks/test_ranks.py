@@ -97,4 +97,6 @@ def test_command_reads_within_and_between(tmp_path: Path) -> None:
     assert "Kruskal-Wallis test" in ended.output
     ended = runner.invoke(app, named)
     assert isinstance(ended.exception, InputError)
-    assert str(ended.exception) == "expected one factor: either --within COLUMN or --between COLUMN"
+    assert (
+        str(ended.exception) == "expected a factor (--within or --between COLUMN), or a value (--against 4)"
+    )
