@@ -12,7 +12,7 @@ app = command_group(
 def _gather() -> None:
     from analysis.commands.agreement import register_agreement, register_opinion
     from analysis.commands.anova import register_anova
-    from analysis.commands.checks import register_check_paper, register_verify
+    from analysis.commands.checks import register_check_paper, register_replicate, register_verify
     from analysis.commands.choices import register_pairs, register_thresholds
     from analysis.commands.models import register_models
     from analysis.commands.plan import register_plan
@@ -30,6 +30,7 @@ def _gather() -> None:
     register_opinion(app)
     register_agreement(app)
     register_verify(app)
+    register_replicate(app)
     register_convert(app)
     register_reshape(app)
     register_plan(app)

@@ -52,8 +52,9 @@ class MeanTest:
         95% interval of the difference.
     d, d_ci : float, (float, float)
         Cohen's d: over the pooled SD of the two groups, or the SD of the one; interval from the noncentral t.
-    d_ci_effsize : (float, float)
-        The approximation that R's effsize prints; of one sample it leaves out the error of the SD.
+    d_ci_approximate : (float, float)
+        What many papers print (R's effsize): t times the large-sample error of d; of one sample 1.96 times
+        1 / sqrt(n), which leaves out the error of the SD.
     bayes_factor : float
         BF10 with Jeffreys, Zellner and Siow's prior, r = sqrt(2) / 2; of two groups it pools variances.
     p_holm, p_bonferroni : float
@@ -74,7 +75,7 @@ class MeanTest:
     ci: tuple[float, float]
     d: float
     d_ci: tuple[float, float]
-    d_ci_effsize: tuple[float, float]
+    d_ci_approximate: tuple[float, float]
     bayes_factor: float
     p_holm: float
     p_bonferroni: float
@@ -157,7 +158,7 @@ def compare_with_value(
             )
         n, sd = len(group), float(group.std(ddof=1))
         difference, se = float(group.mean()) - value, sd / n**0.5
-        size = _Size(difference / se, n**-0.5, n - 1, n, n**-0.5)
+        size = _Size(difference / se, n**-0.5, n - 1, n, float(stats.norm.ppf(0.975)) * n**-0.5)
         rows.append(_tested(name, f"{value:g}", difference, se, n - 1, size))
     tests = _corrected(rows, bounds, [None] * len(rows))
     return MeansAnalysis(factor, _described(names, groups), None, tests, value, bounds)
@@ -174,26 +175,27 @@ def _unequal(first: str, second: str, a: Floats, b: Floats) -> MeanTest:
     pooled_df = int(n.sum() - 2)
     pooled = float(((n - 1) * variances).sum() / pooled_df) ** 0.5
     scale, d = float((1 / n).sum()) ** 0.5, difference / pooled
-    approximate = ((scale**2 + d**2 / pooled_df / 2) * float(n.sum()) / pooled_df) ** 0.5
+    error = ((scale**2 + d**2 / pooled_df / 2) * float(n.sum()) / pooled_df) ** 0.5
+    approximate = float(stats.t.ppf(0.975, pooled_df)) * error
     size = _Size(d / scale, scale, pooled_df, scale**-2, approximate)
     return _tested(first, second, difference, se, df, size)
 
 
 @dataclass(frozen=True)
 class _Size:
-    """What an effect size rests on: t, d over t, their df and n, and effsize's error of d."""
+    """What an effect size rests on: t, d over t, their df and n, and half the approximate interval of d."""
 
     t: float
     scale: float
     df: int
     n: float
-    error: float
+    reach: float
 
 
 def _tested(first: str, second: str, difference: float, se: float, df: float, size: _Size) -> MeanTest:
     reach = float(stats.t.ppf(0.975, df)) * se
     low, high = size_intervals(np.array([size.t]), np.array([size.scale]), size.df, 0.95)[0]
-    d, around = size.t * size.scale, float(stats.t.ppf(0.975, size.df)) * size.error
+    d = size.t * size.scale
     return MeanTest(
         first,
         second,
@@ -205,7 +207,7 @@ def _tested(first: str, second: str, difference: float, se: float, df: float, si
         (difference - reach, difference + reach),
         d,
         (float(low), float(high)),
-        (d - around, d + around),
+        (d - size.reach, d + size.reach),
         bayes_factor(size.t, size.n, size.df),
         np.nan,
         np.nan,

@@ -1,4 +1,4 @@
-"""`analysis check-paper` and `analysis verify`."""
+"""`analysis check-paper`, `analysis verify` and `analysis replicate`."""
 
 from dataclasses import asdict
 from datetime import date
@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from analysis.commands.output import progress_spinner
+from analysis.commands.output import (
+    JsonOption,
+    check_folder,
+    progress_spinner,
+    save_json,
+    show_tables,
+    show_text,
+)
 
 if TYPE_CHECKING:
     from analysis.capsule import FileComparison
@@ -196,3 +203,72 @@ def _tell(compared: "list[FileComparison]", versions: list[str]) -> None:
         typer.echo("NOT verified: figures differ under the same versions", err=True)
         raise typer.Exit(1)
     typer.echo("verified: every table is as printed; the differences are due to other versions or processors")
+
+
+# `analysis replicate`: published studies rebuilt from their raw files.
+
+
+def register_replicate(app: typer.Typer) -> None:
+    """Add the command to `app`."""
+    app.command(name="replicate")(replicate)
+
+
+def replicate(
+    study: Annotated[
+        list[str] | None,
+        typer.Argument(help="Shipped studies, or folders with a study.toml. Default: every shipped study."),
+    ] = None,
+    data: Annotated[
+        Path | None, typer.Option(help="Folder with your copy of files that may not be shipped.")
+    ] = None,
+    slow: Annotated[bool, typer.Option("--slow", help="Add bootstraps and other slow analyses.")] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Write comparison.csv and comparison.md, every number, to this folder."),
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """Rebuild published studies from their raw files, and compare every printed number.
+
+    A study is a folder whose study.toml declares the files with their SHA-256, the commands, and the
+    printed numbers. Exit code 1 if a number differs and study.toml gives no reason.
+
+    Examples:
+
+      analysis replicate
+
+      analysis replicate hdr-vdc-pairs --slow --out comparison
+
+      analysis replicate p1203-acr --data downloads/p1203
+    """
+    from analysis.replication import (
+        differences_table,
+        replicate_study,
+        rows_table,
+        shipped_studies,
+        studies_table,
+    )
+    from analysis.report.formats import as_markdown
+
+    if out is not None:
+        check_folder(out)
+    with progress_spinner("replicating") as say:
+        results = []
+        for name in study or shipped_studies():
+            say(name)
+            results.append(replicate_study(name, data, slow))
+    save_json(
+        json, {"studies": [one.summary() | {"rows": [asdict(row) for row in one.rows]} for one in results]}
+    )
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        rows = rows_table(results)
+        rows.to_csv(out / "comparison.csv", index=False)
+        tables = [studies_table(results), differences_table(results)]
+        (out / "comparison.md").write_text("\n".join(map(as_markdown, tables)), encoding="utf-8")
+        typer.echo(f"written to {out}: comparison.csv ({len(rows)} numbers), comparison.md")
+    show_tables(studies_table(results))
+    for study_name, number, printed, ours, why in differences_table(results).rows:
+        show_text(f"- {study_name}, {number}: printed {printed}, ours {ours}: {why}.")
+    if any(one.unexplained for one in results):
+        raise typer.Exit(1)

@@ -15,6 +15,7 @@ from analysis.commands.output import (
     show_tables,
     show_text,
 )
+from experiments.errors import InputError
 
 if TYPE_CHECKING:
     from analysis.thresholds.answers import Answers
@@ -29,6 +30,14 @@ class MethodChoice(StrEnum):
     BRADLEY_TERRY = "bradley-terry"
     DAVIDSON = "davidson"
     THURSTONE = "thurstone"
+    JOD = "jod"
+
+
+class PriorChoice(StrEnum):
+    """Prior of scores in JOD."""
+
+    GAUSSIAN = "gaussian"
+    NONE = "none"
 
 
 def register_pairs(app: typer.Typer) -> None:
@@ -53,8 +62,9 @@ def pairs(
         MethodChoice | None,
         typer.Option(
             help=(
-                "bradley-terry, davidson (ties) or thurstone (case V). Default: depends on whether there are "
-                "ties."
+                "bradley-terry, davidson (ties), thurstone (case V), or jod: case V in just-objectionable "
+                "differences (1 JOD: 75% prefer the better), as pwcmp scales. Default: depends on whether "
+                "there are ties."
             )
         ),
     ] = None,
@@ -73,6 +83,24 @@ def pairs(
     firth: Annotated[
         bool, typer.Option("--firth", help="Finite estimates even if an item always wins (penalized).")
     ] = False,
+    by: Annotated[
+        str | None,
+        typer.Option(help="Column of the content (scene): each is scaled separately, and all together."),
+    ] = None,
+    prior: Annotated[
+        PriorChoice, typer.Option(help="For jod: pwcmp's prior, or none (maximum likelihood).")
+    ] = PriorChoice.GAUSSIAN,
+    reference: Annotated[
+        str | None,
+        typer.Option(help="For jod: item whose score is fixed, ITEM or ITEM=10. Default: a mean of 0."),
+    ] = None,
+    bootstrap: Annotated[
+        int, typer.Option(help="For jod: samples of raters for the intervals; 0 for none.", min=0)
+    ] = 500,
+    screen: Annotated[
+        bool,
+        typer.Option("--screen", help="For jod: find raters whose answers are unlike the others'."),
+    ] = False,
     levels: LevelsOption = None,
     json: JsonOption = None,
 ) -> None:
@@ -87,29 +115,67 @@ def pairs(
       analysis pairs table.csv --method thurstone --factors items.csv
 
       analysis pairs comparisons.csv --levels left=baseline,ours,recorded
+
+      analysis pairs comparisons.csv --by scene --participant observer --method jod --screen
     """
     from analysis.pairs.abilities import fit_abilities, read_item_factors
     from analysis.pairs.comparisons import read_comparisons
+    from analysis.pairs.jod import scale_jod
     from analysis.pairs.likelihood import Method
-    from analysis.report.choice_tables import abilities_table, contrasts_table, factors_table, pairs_text
+    from analysis.report.choice_tables import (
+        abilities_table,
+        contrasts_table,
+        factors_table,
+        jod_tables,
+        jod_text,
+        pairs_text,
+    )
 
     with progress_spinner("reading comparisons"):
         # The items are levels of `left`; any other ordered column is a factor of the items.
         orders = levels or []
         of_items = [one for one in orders if factors is None or one.partition("=")[0].strip() == left]
         of_factors = [one for one in orders if one not in of_items]
-        comparisons = read_comparisons(file, left, right, winner, tie, participant, of_items)
+        is_jod = method is MethodChoice.JOD
+        comparisons = read_comparisons(file, left, right, winner, tie, participant, of_items, by, same=is_jod)
         design = None if factors is None else read_item_factors(factors, of_factors)
+    if is_jod:
+        if factors or order_effect or firth:
+            raise InputError("--method jod takes no --factors, --order-effect or --firth; remove them")
+        anchor, at = _anchor(reference)
+        with progress_spinner("fitting"):
+            scaled = scale_jod(comparisons.by_content(), prior.value, anchor, at, bootstrap, screen)
+        save_json(json, asdict(scaled), comparisons.synthetic)
+        show_text(jod_text(scaled, file.stem, comparisons.synthetic))
+        show_tables(*jod_tables(scaled, file.stem, comparisons.synthetic))
+        return
+    if reference or screen:
+        raise InputError("--reference and --screen are for --method jod")
     usual: Method = "davidson" if comparisons.ties else "bradley-terry"
-    chosen: Method = method.value if method else usual
+    chosen: Method = usual if method is None else method.value  # type: ignore[assignment]
     with progress_spinner("fitting"):
-        result = fit_abilities(comparisons, chosen, order_effect=order_effect, firth=firth, factors=design)
-    save_json(json, asdict(result), comparisons.synthetic)
-    show_text(pairs_text(result, file.stem, comparisons.synthetic))
-    show_tables(abilities_table(result, file.stem, comparisons.synthetic))
-    if design is not None:
-        show_tables(factors_table(result, file.stem, comparisons.synthetic))
-    show_tables(contrasts_table(result, file.stem, comparisons.synthetic))
+        fitted = {
+            content: fit_abilities(own, chosen, order_effect=order_effect, firth=firth, factors=design)
+            for content, own in comparisons.by_content().items()
+        }
+    numbers = {content: asdict(result) for content, result in fitted.items()}
+    save_json(json, {"by": by, "contents": numbers} if by else numbers["all"], comparisons.synthetic)
+    for content, result in fitted.items():
+        name = f"{file.stem}, {content}" if by else file.stem
+        show_text(pairs_text(result, name, comparisons.synthetic))
+        show_tables(abilities_table(result, name, comparisons.synthetic))
+        if design is not None:
+            show_tables(factors_table(result, name, comparisons.synthetic))
+        show_tables(contrasts_table(result, name, comparisons.synthetic))
+
+
+def _anchor(reference: str | None) -> tuple[str | None, float]:
+    """The reference item and its score; `ITEM=10` gives the score."""
+    item, _, score = (reference or "").rpartition("=")
+    try:
+        return (item, float(score)) if item else (reference, 0.0)
+    except ValueError:
+        return reference, 0.0
 
 
 # `analysis thresholds`.

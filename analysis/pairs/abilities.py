@@ -363,6 +363,11 @@ def _refuse_unfit(comparisons: Comparisons, method: Method, firth: bool) -> None
             f"{comparisons.source}: {comparisons.ties} comparisons are ties, which {method} does not "
             "support; use --method davidson"
         )
+    if comparisons.ties == comparisons.outcome.size:
+        raise InputError(
+            f"{comparisons.source}: every comparison is a tie, so items do not differ and the frequency "
+            "of ties has no finite estimate; there is nothing to fit"
+        )
     if not comparisons.ties and method == "davidson":
         raise InputError(f"{comparisons.source}: no comparison is a tie; use --method bradley-terry")
     if firth and method != "bradley-terry":

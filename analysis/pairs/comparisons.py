@@ -1,7 +1,7 @@
 """Paired comparisons as they were made: reading, connectedness and transitivity."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -47,6 +47,8 @@ class Comparisons:
         `LEFT`, `RIGHT` or `TIE`.
     participant : (n,) int64 or None
         Index into `participants`.
+    content : (n,) array of str or None
+        What was shown in both items, where a column names it.
     """
 
     items: tuple[str, ...]
@@ -58,6 +60,35 @@ class Comparisons:
     source: str
     synthetic: bool
     decisions: tuple[str, ...]
+    content: NDArray[Any] | None = None
+
+    def by_content(self) -> dict[str, "Comparisons"]:
+        """The comparisons of each content, and of all together if contents share their items."""
+        if self.content is None:
+            return {"all": self}
+        parts = {name: self._subset(self.content == name, name) for name in map(str, np.unique(self.content))}
+        shared = len(_components(self, strong=False)) == 1
+        return {**({"all": self} if shared and len(parts) > 1 else {}), **parts}
+
+    def _subset(self, rows: NDArray[np.bool_], name: str) -> "Comparisons":
+        """Some comparisons; items and raters without one are left out."""
+        used, sides = np.unique(np.stack([self.left[rows], self.right[rows]]), return_inverse=True)
+        sides = sides.reshape(2, -1)
+        people, raters = self.participant, self.participants
+        if people is not None:
+            there, people = np.unique(people[rows], return_inverse=True)
+            raters = tuple(raters[k] for k in there)
+        return replace(
+            self,
+            items=tuple(self.items[k] for k in used),
+            left=sides[0].astype(np.int64),
+            right=sides[1].astype(np.int64),
+            outcome=self.outcome[rows],
+            participant=people,
+            participants=raters,
+            source=f"{self.source}, {name}",
+            content=None,
+        )
 
     @property
     def ties(self) -> int:
@@ -73,6 +104,8 @@ def read_comparisons(
     tie: str | None = None,
     participant: str | None = None,
     levels: Sequence[str] = (),
+    by: str | None = None,
+    same: bool = False,
 ) -> Comparisons:
     """Read one row per comparison.
 
@@ -90,6 +123,10 @@ def read_comparisons(
         Column that names the rater.
     levels : sequence of str, optional
         Order of the items, as that of the column `left`.
+    by : str, optional
+        Column that names the content of both items.
+    same : bool
+        Whether comparisons of an item with itself are kept.
 
     Raises
     ------
@@ -97,13 +134,17 @@ def read_comparisons(
         As `read_text_table`; a pair of an item with itself; a winner that is none of the two; a `tie` that
         is an item or a side.
     """
-    roles = [left, right, winner, *([participant] if participant else [])]
+    more = [name for name in (participant, by) if name]
+    roles = [left, right, winner, *more]
     refuse_shared_roles(roles)
     table = read_text_table(path, roles, EXPORT_COLUMNS)
-    for name in (left, right, *([participant] if participant else [])):
+    for name in (left, right, *more):
         texts_required(table, name)
     columns = {name: table.columns[name].astype(str).to_numpy() for name in roles}
-    _refuse_same(table, columns[left], columns[right])
+    if same:
+        _report_same(table, columns[left] == columns[right])
+    else:
+        _refuse_same(table, columns[left], columns[right])
     outcome, judged = _outcomes(table, columns[left], columns[right], columns[winner], winner, tie)
     judged = answers_that_count(table, judged, "comparisons", EXPORTED_SIDES)
     items = _items(table.columns[left], table.columns[right], judged)
@@ -124,7 +165,16 @@ def read_comparisons(
         path.name,
         table.synthetic,
         (*table.decisions, *said),
+        columns[by][judged] if by else None,
     )
+
+
+def _report_same(table: TextTable, same: NDArray[np.bool_]) -> None:
+    if same.any():
+        table.decisions.append(
+            f"{int(same.sum())} comparisons of an item with itself count in the prior only "
+            f"({name_lines(table, same)})"
+        )
 
 
 def _items(left: "pd.Series[Any]", right: "pd.Series[Any]", judged: NDArray[np.bool_]) -> tuple[str, ...]:

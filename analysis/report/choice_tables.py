@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from analysis.pairs.abilities import Contrast, PairsResult
+from analysis.pairs.jod import JodResult
 from analysis.report.contents import caption, mark_name
 from analysis.report.formats import Table
 from analysis.report.numbers import DASH, apa_p, decimals, fixed, interval, p_value
@@ -100,6 +101,66 @@ def pairs_text(result: PairsResult, name: str, synthetic: bool = False) -> str:
     triples = result.transitivity
     if triples.triples:
         said.append(f"{triples.weak_violations} of {triples.triples} triples violated weak transitivity.")
+    return " ".join([*said, *(f"{decision}." for decision in result.decisions)])
+
+
+# Scores in JOD as tables and words.
+
+SCREENED = (
+    "Likelihood: mean log10 probability of an observer's answers if the others' scores hold. Distance: "
+    "interquartile ranges below the first quartile; look at observers above 1.5. Nobody was excluded."
+)
+
+
+def jod_tables(result: JodResult, name: str, synthetic: bool = False) -> tuple[Table, ...]:
+    """Scores of every content, and the observers where they were screened."""
+    several = len(result.scales) > 1
+    intervals = any(item.jod_low is not None for scale in result.scales for item in scale.items)
+    rows = tuple(
+        (
+            *((scale.content,) if several else ()),
+            item.name,
+            fixed(item.jod),
+            *((interval((item.jod_low or 0.0, item.jod_high or 0.0)),) if intervals else ()),
+            *((DASH if item.jod_plain is None else fixed(item.jod_plain),) if result.prior != "none" else ()),
+            f"{item.wins}/{item.losses}",
+        )
+        for scale in result.scales
+        for item in sorted(scale.items, key=lambda one: -one.jod)
+    )
+    header = (*(("Content",) if several else ()), "Item", "JOD", *(("95% CI",) if intervals else ()))
+    header = (*header, *(("no prior",) if result.prior != "none" else ()), "W/L")
+    notes = [f"1 JOD: 75% prefer the better item. Prior: {result.prior}."]
+    if intervals:
+        notes.append(f"Intervals: {result.bootstrap} samples of raters.")
+    scores = Table("jod", caption("Scores in JOD", name, synthetic), header, rows, 1 + several, tuple(notes))
+    if not result.observers:
+        return (scores,)
+    observers = tuple(
+        (
+            one.name,
+            str(one.n),
+            DASH if one.log_likelihood is None else fixed(one.log_likelihood, 3),
+            DASH if one.distance is None else fixed(one.distance),
+        )
+        for one in sorted(result.observers, key=lambda one: (-(one.distance or 0.0), one.name))
+    )
+    head = ("Observer", "Answers", "Likelihood", "Distance")
+    return scores, Table("observers", caption("Observers", name, synthetic), head, observers, 1, (SCREENED,))
+
+
+def jod_text(result: JodResult, name: str, synthetic: bool = False) -> str:
+    """What was scaled, and what to know about it."""
+    first = result.scales[0]
+    contents = "" if len(result.scales) == 1 else f" of {len(result.scales)} contents"
+    zero = "a mean of 0" if first.reference is None else f"{first.reference} = {result.reference_jod:g}"
+    number = sum(scale.n_comparisons for scale in result.scales if scale.content != "all")
+    said = [
+        f"{mark_name(name, synthetic)}: Thurstone's case V in JOD{contents}, {zero}, "
+        f"{number or first.n_comparisons} comparisons."
+    ]
+    if far := [one.name for one in result.observers if one.is_far]:
+        said.append(f"Unlike the other observers: {', '.join(far)}.")
     return " ".join([*said, *(f"{decision}." for decision in result.decisions)])
 
 

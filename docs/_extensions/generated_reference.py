@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import re
@@ -15,6 +16,7 @@ from typing import Any
 from sphinx.application import Sphinx
 from typer.main import get_command
 
+ANALYSIS = Path(__file__).parents[2] / "analysis"
 PROGRAMS = ("stimuli", "server", "analysis")
 MODULES = {"stimuli": "stimuli_builder.cli", "server": "server.cli", "analysis": "analysis.cli"}
 
@@ -37,6 +39,24 @@ def write_references(app: Sphinx) -> None:
     for program in PROGRAMS:
         _write(folder / f"{program}.md", "\n".join(command_page(program)))
     _write(folder / "http-api.md", "\n".join(api_page()))
+    write_replications(folder / "replications.md")
+
+
+def write_replications(file: Path) -> None:
+    """Rebuild the published studies, unless the page is of the same code and data."""
+    sources = sorted(
+        path for path in ANALYSIS.rglob("*") if path.is_file() and "__pycache__" not in path.parts
+    )
+    inputs = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()
+    if file.is_file() and inputs in file.read_text(encoding="utf-8"):
+        return
+    with tempfile.TemporaryDirectory() as out:
+        # In another process: the commands may leave settings of their own.
+        command = [sys.executable, "-c", "from analysis.cli import main; main()", "replicate", "--out", out]
+        subprocess.run(command, check=True, capture_output=True, cwd=ANALYSIS.parent)
+        tables = (Path(out) / "comparison.md").read_text(encoding="utf-8")
+    said = "Made by `analysis replicate` from the raw files ([how](../../how-to/replicate-studies.md))."
+    _write(file, f"# Published studies\n\n<!-- {inputs} -->\n\n{said}\n\n{tables}")
 
 
 def _write(file: Path, text: str) -> None:
