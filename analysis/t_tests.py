@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from scipy import special, stats
 
 from analysis.within.adjustments import bonferroni, holm, tukey
-from analysis.within.bayes_factor import bayes_factor
-from analysis.within.pairwise import size_intervals
+from analysis.within.pairwise import bayes_factor, size_intervals
 from experiments.errors import InputError
 
 Floats = NDArray[np.float64]

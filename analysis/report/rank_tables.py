@@ -23,7 +23,7 @@ def levels_table(result: RankAnalysis, name: str, synthetic: bool = False) -> Ta
             zip(result.levels, result.n, result.medians, result.mean_ranks, strict=True)
         )
     )
-    header = (result.factor, "n", "Median", "Mean rank", "χ²", "df", "p", "Effect")
+    header = (result.factor or "", "n", "Median", "Mean rank", "χ²", "df", "p", "Effect")
     bounds = share_interval((test.effect_low, test.effect_high))
     notes = (f"{test.name} test, corrected for ties. Effect: {EFFECTS[test.name]}, 95% CI {bounds}.",)
     return Table("ranks", caption(f"{test.name} test", name, synthetic), header, rows, 1, notes)
