@@ -247,10 +247,10 @@ def _find_file(file: str, folder: Path, data: Path | None) -> Path | None:
 
 def _verified(file: str, path: Path, sha256: str) -> bytes:
     content = gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()
-    found = hashlib.sha256(content).hexdigest()
-    if found != sha256:
+    digest = hashlib.sha256(content).hexdigest()
+    if digest != sha256:
         raise InputError(
-            f"{path}: SHA-256 is {found[:12]}..., expected {sha256[:12]}... of the published {file}; get the "
+            f"{path}: SHA-256 is {digest[:12]}..., expected {sha256[:12]}... of the published {file}; get the "
             "file again from the source in study.toml"
         )
     return content
@@ -361,10 +361,10 @@ def _sentence(analysis: StudyAnalysis) -> Iterator[Figure]:
         re.escape(part) if number % 2 == 0 else r"(?:= )?([<>]? ?[-+−]?[\d.]+(?:e[-+]?\d+)?)"
         for number, part in enumerate(parts)
     )
-    found = re.fullmatch(pattern, analysis.printed or "")
-    if found is None:
+    match = re.fullmatch(pattern, analysis.printed or "")
+    if match is None:
         raise InputError(f"{analysis.name}: '{analysis.printed}' does not have the form '{analysis.form}'")
-    for at, printed in zip(parts[1::2], found.groups(), strict=True):
+    for at, printed in zip(parts[1::2], match.groups(), strict=True):
         yield Figure(name=at, printed=printed, at=at)
 
 
@@ -425,8 +425,8 @@ def _one_number(numbers: Any, address: str) -> float:
 
 def _below(at: Any, bracket: str, key: str) -> Any:
     if "=" in bracket:
-        wanted = [part.split("=", 1) for part in bracket.split(", ")]
-        return next(one for one in at if all(str(_value_at(one, path)) == text for path, text in wanted))
+        selectors = [part.split("=", 1) for part in bracket.split(", ")]
+        return next(one for one in at if all(str(_value_at(one, path)) == text for path, text in selectors))
     if bracket:
         return at[int(bracket)] if isinstance(at, list) else at[bracket]
     return at[key]

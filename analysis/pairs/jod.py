@@ -262,10 +262,10 @@ def _maximum(total: Array, prior: Prior, start: Array | None = None) -> tuple[Ar
     begin = np.zeros(len(total)) if start is None else start
     # pwcmp's mean of zero makes the information regular
     inverse = np.linalg.inv(information(begin) + MEAN_WEIGHT / len(total) ** 2)
-    found = optimize.minimize(
+    optimum = optimize.minimize(
         loss, begin, jac=True, method="BFGS", options={"gtol": 1e-6, "hess_inv0": (inverse + inverse.T) / 2}
     )
-    return np.asarray(found.x, dtype=np.float64), likelihood(found.x)
+    return np.asarray(optimum.x, dtype=np.float64), likelihood(optimum.x)
 
 
 def _posterior(
