@@ -250,8 +250,8 @@ def _verified(file: str, path: Path, sha256: str) -> bytes:
     digest = hashlib.sha256(content).hexdigest()
     if digest != sha256:
         raise InputError(
-            f"{path}: SHA-256 is {digest[:12]}..., expected {sha256[:12]}... of the published {file}; get the "
-            "file again from the source in study.toml"
+            f"{path}: SHA-256 is {digest[:12]}..., expected {sha256[:12]}... of the published {file}; get "
+            "the file again from the source in study.toml"
         )
     return content
 

@@ -118,7 +118,7 @@ def test_a_new_study_is_one_folder(tmp_path: Path) -> None:
         ("t-test", "t-tests", "There is no command 't-tests'"),
         ('title = "A study"', "titel = 1", "study.toml: title: Field required"),
         ('"doubled", "--against"', '"tripled", "--against"', "ratings.csv has no column 'tripled'"),
-        ("{sha}", "{sha:.63}0", "get the file again from the source"),
+        ("{sha}", "{sha:.63}0", "the file again from the source"),
     ],
 )
 def test_wrong_declarations_are_one_line(tmp_path: Path, before: str, after: str, said: str) -> None:
