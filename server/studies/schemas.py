@@ -343,6 +343,7 @@ class StudyDetail(BaseModel):
     versions: list[VersionOut]
     series: list[SeriesOut]
     recruiter: dict[str, Any] | None
+    rendered: bool = Field(description="Whether clips of the active version were rendered, not uploaded.")
 
 
 # What the endpoints of a study's life cycle take and give: copies, the archive, comparisons.

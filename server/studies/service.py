@@ -209,7 +209,8 @@ def detail(session: Session, name: str, identity: Identity) -> StudyDetail:
     version = active_version(session, study)
     experiment = definition_of(version)
     planned = design_out(experiment)
-    notes = [*planned.notes, *size_notes(experiment, Manifest.model_validate(version.manifest))]
+    manifest = Manifest.model_validate(version.manifest)
+    notes = [*planned.notes, *size_notes(experiment, manifest)]
     return StudyDetail(
         summary=summary(
             study, repository.shown_runs_by_status(session, study), standing_on(session, study, rights)
@@ -221,6 +222,7 @@ def detail(session: Session, name: str, identity: Identity) -> StudyDetail:
         versions=[_version_out(row, number) for row, number in repository.versions_with_runs(session, study)],
         series=series_of(session, study),
         recruiter=study.recruiter,
+        rendered=any(clip.profile or clip.inputs for clip in manifest.clips),
     )
 
 

@@ -3225,6 +3225,7 @@ export interface components {
    recruiter: {
     [key: string]: unknown;
    } | null;
+   rendered: boolean;
   };
   StudySummary: {
    name: string;

@@ -14,16 +14,24 @@ import {
   type Path,
   singularOf,
   valueAt,
+  storedName,
+  withDerivedName,
   withMoved,
   withValue,
   suggestionsFor,
 } from "../../src/admin/builder/data";
 import { begun, edited, latestToml, redone, undone, written } from "../../src/admin/builder/history";
+import { sentenceOf } from "../../src/admin/studies/CompareVersions";
 import {
+  BASIC,
   type Editor,
   editorOf,
   effectOf,
   EXPERIMENT,
+  isBasic,
+  resolved,
+  TUCKED,
+  withoutNull,
   type Schema,
   starter,
   starterOf,
@@ -191,6 +199,80 @@ describe("data under edit", () => {
     expect(latestToml(history)).toBe("a = 1");
     expect(latestToml(written(history, history.now.data, "a = 2"))).toBe("a = 2");
     expect(written(history, { a: 2 }, "a = 2").now.toml).toBeNull();
+  });
+});
+
+describe("names that follow from what participants read", () => {
+  const option = (value: string, label: string) => ({ value, label: { en: label } });
+  const question = (name: string, label: string, ...options: unknown[]) => ({ name, label: { en: label }, options });
+  const form = (...fields: unknown[]) => ({ forms: [{ name: "form", title: { en: "" }, fields }] });
+  const options = ["forms", 0, "fields", 0, "options"] as const;
+
+  it("are short, and have letters of every keyboard", () => {
+    expect(storedName("I would rather not say")).toBe("i_would_rather_not_say");
+    expect(storedName("  Größe, geschätzt ")).toBe("grosse_geschatzt");
+    expect(storedName("日本語")).toBe("");
+  });
+
+  it("are given to new questions, answers and questionnaires", () => {
+    const data = form(question("question", "", option("option", "")));
+    const asked = withDerivedName(data, null, ["forms", 0, "fields", 0, "label", "en"], "Your age");
+    expect(valueAt(asked, ["forms", 0, "fields", 0, "name"])).toBe("your_age");
+    const answered = withDerivedName(asked, null, [...options, 0, "label", "en"], "Yes");
+    expect(valueAt(answered, [...options, 0])).toEqual(option("yes", "Yes"));
+    const typed = withDerivedName(answered, null, [...options, 0, "label", "en"], "Yes, often");
+    expect(valueAt(typed, [...options, 0, "value"])).toBe("yes_often");
+    expect(valueAt(withDerivedName(typed, null, ["forms", 0, "title", "en"], "About you"), ["forms", 0, "name"])).toBe("about_you");
+  });
+
+  it("stay where answers are stored by them, where somebody chose them, and are never taken twice", () => {
+    const data = form(question("age", "Age", option("yes", "Yes"), option("2", "No"), option("option", "")));
+    const change = (saved: unknown, index: number, label: string) =>
+      valueAt(withDerivedName(data, saved, [...options, index, "label", "en"], label), [...options, index, "value"]);
+    expect(change(data, 0, "Yes, often")).toBe("yes");
+    expect(change(null, 0, "Yes, often")).toBe("yes_often");
+    expect(change(null, 1, "Never")).toBe("2");
+    expect(change(null, 2, "Yes")).toBe("yes_2");
+    expect(withDerivedName({ title: "a" }, null, ["title"], "b")).toEqual({ title: "b" });
+  });
+});
+
+describe("keys that every study decides", () => {
+  it("are shown, others are under “More” until they are set; stored names always are", () => {
+    expect(isBasic("blocks.repeats", false)).toBe(true);
+    expect(isBasic("trial.scale.maximum", false)).toBe(true);
+    expect(isBasic("render.squint_mm", false)).toBe(false);
+    expect(isBasic("analysis.kind", true)).toBe(true);
+    expect(isBasic("forms.fields.name", true)).toBe(false);
+  });
+
+  it("are keys of the declaration", () => {
+    const known = (path: string) =>
+      path.split(".").reduce<Schema | undefined>((schema, key) => {
+        const inner = schema === undefined ? undefined : withoutNull(resolved(schema));
+        const of = inner?.items === undefined ? inner : resolved(inner.items);
+        const members = Object.values(of?.discriminator?.mapping ?? {}).map(($ref) => resolved({ $ref }));
+        return [of, ...members].map((one) => one?.properties?.[key]).find((one) => one !== undefined);
+      }, EXPERIMENT);
+    expect([...BASIC, ...TUCKED].filter((path) => known(path) === undefined)).toEqual([]);
+  });
+});
+
+describe("what differs between two versions", () => {
+  const piece = (kind: "same" | "gone" | "new", text: string) => ({ kind, text });
+
+  it("reads as a sentence", () => {
+    const path = "forms.about.fields.age.minimum";
+    expect(sentenceOf({ path, pieces: [piece("gone", "18"), piece("new", "16")] })).toBe(
+      "Changed “Minimum” of the question age of the questionnaire about from 18 to 16.",
+    );
+    expect(sentenceOf({ path: "forms.demographics", pieces: [piece("new", "{...}")] })).toBe("Added the questionnaire demographics.");
+    expect(sentenceOf({ path: "exclusions.1", pieces: [piece("gone", "x")] })).toBe("Removed the exclusion rule 1.");
+    const long = [piece("same", "a ".repeat(40)), piece("new", "b")];
+    expect(sentenceOf({ path: "texts.en.block_break", pieces: long })).toBe("Changed the text “Block break” in English (en).");
+    expect(sentenceOf({ path: "trial.scale.maximum", pieces: [piece("gone", "7"), piece("new", "5")] })).toBe(
+      "Changed “Maximum” of “Scale” of “Trial” from 7 to 5.",
+    );
   });
 });
 

@@ -38,8 +38,9 @@ def test_owners_are_shown_the_secret_of_the_study_and_of_a_link(dashboard: Dashb
     declare(dashboard, "links", "2")
     dashboard.open("/studies/short/links")
     of_link = shown(dashboard, button)
-    expect(dashboard.open("/studies/short/settings").get_by_role("heading", name="Running")).to_be_visible()
+    recruitment = "/studies/short/settings?part=recruitment"
+    expect(dashboard.open(recruitment).get_by_role("heading", name="Recruitment")).to_be_visible()
     expect(button).to_have_count(0)
     declare(dashboard, "studies", "1")
-    dashboard.open("/studies/short/settings")
+    dashboard.open(recruitment)
     assert shown(dashboard, button) != of_link

@@ -5,7 +5,7 @@ import { downloadText, notify } from "../ui/useChange";
 import { FORMS, inLanguages, CONSENTS } from "./bank";
 import { isTable, listAt, textAt, labelOf, type Path } from "./data";
 import { Field, named } from "./fields/Field";
-import { EXPERIMENT, editorOf } from "./schema";
+import { EXPERIMENT, type Editor, editorOf } from "./schema";
 import { useBuilderHere } from "./useBuilder";
 import { useEffect, useRef, useState } from "react";
 import { markdown } from "../../ui/markdown";
@@ -100,10 +100,30 @@ export function Texts() {
         />
       )}
       <ConsentMenu language={language} />
-      {table.keys.map(([name, schema]) => (
-        <OnePage key={`${language}.${name}`} path={["texts", language, name]} schema={schema} required={table.required.includes(name)} />
-      ))}
+      <Pages key={language} language={language} table={table} />
     </Stack>
+  );
+}
+
+/** Pages that every study has, and those that are written; the others have words of the page's own. */
+function Pages({ language, table }: { language: string; table: Extract<Editor, { kind: "table" }> }) {
+  const builder = useBuilderHere();
+  const isShown = (name: string) => table.required.includes(name) || textAt(builder.data, ["texts", language, name]) !== "";
+  const [shown] = useState(() => new Set(table.keys.map(([name]) => name).filter(isShown)));
+  const more = table.keys.filter(([name]) => !shown.has(name));
+  const page = ([name, schema]: (typeof table.keys)[number]) => (
+    <OnePage key={name} path={["texts", language, name]} schema={schema} required={table.required.includes(name)} />
+  );
+  return (
+    <>
+      {table.keys.filter(([name]) => shown.has(name)).map(page)}
+      {more.length > 0 && (
+        <details>
+          <summary className="small-summary">More: {more.map(([name]) => labelOf(name).toLowerCase()).join(", ")}</summary>
+          <Stack mt="xs">{more.map(page)}</Stack>
+        </details>
+      )}
+    </>
   );
 }
 
@@ -147,11 +167,19 @@ function OnePage(props: { path: Path; schema: Parameters<typeof editorOf>[0]; re
         required={required}
         autosize
         minRows={3}
-        maxRows={20}
+        maxRows={8}
         value={text}
         onChange={(event) => set(event.currentTarget.value === "" && !required ? undefined : event.currentTarget.value)}
       />
-      <Paper withBorder p="sm" mt={{ base: 0, md: 25 }} role="group" aria-label={`${label}, as participants see it`}>
+      <Paper
+        withBorder
+        p="sm"
+        mt={{ base: 0, md: 25 }}
+        className="preview-text"
+        tabIndex={0}
+        role="group"
+        aria-label={`${label}, as participants see it`}
+      >
         <Shown text={text} />
       </Paper>
     </SimpleGrid>

@@ -8,10 +8,10 @@ import { adminKind } from "../kinds";
 import { counted } from "../ui/format";
 import { Link, useNavigate, useSearch } from "@tanstack/react-router";
 import { useState } from "react";
-import { Design, TomlText } from "../studies/Design";
+import { DesignLine, TomlText } from "../studies/Design";
 import { TurnedAway } from "../studies/StatusBadge";
 import { useChange } from "../ui/useChange";
-import type { Data, Section } from "./data";
+import { type Data, isTable, type Section } from "./data";
 import { Field } from "./fields/Field";
 import { Forms, Texts } from "./Forms";
 import { forgetWork } from "./kept";
@@ -88,8 +88,8 @@ interface Props {
 }
 
 export function Workbench({ detail, start }: Props) {
-  const { name, revision } = detail.summary;
-  const builder = useBuilder(name, revision, detail.toml, start);
+  const { name } = detail.summary;
+  const builder = useBuilder(detail, start);
   const [beside, setBeside] = useState(false);
   const { section: asked }: { section?: unknown } = useSearch({ strict: false });
   const section = SECTIONS.find(({ id }) => id === asked) ?? SECTIONS[0];
@@ -120,27 +120,29 @@ export function Workbench({ detail, start }: Props) {
           {builder.broken ? (
             <Alert color="yellow">This is not valid TOML. Correct the text or undo; the forms return then.</Alert>
           ) : (
-            <Page section={section} />
+            <Page key={section.id} section={section} rendered={detail.rendered} />
           )}
         </Stack>
         {beside && <TomlText toml={builder.toml} onChange={builder.setToml} problems={builder.problems} rows={40} />}
       </div>
       {wrong && <Wrong study={name} builder={builder} />}
       {builder.changed && !builder.writing && !wrong && <JudgedEdit detail={detail} toml={builder.toml} />}
-      {builder.design !== null && !wrong && <Design design={builder.design} />}
+      {builder.design !== null && !wrong && <DesignLine design={builder.design} />}
     </BuilderContext>
   );
 }
 
-function Page({ section }: { section: Section }) {
+function Page({ section, rendered }: { section: Section; rendered: boolean }) {
   const builder = useBuilderHere();
+  // Clips that were uploaded have no rendering: its keys would say nothing.
+  const keys = section.keys.filter((key) => key !== "render" || rendered || isTable(builder.data["render"]));
   if (section.id === "forms") return <Forms />;
   if (section.id === "texts") return <Texts />;
   return (
     <Stack gap="sm">
       {section.id === "trial" && <TrialPreview />}
       {section.id === "screen" && <TurnedAway design={builder.design ?? undefined} />}
-      {section.keys
+      {keys
         .map((key) => [key, EXPERIMENT.properties?.[key]] as const)
         .map(([key, schema]) =>
           schema === undefined ? null : (

@@ -96,6 +96,50 @@ export function freeName(stem: string, taken: readonly string[]): string {
   return `${stem}_${number}`;
 }
 
+// Names and stored values of questions and answers, which follow from what participants read.
+
+/** Names that a question, an answer or a questionnaire gets before it has words. */
+const UNNAMED = /^(?:name|form|field|option|value|choice|question)(?:_\d+)?$/;
+
+/** "I would rather not say" is stored as "i_would_rather_not_say"; letters beyond ASCII lose their marks. */
+export function storedName(words: string): string {
+  return words
+    .replaceAll("ß", "ss")
+    .normalize("NFD")
+    .replaceAll(/\p{M}/gu, "")
+    .toLowerCase()
+    .replaceAll(/[^a-z0-9]+/g, "_")
+    .replaceAll(/^[\d_]+|_+$/g, "")
+    .slice(0, 40);
+}
+
+/**
+ * `data` with another value at `path`, and with the name that follows from it where the path is what a questionnaire, a
+ * question or an answer is called. A name that somebody chose stays, and so does one that is stored: answers have it.
+ */
+export function withDerivedName(data: Data, saved: unknown, path: Path, value: unknown): Data {
+  const next = withValue(data, path, value) as Data;
+  const at = path.findIndex((part) => part === "label" || part === "title");
+  if (path[0] !== "forms" || at < 0 || typeof path[at - 1] !== "number") return next;
+  const [element, list] = [path.slice(0, at), path.slice(0, at - 1)];
+  const key = valueAt(next, [...element, "value"]) === undefined ? "name" : "value";
+  const name = textAt(next, [...element, key]);
+  const words = (of: Data) => firstText(valueAt(of, path.slice(0, at + 1)));
+  const isFree = UNNAMED.test(name) || name === "" || name === storedName(words(data));
+  const isStored = listAt(saved, list).some((one) => textAt(one, [key]) === name);
+  const derived = storedName(words(next));
+  if (!isFree || isStored || derived === "") return next;
+  const others = listAt(next, list).filter((_, index) => index !== path[at - 1]);
+  const taken = others.map((other) => textAt(other, [key]));
+  return withValue(next, [...element, key], freeName(derived, taken)) as Data;
+}
+
+/** A text, or the first of its languages. */
+function firstText(value: unknown): string {
+  if (typeof value === "string") return value;
+  return isTable(value) ? textAt(value, [Object.keys(value)[0] ?? ""]) : "";
+}
+
 // Values that a key of text may well take, from what is declared elsewhere: names of factors, forms, cells.
 
 const KNOWN: Record<string, string[]> = {

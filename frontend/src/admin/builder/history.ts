@@ -1,5 +1,5 @@
 /** States of a declaration under edit, with undo and redo. */
-import { type Data, type Path, pathName, withValue } from "./data";
+import { type Data, type Path, pathName, withDerivedName } from "./data";
 
 interface State {
   data: Data;
@@ -23,9 +23,9 @@ export function begun(data: Data, toml: string): History {
   return { past: [], now: { data, toml, edited: "", at: 0 }, future: [] };
 }
 
-/** One key set to another value (undefined removes it); edits of one key in a row are one step. */
-export function edited(history: History, path: Path, value: unknown, at: number): History {
-  const data = withValue(history.now.data, path, value) as Data;
+/** One key set to another value (undefined removes it); edits of one key in a row are one step. `saved` is what is stored. */
+export function edited(history: History, path: Path, value: unknown, at: number, saved: unknown = null): History {
+  const data = withDerivedName(history.now.data, saved, path, value);
   return stepped(history, { data, toml: null, edited: pathName(path), at });
 }
 

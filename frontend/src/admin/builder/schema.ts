@@ -224,6 +224,54 @@ export function helpOf(schema: Schema): string {
     .trim();
 }
 
+// The keys that every study decides; others are under "More" until they are set.
+
+export const BASIC = new Set([
+  "factors.levels",
+  "factors.between",
+  "render.character",
+  "render.profile",
+  "practice.trials",
+  "blocks.split_by",
+  "blocks.order",
+  "blocks.repeats",
+  "groups.by",
+  "attention.per_block",
+  "evidence.online_recruitment",
+  "display.calibrate",
+  "display.minimum_width_px",
+  "display.minimum_height_px",
+  "session.resume",
+  "forms.when",
+  "forms.fields",
+  "forms.fields.required",
+  "forms.fields.options",
+  "forms.fields.minimum",
+  "forms.fields.maximum",
+  "retention.identifiers_days",
+  "retention.answers_days",
+  "dataset.licence",
+  "analysis.statistic",
+]);
+/** Keys of every scale, wherever in a trial it stands. */
+const OF_SCALES = /^trial\.(?:.*\.)?scales?\.(?:minimum|maximum|question|low|high)$/;
+/** Under "More" even where they are set: what is derived from words that participants read, and fine points of a trial. */
+export const TUCKED = new Set([
+  "forms.name",
+  "forms.fields.name",
+  "trial.expected_seconds",
+  "trial.ahead",
+  "trial.function",
+  "trial.direction",
+  "trial.fixation_ms",
+  "trial.pointer_delay_ms",
+]);
+
+/** Whether a key is shown before anybody opens "More". */
+export function isBasic(path: string, isRequired: boolean): boolean {
+  return !TUCKED.has(path) && (isRequired || BASIC.has(path) || OF_SCALES.test(path));
+}
+
 // The pages of the builder, with those that the declaration's schema adds.
 
 const placed = new Set(NAMED.flatMap((section) => section.keys));

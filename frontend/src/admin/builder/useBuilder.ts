@@ -12,6 +12,8 @@ type Problem = Schemas["ProblemOut"];
 
 export interface Builder {
   data: Data;
+  /** What is stored: names in it are those of answers. */
+  saved: unknown;
   toml: string;
   /** The text does not say what the forms show yet: the server is writing it. */
   writing: boolean;
@@ -50,7 +52,8 @@ interface Start {
   toml: string;
 }
 
-export function useBuilder(study: string, revision: number, stored: string, start: Start): Builder {
+export function useBuilder({ summary, toml: stored, definition }: Schemas["StudyDetail"], start: Start): Builder {
+  const { name: study, revision } = summary;
   const [history, setHistory] = useState<History>(() => begun(start.data, start.toml));
   // Text that is being edited by hand; null where forms and text say the same.
   const [text, setText] = useState<string | null>(null);
@@ -102,6 +105,7 @@ export function useBuilder(study: string, revision: number, stored: string, star
   };
   return {
     data,
+    saved: definition,
     toml: present ?? base,
     writing: present === null || answer?.toml !== present,
     broken: text !== null && answer?.asked.toml === text && answer.data === null,
@@ -110,7 +114,7 @@ export function useBuilder(study: string, revision: number, stored: string, star
     languages: languagesOf(data),
     trialKind: textAt(data, ["trial", "kind"]) || DEFAULT_KIND,
     error,
-    set: (path, value) => setHistory((before) => edited(before, path, value, Date.now())),
+    set: (path, value) => setHistory((before) => edited(before, path, value, Date.now(), definition)),
     setToml: setText,
     undo: history.past.length > 0 ? travel(undone) : null,
     redo: history.future.length > 0 ? travel(redone) : null,

@@ -1,11 +1,12 @@
-/** What differs between two versions, word by word. */
+/** What differs between two versions: a sentence each, and its words where they are asked for. */
 
 import { Badge, Card, Group, List, Select, Stack, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";
 import { api, type Schemas, unwrap } from "../api";
 import { Answer } from "../ui/Answer";
-import { counted } from "../ui/format";
+import { labelOf } from "../builder/data";
+import { counted, languageName, words } from "../ui/format";
 
 export function CompareVersions({ detail }: { detail: Schemas["StudyDetail"] }) {
   const study = detail.summary.name;
@@ -44,16 +45,21 @@ function Compared({ study, old, latest }: { study: string; old: number; latest: 
           {compared.keys.map((key) => (
             <div key={key.path}>
               <Group gap="xs">
-                <code>{key.path}</code>
+                <Text size="sm">{sentenceOf(key)}</Text>
                 <Badge variant="default" size="sm">
                   {key.effect === "measured" ? "changes what is measured" : "wording"}
                 </Badge>
               </Group>
-              <Text size="sm" className="difference">
-                {key.pieces.map((piece, index) => (
-                  <Words key={index} piece={piece} />
-                ))}
-              </Text>
+              <details>
+                <summary className="small-summary">
+                  Word by word: <code>{key.path}</code>
+                </summary>
+                <Text size="sm" className="difference">
+                  {key.pieces.map((piece, index) => (
+                    <Words key={index} piece={piece} />
+                  ))}
+                </Text>
+              </details>
             </div>
           ))}
           {compared.clips.length > 0 && <Clips comparison={compared} />}
@@ -68,6 +74,42 @@ function verdict({ keys, clips_differing, pooled }: Schemas["Comparison"]): stri
   return pooled
     ? "Both measure the same with the same clips. Their answers are pooled."
     : "They differ in what they measure or in their clips. Their answers are kept separate.";
+}
+
+const NOUNS: Readonly<Record<string, string>> = {
+  factors: "factor",
+  levels: "level",
+  forms: "questionnaire",
+  fields: "question",
+  options: "answer",
+  scales: "scale",
+  series: "series",
+  screening: "screening rule",
+  exclusions: "exclusion rule",
+  rules: "rule",
+};
+const MAX_VALUE = 60;
+
+/** "Changed “Minimum” of the question age of the questionnaire about from 18 to 16." */
+export function sentenceOf({ path, pieces }: Pick<Schemas["KeyDifference"], "path" | "pieces">): string {
+  const text = (left: Schemas["Piece"]["kind"]) => pieces.flatMap((piece) => (piece.kind === left ? [] : [piece.text])).join("");
+  const [before, after] = [text("new").trim(), text("gone").trim()];
+  const what = placeOf(path.split("."));
+  if (before === "") return `Added ${what}.`;
+  if (after === "") return `Removed ${what}.`;
+  const isShort = [before, after].every((value) => value.length <= MAX_VALUE && !/[{\n]/.test(value));
+  return `Changed ${what}${isShort ? ` from ${before} to ${after}` : ""}.`;
+}
+
+/** What stands at a path, the innermost first. */
+function placeOf([part = "", name, ...rest]: string[]): string {
+  if (part === "texts" && name !== undefined) return `the text “${labelOf(rest.join(" "))}” in ${languageName(name)}`;
+  const noun = NOUNS[part];
+  const [here, inner] =
+    noun !== undefined && name !== undefined
+      ? [`the ${noun} ${words(name)}`, rest]
+      : [`“${labelOf(part)}”`, name === undefined ? [] : [name, ...rest]];
+  return inner.length === 0 ? here : `${placeOf(inner)} of ${here}`;
 }
 
 function Words({ piece: { kind, text } }: { piece: Schemas["Piece"] }) {

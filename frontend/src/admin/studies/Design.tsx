@@ -81,6 +81,24 @@ export function Design({ design }: { design: Schemas["DesignOut"] }) {
   );
 }
 
+/** The same on one line, with what is to be said of it. */
+export function DesignLine({ design }: { design: Schemas["DesignOut"] }) {
+  const { cells, exemplars, unique_clips, trials_per_participant, expected_minutes, notes } = design;
+  return (
+    <div>
+      <Text size="sm" role="status" aria-label="Size of the design">
+        {counted(cells, "cell")} with {counted(exemplars, "clip")} each, {counted(unique_clips, "clip")} in all;{" "}
+        {counted(trials_per_participant, "trial")} per participant, about {expected_minutes.toFixed(0)} minutes
+      </Text>
+      {notes.map((note) => (
+        <Text key={note} size="sm">
+          {note}
+        </Text>
+      ))}
+    </div>
+  );
+}
+
 // A declaration's text, and its problems, each at its line.
 
 interface Props {

@@ -103,7 +103,7 @@ function Where({ study, finding: { page, path } }: { study: string; finding: Fin
   if (!rights.includes(right)) return null;
   const section = page === "build" ? namedSection(path ?? "") : undefined;
   return (
-    <Link to={to} params={{ study }} search={section === undefined ? {} : { section: section.id }}>
+    <Link to={to} params={{ study }} search={section !== undefined ? { section: section.id } : page === "settings" ? { part: path } : {}}>
       {section === undefined ? label : `${label}, ${section.label}`}
     </Link>
   );

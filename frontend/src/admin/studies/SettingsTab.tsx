@@ -5,7 +5,7 @@ import {
   Title,
   List,
   Button,
-  Group,
+  NavLink,
   NumberInput,
   Select,
   SimpleGrid,
@@ -23,8 +23,8 @@ import { Answer, onDemand } from "../ui/Answer";
 import { counted, when } from "../ui/format";
 import { useState } from "react";
 import { useChange } from "../ui/useChange";
-import { SigningButton } from "./recruiting";
-import { useParams } from "@tanstack/react-router";
+import { Address, addressFor, RECRUITER_NAMES, SigningButton } from "./recruiting";
+import { Link, useParams, useSearch } from "@tanstack/react-router";
 
 /** Languages in which the participants' page itself speaks, and whether a person has read what it says. */
 function PageLanguages() {
@@ -156,20 +156,24 @@ function textsOf(recruiter: Record<string, unknown> | null): Record<Field | "red
   };
 }
 
-function Running({ detail }: { detail: Schemas["StudyDetail"] }) {
-  const { name, revision } = detail.summary;
-  const [paused, setPaused] = useState(detail.summary.paused);
-  const [quota, setQuota] = useState<number | string>(detail.summary.quota ?? "");
-  const [kind, setKind] = useState<Kind | null>(KINDS.find((one) => one === detail.recruiter?.["kind"]) ?? null);
-  const [texts, setTexts] = useState(() => textsOf(detail.recruiter));
-  const save = useChange(
-    () => {
-      const recruiter = kind === null ? null : { kind, ...texts };
-      const body = { revision, paused, quota: quota === "" ? null : Number(quota), recruiter };
+type Settings = Pick<Schemas["ChangeSettings"], "paused" | "quota" | "recruiter">;
+
+/** Saves one part of the settings; the others stay as they are stored. */
+function useSettings({ summary, recruiter }: Schemas["StudyDetail"]) {
+  const { name, revision, paused, quota } = summary;
+  return useChange(
+    (changed: Partial<Settings>) => {
+      const body = { revision, paused, quota, recruiter: recruiter as Settings["recruiter"], ...changed };
       return unwrap(api.PUT("/api/admin/studies/{study}/settings", { params: { path: { study: name } }, body }));
     },
     { touches: [["study", name], ["studies"]], done: "Saved." },
   );
+}
+
+function Running({ detail }: { detail: Schemas["StudyDetail"] }) {
+  const [paused, setPaused] = useState(detail.summary.paused);
+  const [quota, setQuota] = useState<number | string>(detail.summary.quota ?? "");
+  const save = useSettings(detail);
   return (
     <Card withBorder>
       <Stack align="flex-start">
@@ -177,33 +181,8 @@ function Running({ detail }: { detail: Schemas["StudyDetail"] }) {
           Running
         </Title>
         <Switch label="Paused: no new participants" checked={paused} onChange={(event) => setPaused(event.currentTarget.checked)} />
-        <Group align="end">
-          <NumberInput
-            label="Close after this many complete runs"
-            placeholder="no limit"
-            min={1}
-            value={quota}
-            onChange={setQuota}
-            w={280}
-          />
-          <Select
-            label="Recruited through"
-            placeholder="nobody"
-            clearable
-            data={KINDS}
-            value={kind}
-            onChange={(word) => setKind(KINDS.find((one) => one === word) ?? null)}
-          />
-        </Group>
-        {kind !== null && <RecruiterFields texts={texts} onChange={setTexts} />}
-        {Boolean(detail.recruiter?.["signature_parameter"]) && <SigningButton study={name} />}
-        {kind === "prolific" && texts.code_complete === "" && (
-          <Text size="sm" c="orange.9">
-            Enter the completion code of the Prolific study. Without it participants get a random code that Prolific rejects, and the study
-            cannot go live.
-          </Text>
-        )}
-        <Button onClick={() => save.mutate(undefined)} loading={save.isPending}>
+        <NumberInput label="Close after this many complete runs" placeholder="no limit" min={1} value={quota} onChange={setQuota} w={280} />
+        <Button onClick={() => save.mutate({ paused, quota: quota === "" ? null : Number(quota) })} loading={save.isPending}>
           Save
         </Button>
       </Stack>
@@ -211,32 +190,102 @@ function Running({ detail }: { detail: Schemas["StudyDetail"] }) {
   );
 }
 
+/** Where participants come from: the service, what it needs of the study, and what the study needs of it. */
+function Recruitment({ detail }: { detail: Schemas["StudyDetail"] }) {
+  const { name } = detail.summary;
+  const [kind, setKind] = useState<Kind | null>(KINDS.find((one) => one === detail.recruiter?.["kind"]) ?? null);
+  const [texts, setTexts] = useState(() => textsOf(detail.recruiter));
+  const save = useSettings(detail);
+  const service = kind === null ? "" : (RECRUITER_NAMES[kind] ?? kind);
+  return (
+    <Card withBorder>
+      <Stack align="flex-start">
+        <Title order={2} size="h4">
+          Recruitment
+        </Title>
+        <Select
+          label="1. Recruited through"
+          placeholder="nobody"
+          clearable
+          data={KINDS.map((value) => ({ value, label: RECRUITER_NAMES[value] ?? value }))}
+          value={kind}
+          onChange={(word) => setKind(KINDS.find((one) => one === word) ?? null)}
+        />
+        {kind !== null && <RecruiterFields service={service} texts={texts} onChange={setTexts} />}
+        {kind === "prolific" && texts.code_complete === "" && (
+          <Text size="sm" c="orange.9">
+            Enter the completion code of the Prolific study. Without it participants get a random code that Prolific rejects, and the study
+            cannot go live.
+          </Text>
+        )}
+        <Button onClick={() => save.mutate({ recruiter: kind === null ? null : { kind, ...texts } })} loading={save.isPending}>
+          Save
+        </Button>
+        {detail.recruiter !== null && <LinkForRecruiter study={name} recruiter={detail.recruiter} />}
+        {Boolean(detail.recruiter?.["signature_parameter"]) && <SigningButton study={name} />}
+      </Stack>
+    </Card>
+  );
+}
+
+/** What is pasted into the recruiter's page: the first general link, with the parameters that the recruiter fills in. */
+function LinkForRecruiter({ study, recruiter }: { study: string; recruiter: Record<string, unknown> }) {
+  const links = useQuery({
+    queryKey: ["links", study, "first"],
+    queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/links", { params: { path: { study } } })),
+  }).data?.links;
+  const link = links?.find((one) => one.kind === "general" && one.recruiter === null);
+  const service = RECRUITER_NAMES[String(recruiter["kind"])] ?? String(recruiter["kind"]);
+  if (links === undefined) return null;
+  return link === undefined ? (
+    <Text size="sm">
+      3. Create a general link under{" "}
+      <Anchor component={Link} to={`/studies/${study}/links`}>
+        Links
+      </Anchor>
+      . What to paste into {service} then appears here.
+    </Text>
+  ) : (
+    <Address label={`3. Paste this link into ${service}`} url={addressFor(link.url, recruiter)} />
+  );
+}
+
 interface FieldsProps {
+  service: string;
   texts: ReturnType<typeof textsOf>;
   onChange: (texts: ReturnType<typeof textsOf>) => void;
 }
 
-function RecruiterFields({ texts, onChange }: FieldsProps) {
+const [FIRST, ...OTHERS] = Object.keys(FIELDS) as [Field, ...Field[]];
+
+function RecruiterFields({ service, texts, onChange }: FieldsProps) {
+  const field = (name: Field, number = "") => (
+    <TextInput
+      key={name}
+      label={`${number}${FIELDS[name][0]}`}
+      placeholder={FIELDS[name][1]}
+      value={texts[name]}
+      onChange={(event) => onChange({ ...texts, [name]: event.currentTarget.value })}
+    />
+  );
   return (
     <>
       <SimpleGrid cols={{ base: 1, sm: 2 }} w="100%">
-        {(Object.keys(FIELDS) as Field[]).map((field) => (
-          <TextInput
-            key={field}
-            label={FIELDS[field][0]}
-            placeholder={FIELDS[field][1]}
-            value={texts[field]}
-            onChange={(event) => onChange({ ...texts, [field]: event.currentTarget.value })}
-          />
-        ))}
+        {field(FIRST, "2. ")}
+        <TextInput
+          label="Redirect URL: completed"
+          placeholder={`empty: the default of ${service}`}
+          value={texts.redirect_url}
+          onChange={(event) => onChange({ ...texts, redirect_url: event.currentTarget.value })}
+        />
       </SimpleGrid>
-      <TextInput
-        w="100%"
-        label="Redirect URL: completed"
-        description="{code}, {run} and the recruiter's URL parameters are filled in. Empty: the recruiter's default."
-        value={texts.redirect_url}
-        onChange={(event) => onChange({ ...texts, redirect_url: event.currentTarget.value })}
-      />
+      <details>
+        <summary className="small-summary">More: codes and URLs for other endings, signed links</summary>
+        <Text size="sm" my="xs">
+          In a URL, {"{code}"}, {"{run}"} and the recruiter&rsquo;s URL parameters are filled in.
+        </Text>
+        <SimpleGrid cols={{ base: 1, sm: 2 }}>{OTHERS.map((name) => field(name))}</SimpleGrid>
+      </details>
     </>
   );
 }
@@ -245,23 +294,69 @@ const CompareVersions = onDemand(async () => (await import("./CompareVersions"))
 const LifeCycle = onDemand(async () => (await import("./LifeCycle")).LifeCycle);
 const Sharing = onDemand(async () => (await import("./Sharing")).Sharing);
 
+const PARTS = [
+  ["running", "Running"],
+  ["recruitment", "Recruitment"],
+  ["languages", "Languages"],
+  ["retention", "Data retention"],
+  ["sharing", "Sharing"],
+  ["versions", "Versions"],
+  ["danger", "Copy and archive"],
+] as const;
+type Part = (typeof PARTS)[number][0];
+
 export function SettingsTab() {
   const { study = "" } = useParams({ strict: false });
+  const { part: asked }: { part?: unknown } = useSearch({ strict: false });
   return (
     <Answer of={useQuery(studyQuery(study))}>
-      {(detail) => (
-        <Stack key={detail.summary.revision} maw={900}>
-          <Running detail={detail} />
-          <Versions detail={detail} />
-          <CompareVersions detail={detail} />
-          <RetentionCard study={detail.summary.name} />
-          <PageLanguages />
-          {detail.summary.rights.includes("own") && <Sharing summary={detail.summary} />}
-          <LifeCycle detail={detail} />
-        </Stack>
-      )}
+      {(detail) => {
+        const open = PARTS.filter(([part]) => part !== "sharing" || detail.summary.rights.includes("own"));
+        const [current] = open.find(([part]) => part === asked) ?? PARTS[0];
+        return (
+          <div className="builder">
+            <nav className="parts" aria-label="Settings">
+              {open.map(([part, label]) => (
+                <NavLink
+                  key={part}
+                  renderRoot={(props) => <Link {...props} to="/studies/$study/settings" params={{ study }} search={{ part }} />}
+                  label={label}
+                  active={part === current}
+                />
+              ))}
+            </nav>
+            <Stack key={`${current}${String(detail.summary.revision)}`} className="builder-page">
+              <SettingsPart part={current} detail={detail} />
+            </Stack>
+          </div>
+        );
+      }}
     </Answer>
   );
+}
+
+function SettingsPart({ part, detail }: { part: Part; detail: Schemas["StudyDetail"] }) {
+  switch (part) {
+    case "running":
+      return <Running detail={detail} />;
+    case "recruitment":
+      return <Recruitment detail={detail} />;
+    case "languages":
+      return <PageLanguages />;
+    case "retention":
+      return <RetentionCard study={detail.summary.name} />;
+    case "sharing":
+      return <Sharing summary={detail.summary} />;
+    case "versions":
+      return (
+        <>
+          <Versions detail={detail} />
+          <CompareVersions detail={detail} />
+        </>
+      );
+    case "danger":
+      return <LifeCycle detail={detail} />;
+  }
 }
 
 type Version = Schemas["StudyDetail"]["versions"][number];

@@ -1,11 +1,11 @@
 /** The frame of a study's pages: its name, status and tabs, and the buttons that open and close it. */
 
-import { Button, Card, Code, CopyButton, Group, Modal, Stack, Text, Alert, Tabs, Title } from "@mantine/core";
+import { Button, Card, Group, Modal, Stack, Text, Alert, Tabs, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { Link, Outlet, useLocation, useNavigate, useParams } from "@tanstack/react-router";
 import { api, unwrap, studyQuery, type Schemas, clipCheckQuery, launchChecksQuery } from "../api";
 import { Answer, onDemand } from "../ui/Answer";
-import { addressFor, RECRUITER_NAMES } from "./recruiting";
+import { Address, addressFor, RECRUITER_NAMES } from "./recruiting";
 import { TurnedAway, StatusBadge, StudySteps } from "./StatusBadge";
 import { useState, useEffect, useRef } from "react";
 import { keptWork, otherWork } from "../builder/kept";
@@ -74,26 +74,6 @@ async function generalLink(study: string): Promise<{ url: string }> {
   const [made] = await unwrap(api.POST("/api/admin/studies/{study}/links", { ...path, body }));
   if (made === undefined) throw new Error("expected a new link, got none; create one under Links");
   return made;
-}
-
-function Address({ label, url }: { label: string; url: string }) {
-  return (
-    <div>
-      <Text size="sm" fw={600}>
-        {label}
-      </Text>
-      <Group gap="xs" wrap="nowrap">
-        <Code className="wrap-anywhere">{url}</Code>
-        <CopyButton value={url}>
-          {({ copied, copy }) => (
-            <Button size="compact-xs" variant="default" flex="none" onClick={copy} aria-label={`Copy: ${label}`}>
-              {copied ? "Copied" : "Copy"}
-            </Button>
-          )}
-        </CopyButton>
-      </Group>
-    </div>
-  );
 }
 
 const Preflight = onDemand(async () => (await import("./Preflight")).Preflight);

@@ -1,6 +1,6 @@
 /** What a recruiter is given: the study's address with its parameters, and the key of signed links. */
 
-import { Button, Code, Modal, Stack, Text } from "@mantine/core";
+import { Button, Code, CopyButton, Group, Modal, Stack, Text } from "@mantine/core";
 import { useDisclosure } from "@mantine/hooks";
 import { useQuery } from "@tanstack/react-query";
 import { api, unwrap } from "../api";
@@ -92,4 +92,25 @@ export function addressFor(url: string, recruiter: Record<string, unknown> | nul
   const signature = typeof signed === "string" && signed !== "" ? [[signed, "SIGNATURE"]] : [];
   const query = [[name, first[1]], ...others, ...signature].map(([key, value]) => `${key}=${value}`).join("&");
   return `${url}?${query}`;
+}
+
+/** An address to hand on, with a button that copies it. */
+export function Address({ label, url }: { label: string; url: string }) {
+  return (
+    <div>
+      <Text size="sm" fw={600}>
+        {label}
+      </Text>
+      <Group gap="xs" wrap="nowrap">
+        <Code className="wrap-anywhere">{url}</Code>
+        <CopyButton value={url}>
+          {({ copied, copy }) => (
+            <Button size="compact-xs" variant="default" flex="none" onClick={copy} aria-label={`Copy: ${label}`}>
+              {copied ? "Copied" : "Copy"}
+            </Button>
+          )}
+        </CopyButton>
+      </Group>
+    </div>
+  );
 }

@@ -1,10 +1,36 @@
 /** The editors of the declaration's keys, chosen by their schema: tables, lists of tables, and an element a line. */
 
-import { Stack, Textarea, Button, Group, TextInput, Alert, Fieldset, Menu, Select, Switch, Text } from "@mantine/core";
+import { SimpleGrid, Stack, Textarea, Button, Group, TextInput, Alert, Fieldset, Menu, Select, Switch, Text } from "@mantine/core";
 import { useState } from "react";
-import { languageName } from "../../ui/format";
-import { type Data, isTable, textAt, freeName, listAt, type Path, withMoved, pathName, labelOf, singularOf, tableAt } from "../data";
-import { editorOf, type Editor, helpOf, mayBeNull, resolved, type Schema, starter, starterOf, withoutNull } from "../schema";
+import { counted, languageName, plain } from "../../ui/format";
+import {
+  type Data,
+  isTable,
+  textAt,
+  freeName,
+  listAt,
+  type Path,
+  withMoved,
+  pathName,
+  labelOf,
+  singularOf,
+  tableAt,
+  keyName,
+  valueAt,
+} from "../data";
+import {
+  editorOf,
+  type Editor,
+  helpOf,
+  isBasic,
+  TUCKED,
+  mayBeNull,
+  resolved,
+  type Schema,
+  starter,
+  starterOf,
+  withoutNull,
+} from "../schema";
 import { type FieldProps, useField, Choice, Flag, Lists, Numeric, OneText, Raw, Translated, Words } from "./scalars";
 import { useBuilderHere } from "../useBuilder";
 
@@ -22,12 +48,12 @@ function Translations(props: FieldProps) {
     set(next.length === 0 ? undefined : next);
   };
   return (
-    <Stack gap={4}>
+    <SimpleGrid cols={{ base: 1, sm: Math.min(2, builder.languages.length) }} spacing="xs" verticalSpacing={4}>
       {builder.languages.map((language, index) => (
         <Textarea
           key={language}
           label={builder.languages.length > 1 ? `${label}, ${languageName(language)}` : label}
-          description={index === 0 ? `${help} One per line.` : undefined}
+          description={`${help} One per line.`}
           error={index === 0 ? problem : null}
           autosize
           minRows={2}
@@ -36,7 +62,7 @@ function Translations(props: FieldProps) {
           onChange={(event) => change(language, event.currentTarget.value)}
         />
       ))}
-    </Stack>
+    </SimpleGrid>
   );
 }
 
@@ -116,16 +142,20 @@ interface ButtonsProps {
   path: Path;
   title: string;
   count: number;
+  /** Signs in the place of words, on a line that holds more. */
+  short?: boolean;
 }
 
-function ElementButtons({ path, title, count }: ButtonsProps) {
+const SIGNS = { Up: "↑", Down: "↓", Copy: "+", Remove: "✕" };
+
+function ElementButtons({ path, title, count, short = false }: ButtonsProps) {
   const builder = useBuilderHere();
   const list = path.slice(0, -1);
   const position = Number(path.at(-1));
   const change = (to: (elements: unknown[]) => unknown[]) => builder.set(list, to(listAt(builder.data, list)));
-  const button = (word: string, does: () => void, disabled = false) => (
-    <Button size="compact-xs" variant="default" disabled={disabled} aria-label={`${word} ${title}`} onClick={does}>
-      {word}
+  const button = (word: keyof typeof SIGNS, does: () => void, disabled = false) => (
+    <Button size="compact-xs" variant="default" disabled={disabled} aria-label={`${word} ${title}`} title={word} onClick={does}>
+      {short ? SIGNS[word] : word}
     </Button>
   );
   return (
@@ -165,22 +195,29 @@ function Row({ path, editor, element, count }: RowProps) {
   // A label that says no more than the name follows it.
   const rename = (text: string) =>
     builder.set(path, { ...(isTable(element) ? element : {}), [key]: text, label: following(label, name, text) });
-  const more = editor.keys.filter(([inner]) => inner !== key && inner !== "label");
+  // What a level changes is said of clips that are rendered, or where it is set.
+  const more = editor.keys.filter(([inner]) => inner !== key && inner !== "label" && isTable(valueAt(element, [inner])));
+  const isDerivedName = key === "value";
+  // The lines below the first have the same labels: only the first shows them.
+  const naming = (words: string) => (Number(path.at(-1)) === 0 ? { label: words } : { "aria-label": words });
+  const nameField = (
+    <TextInput
+      {...(isDerivedName ? { label: "Stored value" } : naming("Name"))}
+      value={name}
+      error={problem}
+      w={150}
+      onChange={(event) => rename(event.currentTarget.value)}
+    />
+  );
   return (
     <div className="element-row">
       <Group gap="xs" align="end" wrap="wrap">
-        <TextInput
-          label={key === "value" ? "Stored value" : "Name"}
-          value={name}
-          error={problem}
-          w={150}
-          onChange={(event) => rename(event.currentTarget.value)}
-        />
+        {!isDerivedName && nameField}
         {isTable(label) ? (
           builder.languages.map((language) => (
             <TextInput
               key={language}
-              label={`Label, ${languageName(language)}`}
+              {...naming(`Label, ${languageName(language)}`)}
               flex="1 1 150px"
               value={textAt(label, [language])}
               onChange={(event) => builder.set([...path, "label"], { ...label, [language]: event.currentTarget.value })}
@@ -188,20 +225,26 @@ function Row({ path, editor, element, count }: RowProps) {
           ))
         ) : (
           <TextInput
-            label="Label"
+            {...naming("Label")}
             flex="1 1 150px"
             value={typeof label === "string" ? label : ""}
             onChange={(event) => builder.set([...path, "label"], event.currentTarget.value)}
           />
         )}
-        <ElementButtons path={path} title={name} count={count} />
+        <ElementButtons path={path} title={name} count={count} short />
+        {isDerivedName && (
+          <details open={problem !== null || undefined}>
+            <summary className="small-summary">Stored as {name}</summary>
+            {nameField}
+          </details>
+        )}
+        {more.map(([inner, schema]) => (
+          <details key={inner}>
+            <summary className="small-summary">What it changes: {inner}</summary>
+            <Field path={[...path, inner]} schema={schema} />
+          </details>
+        ))}
       </Group>
-      {more.map(([inner, schema]) => (
-        <details key={inner}>
-          <summary className="small-summary">What it changes: {inner}</summary>
-          <Field path={[...path, inner]} schema={schema} />
-        </details>
-      ))}
     </div>
   );
 }
@@ -214,17 +257,46 @@ function following(label: unknown, before: string, after: string): unknown {
 
 // Editors of tables, of tables of several kinds, and of lists of tables.
 
-/** The keys of a table, one below the other. */
+/** The keys of a table, one below the other: what every study decides and what is set; the rest under "More". */
 function Keys({ path, editor, but = [] }: { path: Path; editor: TableEditor; but?: readonly string[] }) {
+  const builder = useBuilderHere();
+  const keys = editor.keys.filter(([name, schema]) => !but.includes(name) && editorOf(schema).kind !== "constant");
+  // As it was when the page was opened: a key that is being typed into stays where it is.
+  const [shown] = useState(() => {
+    const isSet = (name: string) => valueAt(builder.data, [...path, name]) !== undefined;
+    const isShown = (name: string) => {
+      const key = keyName([...path, name]);
+      return isBasic(key, editor.required.includes(name)) || (isSet(name) && !TUCKED.has(key));
+    };
+    const names = keys.map(([name]) => name).filter(isShown);
+    // Of a table that decides nothing the first key stands for the rest.
+    return new Set(names.length > 0 || keys.length > 4 ? names : keys.map(([name]) => name));
+  });
+  const more = keys.filter(([name]) => !shown.has(name));
+  const wrong = more.some(([name]) => isWrong(builder.problems, [...path, name]));
+  const field = ([name, schema]: (typeof keys)[number]) => (
+    <div key={name} className={isNarrow(schema) ? "" : "wide"}>
+      <Field path={[...path, name]} schema={schema} required={editor.required.includes(name)} />
+    </div>
+  );
   return (
     <Stack gap="sm">
-      {editor.keys
-        .filter(([name]) => !but.includes(name))
-        .map(([name, schema]) => (
-          <Field key={name} path={[...path, name]} schema={schema} required={editor.required.includes(name)} />
-        ))}
+      <div className="keys">{keys.filter(([name]) => shown.has(name)).map(field)}</div>
+      {more.length > 0 && (
+        <details open={wrong || undefined}>
+          <summary className="small-summary">More: {more.map(([name]) => labelOf(name).toLowerCase()).join(", ")}</summary>
+          <div className="keys">{more.map(field)}</div>
+        </details>
+      )}
     </Stack>
   );
+}
+
+/** Numbers, choices and switches stand side by side where there is room. */
+const isNarrow = (schema: Schema) => ["number", "choice", "flag", "text"].includes(editorOf(schema).kind);
+
+function isWrong(problems: readonly { path: string }[], path: Path): boolean {
+  return problems.some((problem) => `${problem.path}.`.startsWith(`${pathName(path)}.`));
 }
 
 function Table(props: FieldProps) {
@@ -232,8 +304,8 @@ function Table(props: FieldProps) {
   const editor = editorOf(props.schema);
   if (editor.kind !== "table") return null;
   const optional = mayBeNull(props.schema);
-  return (
-    <Fieldset legend={label}>
+  const inside = (
+    <>
       <Text size="xs" c="dimmed" mb="xs">
         {help}
       </Text>
@@ -249,8 +321,33 @@ function Table(props: FieldProps) {
       )}
       {(!optional || isTable(value)) && <Keys path={props.path} editor={editor} />}
       <Problems path={props.path} />
-    </Fieldset>
+    </>
   );
+  if (props.path.length === 1 && props.path[0] !== "render") return <Fieldset legend={label}>{inside}</Fieldset>;
+  return (
+    <details className="element" open={isWrong(builder.problems, props.path) || undefined}>
+      <summary>
+        <Text span fw={600} size="sm">
+          {label}
+        </Text>
+        <Text span size="sm" c="dimmed" ml="xs">
+          {settingsOf(value)}
+        </Text>
+      </summary>
+      {inside}
+    </details>
+  );
+}
+
+const MAX_SETTINGS = 6;
+
+/** What is set in a table, in a few words: "Amplitude: full; Motion blur: yes". */
+function settingsOf(table: unknown): string {
+  if (!isTable(table)) return "as usual";
+  const words = (value: unknown) => (typeof value === "boolean" ? (value ? "yes" : "no") : plain(value).replaceAll("_", " "));
+  const simple = Object.entries(table).filter(([, value]) => ["string", "number", "boolean"].includes(typeof value));
+  const shown = simple.slice(0, MAX_SETTINGS).map(([key, value]) => `${labelOf(key)}: ${words(value)}`);
+  return [...shown, ...(Object.keys(table).length > shown.length ? ["…"] : [])].join("; ");
 }
 
 /** One of several kinds of table, told apart by a key. */
@@ -278,7 +375,7 @@ function Variants(props: FieldProps) {
         value={variant === undefined ? null : chosen}
         onChange={(tag) => set(tag === null ? undefined : starterOf(editor, tag, builder.languages, table))}
       />
-      {keys?.kind === "table" && <Keys path={props.path} editor={keys} but={[editor.tag]} />}
+      {keys?.kind === "table" && <Keys key={chosen} path={props.path} editor={keys} but={[editor.tag]} />}
     </Stack>
   );
 }
@@ -314,16 +411,23 @@ interface ElementProps {
 
 function Element({ path, schema, element, count }: ElementProps) {
   const builder = useBuilderHere();
+  const [isNew] = useState(() => listAt(builder.saved, path.slice(0, -1)).length <= Number(path.at(-1)));
   const inner = editorOf(schema);
   if (inner.kind === "table" && fitsRow(inner)) return <Row path={path} editor={inner} element={element} count={count} />;
   const title = titleOf(element) || `${labelOf(String(path.at(-2) ?? "")).toLowerCase()} ${Number(path.at(-1)) + 1}`;
-  const wrong = builder.problems.some((problem) => `${problem.path}.`.startsWith(`${pathName(path)}.`));
+  const wrong = isWrong(builder.problems, path);
+  const about = aboutOf(element);
   return (
-    <details className="element" open={wrong || count <= 3 || undefined}>
+    <details className="element" open={wrong || isNew || (count === 1 && path.length === 2) || undefined}>
       <summary>
         <Text span fw={600} size="sm">
           {title}
         </Text>
+        {about !== "" && (
+          <Text span size="sm" c="dimmed" ml="xs">
+            {about}
+          </Text>
+        )}
         {wrong && (
           <Text span size="xs" c="red" ml="xs">
             needs a look
@@ -342,6 +446,15 @@ function titleOf(element: unknown): string {
   const label = textAt(element, ["label"]) || textAt(element, ["label", "en"]) || Object.values(tableAt(element, ["label"])).map(String)[0];
   const name = textAt(element, ["name"]) || textAt(element, ["value"]) || textAt(element, ["rule"]).replaceAll("_", " ");
   return label && name && label !== name ? `${name}: ${label}` : name || label || "";
+}
+
+/** What an element holds, in a few words: its type, its answers or levels, how many questions. */
+function aboutOf(element: unknown): string {
+  const names = (key: string) => listAt(element, [key]).map((one) => titleOf(one).replace(/^[^:]*: /, ""));
+  const type = textAt(element, ["type"]).replaceAll("_", " ");
+  const fields = listAt(element, ["fields"]).length;
+  const inside = [...names("levels"), ...names("options")];
+  return [type, inside.join(", "), fields > 0 ? counted(fields, "question") : ""].filter((part) => part !== "").join(": ");
 }
 
 function Add({ path, of }: { path: Path; of: Schema }) {

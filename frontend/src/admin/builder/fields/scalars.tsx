@@ -3,7 +3,7 @@
 import { keyName, labelOf, type Path, pathName, valueAt, isTable, textAt, withValue, suggestionsFor } from "../data";
 import { helpOf, effectOf, resolved, type Schema, editorOf } from "../schema";
 import { useBuilderHere } from "../useBuilder";
-import { Autocomplete, JsonInput, NumberInput, Select, Stack, Switch, TagsInput, Textarea, TextInput } from "@mantine/core";
+import { Autocomplete, JsonInput, NumberInput, Select, SimpleGrid, Switch, TagsInput, Textarea, TextInput } from "@mantine/core";
 import { useState } from "react";
 import { languageName } from "../../ui/format";
 
@@ -133,12 +133,12 @@ export function Translated(props: FieldProps) {
   const { value, fallback, label, help, problem, set, required, builder } = useField(props);
   const texts = isTable(value) ? value : {};
   return (
-    <Stack gap={4}>
+    <SimpleGrid cols={{ base: 1, sm: Math.min(2, builder.languages.length) }} spacing="xs" verticalSpacing={4}>
       {builder.languages.map((language, index) => (
         <Textarea
           key={language}
           label={builder.languages.length > 1 ? `${label}, ${languageName(language)}` : label}
-          description={index === 0 ? help : undefined}
+          description={help}
           error={index === 0 ? problem : null}
           required={required}
           autosize
@@ -153,7 +153,7 @@ export function Translated(props: FieldProps) {
           }}
         />
       ))}
-    </Stack>
+    </SimpleGrid>
   );
 }
 
