@@ -28,6 +28,7 @@ Fps = Annotated[int, Field(ge=24, le=60)]
 DurationFrames = Annotated[float, Field(ge=3, le=600)]
 DurationMs = Annotated[float, Field(ge=100, le=2000)]
 LowerLidGain = Annotated[float, Field(ge=0, le=3)]
+Strength = Annotated[float, Field(ge=0, le=1)]
 MovedMm = Annotated[float, Field(ge=0, le=1)]
 CountingRate = Annotated[float, Field(ge=15, le=1000)]
 MIN_BLINK_MS, MAX_BLINK_MS = 100.0, 2000.0
@@ -82,6 +83,9 @@ class RenderSettings(Declaration):
     gaze_mm: MovedMm | None = None
     """How far the iris turns down under the closing lid, in mm at closure 1 (0.2 is one degree); otherwise
     like `brow_mm`. It turns half as far toward the nose."""
+    life: Strength = 0.0
+    """Motion between blinks: head sway, breathing, gaze, pupil and sensor noise. 0 is none, 1 as much as in
+    recordings of people. The lids follow the gaze; blinks stay as they are."""
     eyes: Literal["alike", "separate"] = "alike"
     """`alike`: one signal drives both eyes. `separate`: the left and right recordings each drive one eye."""
     performance: Timing | None = None
@@ -171,6 +175,8 @@ class RenderOverrides(Declaration):
     """As [render] `squint_mm`, for clips of this level."""
     gaze_mm: MovedMm | None = None
     """As [render] `gaze_mm`, for clips of this level."""
+    life: Strength | None = None
+    """As [render] `life`, for clips of this level."""
     eyes: Literal["alike", "separate"] | None = None
     """As [render] `eyes`, for clips of this level."""
     performance: Timing | None = None

@@ -27,6 +27,8 @@ Examples:
 
   stimuli clip --character hazel@5 --brow-mm 0.25 --cheek-mm 0.3 --squint-mm 0.2 --gaze-mm 0.4 --out moved.mp4
 
+  stimuli clip --character alder@8 --life 1 --clip-frames 150 --out alive.mp4
+
   stimuli clip --profile mine.csv --character my_renders/ --size 1920x720 --fps 60 --out big.mp4
 """
 OPTIONS = {
@@ -71,6 +73,9 @@ def clip_command(
     gaze_mm: Annotated[
         float | None, typer.Option(help=("Distance in mm that the iris turns down under the lid."))
     ] = None,
+    life: Annotated[
+        float, typer.Option(min=0, max=1, help="Motion between blinks: 0 none, 1 as in recordings of people.")
+    ] = 0.0,
     eyes: Annotated[
         Eyes, typer.Option(help="One signal for both eyes, or the recorded left and right eye.")
     ] = "alike",
@@ -100,6 +105,7 @@ def clip_command(
         cheek_mm=cheek_mm,
         squint_mm=squint_mm,
         gaze_mm=gaze_mm,
+        life=life,
         eyes=eyes,
         fps=fps,
         width_px=width,

@@ -32,6 +32,7 @@ from stimuli_builder.clips.curves import (
 from stimuli_builder.clips.exemplars import Exemplar, exemplar, of_declared_length
 from stimuli_builder.clips.geometry import Geometry, Movement
 from stimuli_builder.clips.jobs import ClipJob, Look, render
+from stimuli_builder.clips.life import draw_life, following_lids
 from stimuli_builder.performance.run import LOWER_IN_MM, LOWER_UP_MM, speech_of
 
 # A clip of living eyes: the blink engine's lids over many seconds, as a curve at 300 fps.
@@ -247,7 +248,10 @@ def _plan(experiment: Experiment, spec: ClipSpec, options: Options) -> PlannedCl
         timing = Timing.drawn(settings.fps, shown.phase_samples, seed, spec.cell, spec.exemplar)
         curve, repeated = clip_curve(shown.profile, timing, settings.lower_lid), shown.repeated
     curve, held = shown_by(curve, settings, character.lower_range_mm)
-    job = ClipJob(look_of(settings, options), curve)
+    # The same motion at every level of other factors, as the blink itself is the same.
+    life_seed = int(generator("life", seed, family, spec.exemplar).integers(2**31))
+    curve = with_life(curve, settings.life, life_seed, character)
+    job = ClipJob(look_of(settings, options), curve, life_seed if settings.life else 0)
     return PlannedClip(spec, settings, job, repeated, character, held)
 
 
@@ -283,6 +287,20 @@ def look_of(settings: RenderSettings, options: Options) -> Look:
         barcode=options.barcode,
         beside=options.beside,
         movement=Movement.of_settings(settings),
+        life=settings.life,
+    )
+
+
+def with_life(curve: ClipCurve, strength: float, seed: int, character: Geometry) -> ClipCurve:
+    """The curve of a clip with motion between blinks: its lids follow the gaze."""
+    if not strength:
+        return curve
+    life = draw_life(len(curve.closure), strength, seed)
+    other = curve.closure_other
+    return replace(
+        curve,
+        closure=following_lids(curve.closure, life, character.opening_mm),
+        closure_other=None if other is None else following_lids(other, life, character.opening_mm),
     )
 
 
@@ -326,7 +344,9 @@ def render_single(clip: SingleClip, out: Path) -> RenderedClip:
     timing = Timing.drawn(settings.fps, shown.phase_samples, clip.seed, clip.profile, clip.exemplar)
     curve = clip_curve(shown.profile, timing, settings.lower_lid, clip.clip_frames)
     curve, _ = shown_by(curve, settings, character.lower_range_mm)
-    job = ClipJob(look_of(settings, Options(barcode=clip.barcode)), curve)
+    life_seed = int(generator("life", clip.seed, clip.profile, clip.exemplar).integers(2**31))
+    curve = with_life(curve, settings.life, life_seed, character)
+    job = ClipJob(look_of(settings, Options(barcode=clip.barcode)), curve, life_seed)
     with whole_file(out) as temporary:
         temporary.write_bytes(render(job))
     return RenderedClip(curve, job.frames, int(curve.onset_sample / samples_per_frame(settings.fps)))

@@ -248,6 +248,7 @@ def _clip(clip: PlannedClip, state: BuildState, seed: int) -> Clip:
             "lower_lid": settings.lower_lid,
             **moved_mm(clip),
             **job.look.movement.inputs(),
+            **({"life": repr(settings.life), "life_seed": str(job.life_seed)} if settings.life else {}),
             "eyes": settings.eyes,
             **clip.lower_held,
             "encoder": job.look.encoder,

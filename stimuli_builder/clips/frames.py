@@ -1,6 +1,7 @@
 """From a clip's curve to its pictures: blended in linear light, as planes ready for the encoder."""
 
 from collections.abc import Iterator
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +10,7 @@ from experiments.errors import InputError
 from stimuli_builder.clips.curves import ClipCurve, frame_windows
 from stimuli_builder.clips.kernels import GAMMA, blend, split_planes, to_yuv
 from stimuli_builder.clips.levels import LevelSet
+from stimuli_builder.clips.life import EyeRegions, Life, moments_of, noise_of
 
 # The test barcode: a frame's number drawn in the picture, for tests that read back what was shown.
 #
@@ -48,6 +50,8 @@ def read_barcode(luma: NDArray[np.uint8]) -> int | None:
 
 Planes = NDArray[np.uint8]
 Light = NDArray[np.float32]
+LUMA_SHARES = np.array([0.2126, 0.7152, 0.0722], np.float32)
+"""BT.709."""
 PAINTED_KEPT = 16
 """Pictures a painter keeps, so that resting frames are painted once however long the clip is."""
 SEAM_MM = 4.0
@@ -61,10 +65,12 @@ class FramePainter:
         self.character = character
         self._base = character.base_planes
 
-    def frames(self, curve: ClipCurve, fps: float, blur: bool, barcode: bool = False) -> Iterator[Planes]:
+    def frames(
+        self, curve: ClipCurve, fps: float, blur: bool, barcode: bool = False, life: Life | None = None
+    ) -> Iterator[Planes]:
         """Yield each frame as a (height * 3 / 2, width) array of 4:2:0 planes, to be read only.
 
-        A picture that rests is one array, yielded again for each of its frames.
+        A picture that rests is one array, yielded again for each of its frames; with `life` none rests.
         """
         if curve.lower_vertical_mm is not None and self.character.read_lower is None:
             raise InputError(
@@ -73,6 +79,10 @@ class FramePainter:
         width, height = self.character.size_px
         painted: dict[bytes, Planes] = {}
         for number, (samples, weights) in enumerate(frame_windows(len(curve.closure), fps, blur)):
+            if life is not None:
+                alive = self._paint_alive(curve, samples, weights, life, number)
+                yield _numbered(alive, width, height, number) if barcode else alive
+                continue
             key = same_picture(curve, samples, weights)
             picture = painted.pop(key, None)
             if picture is None:
@@ -117,11 +127,46 @@ class FramePainter:
             blue[half_rows, half_columns.start], red[half_rows, half_columns.start] = first_column
         return planes
 
+    def _paint_alive(
+        self,
+        curve: ClipCurve,
+        samples: NDArray[np.int64],
+        weights: NDArray[np.float64],
+        life: Life,
+        number: int,
+    ) -> Planes:
+        character, regions = self.character, self.eye_regions
+        width, height = character.size_px
+        whole = np.zeros((height, width, 3), np.float32)
+        for part, part_weights, share in moments_of(life, samples, weights, character.px_per_mm):
+            picture = character.base.astype(np.float32)
+            picture[character.window.slices] = self.light(curve, part, part_weights)
+            whole += np.float32(share) * regions.warped(picture, regions.moved_from(life, part, part_weights))
+        planes = np.empty((height * 3 // 2, width), np.uint8)
+        luma, blue, red = split_planes(planes, width, height)
+        to_yuv(whole, GAMMA, luma, blue, red)
+        luma[:] = np.clip(np.rint(luma + noise_of(life, number, luma.shape)), BLACK_LUMA, WHITE_LUMA)
+        return planes
+
+    @cached_property
+    def eye_regions(self) -> EyeRegions:
+        """Where the character's eyes lie."""
+        return regions_of(self.character)
+
     def _seam(self) -> Light:
         window = self.character.window
         from_middle = np.arange(window.x, window.x + window.width) + 0.5 - self.character.size_px[0] / 2
         share = from_middle / (SEAM_MM * self.character.px_per_mm) + 0.5
         return np.asarray(np.clip(share, 0.0, 1.0), np.float32)
+
+
+def regions_of(character: LevelSet) -> EyeRegions:
+    """Where a character's eyes lie in its frame, at its size."""
+    shown = [np.array(character.base, np.float32) for _ in range(2)]
+    for picture, level in zip(shown, (character.levels[0], character.levels[-1]), strict=True):
+        picture[character.window.slices] = level
+    opened, closed = (GAMMA[picture.astype(np.uint16)] @ LUMA_SHARES for picture in shown)
+    return EyeRegions.of_pictures(opened, closed, character.px_per_mm)
 
 
 def _numbered(picture: Planes, width: int, height: int, number: int) -> Planes:

@@ -11,6 +11,7 @@ import numpy as np
 from stimuli_builder.blinks.profile import PROFILE_FPS
 from stimuli_builder.clips.curves import ClipCurve
 from stimuli_builder.clips.geometry import AS_BAKED, Movement
+from stimuli_builder.clips.life import LIFE_VERSION, draw_life
 
 if TYPE_CHECKING:
     from stimuli_builder.clips.levels import LevelSet
@@ -26,7 +27,7 @@ class Look:
 
     `character` is a name or a folder; `beside` the folder it may be relative to. `fingerprint` is the
     SHA-256 of all its pictures, `encoder` names the encoder and its settings, `movement` what of the face
-    moves in addition to what those pictures show.
+    moves in addition to what those pictures show, `life` how strong the motion between blinks is.
     """
 
     character: str
@@ -38,12 +39,15 @@ class Look:
     barcode: bool = False
     beside: Path | None = None
     movement: Movement = AS_BAKED
+    life: float = 0.0
 
     def hashed(self) -> dict[str, Any]:
         """What of it decides a clip's bytes, as JSON data; paths do not count, nor what is not declared."""
         values = asdict(self) | {"beside": None, "character": None}
         if not self.movement.declared:
             del values["movement"]
+        if not self.life:
+            del values["life"]
         return values
 
     def levels(self) -> "LevelSet":
@@ -60,6 +64,7 @@ class ClipJob:
 
     look: Look
     curve: ClipCurve
+    life_seed: int = 0
 
     @property
     def frames(self) -> int:
@@ -70,6 +75,8 @@ class ClipJob:
     def input_hash(self) -> str:
         """SHA-256 over everything that decides the clip's bytes; paths do not count."""
         look = self.look.hashed() | {"render_version": RENDER_VERSION}
+        if self.look.life:
+            look |= {"life_seed": self.life_seed, "life_version": LIFE_VERSION}
         digest = hashlib.sha256(json.dumps(look, sort_keys=True).encode())
         curve = self.curve
         for name in ("closure", "closure_other", "lower_vertical_mm", "lower_horizontal_mm"):
@@ -88,5 +95,6 @@ def render(job: ClipJob) -> bytes:
 
     look = job.look
     painter = FramePainter(look.levels())
-    frames = painter.frames(job.curve, look.fps, look.motion_blur, look.barcode)
+    life = draw_life(len(job.curve.closure), look.life, job.life_seed) if look.life else None
+    frames = painter.frames(job.curve, look.fps, look.motion_blur, look.barcode, life)
     return encode_clip(frames, look.size_px, look.fps)

@@ -1,8 +1,9 @@
 """`stimuli verify`: are the clips what the manifest says, byte for byte and pixel for pixel?"""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -25,10 +26,11 @@ from stimuli_builder.clips.build import Progress, silent
 from stimuli_builder.clips.characters import fingerprint, geometry, shipped_names
 from stimuli_builder.clips.curves import ClipCurve, frame_windows
 from stimuli_builder.clips.face_movement import kept_levels
-from stimuli_builder.clips.frames import SEAM_MM, eye_light, same_picture
+from stimuli_builder.clips.frames import SEAM_MM, eye_light, regions_of, same_picture
 from stimuli_builder.clips.geometry import Movement
 from stimuli_builder.clips.kernels import GAMMA
 from stimuli_builder.clips.levels import LevelSet
+from stimuli_builder.clips.life import EyeRegions, draw_life
 from video_conversion.conversion import conversion_of
 from video_conversion.video_file import NotAClip, examine
 
@@ -66,10 +68,16 @@ class OpeningMeter:
     """
 
     def __init__(self, character: LevelSet, opening_mm: float) -> None:
-        self._character, self._opening_mm = character.thinned(STEP_PX), opening_mm
+        self._whole, self._character = character, character.thinned(STEP_PX)
+        self._opening_mm = opening_mm
         rows, columns = character.window.slices
         self._pixels = slice(rows.start, rows.stop, STEP_PX), slice(columns.start, columns.stop, STEP_PX)
         self._eyes = _eyes(self._character)
+
+    @cached_property
+    def eye_regions(self) -> EyeRegions:
+        """Where the character's eyes lie."""
+        return regions_of(self._whole)
 
     def measured_mm(self, luma: NDArray[np.uint8]) -> Array:
         """(frames, eyes) opening in mm in pictures of (frames, height, width) limited-range luma."""
@@ -296,6 +304,7 @@ def _check(
 def _decoded(path: Path, clip: Clip | CheckClip, meter: OpeningMeter | None, *, is_own: bool) -> DecodedClip:
     """Decode a clip frame by frame."""
     measured: list[NDArray[np.float64]] = []
+    steady = _steadier(clip, meter)
     times: list[Fraction | None] = []
     ends: list[Any] = []
     with av.open(str(path)) as container:
@@ -306,7 +315,7 @@ def _decoded(path: Path, clip: Clip | CheckClip, meter: OpeningMeter | None, *, 
             ends = [*ends[:1], frame]
             if meter is not None and fits:
                 luma = frame.to_ndarray(format="yuv420p")[: frame.height]
-                measured.append(meter.measured_mm(luma[None])[0])
+                measured.append(meter.measured_mm(steady(luma, len(measured))[None])[0])
         problems = list(_shape_problems(stream, times, clip))
         if not is_own:
             problems += _timing_problems(stream, times, clip)
@@ -318,6 +327,25 @@ def _decoded(path: Path, clip: Clip | CheckClip, meter: OpeningMeter | None, *, 
         float(frame.to_ndarray(format="yuv420p")[: frame.height].mean()) for frame in (ends[0], ends[-1])
     )
     return DecodedClip(np.array(measured), (first, last), problems)
+
+
+def _steadier(
+    clip: Clip | CheckClip, meter: OpeningMeter | None
+) -> Callable[[NDArray[np.uint8], int], NDArray[np.uint8]]:
+    """Undoes a frame's motion between blinks, so that the eyes are where the meter looks for them."""
+    strength = float(clip.inputs.get("life", 0))
+    if not strength or meter is None or not isinstance(clip, Clip):
+        return lambda luma, _: luma
+    life = draw_life(len(clip.closure), strength, int(clip.inputs["life_seed"]))
+    regions = meter.eye_regions
+    windows = list(frame_windows(len(life), clip.fps, clip.inputs.get("motion_blur") != "false"))
+
+    def steady(luma: NDArray[np.uint8], number: int) -> NDArray[np.uint8]:
+        moved = regions.moved_from(life, *windows[number])
+        still = regions.warped(luma.astype(np.float32), moved, sign=-1)
+        return np.asarray(np.clip(np.rint(still), 0, 255), np.uint8)
+
+    return steady
 
 
 def _shape_problems(stream: Any, times: list[Fraction | None], clip: Clip | CheckClip) -> Iterator[str]:

@@ -1394,6 +1394,7 @@ export interface components {
    *       "motion_blur": true,
    *       "lower_lid": "none",
    *       "lower_lid_gain": 1,
+   *       "life": 0,
    *       "eyes": "alike",
    *       "seconds": 20,
    *       "state": "listening",
@@ -2526,6 +2527,7 @@ export interface components {
    cheek_mm: number | null;
    squint_mm: number | null;
    gaze_mm: number | null;
+   life: number | null;
    eyes: ("alike" | "separate") | null;
    performance: ("uniform" | "intervals" | "events" | "none") | null;
    seconds: number | null;
@@ -2563,6 +2565,8 @@ export interface components {
    cheek_mm: number | null;
    squint_mm: number | null;
    gaze_mm: number | null;
+   /** @default 0 */
+   life: number;
    /**
    * @default alike
    * @enum {string}
