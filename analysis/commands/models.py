@@ -66,6 +66,15 @@ RandomOption = Annotated[
 ]
 
 
+MeansOption = Annotated[
+    bool,
+    typer.Option("--means", help="Add marginal means, their pairs (Tukey, Holm), and trends of covariates."),
+]
+RatioOption = Annotated[
+    bool, typer.Option("--likelihood-ratio", help="Add likelihood-ratio tests of the fixed effects.")
+]
+
+
 class SlopesChoice(StrEnum):
     """By-participant slopes of the linear mixed model."""
 
@@ -127,6 +136,8 @@ def mixed(
         bool,
         typer.Option("--intervals", help="Add profile likelihood intervals of coefficients and SDs."),
     ] = False,
+    means: MeansOption = False,
+    likelihood_ratio: RatioOption = False,
     levels: LevelsOption = None,
     json: JsonOption = None,
 ) -> None:
@@ -141,9 +152,12 @@ def mixed(
       analysis mixed table.csv --within blur --between group --covariate age --item clip --random face,lab
 
       analysis mixed ratings.csv --df kenward-roger --intervals
+
+      analysis mixed ratings.csv --means --likelihood-ratio
     """
     from analysis.models.mixed import fit_mixed
     from analysis.report.rating_tables import (
+        means_tables,
         mixed_coefficients_table,
         mixed_components_table,
         mixed_effects_table,
@@ -165,13 +179,15 @@ def mixed(
             further,
             df_method=df.value,
             intervals=intervals,
+            means=means,
+            likelihood_ratio=likelihood_ratio,
             progress=say,
         )
     save_json(json, asdict(result), data.synthetic)
     _show(file, data, mixed_text(result))
     named = (result, file.stem, data.synthetic)
     tables = [mixed_effects_table(*named), mixed_components_table(*named)]
-    show_tables(*tables, *([mixed_coefficients_table(*named)] if intervals else []))
+    show_tables(*tables, *([mixed_coefficients_table(*named)] if intervals else []), *means_tables(*named))
 
 
 def ordinal(
@@ -203,6 +219,8 @@ def ordinal(
             max=100,
         ),
     ] = None,
+    means: MeansOption = False,
+    likelihood_ratio: RatioOption = False,
     levels: LevelsOption = None,
     json: JsonOption = None,
 ) -> None:
@@ -215,9 +233,12 @@ def ordinal(
       analysis ordinal table.csv --participant id --rating score --within face,blur --item clip --slopes main
 
       analysis ordinal table.csv --participant id --rating score --within face --quadrature 10
+
+      analysis ordinal ratings.csv --means --likelihood-ratio
     """
     from analysis.models.ordinal import fit_ordinal
     from analysis.report.rating_tables import (
+        means_tables,
         ordinal_coefficients_table,
         ordinal_components_table,
         ordinal_effects_table,
@@ -229,14 +250,23 @@ def ordinal(
     clips = data.item if quadrature in (None, 1) or item else ()
     with progress_spinner("fitting"):
         result = fit_ordinal(
-            data.rows, participant, rating, data.within, clips, slopes.value, groups, numbers, quadrature
+            data.rows,
+            participant,
+            rating,
+            data.within,
+            clips,
+            slopes.value,
+            groups,
+            numbers,
+            quadrature,
+            means=means,
+            likelihood_ratio=likelihood_ratio,
         )
     save_json(json, asdict(result), data.synthetic)
     _show(file, data, ordinal_text(result))
     named = (result, file.stem, data.synthetic)
-    show_tables(
-        ordinal_effects_table(*named), ordinal_coefficients_table(*named), ordinal_components_table(*named)
-    )
+    tables = (ordinal_effects_table, ordinal_coefficients_table, ordinal_components_table)
+    show_tables(*(table(*named) for table in tables), *means_tables(*named))
 
 
 def _read_model_input(

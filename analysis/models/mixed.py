@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -14,7 +14,8 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 from analysis.models.columns import ModelTerms, RandomSlopes, Slopes, Units, split_covariates, units_of
 from analysis.models.design import ModelData, model_data, slope_groups, unmodelled_slopes
 from analysis.models.fixed_effect_tests import KenwardRoger, Uncertainty, kenward_roger, uncertainty
-from analysis.models.profile import with_intervals
+from analysis.models.means import Estimate, model_means, ratio_tests
+from analysis.models.profile import Profile, with_intervals
 from analysis.models.random_part import (
     Coefficient,
     Component,
@@ -76,6 +77,8 @@ def fit_mixed(
     random_slopes: RandomSlopes = "none",
     df_method: DfMethod = "satterthwaite",
     intervals: bool = False,
+    means: bool = False,
+    likelihood_ratio: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> MixedResult:
     """Fit rating ~ full factorial of the factors + covariates with crossed random groupings by REML.
@@ -111,6 +114,10 @@ def fit_mixed(
         coefficients.
     intervals : bool, optional
         Add 95% profile likelihood intervals of coefficients and standard deviations.
+    means : bool, optional
+        Add marginal means, their pairs, and trends of covariates.
+    likelihood_ratio : bool, optional
+        Add likelihood-ratio tests (maximum likelihood, without an effect's sum-coded columns).
     progress : callable, optional
         Takes a word on every interval before it is computed.
 
@@ -139,7 +146,9 @@ def fit_mixed(
             theta = fit_theta(c)
         fitted = _RemlFit(data, random_terms, c, theta, units)
         notes += unmodelled_slopes(data, slopes)
-        result = _result(fitted, effects, slopes, random_slopes, df_method, (*data.notes, *notes))
+        result = _result(fitted, effects, slopes, random_slopes, df_method, (*data.notes, *notes), means)
+        if likelihood_ratio:
+            result = replace(result, ratio_tests=ratio_tests(data, Profile(c, theta).chi2_without))
         if not intervals:
             return result
         scales = [data.unit(row.term) for row in result.components]
@@ -164,6 +173,7 @@ def _result(
     random_slopes: RandomSlopes,
     df_method: DfMethod,
     notes: tuple[str, ...],
+    means: bool,
 ) -> MixedResult:
     data, c, theta, units = fitted.data, fitted.c, fitted.theta, fitted.units
     at = criterion(c, theta)
@@ -178,6 +188,12 @@ def _result(
     effects = tuple(
         MixedEffect(effect, *spread.f_test(at.beta, data.differences(effect))) for effect in data.effects
     )
+
+    def estimated(contrast: Floats) -> Estimate:
+        df = spread.f_test(at.beta, contrast[None])[2]
+        value = float(contrast @ at.beta) * units.scale + float(contrast[0]) * units.middle
+        return value, float(np.sqrt(contrast @ spread.covariance @ contrast)) * units.scale, df
+
     factor = c.blocks[0].factor(theta)
     components = (*components_of_people(labels, factor, sigma, slopes, data),)
     for group, block in zip(data.groups[1:], c.blocks[1:], strict=True):
@@ -203,6 +219,7 @@ def _result(
         notes=(*notes, *degenerate),
         factors=data.factors,
         df_method=df_method,
+        means=model_means(data, estimated) if means else None,
     )
 
 

@@ -1,7 +1,8 @@
 """Cumulative-link mixed model of ratings: logit link, flexible thresholds, crossed random effects."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -12,6 +13,7 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 from analysis.models.columns import ModelTerms, Slopes, split_covariates
 from analysis.models.design import ModelData, model_data, slope_groups, unmodelled_slopes
 from analysis.models.laplace import LaplaceLikelihood, OrdinalData, Parameters
+from analysis.models.means import Estimate, ModelMeans, RatioTest, model_means, ratio_tests
 from analysis.models.ordinal_maximum import (
     OFF_COEFFICIENT,
     OFF_SD,
@@ -90,6 +92,8 @@ class OrdinalResult:
     notes: tuple[str, ...] = ()
     factors: tuple[str, ...] = ()
     quadrature: int = 1
+    means: ModelMeans | None = None
+    ratio_tests: tuple[RatioTest, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -269,6 +273,8 @@ def fit_ordinal(
     between: Sequence[str] = (),
     covariates: Sequence[str] = (),
     quadrature: int | None = None,
+    means: bool = False,
+    likelihood_ratio: bool = False,
 ) -> OrdinalResult:
     """Fit ordered ratings ~ full factorial of the factors + covariates with crossed random effects.
 
@@ -277,7 +283,8 @@ def fit_ordinal(
     rating of the scale that nobody gave has no separate threshold. A model without items and slopes is
     fitted by adaptive Gauss-Hermite quadrature of each participant's integral, with as many nodes as more
     would change nothing; others by Laplace's approximation, with a note where it is not accurate. With
-    `quadrature` there are as many nodes; 1 is Laplace's approximation, without a check.
+    `quadrature` there are as many nodes; 1 is Laplace's approximation, without a check. `means` are on the
+    logit scale.
 
     Raises
     ------
@@ -319,7 +326,40 @@ def fit_ordinal(
         if quadrature is None and not one_integral:
             left_out += _laplace_notes(data, ordinal, maximum, groups)
     terms = RandomTerms(slopes, tuple(groups))
-    return ordinal_result(data, categories, maximum, terms, left_out, nodes)
+    result = ordinal_result(data, categories, maximum, terms, left_out, nodes)
+    if means:
+        result = replace(result, means=_latent_means(data, maximum))
+    if likelihood_ratio:
+        with threadpool_limits(1, "blas"):
+            without = partial(_chi2_without, ordinal, maximum, nodes, bool(items))
+            result = replace(result, ratio_tests=ratio_tests(data, without))
+    return result
+
+
+def _latent_means(data: ModelData, maximum: Maximum) -> ModelMeans:
+    """Means on the logit scale, from the mean of the thresholds (as emmeans' mode `latent`)."""
+    p = maximum.parameters
+    count, gaps = len(p.thresholds), np.diff(p.thresholds)
+    # covariance is of the first threshold and the logs of the gaps; gap j moves all thresholds after it
+    of_mean = np.concatenate([[1.0], gaps * np.arange(count - 1, 0, -1) / count])
+    covariance = maximum.covariance[: -len(p.sd), : -len(p.sd)]
+
+    def estimated(contrast: Floats) -> Estimate:
+        value = float(contrast[1:] @ p.beta - contrast[0] * p.thresholds.mean())
+        row = np.concatenate([-contrast[0] * of_mean, contrast[1:]])
+        return value, float(np.sqrt(row @ covariance @ row)), float("inf")
+
+    return model_means(data, estimated)
+
+
+def _chi2_without(
+    ordinal: OrdinalData, maximum: Maximum, nodes: int, with_items: bool, columns: Integers
+) -> float:
+    smaller = replace(ordinal, x=np.delete(ordinal.x, columns - 1, axis=1))
+    p = maximum.parameters
+    start = replace(p, beta=np.delete(p.beta, columns - 1))
+    likelihood = LaplaceLikelihood(smaller) if nodes == 1 else QuadratureLikelihood(smaller, nodes)
+    return 2 * (maximum.value - maximise(likelihood, start, with_items).value)
 
 
 def _by_enough_nodes(ordinal: OrdinalData, start: Maximum) -> tuple[Maximum, int, list[str]]:

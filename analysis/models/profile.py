@@ -88,6 +88,11 @@ class Profile:
         starts = (self._theta, self._apart())
         return self._end(fit, starts, estimate, -se), self._end(fit, starts, estimate, se)
 
+    def chi2_without(self, columns: NDArray[np.int64]) -> float:
+        """By how much the deviance rises when the coefficients of some columns of X are zero."""
+        smaller = _without(self._c, columns, 0.0)
+        return self._fitted(smaller, (self._theta, self._apart()))[1] - self._least
+
     def sigma(self) -> tuple[float, float]:
         """Interval of the residual standard deviation."""
         estimate = self._best.sigma
@@ -247,8 +252,8 @@ def _minimum(
     return best, least
 
 
-def _without(c: CrossProducts, column: int, value: float) -> CrossProducts:
-    """The cross-products of the model in which a coefficient has this value."""
+def _without(c: CrossProducts, column: int | NDArray[np.int64], value: float) -> CrossProducts:
+    """The cross-products of the model in which a coefficient, or each of several, has this value."""
     turn = np.delete(np.eye(c.f + 1), column, axis=1)
     turn[column, -1] = -value
     return replace(c, pb=c.pb @ turn, cb=c.cb @ turn, bb=turn.T @ c.bb @ turn)

@@ -11,6 +11,7 @@ from scipy import optimize
 from analysis.models.columns import Grouping, RandomSlopes, Slopes
 from analysis.models.design import ModelData
 from analysis.models.fixed_effect_tests import Uncertainty
+from analysis.models.means import ModelMeans, RatioTest
 from analysis.models.reml import CrossProducts, criterion
 from experiments.errors import InputError
 
@@ -318,3 +319,5 @@ class MixedResult:
     notes: tuple[str, ...] = ()
     factors: tuple[str, ...] = field(default=())
     df_method: DfMethod = "satterthwaite"
+    means: ModelMeans | None = None
+    ratio_tests: tuple[RatioTest, ...] = ()

@@ -50,6 +50,59 @@ def mixed_coefficients_table(result: MixedResult, name: str, synthetic: bool) ->
     return Table("mixed-coefficients", caption("Coefficients", name, synthetic), header, rows, 1, (PROFILE,))
 
 
+def means_tables(result: MixedResult | OrdinalResult, name: str, synthetic: bool) -> tuple[Table, ...]:
+    """What was added of marginal means, pairs, trends and likelihood-ratio tests."""
+    tables = []
+    letter = "t" if isinstance(result, MixedResult) else "z"
+    if result.means is not None:
+        means = tuple(
+            (_levels(one.levels), fixed(one.estimate, 3), fixed(one.se, 3), _df(one.df), _interval(one.ci))
+            for one in result.means.means
+        )
+        title = caption("Marginal means", name, synthetic)
+        scale = "" if letter == "t" else " On the logit scale, from the mean of the thresholds."
+        note = f"Equal weights of other factors' levels; covariates at their means.{scale}"
+        tables.append(Table("means", title, ("Mean of", "M", "SE", "df", "95% CI"), means, 1, (note,)))
+        trends = tuple(
+            (
+                f"{one.covariate} {_levels(one.levels)}".strip(),
+                *(fixed(one.estimate, 3), fixed(one.se, 3), fixed(one.t), _df(one.df), p_value(one.p_value)),
+                _interval(one.ci),
+            )
+            for one in result.means.trends
+        )
+        slope_header = ("Slope of", "b", "SE", letter, "df", "p", "95% CI")
+        tables.append(
+            Table("trends", caption("Trends of covariates", name, synthetic), slope_header, trends, 1)
+        )
+        # pairs of cells of two factors are many: they are in the JSON
+        single = [one for one in result.means.pairs if ":" not in one.margin]
+        pairs = tuple(
+            (
+                f"{'' if one in single else one.margin + ', '}{_levels(one.first)} - {_levels(one.second)}",
+                *(fixed(one.difference, 3), fixed(one.se, 3), fixed(one.t), _df(one.df)),
+                *(p_value(one.p_tukey), p_value(one.p_holm), p_value(one.p_bonferroni)),
+            )
+            for one in (*single, *result.means.trend_pairs)
+        )
+        header = ("Pair", "Difference", "SE", letter, "df", "p (Tukey)", "p (Holm)", "p (Bonf.)")
+        tables.append(Table("pairs", caption("Pairs of means and slopes", name, synthetic), header, pairs, 1))
+    rows = tuple(
+        (test.effect, fixed(test.chi2), str(test.df), p_value(test.p_value)) for test in result.ratio_tests
+    )
+    title = caption("Likelihood-ratio tests", name, synthetic)
+    tables.append(Table("likelihood-ratio", title, ("Effect", "χ²", "df", "p"), rows, 1))
+    return tuple(table for table in tables if table.rows)
+
+
+def _levels(levels: dict[str, str]) -> str:
+    return ", ".join(f"{factor}={level}" for factor, level in levels.items())
+
+
+def _df(df: float) -> str:
+    return fixed(df, 1) if df < float("inf") else "∞"
+
+
 def _interval(ends: tuple[float, float] | None) -> str:
     return DASH if ends is None else f"[{fixed(ends[0], 3)}, {fixed(ends[1], 3)}]"
 

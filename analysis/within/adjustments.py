@@ -71,7 +71,7 @@ def studentized_range_tail(q: float, means: int, df: float) -> float:
     means : int
         Number of means k, >= 2.
     df : float
-        Degrees of freedom :math:`\nu`, >= 1.
+        Degrees of freedom :math:`\nu`, >= 1; infinite where the standard error is known.
 
     Returns
     -------
@@ -87,6 +87,8 @@ def studentized_range_tail(q: float, means: int, df: float) -> float:
     :math:`e^{\nu x}` to the left and faster to the right. Where it counts follows from Bonferroni's bound
     :math:`T(w) \le \min(1, k (k - 1) \Phi(-w / \sqrt 2))`; panels meet at the bound's mode.
     """
+    if np.isinf(df):
+        return float(min(1.0, range_tail(np.array([q]), means)[0]))
     low, mode, high = _extent(q, means, df)
     edges = np.unique([low, max(low, mode - KNEE), mode, high])
     nodes, weights = _legendre(PANEL_NODES)
