@@ -11,7 +11,7 @@ CHOICES = {"digit": 9, "direction": 4, "shape": 4, "first_blink": 2, "first_eye"
 
 
 def test_every_language_of_the_page_has_them() -> None:
-    assert sorted(WORDS) == sorted(path.stem for path in LANGUAGES.glob("*.ts"))
+    assert sorted(WORDS) == sorted(path.stem for path in LANGUAGES.glob("*.json"))
 
 
 @pytest.mark.parametrize("language", sorted(WORDS))

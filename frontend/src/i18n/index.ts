@@ -1,15 +1,14 @@
 /** The message catalogue: every sentence the page itself says. Study texts come from the declaration. */
-import type { AnyMessages, Messages } from "./languages/en";
 import { loadModule } from "../ui/load-module";
-import { formOf } from "./message";
+import { formOf, type MessageKey, type Messages } from "./message";
 
-export type MessageKey = keyof Messages;
+export type { MessageKey };
 export type Translate = (key: MessageKey, values?: Record<string, string | number>) => string;
 
 /** A file a language, named by its tag: nothing else needs to know of it. A page loads those it speaks. */
-const files = import.meta.glob<AnyMessages>("./languages/*.ts", { import: "messages" });
+const files = import.meta.glob<Messages>("./languages/*.json", { import: "default" });
 const loaders = Object.fromEntries(Object.entries(files).map(([path, load]) => [tagIn(path), load]));
-const catalogues: Partial<Record<string, AnyMessages>> = {};
+const catalogues: Partial<Record<string, Messages>> = {};
 
 /** Languages that the page speaks itself. English first: it stands in for all others. */
 export const SHIPPED = ["en", ...Object.keys(loaders).filter((tag) => tag !== "en")];
@@ -17,7 +16,7 @@ export const SHIPPED = ["en", ...Object.keys(loaders).filter((tag) => tag !== "e
 const RIGHT_TO_LEFT = new Set(["ar", "dv", "fa", "he", "ku", "ps", "sd", "ug", "ur", "yi"]);
 
 function tagIn(path: string): string {
-  return path.replace(/^.*\/|\.ts$/g, "");
+  return path.replace(/^.*\/|\.json$/g, "");
 }
 
 function shipped(language: string): string {

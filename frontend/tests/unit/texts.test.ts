@@ -1,32 +1,30 @@
 import { describe, expect, it } from "vitest";
 import { direction, loadMessages, pick, preferred, SHIPPED, translator } from "../../src/i18n";
-import { type AnyMessages, messages as en, type Messages } from "../../src/i18n/languages/en";
-import type { Message } from "../../src/i18n/message";
+import en from "../../src/i18n/languages/en.json";
+import type { Message, MessageKey, Messages } from "../../src/i18n/message";
 import { recruiterQuery } from "../../src/participant/flow/identity";
 import { parseBlocks } from "../../src/ui/markdown";
 
 describe("messages", () => {
   const last = (message: Message): string => (typeof message === "string" ? message : message.other);
   const holes = (text: string): string[] => [...text.matchAll(/\{(\w+)\}/g)].map(([, name]) => name ?? "").sort();
-  const files = import.meta.glob<AnyMessages>("../../src/i18n/languages/*.ts", { eager: true, import: "messages" });
-  const translations = Object.entries(files).filter(([path]) => !path.endsWith("/en.ts"));
+  const files = import.meta.glob<Messages>("../../src/i18n/languages/*.json", { eager: true, import: "default" });
+  const translations = Object.entries(files).filter(([path]) => !path.endsWith("/en.json"));
   it.each(translations)("of %s are complete, with the holes of the English ones", (_path, messages) => {
     expect(Object.keys(messages).sort()).toEqual(Object.keys(en).sort());
-    const wrong = (Object.keys(en) as (keyof Messages)[]).filter(
-      (key) => holes(last(messages[key])).join() !== holes(last(en[key])).join(),
-    );
+    const wrong = (Object.keys(en) as MessageKey[]).filter((key) => holes(last(messages[key])).join() !== holes(last(en[key])).join());
     expect(wrong).toEqual([]);
   });
   it.each(Object.entries(files))(
     "of %s have every form that the language has for a number, with none but the English holes",
     (path, messages) => {
-      const rules = new Intl.PluralRules(/(\w+)\.ts$/.exec(path)?.[1]);
+      const rules = new Intl.PluralRules(/(\w+)\.json$/.exec(path)?.[1]);
       const needed = [...new Set(Array.from({ length: 1_000 }, (_, number) => rules.select(number)))];
       for (const [key, message] of Object.entries(messages)) {
         if (typeof message === "string") continue;
         const { by, ...forms } = message;
         expect(Object.keys(forms), key).toEqual(expect.arrayContaining(needed));
-        const known = holes(last(en[key as keyof Messages]));
+        const known = holes(last(en[key as MessageKey]));
         expect(known, key).toContain(by);
         expect(
           Object.values(forms)

@@ -6,6 +6,8 @@ The files of the kind are in `word_choice`, at their places in the tree.
 from pathlib import Path
 from typing import NamedTuple
 
+from tests.conftest import REPOSITORY
+
 
 class Edit(NamedTuple):
     """A text of an existing file, and what stands there afterwards."""
@@ -156,12 +158,9 @@ FIELD: dict[str, str | Edit] = {
     "frontend/src/participant/screens/fields/decimal.ts": DECIMAL_CONTROL,
 }
 
-SWEDISH = """\
-/** Swedish, one sentence of it. */
-import { messages as english, type Messages } from "./en";
-
-export const messages: Messages = { ...english, continue: "Fortsätt" };
-"""
+ENGLISH = REPOSITORY / "frontend/src/i18n/languages/en.json"
+SWEDISH = ENGLISH.read_text(encoding="utf-8").replace('"Continue"', '"Fortsätt"', 1)
+"""Swedish, one sentence of it."""
 
 SWEDISH_CHECKS = """\
 # Words of motion checks in Swedish, a sentence of them.
@@ -172,7 +171,7 @@ question = "Vilken siffra såg du?"
 
 LANGUAGE: dict[str, str | Edit] = {
     "experiments/check_words/sv.toml": SWEDISH_CHECKS,
-    "frontend/src/i18n/languages/sv.ts": SWEDISH,
+    "frontend/src/i18n/languages/sv.json": SWEDISH,
 }
 
 COLUMN: dict[str, str | Edit] = {
