@@ -40,46 +40,28 @@ RUN = "/api/run/"
 Kind = Literal["anonymous", "run", "admin", "upload"]
 
 
-class BodyTooLarge(ApiError):
+class BodyTooLarge(ApiError, status=413, code="too_large"):
     """The body is larger than its sender may send."""
 
-    status = 413
-    code = "too_large"
 
-
-class AddressTooLong(ApiError):
+class AddressTooLong(ApiError, status=414, code="address_too_long"):
     """The address asks for more than any page does."""
 
-    status = 414
-    code = "address_too_long"
 
-
-class TooManyHeaders(ApiError):
+class TooManyHeaders(ApiError, status=431, code="too_many_headers"):
     """The request has more headers than any program sends."""
 
-    status = 431
-    code = "too_many_headers"
 
-
-class BodyTooSlow(ApiError):
+class BodyTooSlow(ApiError, status=408, code="too_slow"):
     """The body did not come in time."""
 
-    status = 408
-    code = "too_slow"
 
-
-class TextNotStorable(ApiError):
+class TextNotStorable(ApiError, status=422, code="invalid_text"):
     """The body holds what no text can hold."""
 
-    status = 422
-    code = "invalid_text"
 
-
-class Busy(ApiError):
+class Busy(ApiError, status=503, code="busy"):
     """Too much is under way at this moment."""
-
-    status = 503
-    code = "busy"
 
 
 class _ClientGone(Exception):

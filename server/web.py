@@ -111,11 +111,8 @@ mimetypes.add_type("text/javascript", ".mjs")
 mimetypes.add_type("application/wasm", ".wasm")
 
 
-class PagesNotBuilt(ApiError):
+class PagesNotBuilt(ApiError, status=503, code="pages_not_built"):
     """The frontend has not been built on this machine."""
-
-    status = 503
-    code = "pages_not_built"
 
 
 @page_router.get("/")
@@ -253,11 +250,8 @@ class Health(BaseModel):
     status: str
 
 
-class NotReady(ApiError):
+class NotReady(ApiError, status=503, code="not_ready"):
     """The server runs but cannot serve yet."""
-
-    status = 503
-    code = "not_ready"
 
 
 def no_room(settings: Settings) -> str | None:

@@ -9,8 +9,6 @@ from scipy import special
 
 Floats = NDArray[np.float64]
 
-ETA_CI_FORM = "noncentral F (Steiger 2004)"
-"""Name of the interval's form, printed wherever the interval is."""
 
 _STEPS = 80
 _RELATIVE_CHANGE = 1e-13

@@ -44,17 +44,12 @@ WAITING = 16
 NICENESS = 10
 
 
-class WeakPassword(Invalid):
+class WeakPassword(Invalid, code="weak_password"):
     """A new password is too easy to guess."""
 
-    code = "weak_password"
 
-
-class PasswordsBusy(ApiError):
+class PasswordsBusy(ApiError, status=503, code="busy"):
     """More passwords are waiting than can be looked at soon."""
-
-    status = 503
-    code = "busy"
 
 
 @cache

@@ -12,11 +12,8 @@ FRESH_FOR = timedelta(minutes=15)
 """After signing in, what would outlive a stolen session may be changed for so long."""
 
 
-class NotSignedIn(ApiError):
+class NotSignedIn(ApiError, status=401, code="not_signed_in"):
     """The request carries no valid session or token."""
-
-    status = 401
-    code = "not_signed_in"
 
 
 class UnknownToken(NotSignedIn):
@@ -25,27 +22,16 @@ class UnknownToken(NotSignedIn):
     audited = True
 
 
-class NotAllowed(ApiError):
+class NotAllowed(ApiError, status=403, code="not_allowed", audited=True):
     """The account's role or the token's scope is not enough."""
 
-    status = 403
-    code = "not_allowed"
-    audited = True
 
-
-class SecondFactorNeeded(ApiError):
+class SecondFactorNeeded(ApiError, status=403, code="second_factor_needed", audited=True):
     """What is asked for opens only to who signed in with a second factor."""
 
-    status = 403
-    code = "second_factor_needed"
-    audited = True
 
-
-class SignInAgain(ApiError):
+class SignInAgain(ApiError, status=403, code="sign_in_again"):
     """What is asked for would outlive a stolen session, and this one began a while ago."""
-
-    status = 403
-    code = "sign_in_again"
 
 
 @dataclass(frozen=True)

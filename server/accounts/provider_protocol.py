@@ -28,25 +28,16 @@ from server.core.settings import Provider, Settings, is_safe
 log = logging.getLogger("palpebra")
 
 
-class ProviderAway(ApiError):
+class ProviderAway(ApiError, status=503, code="provider_away"):
     """The provider does not answer, or not as one."""
 
-    status = 503
-    code = "provider_away"
 
-
-class NotRecognised(ApiError):
+class NotRecognised(ApiError, status=401, code="sign_in_refused"):
     """What the provider's answer says does not hold."""
 
-    status = 401
-    code = "sign_in_refused"
 
-
-class LogoutRefused(ApiError):
+class LogoutRefused(ApiError, status=400, code="logout_refused"):
     """What came is no logout token that holds (Back-Channel Logout 1.0, 2.8)."""
-
-    status = 400
-    code = "logout_refused"
 
 
 def provider_away(why: str) -> ProviderAway:

@@ -306,11 +306,8 @@ _NOT_IN_A_NAME = re.compile(r"[^\w.@+ -]+")
 MAX_NAME = 90
 
 
-class NotAdmitted(ApiError):
+class NotAdmitted(ApiError, status=403, code="not_admitted"):
     """The provider knows her, this server does not."""
-
-    status = 403
-    code = "not_admitted"
 
 
 def new_account(

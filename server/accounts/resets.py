@@ -29,10 +29,8 @@ RESERVED_LETTERS, RESERVED_LINKS = 4, 1
 knows a name and has many addresses uses up all the others."""
 
 
-class LinkOver(Conflict):
+class LinkOver(Conflict, code="link_over"):
     """The link was used, is too old, or was never made."""
-
-    code = "link_over"
 
 
 @dataclass(frozen=True)

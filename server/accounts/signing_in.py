@@ -16,11 +16,8 @@ from server.core.values import hash_token, new_token, now
 from server.models import Account, AdminSession
 
 
-class WrongCredentials(ApiError):
+class WrongCredentials(ApiError, status=401, code="wrong_credentials"):
     """Name, password or code do not fit."""
-
-    status = 401
-    code = "wrong_credentials"
 
 
 class WrongProof(WrongCredentials):
@@ -29,11 +26,8 @@ class WrongProof(WrongCredentials):
     audited = True
 
 
-class SecondFactorRequired(ApiError):
+class SecondFactorRequired(ApiError, status=401, code="second_factor_required"):
     """The password fits; a code is needed too."""
-
-    status = 401
-    code = "second_factor_required"
 
 
 def identity_of(account: Account, session_id: int | None = None) -> Identity:

@@ -45,10 +45,8 @@ def address_range(address: str) -> str:
     return str(ipaddress.ip_network((parsed, bits), strict=False))
 
 
-class TooManyFailures(TooManyRequests):
+class TooManyFailures(TooManyRequests, code="too_many_failures"):
     """Wrong credentials came too often from here."""
-
-    code = "too_many_failures"
 
 
 class BackOff:

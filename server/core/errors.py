@@ -72,13 +72,18 @@ def _kind(given: Any) -> str:
 class ApiError(Exception):
     """Base of every refusal: a status, a code for programs, a sentence for people.
 
-    Subclasses set `status` and `code`; the message says what was expected, what came, and what to do. Those
-    that tell of somebody who tries what is not hers are `audited`.
+    A subclass names what differs from its base: `class NotFound(ApiError, status=404, code="not_found")`. The
+    message says what was expected, what came, and what to do. Those that tell of somebody who tries what is
+    not hers are `audited`.
     """
 
     status: ClassVar[int] = 400
     code: ClassVar[str] = "bad_request"
     audited: ClassVar[bool] = False
+
+    def __init_subclass__(cls, status: int = 0, code: str = "", *, audited: bool = False) -> None:
+        cls.status, cls.code = status or cls.status, code or cls.code
+        cls.audited = audited or cls.audited
 
     def __init__(self, message: str, *, headers: dict[str, str] | None = None, **details: Any) -> None:
         super().__init__(message)
@@ -87,32 +92,20 @@ class ApiError(Exception):
         self.headers = headers
 
 
-class NotFound(ApiError):
+class NotFound(ApiError, status=404, code="not_found"):
     """Nothing is there."""
 
-    status = 404
-    code = "not_found"
 
-
-class Conflict(ApiError):
+class Conflict(ApiError, status=409, code="conflict"):
     """The request contradicts what is stored."""
 
-    status = 409
-    code = "conflict"
 
-
-class TooManyRequests(ApiError):
+class TooManyRequests(ApiError, status=429, code="too_many_requests"):
     """A rate limit was reached; try again later."""
 
-    status = 429
-    code = "too_many_requests"
 
-
-class Invalid(ApiError):
+class Invalid(ApiError, status=422, code="invalid"):
     """The request is well-formed, but its content is not acceptable."""
-
-    status = 422
-    code = "invalid"
 
 
 class ErrorDetail(BaseModel):

@@ -22,11 +22,8 @@ from server.core.settings import Settings
 CHUNK_BYTES = 1 << 20
 
 
-class ClipsAway(ApiError):
+class ClipsAway(ApiError, status=503, code="clips_away"):
     """The object store does not answer; pages try again."""
-
-    status = 503
-    code = "clips_away"
 
 
 class ClipStore(Protocol):

@@ -65,11 +65,8 @@ router = APIRouter(tags=["health"], responses=ERROR_RESPONSES, include_in_schema
 THIS_MACHINE = frozenset({"127.0.0.1", "::1", "localhost"})
 
 
-class MetricsNotForYou(ApiError):
+class MetricsNotForYou(ApiError, status=403, code="metrics_not_allowed"):
     """The counts are for whoever operates the server."""
-
-    status = 403
-    code = "metrics_not_allowed"
 
 
 @router.get("/metrics")

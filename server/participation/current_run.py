@@ -51,11 +51,8 @@ SERVER_EVENTS = frozenset({"screened_out", "warned", REFUSED, *ANSWER, *VIEW})
 MAX_DEPTH = 8
 
 
-class RunDataTooLarge(ApiError):
+class RunDataTooLarge(ApiError, status=413, code="run_data_too_large"):
     """A run holds as much as it may."""
-
-    status = 413
-    code = "run_data_too_large"
 
 
 def checked_device(device: dict[str, Any]) -> dict[str, Any]:
@@ -72,11 +69,8 @@ def checked_data(data: dict[str, Any]) -> dict[str, Any]:
     return data
 
 
-class EventReserved(ApiError):
+class EventReserved(ApiError, status=422, code="event_reserved"):
     """A page sent an event that only the server writes."""
-
-    status = 422
-    code = "event_reserved"
 
 
 def check_event_types(types: Iterable[str]) -> None:

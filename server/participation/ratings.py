@@ -201,16 +201,12 @@ def with_zone(moment: datetime | None) -> datetime | None:
 # Motion checks: what may be answered, and whether their clip was shown; studies of every kind have them.
 
 
-class NoSuchChoice(Invalid):
+class NoSuchChoice(Invalid, code="no_such_choice"):
     """The check has no such choice."""
 
-    code = "no_such_choice"
 
-
-class NoOtherWay(Invalid):
+class NoOtherWay(Invalid, code="no_other_way"):
     """The study offers no way around its checks."""
-
-    code = "no_other_way"
 
 
 def validate_check(loaded: LoadedVersion, clips: Mapping[str, int], rating: RatingIn) -> None:
@@ -234,16 +230,12 @@ def judge_check(loaded: LoadedVersion, clips: Mapping[str, int], rating: RatingI
 # Store a rating once, judge its playback, and write the receipt.
 
 
-class PlayOutOfRange(Invalid):
+class PlayOutOfRange(Invalid, code="play_out_of_range"):
     """A clip may not be shown as often as this."""
 
-    code = "play_out_of_range"
 
-
-class RatingDiffers(Conflict):
+class RatingDiffers(Conflict, code="rating_differs"):
     """Another value is stored under this id, or for this play."""
-
-    code = "rating_differs"
 
 
 def save_rating(

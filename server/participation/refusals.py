@@ -5,84 +5,59 @@ from server.core.errors import ApiError, Conflict, Invalid, NotFound
 # Why an answer is refused: the visit is not known, over, or has not begun.
 
 
-class RunUnknown(ApiError):
+class RunUnknown(ApiError, status=401, code="run_unknown"):
     """No run has this token."""
 
-    status = 401
-    code = "run_unknown"
 
-
-class RunClosed(Conflict):
+class RunClosed(Conflict, code="run_closed"):
     """The run is over."""
 
-    code = "run_closed"
 
-
-class TrialNotInRun(NotFound):
+class TrialNotInRun(NotFound, code="trial_not_in_run"):
     """The run has no such trial."""
 
-    code = "trial_not_in_run"
 
-
-class ConsentMissing(Conflict):
+class ConsentMissing(Conflict, code="consent_missing"):
     """Nothing is stored before the participant has agreed."""
-
-    code = "consent_missing"
 
 
 # Why an answer is refused for what comes, or does not come, with it.
 
 
-class TicketMissing(Invalid):
+class TicketMissing(Invalid, code="ticket_missing"):
     """The run's answers carry tickets, and this one has none."""
 
-    code = "ticket_missing"
 
-
-class TicketInvalid(Invalid):
+class TicketInvalid(Invalid, code="ticket_invalid"):
     """The batch was not sealed by this server, or was changed."""
 
-    code = "ticket_invalid"
 
-
-class TicketOfAnotherRun(Invalid):
+class TicketOfAnotherRun(Invalid, code="ticket_of_another_run"):
     """The batch was issued for another run."""
 
-    code = "ticket_of_another_run"
 
-
-class TicketOfAnotherTrial(Invalid):
+class TicketOfAnotherTrial(Invalid, code="ticket_of_another_trial"):
     """The ticket belongs to another trial or play, or was changed."""
 
-    code = "ticket_of_another_trial"
 
-
-class TicketExpired(Conflict):
+class TicketExpired(Conflict, code="ticket_expired"):
     """The ticket is older than any visit may be."""
 
-    code = "ticket_expired"
 
-
-class ClipsOutlastTickets(Conflict):
+class ClipsOutlastTickets(Conflict, code="clips_outlast_tickets"):
     """The clips answered last longer than the time since their tickets were issued."""
 
-    code = "clips_outlast_tickets"
 
-
-class DigestMissing(Invalid):
+class DigestMissing(Invalid, code="clip_digest_missing"):
     """The answer does not show that its clip was fetched."""
-
-    code = "clip_digest_missing"
 
 
 class UnratedWithoutDigest(DigestMissing):
     """As before, of a play without a rating: a page that was loaded again may not have its clip yet."""
 
 
-class DigestDiffers(Invalid):
+class DigestDiffers(Invalid, code="clip_digest_differs"):
     """The digest is not that of the trial's clip under its ticket."""
-
-    code = "clip_digest_differs"
 
 
 EVIDENCE_REFUSALS: tuple[type[ApiError], ...] = (
@@ -101,133 +76,89 @@ EVIDENCE_REFUSALS: tuple[type[ApiError], ...] = (
 # Why a participant's request is refused.
 
 
-class LinkUnknown(NotFound):
+class LinkUnknown(NotFound, code="link_unknown"):
     """No link has this token, or it was withdrawn."""
 
-    code = "link_unknown"
 
-
-class LinkExpired(Conflict):
+class LinkExpired(Conflict, code="link_expired"):
     """The link's time is over."""
 
-    code = "link_expired"
 
-
-class StudyClosed(Conflict):
+class StudyClosed(Conflict, code="study_closed"):
     """The study takes no more participants."""
 
-    code = "study_closed"
 
-
-class StudyPaused(Conflict):
+class StudyPaused(Conflict, code="study_paused"):
     """The study takes no participants for the moment."""
 
-    code = "study_paused"
 
-
-class StudyFull(Conflict):
+class StudyFull(Conflict, code="study_full"):
     """Every place is taken."""
 
-    code = "study_full"
 
-
-class GroupRefused(Invalid):
+class GroupRefused(Invalid, code="group_refused"):
     """The address asks for a group that its link is not for."""
 
-    code = "group_refused"
 
-
-class GroupDecided(Conflict):
+class GroupDecided(Conflict, code="group_decided"):
     """An answer that decided the group is not changed afterwards."""
 
-    code = "group_decided"
 
-
-class RunTooOld(Conflict):
+class RunTooOld(Conflict, code="run_too_old"):
     """The visit began too long ago to be taken up again."""
 
-    code = "run_too_old"
 
-
-class RunLeft(Conflict):
+class RunLeft(Conflict, code="run_left"):
     """The study must be done in one go, and the visit was left."""
 
-    code = "run_left"
 
-
-class ResumeCodeNeeded(Conflict):
+class ResumeCodeNeeded(Conflict, code="resume_code_needed"):
     """A visit under this recruiter's id has begun in another browser; the id alone does not take it up."""
 
-    code = "resume_code_needed"
 
-
-class ResumeCodeWrong(Conflict):
+class ResumeCodeWrong(Conflict, code="resume_code_wrong"):
     """The resume code is that of no visit by this link."""
 
-    code = "resume_code_wrong"
 
-
-class IdentifierInvalid(Invalid):
+class IdentifierInvalid(Invalid, code="identifier_invalid"):
     """The recruiter's id in the address is not written as that recruiter writes its ids."""
 
-    code = "identifier_invalid"
 
-
-class RecruiterNotSet(Conflict):
+class RecruiterNotSet(Conflict, code="recruiter_not_set"):
     """The address is of a recruiter that neither the link nor the study has."""
 
-    code = "recruiter_not_set"
 
-
-class SignatureMissing(Conflict):
+class SignatureMissing(Conflict, code="signature_missing"):
     """Addresses of this study are signed, and this one is not."""
 
-    code = "signature_missing"
 
-
-class SignatureWrong(Conflict):
+class SignatureWrong(Conflict, code="signature_wrong"):
     """The signature of the address is not that of its participant and study."""
 
-    code = "signature_wrong"
 
-
-class TakenPartAlready(Conflict):
+class TakenPartAlready(Conflict, code="taken_part_already"):
     """A visit under this recruiter's id is over."""
 
-    code = "taken_part_already"
 
-
-class RatingsMissing(Conflict):
+class RatingsMissing(Conflict, code="ratings_missing"):
     """Trials are still to be answered."""
 
-    code = "ratings_missing"
 
-
-class FormsMissing(Conflict):
+class FormsMissing(Conflict, code="forms_missing"):
     """Forms with required questions are still to be answered."""
 
-    code = "forms_missing"
 
-
-class ScreeningUndeclared(Conflict):
+class ScreeningUndeclared(Conflict, code="screening_undeclared"):
     """The study does not screen by this."""
 
-    code = "screening_undeclared"
 
-
-class LanguageUnknown(Invalid):
+class LanguageUnknown(Invalid, code="language_unknown"):
     """The study has no texts in this language."""
 
-    code = "language_unknown"
 
-
-class FormUnknown(NotFound):
+class FormUnknown(NotFound, code="form_unknown"):
     """The study declares no such form."""
 
-    code = "form_unknown"
 
-
-class FormInvalid(Invalid):
+class FormInvalid(Invalid, code="form_invalid"):
     """An answer does not fit its question."""
-
-    code = "form_invalid"

@@ -34,10 +34,8 @@ MAX_WHOLE = 100
 """The first of a run are kept whole, of further ones the reason alone: all are read with each answer."""
 
 
-class TooManyRefused(Conflict):
+class TooManyRefused(Conflict, code="too_many_refused"):
     """A run has as many refused records as are kept."""
-
-    code = "too_many_refused"
 
 
 def keep_refused(

@@ -202,10 +202,8 @@ def _in_time(received_at: datetime, issued_at: datetime, before: _EarlierViews) 
 # Store views once each: what began is known though the page dies, what ended carries its frames.
 
 
-class ViewDiffers(Conflict):
+class ViewDiffers(Conflict, code="view_differs"):
     """Another view is stored under this id, or with this number."""
-
-    code = "view_differs"
 
 
 def save_views(

@@ -41,16 +41,16 @@ class Manner:
 
     Attributes
     ----------
+    rt_ms : callable
+        Response time of one answer.
+    interaction : callable
+        Presses between two answers, None where none are told.
     tickets : bool
         Sends the server's tickets.
     fetches : bool
         Fetches clips, and shows it.
     waits : bool
         Lets the clips play.
-    rt_ms : callable
-        Response time of one answer.
-    interaction : callable
-        Presses between two answers, None where none are told.
     answers : {"model", "same", "any"}
         By the rater model, always the same, or any.
     reads : bool
@@ -61,11 +61,11 @@ class Manner:
         Chances of each before an answer.
     """
 
-    tickets: bool
-    fetches: bool
-    waits: bool
     rt_ms: Callable[[random.Random, "Habits"], float]
     interaction: Callable[[random.Random, "Habits"], Interaction | None]
+    tickets: bool = True
+    fetches: bool = True
+    waits: bool = True
     answers: Literal["model", "same", "any"] = "model"
     reads: bool = True
     checks: Literal["sees", "guesses", "goes around"] = "guesses"
@@ -141,62 +141,15 @@ def _no_interaction(_rng: random.Random, _person: Habits) -> None:
 
 
 MANNERS: dict[str, Manner] = {
-    "http": Manner(
-        tickets=False,
-        fetches=False,
-        waits=False,
-        rt_ms=_plausible_rt,
-        interaction=_no_interaction,
-        answers="any",
-    ),
-    "http-slow": Manner(
-        tickets=True, fetches=True, waits=True, rt_ms=_plausible_rt, interaction=_no_interaction
-    ),
-    "script": Manner(
-        tickets=True, fetches=True, waits=True, rt_ms=_polling_rt, interaction=_synthetic_click, answers="any"
-    ),
-    "frames": Manner(tickets=True, fetches=True, waits=True, rt_ms=_human_rt, interaction=_driver),
-    "flow": Manner(
-        tickets=True, fetches=True, waits=True, rt_ms=_human_rt, interaction=_driver, checks="sees"
-    ),
-    "careless": Manner(
-        checks="sees",
-        tickets=True,
-        fetches=True,
-        waits=True,
-        rt_ms=_hasty_rt,
-        interaction=_hand,
-        answers="same",
-        reads=False,
-    ),
-    "honest": Manner(
-        checks="sees",
-        tickets=True,
-        fetches=True,
-        waits=True,
-        rt_ms=_human_rt,
-        interaction=_hand,
-        offline=0.01,
-        reloads=0.01,
-        clock_jumps=0.01,
-    ),
-    "assistive": Manner(
-        tickets=True,
-        fetches=True,
-        waits=True,
-        rt_ms=_slow_rt,
-        interaction=_screen_reader,
-        checks="goes around",
-    ),
-    "scripted": Manner(
-        tickets=True,
-        fetches=True,
-        waits=True,
-        rt_ms=_human_rt,
-        interaction=_busy_driver,
-        answers="any",
-        reads=False,
-    ),
+    "http": Manner(_plausible_rt, _no_interaction, tickets=False, fetches=False, waits=False, answers="any"),
+    "http-slow": Manner(_plausible_rt, _no_interaction),
+    "script": Manner(_polling_rt, _synthetic_click, answers="any"),
+    "frames": Manner(_human_rt, _driver),
+    "flow": Manner(_human_rt, _driver, checks="sees"),
+    "careless": Manner(_hasty_rt, _hand, checks="sees", answers="same", reads=False),
+    "honest": Manner(_human_rt, _hand, checks="sees", offline=0.01, reloads=0.01, clock_jumps=0.01),
+    "assistive": Manner(_slow_rt, _screen_reader, checks="goes around"),
+    "scripted": Manner(_human_rt, _busy_driver, answers="any", reads=False),
 }
 """http: plain HTTP. http-slow: HTTP with plausible waits and fetched clips. script: a headless browser whose
 page a script clicks. frames: a driven browser that answers from single frames. flow: one that computes

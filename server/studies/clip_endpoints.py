@@ -175,17 +175,12 @@ _CLIP_ANSWERS: dict[int | str, dict[str, Any]] = {
 }
 
 
-class ClipUnknown(NotFound):
+class ClipUnknown(NotFound, code="clip_unknown"):
     """No clip has this hash."""
 
-    code = "clip_unknown"
 
-
-class RangeNotSatisfiable(ApiError):
+class RangeNotSatisfiable(ApiError, status=416, code="range_not_satisfiable"):
     """The part asked for lies outside the clip."""
-
-    status = 416
-    code = "range_not_satisfiable"
 
 
 @clip_router.get("/clips/{sha256}.mp4", response_class=Response, responses=_CLIP_ANSWERS)

@@ -72,10 +72,8 @@ def planned_experiment(text: str, source: str = "definition") -> Experiment:
 # What every change of a study begins with: nobody else changed it meanwhile.
 
 
-class EditedMeanwhile(Conflict):
+class EditedMeanwhile(Conflict, code="edited_meanwhile"):
     """Somebody else changed the study since this edit began."""
-
-    code = "edited_meanwhile"
 
 
 def for_edit(
@@ -97,10 +95,8 @@ def for_edit(
 # Take a declared experiment and a folder of clips into the server: all of it, or nothing.
 
 
-class NameTaken(Conflict):
+class NameTaken(Conflict, code="name_taken"):
     """Another study has this name."""
-
-    code = "name_taken"
 
 
 def check_name(declared: Experiment, manifest: Manifest, clips: Path) -> None:

@@ -37,10 +37,8 @@ from server.studies.schemas import LaunchCheck, LaunchPage
 MAX_TEXTS_NAMED = 3
 
 
-class NotReady(Conflict):
+class NotReady(Conflict, code="not_ready"):
     """A launch check that blocks has found something."""
-
-    code = "not_ready"
 
 
 class LaunchState(NamedTuple):

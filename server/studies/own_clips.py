@@ -141,10 +141,8 @@ def _numbers(levels: list[str]) -> bool:
 # A study from somebody's own clips: definition and manifest.
 
 
-class StillPreparing(Conflict):
+class StillPreparing(Conflict, code="still_preparing"):
     """Clips of an upload are still being looked into or converted."""
-
-    code = "still_preparing"
 
 
 def definition_text(name: str, placed: Placed, asked: OwnClips) -> str:

@@ -45,11 +45,8 @@ CHUNK_BYTES = 1 << 20
 NAME = re.compile(r"\w[^\x00-\x1f\x7f]*")
 
 
-class UploadTooLarge(ApiError):
+class UploadTooLarge(ApiError, status=413, code="too_large"):
     """The upload is larger than this server takes."""
-
-    status = 413
-    code = "too_large"
 
 
 def safe_name(path: str) -> str:

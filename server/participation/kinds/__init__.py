@@ -61,10 +61,8 @@ class ServedKind:
     counted: Callable[[Mapping[str, NumberedClip], Mapping[str, Any]], Iterable[TallyEntry]]
 
 
-class AnswerOfOtherKind(Invalid):
+class AnswerOfOtherKind(Invalid, code="answer_of_other_kind"):
     """The answer belongs to trials of another kind than the study's."""
-
-    code = "answer_of_other_kind"
 
 
 A = TypeVar("A", bound=Answer)

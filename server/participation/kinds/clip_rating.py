@@ -25,28 +25,20 @@ NOT_APPLICABLE_SHARE = 0.05
 """Share of answers of simulated people that a scale does not apply, where it has that answer."""
 
 
-class RatingOutOfScale(Invalid):
+class RatingOutOfScale(Invalid, code="rating_out_of_scale"):
     """The rating does not lie on the declared scale."""
 
-    code = "rating_out_of_scale"
 
-
-class RatingMissing(Invalid):
+class RatingMissing(Invalid, code="rating_missing"):
     """Only a clip that failed may go without a rating."""
 
-    code = "rating_missing"
 
-
-class NoSuchScale(Invalid):
+class NoSuchScale(Invalid, code="no_such_scale"):
     """The study does not declare a scale of this name."""
 
-    code = "no_such_scale"
 
-
-class NoReference(Invalid):
+class NoReference(Invalid, code="no_reference"):
     """The study declares no reference before its clips."""
-
-    code = "no_reference"
 
 
 def validate(experiment: Experiment, part: Part, rating: RatingIn) -> None:

@@ -28,10 +28,8 @@ DRIFT_SHARE = 0.01
 """Spread of a simulated person's wandering from sample to sample, as a share of the range."""
 
 
-class TraceMissing(Invalid):
+class TraceMissing(Invalid, code="trace_missing"):
     """A trace comes with its step, an attention check with a number."""
-
-    code = "trace_missing"
 
 
 def validate(experiment: Experiment, part: Part, rating: RatingIn) -> None:

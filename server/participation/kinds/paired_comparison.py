@@ -26,10 +26,8 @@ TIE_SHARE = 0.5
 """Davidson's nu of simulated people: ties against the geometric mean of the two odds."""
 
 
-class NoComparison(Invalid):
+class NoComparison(Invalid, code="no_comparison"):
     """The answer is none to a pair."""
-
-    code = "no_comparison"
 
 
 def validate(experiment: Experiment, part: Part, rating: RatingIn) -> None:

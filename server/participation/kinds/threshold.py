@@ -16,10 +16,8 @@ from server.participation.verdict import judge as judge_play
 from server.participation.versions import LoadedVersion
 
 
-class NoSuchAnswer(Invalid):
+class NoSuchAnswer(Invalid, code="no_such_answer"):
     """The task has other answers."""
-
-    code = "no_such_answer"
 
 
 def validate(experiment: Experiment, part: Part, rating: RatingIn) -> None:

@@ -94,7 +94,8 @@ SCALE: dict[str, str | Edit] = {
         'question = { en = "How long did it take?" }\nnot_applicable = { en = "I cannot say" }\n',
     ),
     "docs/reference/trials/clip_rating.md": Edit(
-        "| `slider` | a line", "| `magnitude` | a number that is typed |\n| `slider` | a line"
+        '| `type = "slider"` | from',
+        '| `type = "magnitude"` | a number that is typed |\n| `type = "slider"` | from',
     ),
 }
 
