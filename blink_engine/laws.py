@@ -126,6 +126,7 @@ class SplitMix32:
 
     def next(self) -> int:
         """Return the next 32-bit integer."""
+        # An odd constant: the state runs through all 2^32 values before it repeats.
         self.state = (self.state + GOLDEN_GAMMA) & MASK
         mixed = self.state
         mixed = ((mixed ^ (mixed >> 16)) * 0x21F0AAAD) & MASK
@@ -146,12 +147,15 @@ class RandomNumbers:
     """
 
     def __init__(self, seed: int, stream: int = 0) -> None:
+        # Spread by an odd multiplier, else the streams of neighboring seeds would be one another's.
         filler = SplitMix32((seed ^ (stream * 0x85EBCA6B)) & MASK)
         self._state = [filler.next() for _ in range(4)]
 
     def integer(self) -> int:
         """Return the next integer in [0, 2**32)."""
         s = self._state
+        # Python's integers have no width: every product is cut to the 32 bits that `Math.imul` keeps in the
+        # page.
         result = (_rotate_left((s[1] * 5) & MASK, 7) * 9) & MASK
         shifted = (s[1] << 9) & MASK
         s[2] ^= s[0]
@@ -201,6 +205,7 @@ class Law:
         """Draw one number; a log-normal and a fixed law use one uniform number, a gamma two or more."""
         if self.kind == "gamma":
             return self._scale() * _gamma(self.spread, numbers)
+        # Drawn for a fixed law too: a law may be changed without shifting the numbers of what follows.
         z = numbers.normal()
         return self.median if self.kind == "fixed" else self.median * math.exp(self.spread * z)
 
@@ -233,6 +238,7 @@ class Law:
 
 def _gamma(shape: float, numbers: RandomNumbers) -> float:
     """Draw from the gamma law of scale 1 by Marsaglia & Tsang (2000), ACM TOMS 26(3), 363-372."""
+    # Their method needs a shape of 1 or more; a smaller one is reached by a power of a uniform number.
     if shape < 1.0:
         boost = math.pow(numbers.uniform(), 1.0 / shape)
         return boost * _gamma(shape + 1.0, numbers)
@@ -240,6 +246,7 @@ def _gamma(shape: float, numbers: RandomNumbers) -> float:
     c = 1.0 / math.sqrt(9.0 * d)
     while True:
         x, u = numbers.normal(), numbers.uniform()
+        # Wilson and Hilferty's cube: near enough to gamma that more than 95 % of the tries are kept.
         v = (1.0 + c * x) ** 3
         if v > 0.0 and math.log(u) < 0.5 * x * x + d - d * v + d * math.log(v):
             return d * v

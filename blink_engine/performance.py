@@ -11,6 +11,7 @@ from blink_engine.plan import Array, Blink, BlinkPlan, lid_course
 
 # One call a frame: the lids at a moment, for games, avatars and robots.
 
+# A look up widens an eye a little; however far down it goes, the lid leaves it open.
 GAZE_CLOSURE_MIN, GAZE_CLOSURE_MAX = -0.15, 0.6
 
 
@@ -98,6 +99,7 @@ class BlinkEngine:
         if not time_s >= self._time_s or math.isinf(time_s):
             raise ValueError(f"expected a time of at least {self._time_s} s, got {time_s}")
         self._time_s = time_s
+        # Blinks that a slow frame skipped whole are dropped unseen, as at that rate no frame shows them.
         self._active = [blink for blink in self._active if blink.end_s > time_s]
         self._active += [blink for blink in self._plan.due(time_s) if blink.end_s > time_s]
         return self._lids(resting_closure(self.parameters, gaze_down_deg, squint), min(1.0, max(0.0, squint)))
@@ -207,6 +209,7 @@ def perform(
         raise ValueError(f"expected a duration above 0 s and below 10,000,000 s, got {duration_s}")
     chosen = parameters or default_parameters()
     blinks = plan_blinks(duration_s, BlinkPlan(chosen, state, seed), events, changes)
+    # The last frame of n stands at duration - 1 / fps.
     if ends_open:
         blinks = [blink for blink in blinks if blink.end_s <= duration_s - 1.0 / fps]
     count = max(1, round(duration_s * fps))
@@ -229,6 +232,7 @@ def plan_blinks(
 ) -> list[Blink]:
     """Return every blink that begins within the duration, with events and state changes in their order."""
     happenings: list[Event | StateChange] = [*changes, *events]
+    # States first: an event at that moment is answered as in the state that it finds.
     happenings.sort(key=lambda one: (one.time_s, isinstance(one, Event)))
     blinks: list[Blink] = []
     for happening in happenings:
@@ -255,6 +259,7 @@ def _lay(blinks: Sequence[Blink], count: int, fps: float, *, right: bool) -> Arr
         [(b.right_onset_s, b.right_peak) if right else (b.left_onset_s, b.left_peak) for b in blinks]
     ).T
     shape = np.array([(b.shape.closing_s, b.shape.closed_s, b.shape.opening_s) for b in blinks])
+    # A frame shows the moment at which it begins.
     first = np.clip(np.ceil(onset * fps), 0, count).astype(np.int64)
     last = np.clip(np.floor((onset + shape.sum(axis=1)) * fps) + 1, first, count).astype(np.int64)
     lengths = last - first
@@ -266,5 +271,7 @@ def _lay(blinks: Sequence[Blink], count: int, fps: float, *, right: bool) -> Arr
     course = lid_course(
         frame / fps - onset[owner], closing, closed, opening, powers.closing_power, powers.opening_power
     )
+    # `at`, since frames repeat where blinks overlap: a plain assignment would keep the last blink, not the
+    # greatest.
     np.maximum.at(closure, frame, peak[owner] * course)
     return closure

@@ -135,6 +135,7 @@ class BlinkPlan:
         self._drift = parameters.drift.under_way(self._drifts.normal())
         self._slow = parameters.slow_drift.under_way(self._drifts.normal())
         met = parameters.intervals[state].draw_under_way(self._intervals)
+        # The rest of an interval met at random is uniform within it.
         self._spontaneous_s = self._drifted(met) * self._intervals.uniform()
         self._answer_s, self._answer_cause = math.inf, ""
         self._anticipated = 0
@@ -152,6 +153,8 @@ class BlinkPlan:
             self._answer(event.time_s, "blink")
             return
         response = self._parameters.responses[event.kind]
+        # Both are drawn whether or not the event is answered, so that the next event's numbers stay the
+        # same.
         chance, latency = self._responses.uniform(), self._responses.uniform()
         if chance < response.chance(event.amplitude_deg):
             delay = response.earliest_s + latency * (response.latest_s - response.earliest_s)
@@ -170,6 +173,7 @@ class BlinkPlan:
             self._spontaneous_s = onset + self._interval()
             if self._anticipated:
                 self._anticipated -= 1
+            # An answer may just have come: two onsets closer than this are one blink to an observer.
             elif onset >= self._last_onset_s + self._parameters.least_interval_s:
                 yield self._blink(onset, "spontaneous")
 
@@ -212,6 +216,8 @@ class BlinkPlan:
         if again and cause != "double":
             self._answer(onset + shape.duration_s, "double")
         return Blink(
+            # The eye that is first keeps the planned onset: a blink never begins before `due` was asked for
+            # it.
             onset + max(0.0, -delay),
             onset + max(0.0, delay),
             peak if complete else _bounded(peak + asymmetry / 2.0),

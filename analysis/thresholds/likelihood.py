@@ -58,6 +58,7 @@ def function(shape: Shape, x: Array, location: float, log_spread: float) -> Arra
     b = np.exp(log_spread)
     if shape == "weibull":
         with np.errstate(over="ignore"):
+            # exp overflows above 709; long before, F is 1 to the last digit.
             power = np.exp(np.minimum(b * (np.log(x) - np.log(location)), 700.0))
         return np.asarray(-np.expm1(-np.log(2.0) * power))
     z = (x - location) / b
@@ -84,6 +85,8 @@ class Likelihood:
         lapse = values[2] if self.lapse is None else self.lapse
         rising = function(self.shape, self.trials.x, values[0], values[1])
         f = 1.0 - rising if self.falling else rising
+        # One answer against a saturated function then costs 27.6, and not infinity: the search can go on
+        # past it.
         return np.asarray(np.clip(self.guess + (1 - self.guess - lapse) * f, 1e-12, 1 - 1e-12))
 
     def negative(self, values: Array) -> float:
@@ -156,15 +159,20 @@ class Likelihood:
 
     def _bounds(self) -> list[tuple[float, float]]:
         x = self.trials.x
+        # Wider than the three ranges that `fit_threshold` takes, so that a refusal is told from a search
+        # that was held.
         low, high = float(x.min() - 5 * self.width), float(x.max() + 5 * self.width)
         if self.shape == "weibull":
             low, spread = float(x.min()) * 1e-3, (float(np.log(1e-2)), float(np.log(1e3)))
         else:
+            # From a step between neighboring levels to a function that is flat over all of them.
             spread = (float(np.log(self.width * 1e-4)), float(np.log(self.width * 50)))
         return [(low, high), spread, (0.0, LAPSE_MAX)]
 
     def _starts(self, size: int) -> list[Array]:
         x, n = self.trials.x, self.trials.n
+        # Two places and two spreads: with guesses and lapses the likelihood has further maxima at flat
+        # functions.
         places = [float(np.average(x, weights=n)), float(np.quantile(x, 0.25))]
         spreads = [1.0, 4.0] if self.shape == "weibull" else [self.width / 3, self.width / 10]
         return [
@@ -176,6 +184,8 @@ class Likelihood:
         inner = best.copy()
         if self.lapse is None and not BOUND < best[2] < LAPSE_MAX - BOUND:
             return None
+        # About the fourth root of the machine's precision, where rounding and truncation of a second
+        # difference are equal.
         steps = np.maximum(np.abs(inner), [self.width / 10, 1.0, 0.02][: inner.size]) * 1e-4
         size = inner.size
         information = np.zeros((size, size))
@@ -183,6 +193,8 @@ class Likelihood:
             for j in range(size):
                 one, other = np.zeros(size), np.zeros(size)
                 one[i], other[j] = steps[i], steps[j]
+                # The mixed second difference over four corners; with i = j it is the usual one at twice the
+                # step.
                 signs = ((1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1))
                 total = sum(sign * self.negative(inner + a * one + b * other) for a, b, sign in signs)
                 information[i, j] = total / (4 * steps[i] * steps[j])
@@ -213,6 +225,7 @@ class Likelihood:
                 return float(optimize.brentq(loss, inside, outside, xtol=1e-7 * max(1.0, self.width)))
             if outside == bound:
                 return None
+            # Growing steps: the end of an open profile, at a bound, is reached in a dozen fits.
             inside, step = outside, step * 1.6
 
 

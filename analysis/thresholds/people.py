@@ -56,8 +56,13 @@ def average(y: Array, errors: Array) -> Average | None:
 
     span = float(np.var(y)) + float(s2.mean())
     optimum = optimize.minimize_scalar(
-        restricted, bounds=(np.log(span) - 25, np.log(span) + 3), method="bounded"
+        # Below, tau vanishes next to any error; above, it would exceed the spread of the thresholds
+        # themselves.
+        restricted,
+        bounds=(np.log(span) - 25, np.log(span) + 3),
+        method="bounded",
     )
+    # The likelihood may rise all the way to tau = 0, which no finite logarithm reaches.
     tau2 = float(np.exp(optimum.x)) if optimum.fun < restricted(-np.inf) else 0.0
     weights = 1 / (s2 + tau2)
     mean = float(np.sum(weights * y) / weights.sum())
@@ -73,7 +78,10 @@ NODES = 15
 """Gauss-Hermite nodes for a person's threshold, and for the spread."""
 
 NEWTON_STEPS = 25
+# About the fourth root of the machine's precision, where rounding and truncation of second differences are
+# equal.
 STEP = 1e-4
+# exp(-12) = 6e-6 of the width: zero in every printed digit, while the logarithm stays finite.
 LOG_SD_MIN = -12.0
 SHAPES_WITH_POPULATION = ("normal", "logistic")
 
@@ -177,13 +185,17 @@ class PopulationLikelihood:
 
     def value(self, values: Array) -> float:
         """Log-likelihood at (mu, log tau, nu, log omega)."""
+        # The parameters have moved little since the last call, and so have the modes: two or three steps
+        # are enough.
         u = self.modes
         for _ in range(NEWTON_STEPS):
             gradient, hessian = self._differences(values, u)
             curvature = _positive(-hessian)
             step = np.linalg.solve(curvature, gradient[:, :, None])[:, :, 0]
+            # At most 1.5 prior SDs at once: far from its mode a posterior is no parabola.
             step *= np.minimum(1.0, 1.5 / np.maximum(np.abs(step).max(axis=1, keepdims=True), 1e-12))
             better = self.joint(values, (u + step)[:, None])[:, 0] >= self.joint(values, u[:, None])[:, 0]
+            # All people move together in one array, so a step that would lose is cut, not searched along.
             u = u + np.where(better[:, None], step, step / 8)
             if np.abs(step).max() < 1e-5:
                 break
@@ -221,6 +233,8 @@ def fit_population(
     start = np.array([x.mean(), np.log(width / 8), np.log(width / 6), np.log(0.3)])
     best = _maximum(model, start, width, None)
     value, mu = model.value(best), float(best[0])
+    # A difference of the profile, not of the likelihood: the error then holds that of every other
+    # parameter.
     h = 1e-3 * width
     sides = [_profiled(model, best, width, mu + sign * h) for sign in (1, -1)]
     curvature = (2 * value - sum(sides)) / h**2
@@ -242,6 +256,7 @@ def fit_population(
 
 
 def _maximum(model: PopulationLikelihood, start: Array, width: float, mu: float | None) -> Array:
+    # The search's tolerances are absolute: mu is brought to the size of the logarithms beside it.
     scale = np.array([width, 1.0, 1.0, 1.0])
 
     def negative(scaled: NDArray[np.float64]) -> float:
@@ -273,6 +288,7 @@ def _end(model: PopulationLikelihood, best: Array, value: float, width: float, s
         return 2 * (value - _profiled(model, best, width, mu)) - CHI2_95
 
     inside, outside = float(best[0]), float(best[0]) + 2 * step
+    # Sixteen standard errors out: a profile that has not fallen there has no end.
     for _ in range(8):
         if fall(outside) > 0:
             return float(optimize.brentq(fall, inside, outside, xtol=1e-6 * width))

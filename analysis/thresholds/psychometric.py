@@ -21,6 +21,7 @@ from experiments.errors import InputError
 
 NORMAL_95 = float(special.ndtri(0.975))
 
+# Far below what any number of answers can tell from 0 or 1, far above the rounding of F.
 STEP = 1e-6
 """How near its ends a function is that has reached them."""
 
@@ -100,6 +101,7 @@ def fit_threshold(
     model = Likelihood(Trials((trials.x - centre) / unit, trials.n, trials.k), shape, guess, lapse, falling)
     best, value = model.maximum({})
     location = centre + unit * best[0]
+    # The Weibull's spread is an exponent and has no unit.
     log_spread = best[1] + (0.0 if shape == "weibull" else float(np.log(unit)))
     lapsed = best[2] if lapse is None else lapse
     step = _is_step(model, trials, best)
@@ -110,6 +112,8 @@ def fit_threshold(
             "a test of fit"
         )
     low, high = float(trials.x.min()), float(trials.x.max())
+    # Three ranges away F is as good as straight over the levels: its place would follow from its assumed
+    # shape alone.
     if not low - 3 * (high - low) <= location <= high + 3 * (high - low):
         raise InputError(
             f"the threshold is far outside the levels shown ({low:g} to {high:g}); the answers hardly change "
@@ -120,6 +124,8 @@ def fit_threshold(
     empty = Interval(None, None)
     location_ci = model.profile(0, best, value) if intervals else empty
     spread_ci = model.profile(1, best, value) if intervals else empty
+    # At the edge of its range the score of the lapse rate is not zero, and the curvature there is no
+    # information.
     curvature = model.standard_error(best) if lapsed > BOUND or lapse is not None else None
     error = error_of(curvature, location_ci)
     level = _level(model, best, 0.75)
@@ -154,6 +160,7 @@ def fit_threshold(
 def _scale(trials: Trials, shape: Shape) -> tuple[float, float]:
     """Center and unit in which x is fitted: steps and tolerances are absolute, units of x are anyone's."""
     unit = float(trials.x.max() - trials.x.min())
+    # The Weibull begins at x = 0: it may be scaled, but not moved.
     return (0.0 if shape == "weibull" else float(np.average(trials.x, weights=trials.n))), unit
 
 
@@ -208,6 +215,7 @@ def _level(model: Likelihood, best: Array, level: float) -> float | None:
 
 def _deviance(trials: Trials, p: Array) -> float:
     yes, no = trials.k, trials.n - trials.k
+    # A level with answers of one kind adds 0 log 0, which is 0 here and NaN with `log`.
     terms = special.xlogy(yes, yes / (trials.n * p)) + special.xlogy(no, no / (trials.n * (1 - p)))
     return float(2 * terms.sum())
 
@@ -252,6 +260,7 @@ def _doubts(
 def _below(trials: Trials, guess: float) -> list[str]:
     """Say at which level fewer answers are yes than guessing alone gives, with p below .001 over levels."""
     chance = np.asarray(stats.binom.cdf(trials.k, trials.n, guess))
+    # Times the number of levels: Bonferroni's bound for looking at the smallest p.
     if guess == 0 or chance.min() * trials.x.size > 0.001:
         return []
     at = int(chance.argmin())

@@ -123,6 +123,7 @@ class GroupCommit:
         loop = asyncio.get_running_loop()
         future: asyncio.Future[T] = loop.create_future()
         queues = self._queues or self._start()
+        # The last writer takes heavy work alone; with SQLite it is also the only one.
         queue = hash(key) % max(1, len(queues) - 1) if weight == 1 else -1
         queues[queue].put(_Work(work, weight, loop, future))
         return await future
@@ -151,6 +152,7 @@ class GroupCommit:
         writer = self.database.writer()
         while batch := queue.take(writer.rest):
             _commit(writer, batch)
+            # One call into each event loop per commit, since every such call wakes the loop through a pipe.
             for loop in {work.loop for work in batch}:
                 mine = [work for work in batch if work.loop is loop]
                 _resolve_batch(loop, mine)
@@ -288,6 +290,8 @@ class Prepared:
         if dialect.name not in self._compiled:
             self._compiled[dialect.name] = _compile_statement(self._statement, dialect, self._columns)
         compiled = self._compiled[dialect.name]
+        # The driver's own cursor is used below, so SQLAlchemy does not notice that a transaction has to
+        # begin.
         if not connection.in_transaction():
             connection.begin()
         given = compiled.values(values)
@@ -360,6 +364,7 @@ def _processed_row(row: Sequence[Any], processors: _ResultProcessors) -> list[An
 def _as_sqlalchemy_raises(connection: Connection, text: str, error: Any) -> DBAPIError:
     """The driver's error as the rest of the program knows it; a broken connection is given up."""
     dialect = connection.dialect
+    # A dead connection must not go back to the pool, which would hand it to the next who asks.
     is_cut = dialect.is_disconnect(error, connection.connection, None)
     if is_cut:
         connection.invalidate(error)
@@ -368,6 +373,7 @@ def _as_sqlalchemy_raises(connection: Connection, text: str, error: Any) -> DBAP
         None,
         error,
         dialect.loaded_dbapi.Error,
+        # They are people's answers, and errors are logged.
         hide_parameters=True,
         connection_invalidated=is_cut,
         dialect=dialect,

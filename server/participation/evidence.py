@@ -34,6 +34,7 @@ def _without_time(value: Any) -> Any:
 
 # What a run's answers say about how they were given: one number a signal, None where it cannot be had.
 
+# Patterns that fingers make are short; each further distance would be one more chance to fit by accident.
 LONGEST_CYCLE = 4
 MIN_FOR_SPREAD = 8
 """Answers from which on a spread or a pattern is told."""
@@ -174,9 +175,11 @@ def signals_of(
     """
     if not answers:
         return Signals()
+    # The second key makes the result the same in whatever order the database gives answers of one moment.
     came = sorted(answers, key=lambda one: (one.received_at, one.trial_index))
     main = sorted((one for one in answers if one.part == "main"), key=lambda one: one.trial_index)
     responses = [one.response for one in main if one.response is not None]
+    # Zero has no logarithm, and comes from a clock that stood still rather than from a person.
     times = [one.rt for one in main if one.rt is not None and one.rt > 0]
     lengths = [one.press_ms for one in answers if one.press_ms is not None]
     checks = [one for one in answers if one.part == "attention"]
@@ -225,6 +228,7 @@ def _guessed_together(checks: Sequence[JudgedAnswer], wrong: Sequence[int]) -> f
 
 def checks_tell(answers: Sequence[JudgedAnswer], passed_over: Sequence[int] = ()) -> bool:
     """Whether the motion checks asked, void ones and those passed over too, can tell guesses from people."""
+    # Void ones are counted in: whether checks can tell must not hang on how many of them a page lets fail.
     asked = [one.choices for one in answers if one.part == "check" and one.choices and not one.other_way]
     return _can_tell([*asked, *passed_over])
 
@@ -246,16 +250,20 @@ def chance_of_guessing(
 
 def _can_tell(choices: Sequence[int]) -> bool:
     guesses = _at_least([1 / number for number in choices])
+    # The fewest right answers that guesses reach too seldom; None where even all of them are not rare
+    # enough.
     needed = next((number for number, chance in enumerate(guesses) if chance < GUESSED_BY_CHANCE), None)
     return needed is not None and _at_least([SEEN] * len(choices))[needed] >= POWER
 
 
 def _at_least(chances: Sequence[float]) -> list[float]:
     """The probability of at least 0, 1, 2 ... hits where the i-th comes with chances[i]."""
+    # One Bernoulli variable convolved in at a time: exact, and cheap for the few dozen checks of a visit.
     exactly = [1.0]
     for chance in chances:
         missed, hit = [*exactly, 0.0], [0.0, *exactly]
         exactly = [(1 - chance) * a + chance * b for a, b in zip(missed, hit, strict=True)]
+    # The sum of all may exceed 1 by a rounding error.
     return [min(1.0, sum(exactly[number:])) for number in range(len(exactly))]
 
 
@@ -265,6 +273,7 @@ def _share(facts: Sequence[bool]) -> float | None:
 
 def _of_time_there_was(came: Sequence[JudgedAnswer], claimed_ms: float) -> float | None:
     issued = [one.issued_at for one in came if one.issued_at is not None]
+    # From the tickets on, not from the first answer: the first clip was shown before its answer came.
     there_was = (came[-1].received_at - min(issued)) / timedelta(milliseconds=1) if issued else 0.0
     return claimed_ms / there_was if there_was > 0 else None
 
@@ -280,6 +289,7 @@ def _share_of_commonest(responses: Sequence[int | str]) -> float:
 def _cycle(responses: Sequence[int | str]) -> float:
     return max(
         float(sum(map(eq, responses, responses[lag:]))) / (len(responses) - lag)
+        # Not 1: the same answer over and over is weighed by `same_answer`, and would be counted twice.
         for lag in range(2, LONGEST_CYCLE + 1)
     )
 

@@ -38,9 +38,12 @@ from server.participation.tallies import ClipTime
 # The ticket of trial i, play p is  HMAC(k, "ticket:" batch ":" i ":" p). Nothing of it is stored when it is
 # issued, and it is good offline. Both codes are cut to 128 bits.
 
+# Half of SHA-256 is far out of reach of FALSE_ANSWERS_PER_MINUTE guesses, and every state carries a ticket
+# per play: 22 letters in place of 43.
 CODE_BYTES = 16
 CODE_LETTERS = 22
 """In base64, the two that only fill it up left out."""
+# Two batches of one run in the same millisecond must differ, or they would hold the same tickets.
 NONCE_BYTES = 6
 LIFETIME = timedelta(days=60)
 """From the ticket to its answer: longer than a visit may last anywhere. Delivery may be later still."""
@@ -61,6 +64,7 @@ class Batch:
 
 def evidence_key(secret: bytes) -> bytes:
     """The key of all tickets of an installation, from its secret key."""
+    # A label per purpose: the key of the tickets gives away no other key made from the same secret.
     return hmac.digest(secret, b"palpebra evidence 1", "sha256")
 
 
@@ -88,11 +92,13 @@ def ticket(key: bytes, batch: Batch, trial_index: int, play: int) -> str:
 def open_batch(key: bytes, text: str) -> Batch:
     """The batch of this text; TicketInvalid where the seal does not fit."""
     head, _, seal = text.rpartition(".")
+    # The seal comes last, so that the run and the moment are covered whatever they hold.
     parts = head.split(".")
     # Bytes, since text beyond ASCII cannot be compared in constant time.
     sealed = hmac.compare_digest(_code(key, f"batch:{head}").encode(), seal.encode())
     if len(parts) != 3 or not sealed:
         raise TicketInvalid("Expected a batch of tickets as this server issued it; nothing is stored.")
+    # Read only now: under a seal of ours the second part is always a number.
     return Batch(text, parts[0], _EPOCH + timedelta(milliseconds=int(parts[1])))
 
 
@@ -106,6 +112,8 @@ def check_ticket(
     given_at : datetime
         When the answer was given, which may be long before it is delivered.
     """
+    # From the coarsest cause to the finest, so that a page with two visits open hears of the visit and not
+    # of a trial.
     opened = open_batch(key, batch)
     if opened.run != run:
         raise TicketOfAnotherRun("Expected a ticket of this visit, got one of another; nothing is stored.")
@@ -133,9 +141,14 @@ TRIED_MS = 1_000.0
 """What a play without a rating takes at least: the page says that a clip cannot be shown for as long."""
 UNFETCHED, UNFETCHED_SHARE = 3, 5
 """Plays of a run without a rating and without the clip's digest: at most three, or one for five trials."""
+# Four times the outbox's longest pause (15 s): a delivery that is later waited for a connection, not for
+# its turn.
 LATE = timedelta(seconds=60)
 _MILLISECOND = timedelta(milliseconds=1)
+# More than a faulty page sends by itself, whose pauses grow, and too few to try out tickets or digests.
 FALSE_ANSWERS_PER_MINUTE = 60
+# Previews and simulated runs come from programs of ours, which have nothing to prove; a rehearsal says that
+# it wants to.
 ENFORCED_ORIGINS = ("participant", "pilot")
 
 
@@ -232,12 +245,15 @@ class Intake:
             if enforced:
                 self.note(connection, answer, refusal, evidence_repository.ANSWER)
                 raise
+            # What is left out as evidence takes no time either: else a false answer would use up the time
+            # of the true ones.
             return before
         if not stores:
             return before.plus(answer.clip_ms, batch.issued_at, answer.received_at)
         evidence_repository.add_evidence(
             connection, _row(answer, batch, given, late=late, digest_right=right)
         )
+        # Wakes the task that judges such answers once the store gives the clip (`digests_judged_later`).
         if right is None and given.digest is not None:
             self.unchecked.set()
         return before.plus(answer.clip_ms, batch.issued_at, answer.received_at)
@@ -316,6 +332,9 @@ def _in_time(connection: Connection, answer: Answer, batch: Batch, before: ClipT
     of_batch = before.since(batch.issued_at)
     if of_batch is None:  # tickets of a page before a reload, after answers by those of a page after it
         of_batch = evidence_repository.clip_ms_since(connection, answer.run, batch.issued_at)
+    # Counted twice (decision 0420). From this batch on: time spent idle before a reload is no credit for
+    # what is shown after it. From the first batch on: several batches at once do not multiply the time
+    # there was.
     for issued_at, before_ms in ((batch.issued_at, of_batch), (first, before.clip_ms)):
         needed, there_was = before_ms + answer.clip_ms, milliseconds(answer.received_at - issued_at)
         if too_short(needed, there_was) and not _seen_before(connection, answer, issued_at, before_ms):
@@ -347,6 +366,8 @@ def _is_late(answer: Answer, last_received_at: datetime | None) -> bool:
     """True where it came sooner after the one before than its clip lasts, or long after it was given."""
     delay = answer.received_at - answer.answered_at if answer.answered_at else timedelta()
     gap_ms = milliseconds(answer.received_at - last_received_at) if last_received_at else answer.clip_ms
+    # Either sign: a client's clock that is ahead by a minute says as little about the delivery as one that
+    # is behind.
     return abs(delay) > LATE or gap_ms < answer.clip_ms
 
 

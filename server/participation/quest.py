@@ -90,10 +90,12 @@ def tilt(model: Model, counts: Mapping[Point, tuple[int, int]]) -> Tilt:
         for point, (n, positive) in counts.items():
             yes, no = table[point]
             posterior = posterior * yes**positive * no ** (n - positive)
+            # After each stimulus, as the product of hundreds of likelihoods is zero in double precision.
             posterior = posterior / posterior.sum()
         axis = list(engine.param_domain).index("tilt")
         others = tuple(other for other in range(posterior.ndim) if other != axis)
         shares, values = posterior.sum(axis=others).tolist(), engine.param_domain["tilt"].tolist()
+    # Summed exactly: the estimate must not hang on how an array is split for its sum.
     mean = math.fsum(p * value for p, value in zip(shares, values, strict=True))
     variance = math.fsum(p * (value - mean) ** 2 for p, value in zip(shares, values, strict=True))
     return Tilt(-mean if model.falling else mean, math.sqrt(variance))
@@ -117,6 +119,7 @@ def _likelihoods(model: Model) -> dict[Point, tuple[Any, Any]]:
 def _state_after(model: Model, answers: Answers) -> _State:
     """The state after these answers, from the longest beginning of them that is kept."""
     begin = len(answers)
+    # The longest kept beginning: a further answer costs one update, whichever worker took those before.
     while begin and (model, answers[:begin]) not in _states:
         begin -= 1
     state = _states.get((model, answers[:begin])) or _store_state(model, (), None)
@@ -132,6 +135,7 @@ def _store_state(model: Model, answers: Answers, before: _State | None) -> _Stat
         warnings.simplefilter("ignore")
         state = _next_state(model, answers, before)
     _states[model, answers] = state
+    # By size and by number: a fine grid may hold a million parameters in one posterior.
     while len(_states) > min(MAX_STATES, max(1, MAX_PARAMETERS // state.posterior.size)):
         _states.popitem(last=False)
     return state
@@ -144,12 +148,14 @@ def _next_state(model: Model, answers: Answers, before: _State | None) -> _State
     else:
         (stimulus, positive), engine.posterior = answers[-1], before.posterior
         engine.update(stim=_named_stimulus(model, stimulus), outcome={"response": YES if positive else NO})
+        # It would grow with every answer of every participant that shares the object.
         engine.stim_history.clear()
         engine.resp_history.clear()
     spoken = engine.next_stim
     likelihood = engine.likelihoods.sel(**spoken, response=YES)
     share = float((engine.posterior * likelihood).sum())
     sign = -1 if model.falling else 1
+    # A falling function is fitted with the stimulus turned round; here it is turned back.
     chosen = Point(sign * spoken["intensity"], spoken.get("second"))
     return _State(engine.posterior, chosen, share >= 0.5, _estimate(model, engine))
 

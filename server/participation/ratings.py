@@ -250,13 +250,19 @@ def save_rating(
     """Store a rating with its evidence, or find it stored; return the receipt and whether it is new."""
     delivery = delivery_of(versions, connection, token, rating_id, rating, saved_at)
     known = _known_rating(delivery)
+    # Before any check: a rating that is stored gets the same receipt for ever, also after the visit is
+    # over.
     if known is not None:
         return _receipt_of_known(connection, delivery, known), False
     _check(delivery)
+    # Read with the trial in one query, and written below in the same transaction.
     tally = delivery.trial.tally or Tally()
     if delivery.run.evidence == "asked":
         tally.clip_time = intake.take(connection, evidence_of(delivery), tally.clip_time)
+    # After the evidence: what is refused needs no verdict.
     ruling = _ruling_of(delivery)
+    # Row and tally in one transaction: results are read from tallies, and must never count a row that is
+    # not there.
     rating_repository.add_rating(connection, row_of(delivery, ruling))
     tally.add(play_of(delivery, ruling))
     rating_repository.keep_tally(connection, delivery.run.id, tally, is_new=delivery.trial.tally is None)
@@ -268,6 +274,7 @@ def _known_rating(delivery: SubmittedRating) -> rating_repository.StoredRating |
     rating, payload = delivery.rating, delivery.payload
     for row in delivery.stored:
         same_play = (row.trial_index, row.play) == (rating.trial_index, rating.play)
+        # Two keys, either of which marks a repetition: the id, and the play of the trial.
         if row.rating_id != delivery.rating_id and not same_play:
             continue
         if same_play and row.payload == payload:
@@ -330,7 +337,9 @@ def _receipt_of_new(connection: Connection, delivery: SubmittedRating, ruling: R
         connection, run.id, delivery.loaded, delivery.trial, rating, ruling
     ):
         before = True
+    # A second play of a settled trial is stored, but the trial is answered once.
     answered = int(settles and not before)
+    # Answers of an outbox may come out of order: time must not run backwards.
     elapsed = max(run.elapsed_ms, rating.time_elapsed or 0.0)
     rating_repository.mark_seen(connection, run.id, delivery.saved_at, elapsed, answered)
     lapse = _consequence(connection, delivery)

@@ -102,6 +102,7 @@ def outlook_after(loaded: LoadedVersion, trials: Sequence[Any], answers: Sequenc
     experiment = loaded.experiment
     assumed, declared, levels = model(experiment), threshold_of(experiment), points(experiment)
     shown, known = loaded.once(_points), dict[str, int]()
+    # Each series for itself: its choices rest on its own answers, as those of separate experiments would.
     offers: list[Offer] = []
     estimates: dict[tuple[int, int], Estimate] = {}
     closing: list[int] = []
@@ -117,6 +118,7 @@ def outlook_after(loaded: LoadedVersion, trials: Sequence[Any], answers: Sequenc
         if waiting and is_certain_enough(declared.stop, assumed, said):
             closing += [row.trial_index for row in waiting]
             continue
+        # One to be shown and those after it: the page has their clips before it needs them.
         next_ones = waiting[: declared.ahead + 1]
         chosen = quest.choices(assumed, said, len(next_ones))
         for row, stimulus in zip(next_ones, chosen, strict=True):
@@ -145,6 +147,7 @@ def _store_outlook(connection: Connection, token: str, outlook: Outlook) -> Outl
     now: dict[str, int] = dict.fromkeys(outlook.known, 0)
     for row in series_repository.answers(connection, run.id):
         now[row.series] += 1
+    # Other answers came while this was reckoned: their own request brings the series up to date.
     if run.status != "active" or now != outlook.known:
         return None
     for (trial_index, play), estimate in outlook.estimates.items():
@@ -245,6 +248,7 @@ def take_answer(
     two = isinstance(threshold_of(loaded.experiment).task, TwoInterval)
     right = answer.chosen == (offered.role if two else "yes") if answer.given else None
     counts = offered.series is not None and answer.given and ruling[0] != "failed"
+    # The page's word, bounded: it cannot have known answers that were never given.
     known = min(answer.known, before)
     values = {
         "study_run_id": run,

@@ -84,6 +84,7 @@ def judge(
     """
     if clip_sha256 is None:
         return GOOD if rated else ("failed", "not_rated")
+    # From the plainest cause to the subtlest: the first that holds is the one that is reported.
     if playback.disturbances.get(INTERRUPTED):
         return "failed", INTERRUPTED
     if playback.method == "none":
@@ -96,6 +97,7 @@ def judge(
     flagged = _flagging_rule(rules, playback, frames)
     if flagged:
         return "flagged", flagged
+    # Last, as it speaks of what could not be seen: any fault that was seen says more.
     uncertain = _uncertainty(rules, playback, fps)
     return ("uncertain", uncertain) if uncertain else GOOD
 
@@ -110,6 +112,7 @@ def _failing_rule(rules: PlaybackRules, playback: Playback) -> str:
 
 def _disturbance_with(rules: PlaybackRules, playback: Playback, consequence: Consequence) -> str:
     """The first disturbance of the play that has this consequence; empty where none has."""
+    # A page's own count of lost focus, where it sends one, takes the place of the flag.
     counts = {"focus_lost": int(bool(playback.focus_lost)), **playback.disturbances}
     named = (name for name, count in counts.items() if count and rules.consequence(name) == consequence)
     return next(named, "")
@@ -148,6 +151,7 @@ def _unevenness_ms(playback: Playback) -> float | None:
     """By how much the animation clock was later than even, at the worst."""
     if playback.clock_gap_ms is None or playback.clock_late_ms is None:
         return None
+    # A gap between two callbacks holds one refresh anyway; only what is beyond it is unevenness.
     return max(playback.clock_gap_ms - _refresh_ms(playback.refresh_rate_hz), playback.clock_late_ms)
 
 
@@ -178,6 +182,7 @@ def frames_in_log(indices: Iterable[int]) -> int:
     """Different frames drawn, each view counted for itself: an index below the one before begins a view."""
     seen, latest, in_view = 0, -1, set[int]()
     for index in indices:
+        # Frames of one view only ever increase, so that a smaller index is the next view's.
         if index < latest:
             seen, in_view = seen + len(in_view), set()
         in_view.add(index)

@@ -139,6 +139,8 @@ def take_views(intake: Intake, connection: Connection, arrival: Arrival) -> list
             if intake.enforces(arrival.origin):
                 intake.note(connection, arrival, refusal, evidence_repository.VIEW)
                 raise
+            # Kept as a view without a ticket: where nothing is refused, what was shown still counts as
+            # shown.
             issued.append(None)
     return issued
 
@@ -174,6 +176,7 @@ def _issued_at(
         if arrival.needs_tickets:
             raise TicketMissing("Expected a ticket with the view, got none; please reload the page.")
         return None
+    # The earlier of both moments, so that a device's clock in the future cannot age a ticket.
     where = (arrival.run_id, view.trial_index, view.play, min(arrival.received_at, view.given_at))
     issued_at = check_ticket(intake.key, given.batch, given.ticket, *where).issued_at
     if view.clip_ms > 0:
@@ -188,6 +191,7 @@ def _in_time(received_at: datetime, issued_at: datetime, before: _EarlierViews) 
     first = min(filter(None, (spent.first_issued_at, *(moment for moment, _ in shown))))
     of_batch = spent.batch_ms + sum(ms for moment, ms in shown if moment >= issued_at)
     of_run = spent.run_ms + sum(ms for _, ms in shown)
+    # Twice, as for answers (`intake._in_time`): neither a reload nor a second batch makes more time.
     for since, needed in ((issued_at, of_batch), (first, of_run)):
         there_was = milliseconds(received_at - since)
         if too_short(needed, there_was):
@@ -221,6 +225,7 @@ def save_views(
         )
     if run.consented_at is None:
         raise ConsentMissing("Nothing is stored before the participant has agreed; send the consent first.")
+    # Looked up once for all that came: up to 100 views arrive together after a time offline.
     known = {view.view_id: view for view in _known_views(connection, run, sent)}
     numbers = {(view.trial_index, view.number): view.view_id for view in known.values()}
     _refuse_others(sent, known, numbers)
@@ -231,6 +236,7 @@ def save_views(
     begun = completed = 0
     for view, issued_at, length in zip(news, issued, clip_ms, strict=True):
         ident = str(view.id)
+        # A view may begin and end in one delivery, as after a time offline.
         row = known.get(ident) or StoredView(ident, view.trial_index, view.number, completed=False)
         if ident not in known:
             view_repository.begin(connection, _new_view_row(run, view, moment, issued_at))
@@ -305,6 +311,8 @@ def _clip_ms(
 def _shows(view: ViewIn, run: RunOfViews) -> bool:
     """Whether a view was shown to its end; pages that bring tickets with views say so of each that ended."""
     untold = view.outcome is None and view.ended_at_client is not None
+    # Such a page names every outcome: a view without one is taken as shown, since that is what takes
+    # time.
     return view.outcome == "shown" or (run.view_tickets and untold)
 
 

@@ -132,6 +132,7 @@ def measure_blinks(
         raise not_below(closed, f"any blink of '{series.column}'", widest)
     reason = f"it begins or ends at or below the closed distance {closed:.3g}"
     refused = [RefusedMinimum(blink.minimum, reason) for blink in blinks if blink not in fit]
+    # Of the filtered distance: a difference of raw frames would be noise times the frame rate.
     velocity = np.gradient(smooth) * series.fps
     measured = [
         _measure(series, blink, number, smooth, velocity, closed, complete_from)
@@ -153,6 +154,8 @@ def _measure(
     onset_s, minimum_s, end_s = _times(blink, fps)
     open_distance = float(np.interp(minimum_s, [onset_s, end_s], open_levels(smooth, blink)))
     amplitude = open_distance - least
+    # The mean of the deepest quarter is the closed level, so that about half of those blinks go beyond
+    # it.
     closure = min(1.0, amplitude / (open_distance - closed))
     before, after = _rests(smooth, blink, fps, closed)
     event = blink.event
@@ -262,6 +265,7 @@ def at_300(values: Array, fps: float, onset: int, minimum: int, end: int) -> tup
     frames = np.concatenate(
         [np.linspace(onset, minimum, before + 1), np.linspace(minimum, end, after + 1)[1:]]
     )
+    # Monotone: a common cubic would overshoot at the closed phase and open the lid before it opens.
     spline = PchipInterpolator(np.arange(onset, end + 1), values[onset : end + 1])
     return np.asarray(spline(frames)), before
 

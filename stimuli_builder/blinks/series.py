@@ -132,6 +132,8 @@ def box_filter(values: Array, width_frames: float) -> Array:
     edge = (width_frames - (2 * reach - 1)) / 2
     kernel = np.ones(2 * reach + 1)
     kernel[0] = kernel[-1] = edge
+    # Ends are divided by the part of the window that exists, else every series would begin and end half
+    # shut.
     weight = np.convolve(np.ones(values.size), kernel, mode="full")[reach : reach + values.size]
     return np.asarray(np.convolve(values, kernel, mode="full")[reach : reach + values.size] / weight)
 

@@ -40,11 +40,14 @@ def with_errors(model: CoupledModel, held_out: Sequence[HeldOut], limits: Values
     if not seen:
         return with_residual_limits(model, limits)
     residuals = np.array([one.residuals for one in seen])
+    # The median: a single frame with a hand in it must not set what is usual.
     usual = np.median(residuals, axis=0)
+    # In logarithms, as errors grow by a factor with the residual, not by an amount.
     excess = np.log(np.maximum((residuals / usual).max(1), 1e-3))
     error = np.log([max(one.rms_px or 0.0, 1e-3) for one in seen])
     spread = float(((excess - excess.mean()) ** 2).sum())
     slope = float(((excess - excess.mean()) * (error - error.mean())).sum()) / max(spread, 1e-9)
+    # A negative slope would state less error for a worse picture, which a handful of frames may suggest.
     slope = float(np.clip(slope, 0, STEEPEST)) * len(seen) / (len(seen) + 10)
     scale = np.maximum((residuals / usual).max(1), 1.0) ** slope
     errors = np.array([one.point_errors_px for one in seen]) / scale[:, None]
@@ -55,6 +58,8 @@ def _would_be_taken(one: HeldOut, limits: Values) -> bool:
     """Whether tracking would call such a fit neither lost nor, since its eyes jump, doubtful."""
     if one.residuals is None or one.point_errors_px is None or one.width_px is None:
         return False
+    # Canthi do not move with the lids, so a canthus that is far off means that another place was taken for
+    # the eye.
     away = one.point_errors_px.reshape(-1, EYE_POINTS)[:, CANTHI].max()
     return bool((one.residuals <= limits).all() and away <= JUMP_SHARE * one.width_px)
 
@@ -66,11 +71,13 @@ def stated_errors(model: CoupledModel, fit: Fit, difference_px: float | None) ->
     e_p = e0_p max(1, r / r0)^s, r / r0 the worse eye's residual over the usual one; a detector that differs
     by d px in the mean raises it to sqrt(e_p^2 + (d - e)^2) where d is above the mean e of the e_p.
     """
+    # The worse eye speaks for both: they share the coupled parameters.
     excess = float(np.max(fit.residuals / model.usual_residuals))
     errors = model.point_errors * max(excess, 1.0) ** float(model.error_slope[0])
     if difference_px is None:
         return np.asarray(errors)
     more = max(0.0, difference_px - float(np.sqrt((errors**2).mean())))
+    # In quadrature: what the detector adds is taken as independent of what the residual states.
     return np.asarray(np.sqrt(errors**2 + more**2))
 
 
@@ -93,6 +100,7 @@ def doubt(
         Points of the frame before, where that was tracked.
     """
     width = widths(points)
+    # From the most direct evidence to the least: the first reason found is the one that is reported.
     if difference is not None and difference > DIFFERING_SHARE:
         return f"model and detector differ by {difference:.0%} of the eye's width"
     unusual = float(np.sqrt(np.mean((fit.c / np.maximum(model.sd, 1e-9)) ** 2)))

@@ -93,7 +93,9 @@ Values = NDArray[np.float64]
 
 STOP_PX = 0.03
 MAX_ITERATIONS = 30
+# Beyond, the linear modes draw shapes that no eye has.
 LIMIT_SD = 4.0
+# Relative to the Hessian's own diagonal: enough to invert it where two modes move the same pixels.
 RIDGE = 1e-6
 
 
@@ -169,6 +171,8 @@ def linear_parts(model: CoupledModel, gx: Values, gy: Values, directions: Values
     mesh, modes = model.mesh, len(model.shape_modes)
     corners = directions[:, mesh.triangles[mesh.triangle_of], :]
     movement = np.einsum("nk,pnkd->pnd", mesh.weights(), corners)
+    # By the chain rule the picture pulled back changes by grad A dW/dc; the model's own change with c is
+    # taken from it.
     parts = -(gx[:, None] * movement[None, :, :, 0] + gy[:, None] * movement[None, :, :, 1])
     parts[0, :modes] += model.appearance[1:]
     return np.asarray(parts)
@@ -183,9 +187,12 @@ def work_out(model: CoupledModel) -> Algebra:
     count, size, pixels = parts.shape
     rows = parts.reshape(count * size, pixels)
     products = ((rows * model.weights) @ rows.T).reshape(count, size, count, size).transpose(0, 2, 1, 3)
+    # H is quadratic in (1, c): its forms are summed once here, so that a frame needs no product over
+    # pixels.
     lower = np.tril_indices(size)
     forms = [
         (products[i, j] + (products[j, i] if i < j else 0.0))[lower]
+        # Symmetric in i and j: one form serves both orders, with the two products added.
         for i in range(count)
         for j in range(i, count)
     ]
@@ -233,11 +240,14 @@ class Fitter:
             algebra.scales, algebra.centre,
         )  # fmt: skip
         vertices = np.empty(mesh.vertices.shape, np.float32)
+        # One block, rows next to one another: single precision halves what every iteration reads from
+        # memory.
         sampled, look, error, gx, gy = np.empty((5, pixels), np.float32)
         self._buffers = Buffers(sampled, look, error, gx, gy, vertices, np.empty(model.eyes))
 
     def fit(self, picture: Picture, c: Values, pose: Values, max_iterations: int | None = None) -> Fit:
         """Fit to a reduced picture, uint8 (h, w), from parameters c (l,) and a similarity (4,)."""
+        # The kernel writes into both, and callers start further fits from the same ones.
         c, pose = c.copy(), pose.copy()
         run: Any = kernels.fit
         limit = max_iterations or self.max_iterations

@@ -61,6 +61,7 @@ class GlareCheck:
         count = EYE_POINTS * model.eyes
         labelled = model.mesh.vertices + np.tensordot(model.examples, model.shape_modes, axes=1)
         openings = np.array([opening_shares(shape[:count]) for shape in labelled])
+        # Not the widest: one frame of surprise would make every usual opening look half shut.
         self._usual = np.maximum(np.percentile(openings, 90, axis=0), 1e-3)
 
     def of(self, fit: Fit, picture: Picture) -> tuple[Values, str]:
@@ -88,6 +89,8 @@ class GlareCheck:
             seen = outside >= LEAST_OUTSIDE or (inside >= BETWEEN and not dark)
             if not seen or share < LEAST_SHARE:
                 continue
+            # A highlight that hides nothing for sure still makes the lids less certain, as far as it covers
+            # them.
             hidden[eye] = HIDDEN * share
             half_open = SHUT < wide < OPEN and (outside >= WIDE_OUTSIDE or not dark)
             no_iris = wide >= SHUT and quarter > NO_IRIS
@@ -107,6 +110,7 @@ def across_eye(eye: Points) -> tuple[Values, Values]:
     """Places (9,) of an eye's points along its canthi from their middle and square to them, in its widths."""
     first, last = eye[CANTHI[0]], eye[CANTHI[1]]
     dx, dy = last[0] - first[0], last[1] - first[1]
+    # Image-left to image-right, whichever order the points have: `down` then points down in both eyes.
     if dx < 0:
         dx, dy = -dx, -dy
     width = max(math.hypot(dx, dy), 1e-6)
@@ -179,6 +183,7 @@ def highlights(picture: Picture, eye: Points) -> tuple[float, float, float, floa
     skin.sort()
     # The median, so that a highlight may reach down to the cheek.
     usual = skin[len(skin) // 2]
+    # On bright skin BRIGHTER times the cheek would lie above what a picture can hold.
     limit = min(BRIGHTER * usual, max(SATURATED, OVER_SKIN * usual))
     inside = np.empty(COLUMNS * ROWS)
     covered, outside, covered_outside, between, covered_between = 0, 0, 0, 0, 0

@@ -83,16 +83,20 @@ def measure_iris(picture: Picture, eye: Points) -> Iris | None:
 def _measured(picture: Picture, eye: Points) -> Iris | None:
     along, down, width = eye_axis(eye)
     middle = (eye[0] + eye[5]) / 2
+    # In eye widths from here on, so that every threshold above holds for any resolution.
     upper, lower = _lids(eye, np.array([along, down]) / width)
     opening = float(lower[2, 1] - (upper[2, 1] + upper[3, 1]) / 2)
     if opening < LEAST_OPEN or not _well_ordered(upper) or not _well_ordered(lower):
         return None
+    # As wide as the nearer of REACHES: the two sides of the edge are compared, not single lashes.
     smooth = cv2.GaussianBlur(picture, (0, 0), max(0.6, 0.012 * width)).astype(np.float32)
     axes = np.array([*(along * width), *(down * width), *middle])
     best = np.array([0.0, float(upper[2:4, 1].mean() + lower[2, 1]) / 2, sum(RADII) / 2])
+    # Gaze moves an iris about twice as far sideways as up and down before the lids follow or hide it.
     reach, step = np.array([0.26, 0.12, (RADII[1] - RADII[0]) / 2]), 0.0
     for shift, radius in STAGES:
         step = _search(smooth, axes, upper, lower, best, reach, shift, radius)
+        # Two steps of the stage before: its grid may have taken the neighbor of the best place.
         reach = np.array([2 * shift, 2 * shift, 2 * radius])
     if step < LEAST_STEP:
         return None
@@ -155,8 +159,11 @@ def _step_across(
                 near, far = (r - reach) / r, (r + reach) / r
                 inside = _grey(picture, axes, x + (u - x) * near, y + (v - y) * near)
                 outside = _grey(picture, axes, x + (u - x) * far, y + (v - y) * far)
+                # Saturating: a lamp's reflection on the edge may be a hundred levels brighter than the
+                # white.
                 steps += (outside - inside) / (1 + abs(outside - inside) / SOFT)
             count += 1
+        # Both arcs are needed: one edge alone fits circles of any size.
         if count < LEAST_POINTS:
             return 0.0
         total += steps / (count * len(REACHES))
@@ -239,6 +246,7 @@ def write_irises(info: VideoInfo, track: Path, out: Path, advance: Callable[[], 
             count += 1
             believed = row["status"] in BELIEVED
             points = numbers(row, names, str(track)).reshape(-1, EYE_POINTS, 2)
+            # A doubtful frame's lids may be wrong, and the search looks only between them.
             seen = [measure_iris(picture, eye) if believed else None for eye in points]
             diameters += [one.diameter for one in seen if one is not None]
             writer.writerow([row["frame"], row["time_s"], *(cell for one in seen for cell in _cells(one))])
@@ -264,5 +272,6 @@ def _cells(iris: Iris | None) -> list[str]:
 def _summary(count: int, diameters: list[float]) -> IrisSummary:
     if len(diameters) < LEAST_FRAMES:
         return IrisSummary(count, len(diameters), float("nan"), float("nan"))
+    # Quartiles, since some edges found are those of lids or pupils.
     low, middle, high = np.percentile(diameters, [25, 50, 75])
     return IrisSummary(count, len(diameters), float(middle), float(high - low) / 2)

@@ -16,7 +16,9 @@ from stimuli_builder.video import Picture
 Values = NDArray[np.float64]
 
 CLOSURES = 4
+# Neighbors differ by 18 %: no size between them is off by more than 9 %.
 SCALES = (0.85, 1.0, 1.18)
+# Correlation costs the area of the picture times that of the patch.
 PATCH_HEIGHT_PX = 26
 CANDIDATES = 5
 LEAST_MATCH = 0.35
@@ -48,6 +50,8 @@ class Finder:
 
     def _best(self, picture: Picture, starts: Iterator[tuple[Values, Values]]) -> Fit | None:
         fits = [self._fitter.fit(picture, c, pose) for c, pose in starts]
+        # Those inside come first: a fit that slid over the edge sees repeated pixels and so a small
+        # residual.
         good = [fit for fit in fits if fit.iterations and inside(fit, picture)]
         return min(good or [fit for fit in fits if fit.iterations], key=_worst, default=None)
 
@@ -57,12 +61,14 @@ class Finder:
         for number, scale, template in self._templates:
             if template.shape[0] > small.shape[0] or template.shape[1] > small.shape[1]:
                 continue
+            # Normalized by mean and contrast, as the light may have changed since the labeled frames.
             _, match, _, corner_px = cv2.minMaxLoc(cv2.matchTemplate(small, template, cv2.TM_CCOEFF_NORMED))
             if np.isfinite(match) and match > LEAST_MATCH:
                 matches.append((match, number, scale, corner_px))
         matches.sort(key=lambda entry: -entry[0])
         for _, number, scale, corner_px in matches[:CANDIDATES]:
             frame = int(self._model.patch_frames[number])
+            # Pixel centers: the middle of a reduced pixel lies between the middles of those that it covers.
             corner = (np.array(corner_px) + 0.5) * self._factor - 0.5
             yield (
                 self._model.examples[frame],
@@ -93,6 +99,7 @@ def _spread_closures(fitter: Fitter) -> list[Values]:
     shapes = model.mesh.vertices + np.tensordot(model.examples, model.shape_modes, axes=1)
     lids = shapes[:, : EYE_POINTS * model.eyes]
     openings = [inter_eyelid_distances(points, model.markers).mean() for points in lids]
+    # By opening and not by parameters: the starts must differ in what a search has to find.
     order = np.argsort(openings)
     chosen = np.unique(np.linspace(0, len(order) - 1, min(CLOSURES, len(order))).astype(int))
     return [model.examples[order[index]] for index in chosen]
@@ -122,6 +129,7 @@ class Faults:
             return "the fit broke down"
         if not inside(fit, picture):
             return "the eyes left the picture"
+        # Scale and turn are the first two numbers, a complex factor: its modulus is the size.
         size = float(np.hypot(*fit.pose[:2]))
         if not self._sizes[0] < size < self._sizes[1]:
             return f"the eyes would be {size / self._sizes[0] * SCALE_RANGE[0]:.2g} times their labeled size"

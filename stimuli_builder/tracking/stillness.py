@@ -34,6 +34,7 @@ class Stillness:
     """
 
     def __init__(self, fps: float):
+        # A ring of frames and running sums, so that a frame costs the same whatever the window's length.
         self.window = max(LEAST_FRAMES, round(WINDOW_S * fps))
         self._count = 0
         self._first: Points | None = None
@@ -131,6 +132,7 @@ class Light:
     @property
     def steady(self) -> bool:
         """Whether no gray level of an eye would move by more than four."""
+        # A line is farthest from another at one of the ends, so two levels are enough.
         ends = [abs((self.gain - 1) * level + self.offset) for level in (DARK, BRIGHT)]
         return max(ends) <= STEADY_LEVELS
 
@@ -143,6 +145,7 @@ class Light:
         """The gray picture (h, w) as it would be in the light of the labeled frames."""
         if self.steady:
             return picture
+        # A table of 256 entries, as a picture has far more pixels than gray levels.
         levels = np.clip(np.rint(self.gain * np.arange(256) + self.offset), 0, 255).astype(np.uint8)
         return np.asarray(cv2.LUT(picture, levels), np.uint8)
 
@@ -181,6 +184,7 @@ def light_between(look: Values, sampled: Values, weights: Values) -> tuple[float
         away = look[x] - mean_look
         spread += weights[x] * away * away
         both += weights[x] * away * (sampled[x] - mean_sampled)
+    # Hardly related, or reversed: no change of light does this. A gain of 0 is not believed by any caller.
     if not both > 1e-3 * spread:
         return 0.0, 0.0
     gain = spread / both

@@ -33,6 +33,7 @@ from stimuli_builder.video import Picture
 
 # A fit begun from what a detector saw.
 
+# Below the fit's own limit (LIMIT_SD), so that it has room to move from there.
 MAX_SD = 3.0
 """Coupled parameters start within so many of their standard deviations."""
 
@@ -58,6 +59,8 @@ class DetectedStart:
 def _to_parameters(model: CoupledModel) -> NDArray[np.float64]:
     """Matrix (l, 2 V) from movements of the vertices to coupled parameters, least squares kept small."""
     modes = model.shape_modes.reshape(len(model.sd), -1)
+    # The ridge is scaled by the modes' variance: a mode that hardly varies in people is hardly used to
+    # explain a detector.
     size = (modes**2).sum(1).mean() * model.sd.max() ** 2
     ridge = 1e-3 * np.diag(size / np.maximum(model.sd, 1e-9) ** 2)
     return np.asarray(np.linalg.solve(modes @ modes.T + ridge, modes))
@@ -72,8 +75,11 @@ BLANK_RANGE = 12
 """Gray levels between the darkest and the brightest pixel below which a picture shows nothing."""
 WORSE = 1.1
 """A fit from the detector may have so much more residual than the one it replaces."""
+# A blink or a hand passes within a second; after that the person has most likely moved.
 NEAR_EVERY_FRAME = 30
 NEAR_LATER_EVERY = 5
+# A search of the whole picture costs as much as many frames: after 1, 2, 4, 8 ... lost frames, then every
+# 30.
 WHOLE_EVERY = 30
 
 
@@ -129,6 +135,7 @@ class Tracker:
             self._lose()
             self._loss = blank
             return TrackedFrame("lost", blank, None, None, None, 0)
+        # Compared as recorded: in another light two equal pictures may differ by rounding.
         frozen = self._picture is not None and same_picture(picture, self._picture)
         self._picture = picture
         raw, picture = picture, self._light.evened(picture)
@@ -153,6 +160,8 @@ class Tracker:
 
     def _in_other_light(self, raw: Picture, start: Fit, fit: Fit, fault: str) -> tuple[Fit, str]:
         """A failed fit, or where it passes one from the same start in the light of the picture there."""
+        # A single iteration, to sample the picture where the eyes last were before the fit runs away from
+        # it.
         begun = self._fitter.fit(self._light.evened(raw), start.c, start.pose, 1)
         light = self._light.then(*begun.light)
         if not light.believable or Light().then(*begun.light).steady:
@@ -190,6 +199,7 @@ class Tracker:
         """The fit, or one started from the detector where that is nearer to it and no worse a picture."""
         if hint is None:
             return fit, fault
+        # Well within what is believed: a second fit would cost time and could only agree.
         if not fault and lid_difference(self._points(fit), hint) < DIFFERING_SHARE / 2:
             return fit, fault
         other = self._from_detection.fit(picture, hint)
@@ -250,6 +260,7 @@ class Tracker:
             near = self._finder.near(picture, self._last.pose)
             if near is not None:
                 yield near
+        # True for 0 and the powers of two.
         if count & (count - 1) == 0 or count % WHOLE_EVERY == 0:
             anywhere = self._finder.anywhere(picture)
             if anywhere is not None:
@@ -259,6 +270,7 @@ class Tracker:
         self, fit: Fit, status: Status, reason: str, hint: Points | None = None, raw: Picture | None = None
     ) -> TrackedFrame:
         """The frame of a fit that passed; with its picture as recorded, `raw`, another light may be tried."""
+        # After a search the eyes may be anywhere: a jump says nothing.
         before = self._before if status == "tracked" else None
         points, errors, why = self._judged(fit, before, hint)
         if why and raw is not None and self._fits_badly(fit):
@@ -266,6 +278,7 @@ class Tracker:
             points, errors, why = self._judged(fit, before, hint)
         self._last, self._lost_frames, self._started, self._loss = fit, 0, True, ""
         self._before = points
+        # The light is learned from frames that are believed, else a hand would pass for a shadow.
         if not why:
             self._light = self._light.following(*fit.light)
         if self._stillness is not None and self._stillness.after(points):

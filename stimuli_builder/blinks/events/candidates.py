@@ -90,6 +90,8 @@ def depth_of(distance: Array, fps: float) -> Depth:
 def local_opening(distance: Array, fps: float) -> Array:
     """Opening about each frame: the 85th percentile within 5 s, not below 0.6 of the recording's."""
     stride = max(1, int(fps / 10))
+    # Ten values a second are enough for a percentile over ten seconds, whose cost grows with the square
+    # of their number.
     coarse = distance[::stride]
     reach = max(1, round(OPEN_REACH_S * fps / stride))
     level = percentile_filter(coarse, OPEN_PERCENTILE, size=2 * reach + 1, mode="nearest")
@@ -103,6 +105,8 @@ def frame_noise(raw: Array) -> float:
     """Noise of one frame from second differences, which lids moving smoothly hardly touch."""
     if raw.size < 4:
         return NOISE_FLOOR
+    # White noise of variance s^2 has second differences of variance (1 + 4 + 1) s^2: hence the root of 6
+    # below.
     second = np.diff(raw, 2)
     spread = float(np.median(np.abs(second - np.median(second))))
     return max(NOISE_FLOOR, 1.4826 * spread / 6**0.5)
@@ -144,6 +148,7 @@ LEVELS = (0.2, 0.5, 0.85)
 def find_candidates(depth: Depth) -> list[Candidate]:
     """Every dip that rises clearly above noise and is not a ripple of a larger one, in order of time."""
     least = max(LEAST_PROMINENCE, NOISES * depth.noise)
+    # A dip cut off by the edge of a piece has a prominence as well.
     padded = np.concatenate([[depth.smooth.min()], depth.smooth, [depth.smooth.min()]])
     wide = 2 * int(REACH_S * depth.fps) + 1
     peaks, facts = find_peaks(padded, prominence=least, wlen=wide)
@@ -179,6 +184,8 @@ def level_crossing(depth: Depth, peak: int, level: float, step: int) -> float:
 
 def deep_level(candidates: list[Candidate], depth: Depth) -> float:
     """How deep this recording's blinks go: the upper quintile of its dips as short as blinks are."""
+    # Longer dips are closed eyes or squints, shallower ones partial blinks: neither shows how deep a blink
+    # goes.
     short = [
         c.depth for c in candidates if 0.03 <= (c.right[1] - c.left[1]) / depth.fps <= 0.5 and c.depth >= 0.15
     ]
@@ -212,6 +219,8 @@ def _courses(candidates: list[Candidate], depth: Depth, deep: float, other: Arra
     own = courses(depth.smooth, peaks, depth.fps) / heights
     if other is None:
         return np.concatenate([np.clip(own, -2, 2), np.zeros_like(own)], axis=1)
+    # Of the same depth as this eye's own blinks: the features compare the two eyes, whatever the size of
+    # either.
     beside = np.where(np.isfinite(other), other * deep, depth.smooth)
     across = courses(beside, peaks, depth.fps) / heights
     return np.concatenate([np.clip(own, -2, 2), np.clip(across, -2, 2.5)], axis=1)
@@ -219,6 +228,7 @@ def _courses(candidates: list[Candidate], depth: Depth, deep: float, other: Arra
 
 def _row(c: Candidate, depth: Depth, deep: float, other: Array | None) -> list[float]:
     fps, smooth = depth.fps, depth.smooth
+    # Logarithms need a positive length, and no crossing is known to better than a third of a frame.
     least = 0.3 / fps
     wide, half, narrow = ((right - left) / fps for left, right in zip(c.left, c.right, strict=True))
     closing = (c.left[2] - c.left[0]) / fps

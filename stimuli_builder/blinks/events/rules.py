@@ -102,7 +102,9 @@ def with_long_closures(distance: Array, fps: float, events: Sequence[LidEvent]) 
     minima = [distance[event.frame] for event in events if event.kind == "blink"]
     if not minima:
         return list(events)
+    # By this eye's own blinks: an aspect ratio of shut lids is not 0, and differs between people.
     closed, opening = float(np.median(minima)), float(np.nanpercentile(distance, OPEN_PERCENTILE))
+    # Infinity spreads through the average: beside a gap nothing counts as shut.
     level = box_filter(np.where(np.isfinite(distance), distance, np.inf), max(1.0, SMOOTHING_S * fps))
     shut = runs(level < closed + SHUT_SHARE * (opening - closed))
     longer = [
@@ -180,6 +182,7 @@ def separate_events(events: Sequence[LidEvent], depth: Array, start: int, fps: f
     """
     kept: list[LidEvent] = []
     for kinds in (SHUT, LOWERED):
+        # The longest first: what it holds is a trembling of it, never the other way round.
         told = _once(sorted((event for event in events if event.kind in kinds), key=_length, reverse=True))
         kept += _parted(sorted(told, key=lambda event: event.minimum_s), depth, start, fps)
     return sorted(kept, key=lambda event: event.minimum_s)
@@ -363,6 +366,7 @@ def _judged(moved: Array, full: Array, elsewhere: Array) -> Asymmetry:
     noise = elsewhere[np.isfinite(elsewhere)]
     # Median and its error by deviations: some of the times elsewhere hold a blink.
     sd = 1.4826 * float(np.median(np.abs(noise - np.median(noise)))) if noise.size else 0.0
+    # 1.25 sd / sqrt(n) is the standard error of a median of normal values.
     least = NOISES * 1.25 * sd / np.sqrt(moved.size)
     share = float(np.median(moved / full))
     return Asymmetry(share, moved.size, bool(share >= LEAST_MOVEMENT and np.median(moved) > least))

@@ -213,6 +213,8 @@ def timing_of(
     level = max(rest.level for rest in rests)
     rise = max(candidate.depth - level, 1e-3)
     problem = _Fit(times, values, max(depth.noise / sqrt(_step(depth)), MISFIT * rise), forms)
+    # Two starts: a noisy dip's crossings may lie anywhere, while the usual phases are wrong for an unusual
+    # blink.
     measured, usual = _starts(candidate, rests, depth, forms)
     best = problem.solve(measured)
     if problem.misfit(best) > GOOD_MISFIT:
@@ -240,7 +242,11 @@ class _Fit:
     def solved(self, p: Array) -> tuple[Array, Array]:
         """(fits, n) fitted values and (fits, 3) amplitude and levels of each row of parameters."""
         share = np.clip((self.times[None] - p[:, :1]) / np.exp(p[:, 1:4]).sum(1, keepdims=True), 0, 1)
+        # Amplitude and both levels are linear: solved inside, they leave seven numbers to search (variable
+        # projection).
         columns = np.stack([self.curves(p), 1 - share, share], axis=2)
+        # Where a window ends with the blink, the level after it is not determined: the ridge keeps the
+        # system solvable.
         square = np.einsum("fni,fnj->fij", columns, columns) + 1e-9 * np.eye(3)
         weights = np.linalg.solve(square, np.einsum("fni,n->fi", columns, self.values)[..., None])[..., 0]
         return np.einsum("fni,fi->fn", columns, weights), weights
@@ -315,6 +321,7 @@ class _Fit:
     def errors(self, p: Array) -> tuple[float, float, float]:
         """Standard errors of closing, opening and the whole in seconds, by the slope of what is minimized."""
         slope = self.slope(p)
+        # A phase that the samples do not determine has its spread from the prior's rows of the slope.
         covariance = np.linalg.pinv(slope.T @ slope)
         moved = p[None] + np.concatenate([1e-4 * np.eye(p.size), -1e-4 * np.eye(p.size)])
         edges = self.edges(moved)
@@ -338,6 +345,7 @@ def _reached(form: Array, level: float, bend: Array, mixed: Array) -> Array:
     """(fits,) share of the phase at which each bent and mixed form reaches a level."""
     shares = np.linspace(0, 1, 401)
     grid = _shaped(form, shares[None], np.zeros((bend.size, 1)), mixed[:, None])
+    # A mix of two rising forms rises but for rounding, which `interp` would not forgive.
     at = np.array([np.interp(level, np.maximum.accumulate(row), shares) for row in grid])
     return np.asarray(at ** np.exp(-bend))
 

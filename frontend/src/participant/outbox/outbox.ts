@@ -16,12 +16,14 @@ const LONGEST_MS = 15_000;
 
 export function backoff(failures: number, random: () => number = Math.random): number {
   const full = Math.min(LONGEST_MS, FIRST_MS * 2 ** Math.max(0, failures - 1));
+  // Spread, or all who lost the server at one moment would come back at one moment.
   return full * (0.75 + 0.5 * random());
 }
 
 // What is sent next: the oldest write by itself; where there is none, events of one run together.
 
 const events = "/api/run/events";
+// As many as the server takes in one call.
 const EVENTS_A_CALL = 100;
 
 interface Batch {
@@ -33,10 +35,12 @@ interface Batch {
 }
 
 export function nextBatch(queue: readonly OutboxItem[]): Batch | null {
+  // Answers before events: a person who leaves loses what happened, not what was said.
   const write = queue.find((item) => item.kind === "write");
   if (write) return { method: write.method, path: write.path, token: write.token, body: write.body, items: [write] };
   const first = queue[0];
   if (!first) return null;
+  // A visit of before may have left events here, which go with its own token.
   const items = queue.filter((item) => item.token === first.token).slice(0, EVENTS_A_CALL);
   return { method: "POST", path: events, token: first.token, body: { events: items.map((item) => item.body) }, items };
 }
@@ -117,6 +121,7 @@ export class Outbox {
     this.run = { run_id, token };
     const left: OutboxItem[] = [];
     await this.onDisk(async () => void left.push(...(await this.store.all())));
+    // Beyond everything kept: what is said now must be sent after it, over any number of reloads.
     this.sequence = left.reduce((last, item) => Math.max(last, item.sequence), this.sequence);
     // A newer token of the same run replaces the one an item was kept with.
     this.queue = left.map((item) => (item.run_id === run_id ? { ...item, token } : item));
@@ -167,12 +172,14 @@ export class Outbox {
     this.sequence += 1;
     const kept: OutboxItem = { ...item, ...this.run, sequence: this.sequence };
     await this.onDisk(() => this.store.add(kept));
+    // Only now, once the disk has it: a page that dies while it sends must find the record again.
     this.queue.push(kept);
     this.changed();
     void this.sendAll();
   }
 
   private async sendAll(): Promise<void> {
+    // One request at a time: the server then gets answers in the order in which they were given.
     if (this.running || this.stopped) return;
     this.running = true;
     for (let batch = this.next(); batch; batch = this.next()) {
@@ -195,6 +202,7 @@ export class Outbox {
       const answer = await send(batch.method, batch.path, { token: batch.token, body: batch.body });
       if (isTemporary(answer.status)) return this.failed(answer.retry_after_s, refusalOf(answer).code === BUSY);
       this.failures = 0;
+      // Any answer that is not temporary is for good, a refusal too: sending it again would block the queue behind it.
       await this.settle(batch, answer);
       return 0;
     } catch (error) {
@@ -206,6 +214,7 @@ export class Outbox {
   private failed(retry_after_s: number | null, busy = false): number {
     this.failures += 1;
     this.busy = busy;
+    // Never sooner than the server asked for, and not at once either where it asked for nothing.
     return Math.max(backoff(this.failures), (retry_after_s ?? 0) * 1000);
   }
 

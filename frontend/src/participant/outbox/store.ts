@@ -85,6 +85,7 @@ export class IndexedDbStore implements OutboxStore {
 
   refuse(item: OutboxItem, reason: string): Promise<void> {
     return this.write(["outbox", "refused"], (stores) => {
+      // In one transaction: a crash in between may neither lose the record nor send it for ever.
       stores("refused").put({ ...item, reason });
       stores("outbox").delete(item.id);
     });
@@ -96,6 +97,7 @@ export class IndexedDbStore implements OutboxStore {
       const transaction = this.database.transaction(names, "readwrite", { durability: "strict" });
       transaction.oncomplete = () => resolve();
       transaction.onerror = () => reject(failure(transaction.error));
+      // A full disk aborts without an error event.
       transaction.onabort = () => reject(failure(transaction.error));
       work((name) => transaction.objectStore(name));
     });

@@ -55,6 +55,7 @@ export function drawFrame(context: Canvas, clip: SingleClip | Composed, index: n
   const { width, height } = context.canvas;
   const pieces = "parts" in clip ? clip.parts : [{ clip, at: { x: 0, y: 0, width, height } }];
   const pictures = pieces.map((piece) => pictureOf(piece.clip, Math.min(index, countOf(piece.clip) - 1)));
+  // All or none: clips that are compared must never be a frame apart.
   if (pictures.includes(undefined)) return false;
   pieces.forEach(({ at }, pieceIndex) => {
     const picture = pictures[pieceIndex];

@@ -21,6 +21,7 @@ export async function decodeClip(bytes: ArrayBuffer, declared_fps: number | null
   const config = await track.getDecoderConfig();
   if (!config) throw new Error(`expected a codec this browser knows, got ${(await track.getCodec()) ?? "an unknown one"}`);
   const [width, height] = await Promise.all([track.getDisplayWidth(), track.getDisplayHeight()]);
+  // Bitmaps are uncompressed, whatever the clip's bytes: 900 frames of 960 x 360 would take 1.2 GB.
   const kept = Math.min(MAX_KEPT_FRAMES, Math.ceil(MAX_KEPT_BYTES / (4 * width * height)));
   // No more packets are counted than it takes to know.
   const { packetCount, averagePacketRate } = await track.computePacketStats(kept + 1);
@@ -47,12 +48,14 @@ async function decodeAll(config: VideoDecoderConfig, sink: EncodedPacketSink): P
       if (problems.length > 0) break;
       decoder.decode(packet.toEncodedVideoChunk());
     }
+    // The decoder reports by a callback; flush() would only say that it is closed.
     if (problems[0]) throw problems[0];
     await decoder.flush();
   } finally {
     if (decoder.state !== "closed") decoder.close();
   }
   const frames = await Promise.all(pending);
+  // The pictures become ready in any order, as each is made by a promise of its own.
   return frames.sort((a, b) => a.timestamp - b.timestamp);
 }
 

@@ -10,10 +10,12 @@ import { count, duration, frameLog, offset, within } from "../measured";
 // then, since the time between them may have been measured wrongly, or not yet.
 
 /** Up to this share of the period, the clip follows the screen. */
+// 60 fps on 59 Hz differ by 1.7 %, film's 24 on 23.976 by 0.1 %: speeds that nobody sees.
 const LOCKED_WITHIN = 0.03;
 const ROUNDING = 1e-6;
 
 /** Refreshes that follow one another within less than this share of the time believed are those of a faster screen. */
+// Between neighbors such as 60 and 75 Hz (0.8), and beyond the jitter of a mean over some refreshes.
 const FASTER = 0.85;
 
 /** The time between refreshes to go by: that which was seen, where the screen is faster than was believed. */
@@ -51,6 +53,7 @@ export class FrameSchedule {
       this.before_ms = now_ms;
       return (this.last = 0);
     }
+    // The last frame stays while it is due; that the clip is over is for `isOver` to say.
     const due = Math.min(this.frames - 1, this.periods(now_ms));
     return due <= this.last ? null : (this.last = due);
   }
@@ -64,11 +67,13 @@ export class FrameSchedule {
   private periods(now_ms: number): number {
     const { refresh_ms } = this;
     const passed_ms = now_ms - (this.before_ms ?? now_ms);
+    // Summed step by step, not taken from the start: a wrong refresh time would add up over a long clip.
     const step_ms = this.is_locked ? Math.round(passed_ms / refresh_ms) * refresh_ms : passed_ms;
     if (step_ms > 0) {
       this.before_ms = now_ms;
       this.elapsed_ms += step_ms;
     }
+    // Half a refresh on: the refresh nearest to a frame's time draws it, not the first after it.
     return Math.floor((this.elapsed_ms + refresh_ms / 2) / this.period_ms);
   }
 }
@@ -168,6 +173,7 @@ function late({ method, drawn, fps, refresh_ms }: Showing, believed_ms: number):
   const start = drawn[0];
   if (!start) return 0;
   const period_ms = shownPeriod(1000 / fps, refresh_ms ?? believed_ms);
+  // The shorter of both: a page that missed refreshes must not be allowed more for it.
   const allowed_ms = Math.min(refresh_ms ?? believed_ms, believed_ms) + JITTER_MS;
   const began_ms = drawn.map(([index, at_ms]) => at_ms - index * period_ms);
   // A video element holds its first frame until it runs, for a time of its own: most frames tell when it began to.

@@ -8,6 +8,7 @@ import { EncodedPacketSink, type InputVideoTrack } from "mediabunny";
 /** Frames that the decoder is fed ahead of the one shown: more than an H.264 decoder may hold back (16). */
 const AHEAD = 32;
 /** Frames that are pictures before the clip may start. */
+// A fifth of a second at 60 fps in hand, should the decoder pause just when the clip begins.
 const AT_START = 12;
 /** As many as the server takes in the log of a view. */
 const MAX_FRAMES = 5_000;
@@ -79,6 +80,7 @@ export class StreamedClip {
 
   /** Be at the first frame; resolves at once where it has not been left, else when the first frames are decoded again. */
   rewind(): Promise<void> {
+    // Called after each view and again before the next: the second call finds it done.
     if (this.start && this.shown === 0 && !this.problem) return this.start.ready;
     this.close();
     this.problem = null;
@@ -86,6 +88,7 @@ export class StreamedClip {
     const start = newStart();
     this.start = start;
     const decoder = new VideoDecoder({
+      // With its decoder: frames of one that was closed meanwhile still arrive, and belong to another pass.
       output: (frame) => void this.take(frame, decoder),
       error: (error) => {
         if (decoder === this.decoder) this.fail(error);

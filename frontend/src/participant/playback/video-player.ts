@@ -7,6 +7,7 @@ import { count } from "../measured";
 
 const ASSUMED_FPS = 30;
 const LOAD_LIMIT_MS = 20_000;
+// A page in the background gets no refreshes at all.
 const REFRESH_LIMIT_MS = 1_000;
 
 interface Loaded extends Prepared {
@@ -161,6 +162,7 @@ function watchFrames(
     video.requestVideoFrameCallback(frame);
   };
   if (logs_frames) video.requestVideoFrameCallback(frame);
+  // The only sign of a stall where frames are not reported.
   video.addEventListener("waiting", stalled);
   return {
     stop: () => {

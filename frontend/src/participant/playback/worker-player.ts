@@ -16,6 +16,7 @@ import { loadModule } from "../../ui/load-module";
 
 // The page's side of the worker: asks, and turns its messages into promises.
 
+// A decoder that hangs says nothing: after this the trial goes on without its clip.
 const DECODE_LIMIT_MS = 20_000;
 const START_LIMIT_MS = 10_000;
 const MAX_STARTS = 4;
@@ -40,6 +41,7 @@ async function startedWorker(): Promise<Worker> {
       worker.onerror = () => resolve("lost");
       setTimeout(resolve, START_LIMIT_MS, "silent");
     });
+    // The first message says that the script ran; `onerror` alone does not tell a slow network from a blocked one.
     if (outcome === "started") return worker;
     worker.terminate();
     // A worker that is blocked says nothing: another one would not either.
@@ -64,6 +66,7 @@ export class WorkerPlayer implements ClipPlayer {
   ) {
     this.worker.onmessage = ({ data }: MessageEvent<FromWorker>) => this.arrived(data);
     this.worker.onerror = (event) => this.broken(event.message || "the worker stopped");
+    // From here on the page cannot draw on it: only the worker does, whatever the page's own thread is busy with.
     const canvas = this.element.transferControlToOffscreen();
     this.tell({ type: "canvas", canvas, background, sync_patch }, [canvas]);
   }
@@ -88,6 +91,7 @@ export class WorkerPlayer implements ClipPlayer {
 
   async play(sha256: string, { ready, ...options }: PlayOptions): Promise<ShownClip> {
     const { frames, fps } = (await this.prepared.get(sha256)) ?? { frames: 0, fps: 30 };
+    // While the view is still being kept: its way to the disk and the screen's warming up take place at once.
     this.tell({ type: "warm" });
     // A hidden page gets no refreshes: it then ends when it is looked at again, and the gap says so.
     const asked = this.ask({ type: "play", sha256, ...options }, null, Promise.all([layoutShown(), ready]));
@@ -104,6 +108,7 @@ export class WorkerPlayer implements ClipPlayer {
   private keep(name: string, asked: Promise<FromWorker>): Promise<Prepared> {
     const result = asked.then((message) => message as FromWorker & { type: "prepared" });
     this.prepared.set(name, result);
+    // What failed may be tried again; a newer attempt under the same name stays.
     result.catch(() => this.prepared.get(name) === result && this.prepared.delete(name));
     return result;
   }

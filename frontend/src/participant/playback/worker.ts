@@ -39,6 +39,7 @@ async function prepare(request: number, sha256: string, bytes: ArrayBuffer, decl
     const clip = clips.get(sha256) ?? (await decodeClip(bytes, declared_fps));
     const { fps, width, height } = clip;
     const frames = framesOf(clip);
+    // Released, or asked for again, while it was decoded: pictures that nobody would release must not stay.
     if (newest.get(sha256) === request) clips.set(sha256, clip);
     else close(clip);
     scope.postMessage({ type: "prepared", request, frames, width, height, fps });
@@ -118,6 +119,7 @@ function stopBroken(request: number, reason: unknown): void {
 }
 
 function begin(request: number, clip: SingleClip | Composed, refresh_ms: number, fixation_ms: number): void {
+  // Time by the clock, and refreshes counted besides: on a fast screen four of them are over before the way is in step.
   const until = absoluteNow() + fixation_ms;
   draw_after_ms = Math.floor(DRAWS_AFTER * refresh_ms);
   const waited = new EvennessMeter();
@@ -133,6 +135,7 @@ function begin(request: number, clip: SingleClip | Composed, refresh_ms: number,
       if (rest === REST_REFRESHES) draw_after_ms = Math.floor(DRAWS_AFTER * true_ms);
       if (rest-- > 0) return;
       const show = showing(request, clip, true_ms);
+      // In the same refresh: the first frame is drawn now, not one refresh later.
       clock.start(show);
       show(refresh_at_ms, ran_at_ms);
     }
@@ -159,6 +162,7 @@ function showing(request: number, clip: SingleClip | Composed, refresh_ms: numbe
     }
     const index = schedule.next(refresh_at_ms);
     if (index === null || !context) return;
+    // Not decoded in time: the picture stays, and the log says that this frame is missing.
     if (!drawFrame(context, clip, index)) return;
     mark?.(context, index);
     drawn.push([index, absoluteNow() - draw_after_ms]);
@@ -176,6 +180,7 @@ function resize(width: number, height: number): void {
 scope.onmessage = ({ data }) => {
   if (data.type === "canvas") {
     background = data.background;
+    // Opaque: the compositor need not blend the page behind it, which would be one more step on the way.
     context = data.canvas.getContext("2d", { alpha: false });
     blank();
     if (data.sync_patch) void loadSyncPatch();

@@ -25,6 +25,7 @@ export class ClipUnavailable extends Error {
   }
 }
 
+// About threefold each time: a lost packet costs half a second, a server that restarts is met again within ten.
 const WAITS_MS = [400, 1_200, 3_000, 6_000];
 const wait = (attempt: number): Promise<void> =>
   new Promise((resolve) => setTimeout(resolve, WAITS_MS[Math.min(attempt, WAITS_MS.length - 1)]));
@@ -56,6 +57,7 @@ async function attemptOnce(url: string, stall_ms: number, cache: RequestCache, s
   signal?.addEventListener("abort", abort);
   try {
     const response = await fetch(url, { cache, signal: stop.signal });
+    // Told apart from a bad connection, since the participant can do something about that one only.
     if (response.status === 404 || response.status === 410) return "missing";
     if (!response.ok || !response.body) return "offline";
     return await readAll(response.body, moving);
@@ -84,6 +86,7 @@ export async function sha256(bytes: ArrayBuffer): Promise<string> {
 
 // The clips of a block, fetched four at a time and kept in memory until their block is over.
 
+// Browsers open six connections to a host: two stay free for answers.
 const AT_ONCE = 4;
 
 export interface Progress {
@@ -146,6 +149,7 @@ export class ClipCache {
   private one(source: ClipSource, signal?: AbortSignal): Promise<void> {
     if (this.bytes.has(source.clip_sha256)) return Promise.resolve();
     const running = this.loading.get(source.clip_sha256);
+    // Loads overlap, as the next block is fetched while this one is shown: each clip still comes once.
     if (running) return running;
     const loading = this.fetchOne(source, signal ? { signal } : {})
       .then((bytes) => void this.bytes.set(source.clip_sha256, bytes))
