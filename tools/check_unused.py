@@ -53,6 +53,7 @@ CALLED_FROM_OUTSIDE = {
     "collect": "prometheus_client",
     "_gen_likelihoods": "questplus",
     "__call__": "a protocol",
+    "__init_subclass__": "Python, for every subclass",
     "TicketedSubmission": "a protocol that annotations name in quotes",
     "data_url": "a template of the report",
     "create_lasting_app": "uvicorn",
