@@ -248,7 +248,7 @@ def _kendall_w(ranks: Floats) -> tuple[float, float, float]:
     count = ranks.shape[1]
 
     def concordance(drawn: Floats) -> float:
-        # Nobody in the draw may tell two levels apart: then there is no concordance to speak of.
+        # Nobody in the draw may distinguish two levels: then there is no concordance to speak of.
         if np.all(drawn == drawn[:, :1]):
             return 0.0
         return float(_friedman(drawn)[0] / (len(drawn) * (count - 1)))

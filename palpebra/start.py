@@ -133,7 +133,7 @@ def serve_folder(
     with_browser : bool
         Whether to open that page.
     around : callable
-        Returns what runs beside the server, such as a proxy.
+        Returns what runs while the server runs, such as a proxy.
     """
     use_folder(place)
     from server.cli_common import stored_services

@@ -60,7 +60,7 @@ def stored_services(settings: Settings | None = None) -> Iterator[Services]:
     Raises
     ------
     InputError
-        There is no database yet, or it has no tables: in a folder beside the server's, an empty one made on
+        There is no database yet, or it has no tables: in a folder next to the server's, an empty one made on
         the spot would look as if all studies were lost, and its backup as if they were kept.
     """
     settings = settings or Settings()
@@ -100,7 +100,7 @@ def one_of(words: Sequence[Word], word: str, what: str) -> Word:
 
 
 def refusal(error: Exception) -> str | None:
-    """The line; None for what is no refusal."""
+    """The line; None if it is not a refusal."""
     if isinstance(error, ApiError):
         return error.message
     if isinstance(error, ValidationError) and error.title == Settings.__name__:

@@ -90,7 +90,7 @@ def run(
 
 @contextmanager
 def _shared_counts(workers: int) -> Iterator[None]:
-    """Several workers count into files of one folder, so that any of them can tell the sum."""
+    """Several workers count into files of one folder, so that any of them can report the sum."""
     if workers == 1 or MULTIPROCESS_VARIABLE in os.environ:
         yield
         return

@@ -117,7 +117,7 @@ class PagesNotBuilt(ApiError, status=503, code="pages_not_built"):
 
 @page_router.get("/")
 def home() -> RedirectResponse:
-    """Send whoever comes without a link to the admin site."""
+    """Send visitors without a link to the admin site."""
     return RedirectResponse("/admin/")
 
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
-# The text of a value, as a person would type it; free of pandas, for readers that start anew.
+# The text of a value, as a person would type it; free of pandas, for readers in a new process.
 
 
 def cell_text(value: Any) -> str:
@@ -41,7 +41,7 @@ class Cells:
     header : tuple of str
         Names of all columns of the file.
     lines : int64 array
-        Line (or row of the sheet) on which each row stands, (rows,).
+        Line (or row of the sheet) of each row, (rows,).
     labels : mapping of str to mapping of str to str
         Of a column, the word for each coded value, where the file has such words (SPSS).
     numeric : frozenset of str
@@ -49,7 +49,7 @@ class Cells:
     decisions : tuple of str
         What was understood, for the reader of the tables.
     files : array of str or None
-        Name of the file in which each row stands, (rows,), where they are several.
+        Name of the file of each row, (rows,), if there are several.
     """
 
     rows: "pd.DataFrame"

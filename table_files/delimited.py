@@ -41,7 +41,7 @@ def encoding_of(path: Path) -> str:
     Raises
     ------
     InputError
-        The file is no text in the encoding that its first bytes announce, or in any of these.
+        The file is not text in the encoding that its first bytes announce, or in any of these.
     """
     with path.open("rb") as file:
         start = file.read(_HEAD_BYTES)
@@ -63,7 +63,7 @@ def text_of(path: Path) -> str:
 
 
 def _undecodable(path: Path, encoding: str) -> str:
-    """Why the bytes are no text in an encoding; nothing where they are."""
+    """Why the bytes are not text in an encoding; empty if they are."""
     decoder = codecs.getincrementaldecoder(encoding)()
     try:
         with path.open("rb") as file:
@@ -121,7 +121,7 @@ def separator_of(header: str) -> str:
 
 
 class _Head(NamedTuple):
-    """How many lines stand above the header, and the header's first line (or the first of cells)."""
+    """How many lines are above the header, and the header's first line (or the first of cells)."""
 
     skipped: int
     line: str
@@ -201,7 +201,7 @@ class DelimitedTable:
                 raise _wrong_width(self.name, first, last, len(row), width)
 
     def columns(self, names: Sequence[str]) -> tuple[list[tuple[str, ...]], list[int]]:
-        """The cells of some columns, row by row as they stand in the file, and the lines of the rows."""
+        """The cells of some columns, row by row as they are in the file, and the lines of the rows."""
         positions = [self.header.index(name) for name in names]
         rows, lines = [], []
         for line, row in self.rows():
@@ -252,11 +252,11 @@ def _damaged_quote(name: str, first: int, last: int, said: str) -> InputError:
             f"{name}: line {first} opens a double quote that line {last} closes, and the cell goes on "
             "behind it; write a double quote inside a cell twice, or delete it"
         )
-    return InputError(f"{name}: line {first} is not CSV that can be read ({said}); write it anew")
+    return InputError(f"{name}: line {first} is not CSV that can be read ({said}); write it again")
 
 
 def _wrong_width(name: str, first: int, last: int, cells: int, width: int) -> InputError:
-    """A row of too many or too few cells that stands in the lines `first` to `last`."""
+    """A row of too many or too few cells in the lines `first` to `last`."""
     if last > first:
         return InputError(
             f"{name}: line {first} opens a double quote that line {last} closes, so that these lines are one "
@@ -276,7 +276,7 @@ def delimited_table(path: Path, *, alone: str = "") -> DelimitedTable:
     path : Path
     alone : str
         A column that may be the file's only one: its commas are decimal. A first line that is a number
-        without a comma is its first value, where no header line stands.
+        without a comma is its first value, if there is no header line.
 
     Raises
     ------

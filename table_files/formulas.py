@@ -24,7 +24,7 @@ _GUARDED = re.compile(rf"(^|[;\t\r\n])'(?=[{_SIGNS}\t\r\n])")
 _PARTED = re.compile(r"[;\t\r\n]")
 _NUMBER = re.compile(r"\s*[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?\s*")
 _STARTS = (b",", b"\n", b"\r", b'"', b";", b"\t")
-"""What stands before a cell of a line of CSV, or before a part of one."""
+"""What precedes a cell of a line of CSV, or a part of one."""
 _SUSPICIOUS = (b"=", b"@", b"\t", b"\r", b"\xef\xbc", b"\xef\xb9")
 """Signs that are rare in tables; the last two are the first bytes of the full-width and the small forms."""
 _PLAIN = rb"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"

@@ -76,7 +76,7 @@ def named_rows(path: Path) -> NamedRows:
 
 
 def is_delimited(path: Path) -> bool:
-    """Whether a file is read as CSV: whatever is no Excel, SPSS or JSON."""
+    """Whether a file is read as CSV: anything but Excel, SPSS or JSON."""
     path, _ = _split_sheet(path)
     suffix = path.suffix.lower()
     other = suffix in (*_WORKBOOKS, *_SPSS, *_JSON)
@@ -84,7 +84,7 @@ def is_delimited(path: Path) -> bool:
 
 
 def refuse_unread(path: Path) -> None:
-    """Refuse what is no file, and sorts of files that are not read.
+    """Refuse what is not a file, and sorts of files that are not read.
 
     Raises
     ------
@@ -161,7 +161,7 @@ def _json_of(text: str) -> Any:
     except json.JSONDecodeError as error:
         if not error.msg.startswith("Extra data"):
             raise
-    # splitlines would cut at U+2028 and U+0085 too, which may stand in the texts of JSON
+    # splitlines would cut at U+2028 and U+0085 too, which may be in the texts of JSON
     values = [json.loads(line) for line in text.split("\n") if line.strip()]
     return [row for value in values for row in (value if isinstance(value, list) else [value])]
 

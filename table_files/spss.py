@@ -1,4 +1,4 @@
-"""SPSS files (.sav): values as codes, with the words for them beside."""
+"""SPSS files (.sav): values as codes, with their labels."""
 
 import json
 import math
@@ -23,17 +23,17 @@ def header(path: Path) -> list[str]:
 
 def cells(path: Path, names: list[str]) -> Cells:
     """The variables `names`; what is declared missing becomes empty."""
-    told = _read(path, names)
-    columns = told["columns"]
+    report = _read(path, names)
+    columns = report["columns"]
     rows = [list(row) for row in zip(*(columns[name] for name in names), strict=True)]
     read = cells_of(names, rows, names, 1)
-    labels = {name: dict(pairs) for name, pairs in told["labels"].items()}
-    return Cells(read.rows, tuple(told["names"]), read.lines, labels=labels, numeric=read.numeric)
+    labels = {name: dict(pairs) for name, pairs in report["labels"].items()}
+    return Cells(read.rows, tuple(report["names"]), read.lines, labels=labels, numeric=read.numeric)
 
 
 # Decision 0815: Files that crash their reader end in one line.
 def _read(path: Path, names: list[str]) -> dict[str, Any]:
-    """What `main` tells of a file, in a process of its own, which damaged files may kill."""
+    """What `main` reports of a file, in a separate process, because damaged files may kill it."""
     searched = {**os.environ, "PYTHONPATH": os.pathsep.join(folder for folder in sys.path if folder)}
     try:
         done = subprocess.run(  # noqa: S603 - this Python, a module of our own
@@ -44,17 +44,17 @@ def _read(path: Path, names: list[str]) -> dict[str, Any]:
             check=False,
             env=searched,
         )
-        told: dict[str, Any] = json.loads(done.stdout) if done.returncode == 0 else {"refused": _DIED}
+        report: dict[str, Any] = json.loads(done.stdout) if done.returncode == 0 else {"refused": _DIED}
     except (subprocess.TimeoutExpired, ValueError):
-        told = {"refused": _DIED}
-    if "refused" in told:
+        report = {"refused": _DIED}
+    if "refused" in report:
         raise InputError(
-            f"{path.name} is not an SPSS file that can be read ({told['refused']}); open it in SPSS or PSPP "
-            "and save it anew, or export it as CSV"
+            f"{path.name} is not an SPSS file that can be read ({report['refused']}); open it in SPSS or "
+            "PSPP and save it again, or export it as CSV"
         )
-    if not told["names"]:
+    if not report["names"]:
         raise InputError(f"{path.name} has no variables")
-    return told
+    return report
 
 
 _DIED = "it is damaged: reading it ended the reader"

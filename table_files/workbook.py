@@ -77,7 +77,7 @@ def refuse_too_far(path: Path, sheet: "Worksheet") -> None:
 
 
 def _counted(path: Path, book: ZipFile, part: ZipInfo, elements: int) -> int:
-    """The elements so far and those of a part: all, or those before what is no XML or damaged in it."""
+    """The elements so far and those of a part: all, or those before what is not XML or damaged in it."""
     count = _Count(path, elements)
     try:
         with book.open(part) as file:
@@ -89,7 +89,7 @@ def _counted(path: Path, book: ZipFile, part: ZipInfo, elements: int) -> int:
 
 
 class _Count:
-    """What stands in a part: elements, and areas whose every cell is made."""
+    """The content of a part: elements, and areas whose every cell is made."""
 
     def __init__(self, path: Path, elements: int) -> None:
         self.elements = elements
@@ -150,7 +150,7 @@ class Page:
     """A sheet from its first row that holds anything, row `first`, to the last, and its merged cells.
 
     `merged` has a text like `A2:A4` and the rows and columns from and to, counted from 1; `hidden` counts
-    rows with values that a filter or a person hid; `more` says that cells without a value stand below.
+    rows with values that a filter or a person hid; `more` says that cells without a value follow below.
     """
 
     rows: Rows
@@ -272,7 +272,8 @@ def _pages(path: Path, _changed: int, formulas: bool) -> dict[str, Page]:
     except _UNREADABLE as error:
         said = " ".join(str(error).split())
         raise InputError(
-            f"{path.name} is not an Excel workbook that can be read ({said}); save it as .xlsx anew or as CSV"
+            f"{path.name} is not an Excel workbook that can be read ({said}); save it as .xlsx again or as "
+            "CSV"
         ) from error
 
 
@@ -312,7 +313,7 @@ def _refuse_uncalculated(path: Path, title: str, columns: list[str], body: Rows,
         return
     page = _page(path, title, formulas=True)[1]
     formulas = page.rows[1:]
-    # rows without any value end the body; formulas that were never calculated may stand in them
+    # rows without any value end the body; formulas that were never calculated may be in them
     empty += [(i, p) for i in range(len(body), len(formulas)) for p in positions]
     for i, p in empty:
         held = formulas[i][p] if i < len(formulas) and p < len(formulas[i]) else None

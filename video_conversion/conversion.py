@@ -106,7 +106,7 @@ def _stream_words(video: VideoFile) -> tuple[str, ...]:
         named = f"{video.codec} {video.profile}".strip() if video.codec == "h264" else video.codec
         return (f"encoded as H.264, was {named}",)
     if "mp4" not in video.container.split(","):
-        return (f"encoded anew in an MP4 file, was {video.container.split(',')[0]}",)
+        return (f"re-encoded in an MP4 file, was {video.container.split(',')[0]}",)
     if video.is_edited:
         return ("frames as the edit list of the file says, which players apply differently",)
     return ()

@@ -117,7 +117,7 @@ FORMATS = (
     "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi,mpegts,mpeg,mpegvideo,gif,apng,flv,asf,ogg,mxf,"
     "yuv4mpegpipe,h264,hevc,ivf,dv,nut"
 )
-"""Demuxers that read one file and nothing beside it: a playlist would open whatever address it names."""
+"""Demuxers that read one file and nothing else: a playlist would open whatever address it names."""
 OPEN_OPTIONS = {"protocol_whitelist": "file", "format_whitelist": FORMATS}
 WIDE_COLOUR, HDR_TRANSFERS = 9, (16, 18)
 RANGES: dict[int, ColourRange] = {1: "limited", 2: "full"}

@@ -48,7 +48,7 @@ class JodScale:
     Attributes
     ----------
     content : str
-        `all` where contents are not told apart or taken together.
+        `all` if contents are not distinguished or are taken together.
     reference : str or None
         The item whose score is `reference_jod`; None: scores have a mean of zero.
     """

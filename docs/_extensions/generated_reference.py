@@ -51,7 +51,7 @@ def write_replications(file: Path) -> None:
     if file.is_file() and inputs in file.read_text(encoding="utf-8"):
         return
     with tempfile.TemporaryDirectory() as out:
-        # In another process: the commands may leave settings of their own.
+        # In another process: the commands may leave their own settings.
         command = [sys.executable, "-c", "from analysis.cli import main; main()", "replicate", "--out", out]
         subprocess.run(command, check=True, capture_output=True, cwd=ANALYSIS.parent)
         tables = (Path(out) / "comparison.md").read_text(encoding="utf-8")

@@ -29,7 +29,7 @@ def _kind_in(name: str) -> Kind:
 
 
 KINDS: dict[str, Kind] = {name: _kind_in(name) for name in TRIALS}
-"""Every kind by its name in the TOML; the first is the default."""
+"""Every kind by name in the TOML; the first is the default."""
 
 
 def views() -> tuple[View, ...]:

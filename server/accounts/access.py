@@ -60,7 +60,7 @@ def check_origin(request: Request, settings: Settings) -> None:
 
 
 def _address_of(origin: str) -> str:
-    """Scheme and host of an origin; empty where it is no address."""
+    """Scheme and host of an origin; empty if it is not an address."""
     try:
         parts = urlsplit(origin)
     except ValueError:
@@ -199,7 +199,7 @@ class _Access:
         return identity
 
 
-# Whoever is signed in, by what a token must carry. What she may do with a study the study's query decides.
+# Who is signed in, by what a token must carry. The study's query decides what they may do with a study.
 Viewer = Annotated[Identity, Depends(_Access("viewer", "read"))]
 """May look."""
 Exporter = Annotated[Identity, Depends(_Access("viewer", "export"))]

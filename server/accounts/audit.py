@@ -41,10 +41,11 @@ from server.models import AuditEntry
 #     D = HMAC-SHA256(k, "details" | s | d)                                               (1)
 #     H_n = HMAC-SHA256(k, "entry" | H_(n-1) | n | time | actor | action | kind | target | D)   (2)
 #
-# Whoever can write to the database, but has not the key, cannot change, remove or put in an entry without
-# breaking (2) at it. What the database alone cannot tell is that the last entries were cut off, or the whole
-# chain taken away from rows that stay: keep the newest hash elsewhere (export, syslog) and verify with it.
-# Details can be erased with their salt, as data protection asks; D stays, and tells nothing without s.
+# Anyone who can write to the database but does not have the key cannot change, remove or put in an entry
+# without breaking (2) at it. What the database alone cannot show is that the last entries were cut off, or
+# the whole chain taken away from rows that stay: keep the newest hash elsewhere (export, syslog) and verify
+# with it. Details can be erased with their salt, as data protection asks; D stays, and reveals nothing
+# without s.
 
 START = "0" * 64
 """What stands for the hash before the first entry."""
@@ -97,7 +98,7 @@ WAITING_MAX = 1000
 
 
 def forward(address: str, entries: list[dict[str, object]]) -> None:
-    """Send entries, details left out, by a thread of their own: a syslog that is away holds up no request.
+    """Send entries, details left out, in a separate thread: a syslog that is away delays no request.
 
     Entries that cannot be sent, or wait while `WAITING_MAX` others do, are dropped with a line of log: the
     log in the database has them.
@@ -281,7 +282,7 @@ def record(
     /,
     **details: Any,
 ) -> None:
-    """Add an entry in the caller's transaction, so that a change and its entry stand or fall together.
+    """Add an entry in the caller's transaction, so that a change and its entry succeed or fail together.
 
     Parameters
     ----------
@@ -456,13 +457,13 @@ def _problem(key: bytes, last: int, previous: str, entry: AuditEntry, erased_run
     return None
 
 
-# The chain of the audit log under another key of the server: every entry's hashes made anew.
+# The chain of the audit log under another key of the server: every entry's hashes are recomputed.
 
 
 def reseal(session: Session, secret: bytes) -> tuple[int, str]:
-    """Make the hashes of a chain that was verified anew; whatever is in it stays.
+    """Recompute the hashes of a chain that was verified; its contents stay.
 
-    What is left of details that were erased is taken as it is: without their salt nobody can make it anew.
+    What is left of details that were erased is taken as it is: without their salt nobody can recompute it.
 
     Returns
     -------

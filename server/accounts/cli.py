@@ -53,7 +53,7 @@ def link(
     role: Annotated[str, typer.Option(help="owner, experimenter or viewer.")] = "owner",
     label: Annotated[str, typer.Option(help="Name of the person to invite.")] = "",
 ) -> None:
-    """Print a one-time link with which somebody makes an account of her own.
+    """Print a one-time link with which somebody creates their own account.
 
     Example: server admin link --role experimenter --label "Ada"
     """

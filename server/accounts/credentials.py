@@ -141,7 +141,7 @@ class PasswordWork:
 
 
 def _step_back() -> None:
-    # On Linux each thread has a niceness of its own, which the threads it starts (argon2's lanes) inherit.
+    # On Linux each thread has its own niceness, which the threads it starts (argon2's lanes) inherit.
     if hasattr(os, "nice") and os.uname().sysname == "Linux":
         os.nice(NICENESS)
     _hasher(), _nobody()

@@ -160,7 +160,7 @@ async def sign_in(
 
 
 def _notice(settings: Settings, body: SignIn, device_cookie: str | None) -> letters.Notice | None:
-    """What of a sign-in its account is told by mail; None of one in a browser as always."""
+    """What the account is notified of by mail; None for a sign-in in a known browser."""
     if credentials.is_recovery_code(body.code or ""):
         return letters.RECOVERY_CODE_USED
     known = known_device(settings.key, body.name, device_cookie)
@@ -200,7 +200,7 @@ async def attempt(
     if not isinstance(failure, signing_in.SecondFactorRequired):
         await run_in_threadpool(throttle.names.failed, key)
         if fits and not device:
-            # Whoever knows the password could else try codes from everywhere.
+            # Otherwise anyone who knows the password could try codes from everywhere.
             await run_in_threadpool(throttle.codes.failed, body.name.casefold())
     raise failure or signing_in.WrongCredentials("Name or password is wrong.")
 
@@ -284,7 +284,7 @@ def list_sessions(database: DatabaseDep, settings: SettingsDep, me: Myself) -> l
 
 @router.delete("/sessions/{session_id}", status_code=204)
 def revoke_session(database: DatabaseDep, me: Myself, session_id: Number) -> None:
-    """Sign another of one's own browsers out."""
+    """Sign out another browser of the same account."""
     service.revoke_session(database, me, session_id)
 
 
@@ -328,7 +328,7 @@ def create_invitation(
 
 
 def invitation_url(public_url: str, token: str) -> str:
-    """The page an invited person opens. The token stands behind '#', where no log and no referrer sees it."""
+    """The page an invited person opens. The token comes after '#', where no log and no referrer sees it."""
     return f"{public_url}/admin/invitation#{token}"
 
 
@@ -510,7 +510,7 @@ async def remove_address(
 async def confirm_address(
     request: Request, services: ServicesDep, body: ConfirmAddress, after: BackgroundTasks
 ) -> None:
-    """Confirm an address of mail by the link that went there; the address before it is told."""
+    """Confirm an address of mail by the link sent there; the previous address is notified."""
     check_origin(request, services.settings)
     await _count_attempt(services.sign_ins, request, "confirm an address")
     letter = await run_in_threadpool(resets.confirm_address, services.database, body.token)

@@ -27,11 +27,11 @@ class NotAllowed(ApiError, status=403, code="not_allowed", audited=True):
 
 
 class SecondFactorNeeded(ApiError, status=403, code="second_factor_needed", audited=True):
-    """What is asked for opens only to who signed in with a second factor."""
+    """This is only open to accounts that signed in with a second factor."""
 
 
 class SignInAgain(ApiError, status=403, code="sign_in_again"):
-    """What is asked for would outlive a stolen session, and this one began a while ago."""
+    """This would outlive a stolen session, and this session began a while ago."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Identity:
 
 
 class Operator:
-    """Whoever has the machine: the command line and the server's own work. Every study is open to her."""
+    """The machine's operator: the command line and the server's own work. Every study is open to it."""
 
     account_id: Final = None
     name: Final = "command line"

@@ -193,10 +193,10 @@ async def end_by_provider(
     provider: ProviderId,
     logout_token: Annotated[str, Form(max_length=16_000)] = "",
 ) -> None:
-    """Where the provider itself tells that somebody signed out there (OpenID Connect Back-Channel Logout).
+    """Where the provider itself reports that somebody signed out there (OpenID Connect Back-Channel Logout).
 
-    Who sends what is no logout token is kept waiting, not the provider: its people may all sign out at once.
-    A token that comes again ends nothing that was begun since.
+    Senders of anything but a logout token are kept waiting, not the provider: its people may all sign out at
+    once. A token that comes again ends nothing that was begun since.
     """
     provider_sign_in.provider_of(services.settings, provider)
     client = services.providers.of(provider)

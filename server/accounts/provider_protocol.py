@@ -37,7 +37,7 @@ class NotRecognised(ApiError, status=401, code="sign_in_refused"):
 
 
 class LogoutRefused(ApiError, status=400, code="logout_refused"):
-    """What came is no logout token that holds (Back-Channel Logout 1.0, 2.8)."""
+    """What came is not a valid logout token (Back-Channel Logout 1.0, 2.8)."""
 
 
 def provider_away(why: str) -> ProviderAway:
@@ -150,7 +150,7 @@ async def _content(answer: httpx2.Response, request: httpx2.Request) -> bytes:
 
 
 def _proxy_to(url: httpx2.URL) -> str | None:
-    """The environment's proxy, which a client with a transport of its own does not look for."""
+    """The environment's proxy, which a client with its own transport does not look for."""
     if proxy_bypass(url.host):
         return None
     return getproxies().get(url.scheme)
@@ -420,7 +420,7 @@ def _registry(metadata: Metadata) -> JWSRegistry:
 
 
 class Providers:
-    """One client a declared provider; to each the browser comes back at an address of its own."""
+    """One client per declared provider; the browser returns to a separate address for each."""
 
     def __init__(self, settings: Settings) -> None:
         self._clients = {

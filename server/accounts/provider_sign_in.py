@@ -86,7 +86,7 @@ def begin_attempt(
     Parameters
     ----------
     asking : Identity, optional
-        Who wants a login of her own account.
+        The account that asks for a login.
     invitation_hash : str, optional
         Of the invitation by which a new account is to be made of whom the provider recognises.
     """
@@ -189,7 +189,7 @@ def link(database: Database, provider_id: str, attempt: LoginAttempt, whom: Prov
 
 
 def own_logins(session: Session, me: Identity) -> list[AccountLogin]:
-    """The logins of one's own account."""
+    """The logins of the own account."""
     return repository.logins_of(session, me.account_id)
 
 
@@ -218,7 +218,7 @@ log = logging.getLogger("palpebra")
 
 
 def said_of(claims: Mapping[str, Any], name: str) -> Any:
-    """A claim by its name, or by dots through nested ones (`realm_access.roles`); None where none is."""
+    """A claim by name, or by dots through nested ones (`realm_access.roles`); None if there is none."""
     if name in claims:
         return claims[name]
     told: Any = claims
@@ -385,7 +385,7 @@ class SignInOutcome:
     Attributes
     ----------
     told : NoticeRecipient or None
-        What its account is told by mail.
+        What its account is notified of by mail.
     """
 
     page: str
@@ -448,7 +448,7 @@ def finish_with_code(
 ) -> SignInOutcome:
     """After the provider: the account's own second factor, which its session then has.
 
-    Wrong codes are counted outside of the transaction: on PostgreSQL a count is a transaction of its own.
+    Wrong codes are counted outside of the transaction: on PostgreSQL a count is a separate transaction.
     """
     with database.read() as session:
         name = _name_behind(session, browser)

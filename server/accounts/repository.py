@@ -55,7 +55,7 @@ def account(session: Session, account_id: int, *, fresh: bool = False, lock: boo
 
 
 def account_named(session: Session, name: str, *, lock: bool = False) -> Account | None:
-    """An account by its name in any spelling of capitals, its own first; `lock` holds it until the commit."""
+    """An account by name in any spelling of capitals, its own first; `lock` holds it until the commit."""
     query = select(Account).where(func.lower(Account.name) == name.lower())
     query = query.order_by(Account.name != name, Account.id).limit(1)
     return session.scalar(query.with_for_update() if lock else query)

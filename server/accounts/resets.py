@@ -21,12 +21,12 @@ from server.models import Account, LetterPurpose, MailedLink
 
 LINK_MINUTES = 30
 MAX_OPEN_LINKS = 3
-"""Of one account and purpose at a time: nobody's box is filled by whoever knows a name."""
+"""Of one account and purpose at a time: nobody's inbox can be filled by someone who knows a name."""
 MAX_RESET_LETTERS_A_DAY = 10
 """Of one account, until one of them is used."""
 RESERVED_LETTERS, RESERVED_LINKS = 4, 1
-"""Of these, and of the open links, what only a browser gets that the account signed in by before: whoever
-knows a name and has many addresses uses up all the others."""
+"""Of these and of the open links, the part reserved for browsers in which the account signed in before:
+somebody who knows a name and has many addresses uses up all the others."""
 
 
 class LinkOver(Conflict, code="link_over"):

@@ -347,7 +347,7 @@ class ChangeWorkspace(RequestBody):
 
 
 class WorkspaceOut(BaseModel):
-    """A workspace, and the role of the account that asks; null where it is no member."""
+    """A workspace, and the role of the account that asks; null if it is not a member."""
 
     name: str
     title: str
@@ -373,14 +373,17 @@ class SetMember(RequestBody):
 
 
 class GrantOut(BaseModel):
-    """Rights on a study that were granted to an account, beside those of its role in the workspace."""
+    """Rights on a study granted to an account in addition to those of its role in the workspace."""
 
     account: str
     rights: list[Right]
 
 
 class SetGrant(RequestBody):
-    """The rights an account shall have on a study beside those of its role; an empty list takes them back."""
+    """The rights an account gets on a study in addition to those of its role.
+
+    An empty list takes them back.
+    """
 
     rights: Annotated[list[Right], Field(max_length=5)]
 

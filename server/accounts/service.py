@@ -29,7 +29,7 @@ def open_sessions(session: Session, owner: Identity, idle: timedelta) -> list[Ad
 
 
 def revoke_session(database: Database, owner: Identity, session_id: int | None) -> None:
-    """Sign one of one's own browsers out; NotFound where it is somebody else's."""
+    """Sign out a browser of this account; NotFound if it belongs to another."""
     with database.write() as session:
         row = repository.session_of(session, owner.account_id, session_id)
         if row is None:
@@ -62,7 +62,7 @@ def create_token(
 
 
 def revoke_token(database: Database, owner: Identity, token_id: int) -> None:
-    """Revoke one of one's own API tokens; NotFound where it is somebody else's."""
+    """Revoke an API token of this account; NotFound if it belongs to another."""
     with database.write() as session:
         row = repository.token_of(session, owner.account_id, token_id)
         if row is None:
@@ -74,7 +74,7 @@ def revoke_token(database: Database, owner: Identity, token_id: int) -> None:
 def end_everything(session: Session, account_id: int, keep_session: int | None = None) -> None:
     """End the sessions of an account, but for one, revoke its API tokens, and take back what is under way.
 
-    Whoever was in a stolen session may have asked for a link that makes an address of hers the account's, or
+    Somebody in a stolen session may have asked for a link that makes their address the account's, or
     begun to add a login of hers.
     """
     repository.hold(session, account_id)
@@ -138,7 +138,7 @@ def change_password(database: Database, identity: Identity, fresh: str) -> None:
 
 
 def own_password(database: Database, identity: Identity) -> str:
-    """The hash of one's own password."""
+    """The hash of the account's password."""
     with database.read() as session:
         return account_of(session, identity).password_hash
 
@@ -154,7 +154,7 @@ def must_fit(password: str, stored: str) -> None:
 def own_code_failure(
     database: Database, settings: Settings, identity: Identity, code: str
 ) -> ApiError | None:
-    """Why this is no code of one's own second factor; None where it is, and so is used up."""
+    """Why this is not a code of the account's second factor; None if it is, and it is used up."""
     with database.write() as session:
         account = account_of(session, identity)
         repository.hold(session, account.id)
@@ -195,7 +195,7 @@ def reset_password(session: Session, name: str, fresh: str) -> tuple[int, str]:
 def renew(session: Session, actor: Identity | None, account: Account, fresh: str) -> str:
     """Give an account a new password (its hash) for one that is lost; sessions, tokens and logins end.
 
-    A login may be that of whoever stole the password. The logins of an account without any password stay:
+    A login may belong to a person who stole the password. The logins of an account without any password stay:
     they are how its own person signs in.
 
     Returns
@@ -279,7 +279,7 @@ def remove_second_factor(database: Database, settings: Settings, identity: Ident
 def _without_second_factor(session: Session, account: Account) -> None:
     account.totp_secret = account.totp_confirmed_at = account.totp_last_step = None
     account.recovery_code_hashes = []
-    # Who stands before the question for a code has shown no second factor, and there is none to show.
+    # At the question for a code, no second factor was shown yet, and there is none to show.
     repository.end_sign_ins_that_ask_for_a_code(session, account.id)
 
 

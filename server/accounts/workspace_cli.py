@@ -88,7 +88,7 @@ def grant(
     account: AccountArgument,
     rights: Annotated[str, typer.Option(help="Any of view,run,edit,export,own; empty for none.")],
 ) -> None:
-    """Give an account rights on one study, beside those of its role in the workspace.
+    """Give an account rights on one study, in addition to those of its role in the workspace.
 
     Example: server workspace grant exp3 ada --rights view,export
     """

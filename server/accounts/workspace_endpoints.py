@@ -94,7 +94,7 @@ def list_grants(database: DatabaseDep, identity: Myself, study: str) -> list[Gra
 
 @grant_router.put("/grants/{account}", status_code=204)
 def set_grant(database: DatabaseDep, identity: FreshMyself, study: str, account: str, body: SetGrant) -> None:
-    """Grant an account rights on a study, beside those it has by its role; an empty list takes them back."""
+    """Grant an account rights on a study, in addition to those of its role; an empty list takes them back."""
     with database.write() as session:
         workspaces.grant(session, find_study(session, study, identity, "own"), account, body.rights, identity)
 

@@ -29,7 +29,7 @@ from server.models import (
 # run: links, status, settings, exclusions, the making of reports and capsules, the deletion of capsules.
 # edit: versions, deletion of drafts, erasure of persons.
 # export: downloads, the files of reports and capsules, and the answers of single persons.
-# own: recruiters' ids, grants, the workspace a study belongs to; whoever owns a study may do all of it.
+# own: recruiters' ids, grants, the workspace a study belongs to; an owner of a study may do all of it.
 
 OF_ROLE: Final[dict[Role, frozenset[Right]]] = {
     "viewer": frozenset({"view", "export"}),
@@ -58,7 +58,7 @@ def effective_rights(role: Role | None, granted: Iterable[Right]) -> frozenset[R
 
 
 def ordered_rights(rights: Collection[Right]) -> list[Right]:
-    """Rights in the order in which they are told.
+    """Rights in the order in which they are shown.
 
     >>> ordered_rights({"own", "view"})
     ['view', 'own']
@@ -244,7 +244,7 @@ def grants(session: Session, study: Study) -> dict[str, list[Right]]:
 def set_grants(
     session: Session, study: Study, account: Account, rights: Iterable[Right], by: int | None
 ) -> None:
-    """Give an account exactly these rights on a study, beside those of its role."""
+    """Give an account exactly these rights on a study, in addition to those of its role."""
     session.execute(
         delete(StudyGrant).where(StudyGrant.study_id == study.id, StudyGrant.account_id == account.id)
     )

@@ -58,7 +58,7 @@ def standing_on(session: Session, study: Study, rights: frozenset[Right]) -> Sta
 
 
 def find_workspace(session: Session, name: str, *, lock: bool = False) -> Workspace:
-    """The workspace called `name`, for whoever manages the server."""
+    """The workspace called `name`, for managers of the server."""
     workspace = workspace_repository.find_workspace(session, name, lock=lock)
     if workspace is None:
         if name == DEFAULT_WORKSPACE:
@@ -85,9 +85,9 @@ def workspace_for(session: Session, identity: Identity, name: str | None) -> Wor
 
 
 def place_of_copy(session: Session, study: Study, identity: Identity, name: str | None) -> Workspace:
-    """Where a copy of a study goes: into the workspace named, else beside its source.
+    """Where a copy of a study goes: into the named workspace, else into that of its source.
 
-    Invalid where she may make no studies beside it and names no other: a copy opens the declaration to
+    Invalid if the account may not make studies there and names no other: a copy opens the declaration to
     another laboratory, which nothing but her word does.
     """
     own = {one.id: one for one in workspace_repository.workspaces_for_new_studies(session, identity)}
@@ -248,7 +248,10 @@ def set_member(
 def grant(
     session: Session, study: Study, name: str, rights: Sequence[Right], identity: Identity | Operator
 ) -> None:
-    """Give somebody exactly these rights on a study beside those of her role; none takes them all back."""
+    """Give somebody exactly these rights on a study in addition to those of their role.
+
+    None takes them all back.
+    """
     account = account_named(session, name)
     workspace_repository.set_grants(session, study, account, rights, identity.account_id)
     record(

@@ -15,20 +15,20 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from server.core.db import Database, kept_alive
 
-# NOTIFY and LISTEN, by which the processes on one PostgreSQL tell one another that they wrote.
+# NOTIFY and LISTEN, by which the processes on one PostgreSQL notify one another that they wrote.
 
 _CHANNEL = "palpebra_changes"
 
 
 def say_changed(database: Database) -> None:
-    """Tell every process that listens, this one too."""
+    """Notify every process that listens, including this one."""
     with database.engine.connect() as connection:
         connection.execute(text(f"NOTIFY {_CHANNEL}"))
         connection.commit()
 
 
 def heard_changes(database: Database, look_s: float) -> Iterator[int]:
-    """How many were told since the last time, every `look_s`, once it listens: 0 at first.
+    """How many notifications came since the last time, every `look_s`, once it listens: 0 at first.
 
     Where the connection is cut, or there is none, psycopg's error is raised.
     """
@@ -43,9 +43,9 @@ def heard_changes(database: Database, look_s: float) -> Iterator[int]:
             yield sum(1 for _ in connection.notifies(timeout=look_s))
 
 
-# Whether anything was written since: told from process to process by PostgreSQL's LISTEN and NOTIFY.
+# Whether anything was written since: announced between processes by PostgreSQL's LISTEN and NOTIFY.
 #
-# A process that has written says so twice a second at most, on a connection of its own after its commit: a
+# A process that has written says so twice a second at most, on a separate connection after its commit: a
 # NOTIFY within the transaction of a rating would have all commits of the database wait for one another.
 # Streams so look at their study when there may be something to see, and hardly ever when there is not.
 
@@ -103,7 +103,7 @@ class Changes:
             try:
                 say_changed(self._database)
             except SQLAlchemyError as error:
-                LOG.warning("a change could not be told: %s", type(error).__name__)
+                LOG.warning("a change could not be announced: %s", type(error).__name__)
             self._ends.wait(EVERY_S)
 
     def _listen(self) -> None:
@@ -144,13 +144,13 @@ class ChangeNotifier:
         await self.app(scope, receive, send_and_tell)
 
 
-# Whether this server has been told to end: answers that go on for hours ask, and do not hold it up.
+# Whether this server was asked to end: answers that last for hours check it, and do not delay the end.
 
 SIGNALS = (signal.SIGTERM, signal.SIGINT)
 
 
 class Stopping:
-    """False until a signal tells the process to end."""
+    """False until a signal asks the process to end."""
 
     def __init__(self) -> None:
         self._told = False
@@ -190,12 +190,12 @@ Stopped = Callable[[], bool]
 
 @asynccontextmanager
 async def background_task(watch: Callable[[Stopped], Coroutine[Any, Any, None]]) -> AsyncIterator[None]:
-    """Run a watch that never ends by itself beside what is within; its thread ends with its current piece.
+    """Run a watch that never ends by itself while the block runs; its thread ends with its current piece.
 
     Parameters
     ----------
     watch : callable
-        Gets what tells it that the server stops; cancelled then.
+        Gets the event that the server stops; cancelled then.
     """
     stopped = threading.Event()
     watching = asyncio.create_task(watch(stopped.is_set))

@@ -174,7 +174,7 @@ def _commit(writer: Writer, batch: list[_Work]) -> None:
             for work in batch:
                 work.error = error
             return
-        # One of them broke the transaction of all: each gets one of its own.
+        # One of them broke the transaction of all: each gets a separate one.
         for work in batch:
             _commit(writer, [work])
 
@@ -190,7 +190,7 @@ def _resolve_batch(loop: asyncio.AbstractEventLoop, batch: list[_Work]) -> None:
 
 # Statements that run with every rating and view: compiled once, then run at the driver's own cursor.
 #
-# SQLAlchemy makes the text and knows the types, for either database. What else it does anew for each
+# SQLAlchemy makes the text and knows the types, for either database. What else it repeats for each
 # statement (looking for the compiled form, contexts, events, results by any name) takes several times as
 # long as the database.
 
@@ -226,7 +226,7 @@ class _Compiled:
     parameters : tuple of _Parameter
         In the order of the statement.
     constants : mapping
-        Values that stand in the statement itself.
+        Values that are part of the statement itself.
     is_positional : bool
         Whether the driver takes the values by their order.
     """

@@ -15,8 +15,8 @@ from experiments.errors import InputError
 from experiments.kinds import views
 from server.core.row_security import NO_RIGHT, OWN_TABLES, ROLE
 
-# A view is derived, so that a new column needs no migration (decision 0990): whatever stands in the database
-# is compared with what the code would make, and made anew where they differ. What others may do with a view
+# A view is derived, so that a new column needs no migration (decision 0990): whatever is in the database
+# is compared with what the code would make, and created again if they differ. What others may do with a view
 # is read before the view goes, and given again.
 
 NEEDED_BY_OTHERS = "2BP01"
@@ -120,7 +120,7 @@ def _dialect(connection: Connection) -> Dialect:
 
 
 def _statement_mark(statement: str, dialect: Dialect) -> str:
-    """What tells of which statement a view was made.
+    """The mark that shows from which statement a view was made.
 
     SQLite keeps the statement, blanks at its end aside; PostgreSQL writes its own words, and keeps a hash.
     """

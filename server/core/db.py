@@ -109,7 +109,7 @@ SQLITE_AWAY = frozenset(
 
 
 class _Turns:
-    """One writer at a time; who gets no turn in `wait_s` is told so as by an exhausted pool."""
+    """One writer at a time; without a turn within `wait_s`, the error is that of an exhausted pool."""
 
     def __init__(self, wait_s: float) -> None:
         self._lock = threading.Lock()

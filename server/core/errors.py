@@ -143,7 +143,7 @@ def refusal_response(refusal: ApiError, **headers: str) -> JSONResponse:
     return error_response(refusal.status, refusal.code, refusal.message, refusal.details, every)
 
 
-# Answers encoded once: FastAPI would look at each again, in a thread of its own, before it encodes it.
+# Answers encoded once: FastAPI would look at each again, in a separate thread, before it encodes it.
 
 Answer = TypeVar("Answer", bound=BaseModel)
 

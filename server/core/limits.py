@@ -96,7 +96,8 @@ class SharedCounts:
 
     def sweep(self) -> None:
         """Remove counts that are forgotten, and the oldest of too many; some at a time."""
-        # In a transaction of its own, past rows in use: nobody waits for it who counts, and it for nobody.
+        # In a separate transaction that skips rows in use: it waits for nobody, and nobody who counts waits
+        # for it.
         with self._engine.begin() as connection:
             connection.execute(_SWEEP_OLD, {"forgotten": FORGOTTEN_S, "most": _SWEPT_AT_ONCE})
             connection.execute(_SWEEP_MANY, {"kept": KEYS_MAX, "most": _SWEPT_AT_ONCE})
@@ -121,11 +122,11 @@ class RateLimit:
     Parameters
     ----------
     name : str, optional
-        Tells its keys from those of other limits where they are shared.
+        Distinguishes its keys from those of other limits in a shared table.
     shared : SharedCounts, optional
         Where the processes of a server count together; each by itself where not given.
     window_s : float, optional
-        How long it takes until a share that was used up is whole again, where that is no minute.
+        How long it takes until a share that was used up is whole again, if that is not a minute.
     """
 
     def __init__(

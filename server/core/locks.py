@@ -1,4 +1,4 @@
-"""What only one process of a server may do at a time: locks in PostgreSQL, or files beside SQLite."""
+"""What only one process of a server may do at a time: locks in PostgreSQL, or files next to SQLite."""
 
 import hashlib
 import logging
@@ -68,7 +68,7 @@ def _lock_of_file(path: Path) -> FileLock:
 #
 # One connection of a process holds all of its locks, however many there are; another lets others see
 # whether a lock is held. A host that goes without a word lets go of its locks within a minute. Where
-# PostgreSQL is started anew, the process notices within `HEARTBEAT_S` and takes its locks again; where the
+# PostgreSQL is restarted, the process notices within `HEARTBEAT_S` and takes its locks again; where the
 # network was cut, as soon as PostgreSQL has noticed too, and ended the connection of before that still
 # holds them.
 
@@ -109,7 +109,7 @@ class DatabaseLocks:
         """
         number = _number(name)
         with self._changing:
-            # PostgreSQL gives a lock again to the connection that has it: threads are told apart here.
+            # PostgreSQL gives a lock again to the connection that has it: threads are distinguished here.
             if number in self._held or not self._taken(number):
                 raise LockTaken(name)
             self._held.add(number)
@@ -127,7 +127,7 @@ class DatabaseLocks:
     def is_held(self, name: str) -> bool:
         """Whether any process holds a lock."""
         number = _number(name)
-        # Its own word goes: also where PostgreSQL was started anew meanwhile.
+        # Its own word goes: also if PostgreSQL was restarted meanwhile.
         if number in self._held and number not in self._lost:
             return True
         query = text("SELECT pg_try_advisory_xact_lock_shared(:number)")
@@ -206,14 +206,14 @@ def _number(name: str) -> int:
     return int.from_bytes(digest, "big", signed=True)
 
 
-# What only one process of a server may do at a time: locks in PostgreSQL, or files beside SQLite.
+# What only one process of a server may do at a time: locks in PostgreSQL, or files next to SQLite.
 
 BEGINS_WITHIN = timedelta(seconds=15)
 """Between the row of a job and its lock: where the process ended there, others see it after so long."""
 LONGEST_S = 1800
 """How long a job may take."""
 NO_JOB_TAKES = timedelta(seconds=2 * LONGEST_S)
-"""Longer than any job: it tells of one whose lock file this computer never had."""
+"""Longer than any job: it identifies one whose lock file this computer never had."""
 
 
 class Locks(Protocol):
@@ -277,7 +277,7 @@ class FileLocks:
             path.unlink(missing_ok=True)
 
     def job_is_left(self, job: Job) -> bool:
-        """Whether the process of a job that is not over has ended; by its age where no file tells."""
+        """Whether the process of a job that is not over has ended; by its age if there is no file."""
         path = self._folder / job.public_id
         if path.exists():
             return is_left(path)

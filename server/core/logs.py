@@ -1,7 +1,7 @@
 """Logs without personal data: one JSON object a line, or plain lines for a terminal.
 
-No internet address, no token, no answer is ever written. An exception is told by its type and the places it
-passed; its own words are kept only where they cannot quote what a person sent.
+No internet address, no token, no answer is ever written. An exception is reported by its type and the places
+it passed; its own words are kept only where they cannot quote what a person sent.
 """
 
 import json
@@ -69,7 +69,7 @@ class PlainLines(logging.Formatter):
 
 
 class UvicornFilter(logging.Filter):
-    """Leave out what uvicorn says beside our own lines."""
+    """Leave out what uvicorn logs in addition to our own lines."""
 
     def filter(self, record: logging.LogRecord) -> bool:
         """False for what is said already, or says nothing of this server."""

@@ -1,4 +1,4 @@
-"""Bring a database to the newest revision, or tell which one it has."""
+"""Bring a database to the newest revision, or report which one it has."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -49,7 +49,7 @@ def migration_transaction(database: Database) -> Iterator[Connection]:
 def upgrade(database: Database) -> tuple[str | None, str | None]:
     """Run the missing migrations in one transaction; return the revision before and after.
 
-    Views that are not those of this program's columns are made anew, with no new revision too.
+    Views that differ from this program's columns are created again, with no new revision too.
     """
     with migration_transaction(database) as connection:
         before = revision_of(connection)

@@ -105,9 +105,9 @@ def kind_of_session(narrows: bool) -> type[Session]:
 
 # Policies of rows (`server.core.row_security`): made where PostgreSQL and its user allow it.
 #
-# They are no migration of their own: whether the database's user may have the role changes from place to
+# They are not a separate migration: whether the database's user may have the role changes from place to
 # place, and every migration that touches a table would meet them. Each upgrade takes them down and makes
-# them anew.
+# them again.
 
 LOG = logging.getLogger(__name__)
 NO_RIGHT = "42501"
@@ -178,7 +178,7 @@ def _condition(name: str, columns: set[str]) -> str:
 
 # Decision 0782: Row-level security as a second wall.
 def raise_wall(connection: Connection, *, stood: bool = False) -> bool:
-    """Make the policies unless they stand as they should; False where the user or PostgreSQL lets none be.
+    """Make the policies unless they are as they should be; False where the user or PostgreSQL lets none be.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ def raise_wall(connection: Connection, *, stood: bool = False) -> bool:
     Raises
     ------
     InputError
-        Where policies stood, and this user may not make them anew.
+        Policies existed, and this user may not create them again.
     """
     stood = stood or _mark(connection) is not None
     if not _role_is_ours(connection):
@@ -277,7 +277,7 @@ def _mark(connection: Connection) -> str | None:
 
 
 def _is_whole(connection: Connection) -> bool:
-    """Whether policies and rights stand too: a dump brings the mark alone to where the role was missing."""
+    """Whether policies and rights exist, too: a dump brings the mark alone to where the role was missing."""
     query = text(
         "SELECT (SELECT count(*) FROM pg_policies "
         "WHERE policyname = :name AND schemaname = current_schema()), "

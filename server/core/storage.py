@@ -309,7 +309,7 @@ def s3_client(settings: Settings, *, connect_s: float, read_s: float, attempts: 
     )
 
 
-# Where a clip is, whoever asks: pages know it from the clip's hash.
+# Where a clip is, no matter who asks: pages know it from the clip's hash.
 
 
 def clip_address(sha256: str) -> str:

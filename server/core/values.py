@@ -84,7 +84,7 @@ REPLACEMENT = "\N{REPLACEMENT CHARACTER}"
 TOO_DEEP = "(nested too deeply to be shown)"
 _UNSTORABLE = re.compile("[\0\ud800-\udfff]")
 _SUSPICIOUS = re.compile(rb"\\u(?:[dD][89a-fA-F]|0000)")
-"""Escapes that may name a surrogate or NUL; whether they do only reading the JSON tells."""
+"""Escapes that may name a surrogate or NUL; only reading the JSON shows whether they do."""
 
 
 def is_storable(text: str) -> bool:
@@ -121,7 +121,7 @@ def encode_text(text: str) -> bytes:
 
 
 def body_problem(body: bytes) -> str | None:
-    """Why a request's body cannot be taken as text; None where it can, or is no JSON (said later)."""
+    """Why a request's body cannot be taken as text; None if it can, or if it is not JSON (reported later)."""
     try:
         body.decode("utf-8")
     except UnicodeDecodeError as error:

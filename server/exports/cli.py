@@ -94,8 +94,9 @@ def export(
 ) -> None:
     """Export a study's data, for example as CSV with one column per factor.
 
-    Participants have the study's pseudonyms. The file appears under its name only when complete. Beside a CSV
-    with one row a play stand a script for R (afex, emmeans, lme4) and one for Python (pandas, statsmodels).
+    Participants have the study's pseudonyms. The file appears under its name only when complete. Next to a
+    CSV with one row per play there are a script for R (afex, emmeans, lme4) and one for Python (pandas,
+    statsmodels).
 
     Examples:
 
@@ -151,7 +152,7 @@ def export(
 
 
 def _write_scripts(out_file: Path, experiment: Experiment) -> str:
-    """Write the scripts beside the CSV; their names in words."""
+    """Write the scripts next to the CSV; return their names in words."""
     targets = {language: out_file.with_suffix(f".{language}") for language in LANGUAGES}
     for language, target in targets.items():
         _write(target, [encode_text(script(experiment, language, out_file.name))])

@@ -126,7 +126,7 @@ def _text(cells: Iterable[Any]) -> str:
 
 
 def csv_texts(rows: Iterable[Iterable[Any]]) -> list[str]:
-    """Each row as CSV, to be put beside others, so without the line's end.
+    """Each row as CSV, to be joined with others, so without the line's end.
 
     A line of one empty cell has quotes, which part of a line has not.
     """
@@ -152,7 +152,7 @@ def rating_count(session: Session, study: Study, extract: Extract) -> int:
     """Rows that `rating_rows` gives."""
     trials = [one.trial for one in all_definitions(session, study)]
     if any(len(trial.rated_scales()) > 1 for trial in trials):
-        # A rating is a row a scale.
+        # A rating is one row per scale.
         return repository.rows_in_view(session, study, extract, view_of(session, study, extract))
     kind = active_definition(session, study).trial.kind
     of_one_kind = all(trial.kind == kind for trial in trials)

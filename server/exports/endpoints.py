@@ -62,7 +62,7 @@ CONVERTED: dict[tuple[str, str], Format] = {
     ("wide", "parquet"): "parquet-wide",
 }
 _converting = threading.Lock()
-"""One conversion at a time: each is a process of its own that holds a whole table."""
+"""One conversion at a time: each is a separate process that holds a whole table."""
 ROWS_HEADER = "palpebra-rows"
 """How many rows (CSV: below the header; zip: of ratings; JSON lines: runs) a whole download holds."""
 
@@ -193,7 +193,7 @@ def download_runs(asked: AskedAsCsv) -> StreamingResponse:
 def download_script(
     database: DatabaseDep, identity: Viewer, study: str, language: ScriptLanguage
 ) -> Response:
-    """A script that analyses the long CSV, saved beside it under its own name: for R, or for Python."""
+    """A script that analyses the long CSV, saved next to it under its own name: for R, or for Python."""
     with database.read() as session:
         text = script(
             active_definition(session, find_study(session, study, identity, "view")),
@@ -218,7 +218,7 @@ def download_psych_ds(asked: Asked) -> StreamingResponse:
 
 @router.get("/identities.csv", response_class=StreamingResponse)
 def download_identities(services: ServicesDep, identity: Myself, study: str) -> StreamingResponse:
-    """Recruiters' ids beside the pseudonyms, one row a visit; for owners of the study, and audited."""
+    """Recruiters' ids with the pseudonyms, one row per visit; for owners of the study, and audited."""
     return Download(services, identity, study, EVERYTHING).stream("identities", CSV_TYPE, "identities.csv")
 
 
@@ -238,7 +238,7 @@ def download_converted(
     asked: Asked, table: Literal["ratings", "wide"], ending: Literal["sav", "parquet"]
 ) -> FileResponse:
     """One row a play, or the wide table, for SPSS or as Parquet: with labels of variables and levels."""
-    # The last route of this file: its path would stand in for those of the other downloads.
+    # The last route of this file: its path would match those of the other downloads.
     form = CONVERTED[table, ending]
     if not _converting.acquire(blocking=False):
         raise Conflict("Another SPSS or Parquet file is being made. Try again in a moment.")

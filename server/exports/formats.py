@@ -70,7 +70,7 @@ def convert(folder: Path, ending: Ending) -> Path:
     return target
 
 
-# Recruiters' ids beside the pseudonyms: an export of its own, for owners.
+# Recruiters' ids with the pseudonyms: a separate export, for owners.
 
 
 def identity_rows(session: Session, study: Study) -> Iterator[list[Any]]:
@@ -124,7 +124,7 @@ def wide_csv(session: Session, study: Study, extract: Extract) -> Iterator[bytes
 
 
 def raw_json(session: Session, study: Study, extract: Extract) -> Iterator[bytes]:
-    """Everything stored, one JSON object a run and line; the last line tells that it is complete."""
+    """Everything stored, one JSON object per run and line; the last line confirms that it is complete."""
     number = repository.run_count(session, study, extract)
     for line in check_whole(tables.raw_lines(session, study, extract), number):
         yield encode_text(line)
@@ -143,7 +143,7 @@ def psych_ds_zip(session: Session, study: Study, extract: Extract) -> Iterator[b
 
 
 def identities_csv(session: Session, study: Study, extract: Extract) -> Iterator[bytes]:
-    """One row a visit whose person is known, of any origin: the recruiter's id beside the pseudonym."""
+    """One row per visit whose person is known, of any origin: the recruiter's id and the pseudonym."""
     del extract
     rows = identity_rows(session, study)
     yield from csv_pieces(check_whole(rows, repository.known_person_count(session, study), extra=1))

@@ -33,7 +33,7 @@ from server.studies.lookup import all_definitions, definition_of
 from server.studies.series import definition_of_series, version_of_series
 from table_files.formulas import guarded_csv
 
-# A table without what may tell who a person is, for datasets that are handed on.
+# A table without anything that may identify a person, for datasets that are shared.
 #
 # Participants have pseudonyms already. Left out are answers in a person's own words and what the browser said
 # of itself; times are moved so that the study's first run starts with the year 2000, which keeps order and
@@ -75,11 +75,11 @@ def _shifted_moment(moment: Any, shift: timedelta) -> Any:
 
 # Scripts that analyse an export with usual packages: R (afex, emmeans, lme4), Python (pandas, statsmodels).
 #
-# They are written anew for each study, from its declaration, and read the long table of answers.
+# They are written for each study, from its declaration, and read the long table of answers.
 
 ScriptLanguage = Literal["R", "py"]
 LANGUAGES: tuple[ScriptLanguage, ...] = ("R", "py")
-"""By the ending of their files. A view without a template of its own gets one that reads its rows."""
+"""By the ending of their files. A view without its own template gets one that reads its rows."""
 APPLIED = (ExcludeIncomplete, DropFailedPlays, DropSlowTrials)
 """Rules that a row's own columns decide: scripts apply them. The others look at whole runs."""
 
@@ -92,7 +92,7 @@ def script(
     Parameters
     ----------
     data : str
-        The CSV it reads where it is not told another: a path from the script's own folder.
+        The CSV it reads by default: a path from the script's own folder.
     names : mapping of str to str, optional
         What factors are called in that CSV, where it is not their own name.
     """

@@ -1,4 +1,4 @@
-"""Build a report: export the ratings, run `analysis run` as a process of its own, keep what it wrote."""
+"""Build a report: export the ratings, run `analysis run` in a separate process, keep what it wrote."""
 
 import shutil
 import threading

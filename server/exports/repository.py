@@ -229,7 +229,7 @@ def people_of_series(session: Session, study: Study, series: int) -> int:
 def sealed_document(session: Session, study: str, series: int, action: str) -> dict[str, Any] | None:
     """The seal that the audit log keeps of this study's data series.
 
-    What was sealed of a deleted study is no seal of a later one that has its name.
+    A seal of a deleted study does not count for a later one with the same name.
     """
     of_study = (AuditEntry.target_kind == "study", AuditEntry.target == study)
     deleted = select(func.max(AuditEntry.id)).where(*of_study, AuditEntry.action == "study deleted")

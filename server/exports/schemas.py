@@ -20,14 +20,14 @@ EXPORTED = get_args(ExportOrigin)[:-1]
 
 @dataclass(frozen=True)
 class Extract:
-    """The part of a study's data that goes out; without a series of each, told apart by a column.
+    """The part of a study's data that goes out; without a series, of each, distinguished by a column.
 
     Attributes
     ----------
     origin : ExportOrigin
     series : int or None
     old_order : bool
-        Whether columns stand as they stood until 0.2.
+        Whether columns are in the order used until 0.2.
     """
 
     origin: ExportOrigin = "participant"

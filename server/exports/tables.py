@@ -357,7 +357,7 @@ def _means(answers: dict[tuple[Any, str], tuple[Levels, float]]) -> Means:
 
 
 def factor_columns(definitions: Iterable[Experiment]) -> list[Column]:
-    """The CSV's factor columns, which stand in the place of the view's `levels`: those of all versions."""
+    """The CSV's factor columns, which replace the view's `levels`: those of all versions."""
     columns: dict[str, Column] = {}
     for factor in (factor for definition in definitions for factor in definition.factors):
         before = dict(columns[factor.name].labels) if factor.name in columns else {}
@@ -443,7 +443,8 @@ def _term(value: str, labels: dict[str, str]) -> dict[str, str]:
     return term | {"description": labels[value]} if labels.get(value, value) != value else term
 
 
-# The tables that exports are made of: answers (a row a play), runs (a row a visit), wide (a row a run).
+# The tables that exports are made of: answers (one row per play), runs (one row per visit), wide (one row per
+# run).
 
 TableName = Literal["answers", "runs", "wide"]
 Row = Sequence[Any]

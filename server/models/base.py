@@ -84,7 +84,7 @@ def one_of(column: str, *words: str) -> CheckConstraint:
 
 
 class SharedCount(Base):
-    """A share that is used up and refilled, or a row of failures; it is no data and in no backup or copy.
+    """A share that is used up and refilled, or a row of failures; it is not data and is in no backup or copy.
 
     Attributes
     ----------

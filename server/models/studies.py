@@ -24,7 +24,7 @@ class Study(Base):
     quota : int or None
         Complete runs after which the study closes itself.
     revision : int
-        Counts edits, so that of two people editing at once the second is told.
+        Counts edits, so that of two people editing at once the second is warned.
     recruiter : dict of str to Any or None
         See `server.participation.recruiter`.
     archived_at : datetime or None
@@ -327,7 +327,7 @@ class IdentityKey(Base):
     wrapped_key: Mapped[str] = mapped_column(String(80))
 
 
-# What a visit leaves beside its ratings: events, answers to forms, measurements of the screen.
+# What a visit leaves in addition to its ratings: events, answers to forms, measurements of the screen.
 
 
 class RunEvent(Base):

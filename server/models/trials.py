@@ -158,7 +158,7 @@ class View(Base):
     screen : dict of str to Any
         Its state at the start.
     outcome : str or None
-        Null until it has ended, or where an older page does not tell.
+        Null until it has ended, or if an older page does not report it.
     showings : list of dict of str to Any or None
         What was measured of each clip, or clips at once, in order; the frames are with the clips.
     disturbances : dict of str to int
@@ -325,7 +325,7 @@ class SeriesAnswer(Base):
         Its place among those that do, from 1.
     known, ahead : int
         Earlier answers of the series that the choice of the stimulus knew, and did not. The estimate after it
-        is written when it has been reckoned.
+        is written when it has been computed.
     """
 
     __tablename__ = "series_answers"

@@ -36,7 +36,7 @@ from server.privacy.rows import Content, Digest, read_rows, snapshot, tables_of
 #
 # The file is a tar: `backup.json` (what is in it), `tables/NAME.ndjson.gz` (the rows, of neither database's
 # own form, so that a backup of SQLite can be restored to PostgreSQL and back), `clips/SHA256.mp4`,
-# `secret_key`. The keys of recruiters' ids are in a file of their own, see `server.operations.key_escrow`.
+# `secret_key`. The keys of recruiters' ids are in a separate file, see `server.operations.key_escrow`.
 
 DESCRIPTION, TABLES, CLIPS, KEY = "backup.json", "tables/", "clips/", "secret_key"
 SPOOL_BYTES = 1 << 24
@@ -72,8 +72,8 @@ def back_up(
 ) -> Description:
     """Write a backup of one moment while the server goes on; mode 600, under its name only once complete.
 
-    The key file (`keys`, beside the backup where None) and a copy of the ledger of erasures beside that are
-    written before the backup has its name: no backup stands there without its keys.
+    The key file (`keys`, next to the backup if None) and a copy of the ledger of erasures next to that are
+    written before the backup has its name: no backup exists without its keys.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def _write_keys(settings: Settings, path: Path, kept: KeyFile) -> None:
 
 
 def _write_ledger(settings: Settings, path: Path, moment: str) -> None:
-    """A copy of the ledger of erasures beside the key file; what it names already stays."""
+    """A copy of the ledger of erasures next to the key file; what it names already stays."""
     there = path.read_bytes() if path.is_file() else b""
     with whole_private_file(path) as stream:
         stream.write(ledger_for_backup(settings, there, moment))
@@ -241,7 +241,7 @@ def encrypted_stream(write: Callable[[IO[bytes]], None], recipient: x25519.Recip
     Parameters
     ----------
     write : callable
-        Given a stream, in a thread of its own.
+        Given a stream, in a separate thread.
     """
     with (
         _produced_stream(write) as plain,
@@ -282,7 +282,7 @@ class _Reader:
         return piece
 
     def close(self) -> None:
-        """Close it: the writer is told by its next write."""
+        """Close it: the writer notices at its next write."""
         self._stream.close()
 
 

@@ -112,7 +112,7 @@ class FolderOfBackups:
         return sorted(known, key=lambda entry: (entry.written_at, entry.name))
 
     def put(self, name: str, stream: IO[bytes]) -> None:
-        """Write beside the name and rename."""
+        """Write under a temporary name and rename."""
         path = self.folder / name
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
@@ -275,7 +275,7 @@ def installation_of(name: str) -> str | None:
 
 @dataclass(frozen=True)
 class _CompanionFile:
-    """What is kept beside encrypted backups, of an installation and a moment."""
+    """What is kept next to encrypted backups, of an installation and a moment."""
 
     name: str
     installation: str
@@ -314,7 +314,7 @@ def _write(stream: IO[bytes], content: bytes) -> None:
 
 @contextmanager
 def brought_here(kept: StoredBackup, folder: Path, identity: x25519.Identity | None) -> Iterator[Path]:
-    """The backup in the open, as a file in `folder` with key file and ledger beside, removed afterwards.
+    """The decrypted backup, as a file in `folder` with key file and ledger next to it, removed afterwards.
 
     Raises
     ------
@@ -334,7 +334,7 @@ def brought_here(kept: StoredBackup, folder: Path, identity: x25519.Identity | N
 
 
 def _companion_files(kept: StoredBackup) -> Iterator[tuple[str, str]]:
-    """Key file and ledger of a backup: as they are stored, and as they are called beside it."""
+    """Key file and ledger of a backup: as they are stored, and their names next to it."""
     whose = installation_of(kept.name) or ""
     for name in (NAME, LEDGER_NAME):
         if kept.name.endswith(ENDING):

@@ -48,7 +48,7 @@ def register(parent: typer.Typer) -> None:
 
 
 def _register_doctor(parent: typer.Typer) -> None:
-    """Add the commands of whoever operates the server."""
+    """Add the commands for the operator of the server."""
     parent.command("doctor")(doctor)
 
 
@@ -150,7 +150,7 @@ def back(
 ) -> None:
     """Make the SQLite database as it was at a moment; stop the server first.
 
-    What is there now is set aside beside it under another name: remove it once all is well. Whoever was
+    What is there now is set aside next to it under another name: remove it once all is well. Everyone who was
     erased since is erased again; clips stay, they are kept by their content.
 
     Examples:
@@ -178,7 +178,7 @@ def _moment(given: str) -> datetime:
     return moment.astimezone(UTC) if moment.tzinfo else moment.replace(tzinfo=UTC)
 
 
-# `server database`: bring the database to the newest revision, say which one it has, copy it, count anew.
+# `server database`: bring the database to the newest revision, report which one it has, copy it, count again.
 
 app = command_group("The database's tables.")
 
@@ -218,7 +218,7 @@ def status() -> None:
 
 @app.command("recount")
 def recount() -> None:
-    """Count every run's ratings anew and mend the counts that differ; the server may go on meanwhile.
+    """Count every run's ratings again and fix the counts that differ; the server may go on meanwhile.
 
     Results, monitor and participants read these counts; `server doctor` says whether they are right.
     Example: server database recount
@@ -240,7 +240,7 @@ def rewrap(
     """Carry over what was kept under the old key, after the secret key was changed.
 
     Recruiters' ids, second factors and the audit log's chain are made to fit the key of the settings. Move
-    the key file away from beside your backups afterwards and back up anew, but keep it: the backups made so
+    the key file away from your backups afterwards and back up again, but keep it: the backups made so
     far open with it alone (server restore FILE --keys).
     Example: server database rewrap /media/safe/secret_key
     """

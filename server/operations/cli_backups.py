@@ -272,7 +272,7 @@ def drill(
     failure.
 
     Nothing of the server's own data is touched. The server makes this drill weekly by itself where it knows
-    the folder of its backups; /metrics and `server doctor` tell how the last one went. Encrypted backups it
+    the folder of its backups; /metrics and `server doctor` report how the last one went. Encrypted backups it
     drills where it has their private key.
 
     Examples:

@@ -111,7 +111,7 @@ class RekeyedSecrets:
     Attributes
     ----------
     identities, unreadable : int
-        Recruiters' ids whose keys were wrapped anew, and those that are not under the old key.
+        Recruiters' ids whose keys were wrapped again, and those that are not under the old key.
     second_factors : int
         Of accounts.
     broken : str or None
@@ -161,7 +161,7 @@ def _carry_factors(session: Session, old: bytes, secret: bytes) -> int:
         for entry in entries_under_key(session, secret)
         if entry.action == SECOND_FACTOR_SET_UP
     }
-    # Read anew: looking through the log lets go of what was read before.
+    # Read again: looking through the log forgets what was read before.
     holders = [holder for holder in accounts.with_second_factor(session) if holder.id not in of_now]
     for holder in holders:
         holder.totp_secret = rewrap_secret(old, secret, holder.totp_secret or "")

@@ -1,4 +1,4 @@
-"""The newest backup brought back beside the data, examined and removed: on request and each week."""
+"""The newest backup restored next to the data, examined and removed: on request and each week."""
 
 import asyncio
 import logging
@@ -30,7 +30,7 @@ from server.operations.restore import restore
 from server.operations.watched_backups import DrillResult, drill_file, last_drill, newest_backup
 from server.privacy.ledger import ledger_path
 
-# `server drill`: bring the newest backup back beside the data, examine it, and say how it went.
+# `server drill`: restore the newest backup next to the data, examine it, and report how it went.
 #
 # A backup that nobody has ever brought back is a hope. The server makes the drill itself once a week where it
 # knows the folder of its backups.
@@ -53,7 +53,7 @@ def drill(
     identity: x25519.Identity | None = None,
     keys: Path | None = None,
 ) -> DrillResult:
-    """Restore a backup beside the data and examine it; the result is kept, what was restored is removed.
+    """Restore a backup next to the data and examine it; the result is kept, what was restored is removed.
 
     The database is SQLite whatever the server's is: a backup has neither's form. Nothing of the server's own
     data is touched; who was erased since the backup is erased from the copy too, before it is looked at.
@@ -61,7 +61,7 @@ def drill(
     Parameters
     ----------
     keys : Path, optional
-        Key file of a backup that is not encrypted, where it is neither beside it nor in the settings.
+        Key file of a backup that is not encrypted, if it is neither next to it nor in the settings.
 
     Raises
     ------
@@ -173,7 +173,7 @@ def _need_room(settings: Settings, needed: float) -> None:
 
 
 def _drill_settings(settings: Settings, folder: Path) -> Settings:
-    """Settings of an installation of its own in `folder`, with the server's ledger of erasures."""
+    """Settings of a separate installation in `folder`, with the server's ledger of erasures."""
     apart = Settings(
         **settings.model_dump()
         | {
@@ -261,7 +261,7 @@ def _drill_lock(settings: Settings) -> Iterator[None]:
         yield
 
 
-# The weekly drill that the server makes by itself, in a process of its own at the lowest priority.
+# The weekly drill that the server makes by itself, in a separate process at the lowest priority.
 
 LOG = logging.getLogger(__name__)
 FIRST_LOOK_S, LOOK_FOR_DRILL_S, STOP_S = 300.0, 3600.0, 10.0

@@ -66,7 +66,7 @@ THIS_MACHINE = frozenset({"127.0.0.1", "::1", "localhost"})
 
 
 class MetricsNotForYou(ApiError, status=403, code="metrics_not_allowed"):
-    """The counts are for whoever operates the server."""
+    """The counts are for the operator of the server."""
 
 
 @router.get("/metrics")

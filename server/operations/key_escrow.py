@@ -1,4 +1,4 @@
-"""What no backup holds: the keys of recruiters' ids and of pseudonyms, in one file of their own."""
+"""What no backup holds: the keys of recruiters' ids and of pseudonyms, in one separate file."""
 
 import hashlib
 import json
@@ -31,7 +31,7 @@ def run_keys(connection: Connection) -> dict[str, str]:
 
 
 def study_keys(connection: Connection) -> dict[int, str]:
-    """Study -> what stands as the key of its pseudonyms."""
+    """Study -> the stored key of its pseudonyms."""
     rows = connection.execute(text("SELECT id, pseudonym_key FROM studies ORDER BY id"))
     return {int(study): str(key) for study, key in rows}
 

@@ -61,7 +61,7 @@ def restore(
     Parameters
     ----------
     keys : Path, optional
-        The key file, beside the backup where None; without one recruiters' ids are left out.
+        The key file, next to the backup if None; without one recruiters' ids are left out.
     stale_keys : bool
         Take one that is older than the backup, though ids of later visits are left out then.
     despite_erasures : bool
@@ -71,9 +71,9 @@ def restore(
     Raises
     ------
     InputError
-        The file is no backup, is damaged or of a newer program; the database is not empty; the data folder
-        has another secret key; the key file is another installation's or older than the backup; no ledger of
-        erasures knows who was erased since the backup.
+        The file is not a backup, is damaged or from a newer program; the database is not empty; the data
+        folder has another secret key; the key file is another installation's or older than the backup; no
+        ledger of erasures knows who was erased since the backup.
     """
     copied_ledger = (keys or key_file_of(path)).parent / LEDGER_NAME
     try:
@@ -128,7 +128,7 @@ def _not_covered(settings: Settings, copy: Path, described: Description) -> Inpu
 
 
 def _take_over_ledger(settings: Settings, path: Path) -> None:
-    """Who was erased after the backup is in the copy of the ledger beside it, if it was written since."""
+    """Who was erased after the backup is in the copy of the ledger next to it, if it was written since."""
     if path.is_file() and path != ledger_path(settings):
         add_to_ledger(settings, path.read_bytes())
 
@@ -251,7 +251,7 @@ def _rows(tar: tarfile.TarFile, name: str) -> Iterator[Row]:
 def _restore_clip(clips: ClipStore, tar: tarfile.TarFile, sha256: str) -> None:
     # The store checks the hash; only names of the form that we wrote are looked for.
     if not (len(sha256) == 64 and PurePosixPath(sha256).name == sha256):
-        raise InputError(f"the backup names a clip '{sha256[:80]}', which is no hash")
+        raise InputError(f"the backup names a clip '{sha256[:80]}', which is not a hash")
     with _member(tar, f"{CLIPS}{sha256}.mp4") as source:
         clips.add(source, sha256)
 

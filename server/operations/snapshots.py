@@ -136,7 +136,7 @@ def take_snapshot(settings: Settings) -> Snapshot:
     Raises
     ------
     InputError
-        The database is no SQLite file or is damaged, or there is no room.
+        The database is not a SQLite file or is damaged, or there is no room.
     SnapshotUnderWayError
         Another process takes one.
     """
@@ -226,7 +226,7 @@ def remove_superfluous(settings: Settings, moment: datetime) -> list[Snapshot]:
 def erase_in_snapshots(settings: Settings) -> int:
     """Erase in every snapshot what the ledger of erasures names since; return how many snapshots were opened.
 
-    The time stamp of a snapshot's file tells up to when the ledger was carried out in it.
+    The time stamp of a snapshot's file shows up to when the ledger was carried out in it.
     """
     path = ledger_path(settings)
     if not path.is_file():

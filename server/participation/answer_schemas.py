@@ -83,7 +83,7 @@ def validate_measured(
     validate : callable
         Gives the model, or a ValidationError.
     measured : mapping of tuple of str to Any
-        By the path of a measured value, what stands there where it is unknown; `*` is any key or index.
+        By the path of a measured value, its content if it is unknown; `*` is any key or index.
     count : callable
         Notes in the repaired data which values were made unknown.
 
@@ -121,7 +121,7 @@ def _path_cleared(
     here = data
     for step in location:
         held = _value_at_step(here, step)
-        # Of a choice between models the fault names the one chosen, which is no key of the data.
+        # Of a choice between models the fault names the one chosen, which is not a key of the data.
         if held is LEFT_OUT and isinstance(here, dict) and step == here.get("kind"):
             continue
         steps.append(str(step))
@@ -465,7 +465,7 @@ class RefusedRecord(BaseModel):
 class TrialClip(BaseModel):
     """One clip of a trial, and the role in which it is shown; it is at `/clips/{clip_sha256}.mp4`.
 
-    Every clip of a trial is shown at the size of the first, which stands with the trial.
+    Every clip of a trial is shown at the size of the first, which is given with the trial.
     """
 
     role: Role
@@ -475,7 +475,7 @@ class TrialClip(BaseModel):
 
 
 class SeriesPosition(BaseModel):
-    """Where a trial stands in an adaptive series, and how much of it the choice of its clip knew."""
+    """Where a trial is in an adaptive series, and how much of it the choice of its clip knew."""
 
     number: int = Field(description="Which series, from 0.")
     position: int = Field(description="Position in the series, from 1.")
@@ -485,7 +485,7 @@ class SeriesPosition(BaseModel):
 
 
 class TrialInfo(BaseModel):
-    """One trial as the page needs it; nothing tells the participant which cell it is."""
+    """One trial as the page needs it; nothing reveals to the participant which cell it is."""
 
     trial_index: int
     kind: Literal["practice", "main", "attention", "check"]
@@ -500,7 +500,7 @@ class TrialInfo(BaseModel):
     clips: list[TrialClip] = Field(description="Every clip, in the order of its places.")
     prompt: str | None = Field(description="Markdown of an attention check.")
     check: CheckName | None = Field(
-        default=None, description="What kind of motion check it is; its answer is told nobody."
+        default=None, description="What kind of motion check it is; its answer is never sent."
     )
     plays_done: int
     plays_wanted: int

@@ -17,7 +17,7 @@ MAX_HASHES = 200_000
 
 
 def clip_hash(clip: bytes) -> bytes:
-    """SHA-512 of a clip: nothing tells it to who has not its bytes, and each clip needs it but once."""
+    """SHA-512 of a clip: nobody can know it without the clip's bytes, and each clip needs it only once."""
     return hashlib.sha512(clip).digest()
 
 

@@ -40,7 +40,7 @@ def open_run(session: Session, token: str) -> StudyRun:
     return run
 
 
-# How much one run may hold beside its ratings: our page stays far below, a script fills no disk.
+# How much one run may hold in addition to its ratings: our page stays far below, a script fills no disk.
 
 DEVICE_KEYS, DEVICE_BYTES = 200, 32 * 1024
 EVENT_BYTES, EVENTS_A_RUN = 4 * 1024, 20_000

@@ -114,7 +114,7 @@ async def start_run(
 
 @router.post("/unsupported", status_code=202)
 def report_unsupported(services: ServicesDep, report: Unsupported) -> Received:
-    """Tell the server that a browser or screen was turned away before a run began."""
+    """Report that a browser or screen was turned away before a run began."""
     _count(services.database, services.unsupported, report.link_token)
     with services.database.write() as session:
         runs.save_unsupported(session, report)
@@ -174,7 +174,7 @@ def put_form(services: ServicesDep, request: Request, token: RunToken, name: str
 
 @router.put("/run/stage")
 def put_stage(database: DatabaseDep, token: RunToken, change: StageChange) -> Saved:
-    """Tell where the participant is."""
+    """Report where the participant is."""
     with database.write() as session:
         return runs.save_stage(session, token, change.stage)
 
@@ -188,7 +188,7 @@ def put_language(services: ServicesDep, token: RunToken, change: LanguageChange)
 
 @router.post("/run/events")
 def post_events(services: ServicesDep, request: Request, token: RunToken, events: Events) -> Received:
-    """Tell what happened; an event with a known id is left as it is."""
+    """Report what happened; an event with a known id is left as it is."""
     moment = services.time_of(request)
     with services.database.write() as session:
         return Received(received=runs.save_events(session, token, events.events, moment))

@@ -37,7 +37,7 @@ def _without_time(value: Any) -> Any:
 # Patterns that fingers make are short; each further distance would be one more chance to fit by accident.
 LONGEST_CYCLE = 4
 MIN_FOR_SPREAD = 8
-"""Answers from which on a spread or a pattern is told."""
+"""Answers from which on a spread or a pattern is reported."""
 GUESSED_BY_CHANCE = 0.01
 """Motion checks are passed where guesses would be right as often with less than this probability."""
 SEEN, POWER = 0.95, 0.99
@@ -57,7 +57,7 @@ class JudgedAnswer:
     choices : int
         How many answers a motion or attention check offered.
     void : bool
-        The check tells nothing, since its play failed or it was passed over.
+        The check shows nothing, since its play failed or it was passed over.
     other_way : bool
         It was answered the way offered to those who cannot see it.
     needs_digest : bool
@@ -121,14 +121,14 @@ class Signals:
     checks : float or None
         Share of attention checks answered correctly.
     motion_checks : float or None
-        Share of motion checks answered rightly, of the `motion_checks_asked` that tell something.
+        Share of motion checks answered rightly, of the `motion_checks_asked` that show something.
     motion_checks_guessed : float or None
-        How likely guesses are right as often as that; None where too few were asked to tell guesses from
+        How likely guesses are right as often as that; None if too few were asked to distinguish guesses from
         people.
     motion_checks_other_way : float or None
         How many were answered the other way that the study offers.
     motion_checks_void : float or None
-        How many tell nothing, since their play failed or they were passed over.
+        How many show nothing, since their play failed or they were passed over.
     checks_guessed : float or None
         How likely guesses are right in as many of all checks, those of attention and of motion together;
         None where none was answered.
@@ -227,7 +227,7 @@ def _guessed_together(checks: Sequence[JudgedAnswer], wrong: Sequence[int]) -> f
 
 
 def checks_tell(answers: Sequence[JudgedAnswer], passed_over: Sequence[int] = ()) -> bool:
-    """Whether the motion checks asked, void ones and those passed over too, can tell guesses from people."""
+    """Whether all motion checks asked, also void and skipped ones, can distinguish guesses from people."""
     # Void ones are counted in: whether checks can tell must not hang on how many of them a page lets fail.
     asked = [one.choices for one in answers if one.part == "check" and one.choices and not one.other_way]
     return _can_tell([*asked, *passed_over])
@@ -240,7 +240,7 @@ def chance_of_guessing(
 
     The number of right guesses is Poisson-binomial: check i is guessed with 1 / choices[i]. Enough are asked
     where somebody who sees `SEEN` of the checks passes (guesses do as well with less than
-    `GUESSED_BY_CHANCE`) with at least `POWER`; whether they are is told by the choices of all that were
+    `GUESSED_BY_CHANCE`) with at least `POWER`; whether they are follows from the choices of all that were
     `asked`, so that nobody gets around the checks by having one of them fail.
     """
     if not choices or not _can_tell(choices if asked is None else asked):
@@ -347,7 +347,7 @@ With one attention question of seven answers and two motion checks of nine choic
 right: so they are for 99.7 % of those who read the question and see 95 % of such clips (`SEEN`).
 """
 VOID_SHARE = 0.2
-"""Share of motion checks that may tell nothing, as plays fail on honest people's machines; one may always."""
+"""Share of motion checks that may show nothing, as plays fail on honest people's machines; one always may."""
 REFUSED_POINTS = -4.0
 """Points where answers of the run were refused for their evidence."""
 WITHOUT: dict[str, float] = {"trusted": -1, "press_ms": -2}
@@ -383,8 +383,8 @@ def judge(
     """The verdict on a run whose page was asked for evidence.
 
     Without passed checks the verdict is at most unclear. So it is where motion checks were answered the
-    other way that the study offers, or too many of them tell nothing; not so where they were too few to
-    tell anything.
+    other way that the study offers, or too many of them show nothing; not so if they were too few to
+    show anything.
 
     Parameters
     ----------
@@ -409,7 +409,7 @@ def verdict_on(signals: Signals, *, answers: int, refused: bool, tells: bool) ->
     answers : int
         How many answers the run has.
     tells : bool
-        The motion checks that were asked can tell guesses from people (`checks_tell`).
+        The motion checks that were asked can distinguish guesses from people (`checks_tell`).
     """
     points = sum(points_of(name, getattr(signals, name)) for name in BANDS) + REFUSED_POINTS * refused
     if answers < MIN_ANSWERS:
@@ -426,6 +426,6 @@ def _passes_checks(signals: Signals) -> bool:
 
 
 def _escapes_checks(signals: Signals) -> bool:
-    """Whether the run got around its motion checks: all of them tell nothing, or more than may."""
+    """Whether the run got around its motion checks: all of them show nothing, or more than may."""
     void, told = signals.motion_checks_void or 0, signals.motion_checks_asked or 0
     return void > max(1, VOID_SHARE * (void + told)) or (void > 0 and told == 0)

@@ -164,7 +164,7 @@ def _checks(session: Session, run: StudyRun) -> dict[int, CheckName]:
 
 
 def checks_passed_over(session: Session, run: StudyRun) -> list[CheckName]:
-    """Kinds of the motion checks without an answer that stand before a trial with one."""
+    """Kinds of the motion checks without an answer that come before a trial with one."""
     rated = select(Rating.trial_index).where(Rating.study_run_id == run.id)
     last = select(func.max(Rating.trial_index)).where(Rating.study_run_id == run.id).scalar_subquery()
     query = (

@@ -2,7 +2,7 @@
 
 Each run draws a key k of 256 bits. What the recruiter's address said is kept as AES-256-GCM(k, JSON), with
 the run's public id as associated data. k itself is kept wrapped (AES key wrap, RFC 3394) under HKDF-SHA-256
-of the installation's secret key, in a table of its own that no backup holds: a dump of the database alone
+of the installation's secret key, in a separate table that no backup holds: a dump of the database alone
 opens nothing, and a backup without the key file opens nothing.
 """
 

@@ -125,7 +125,10 @@ def readable_identities(session: Session) -> Iterator[bool]:
 
 
 def rewrap_all(session: Session, old_secret: bytes) -> tuple[int, int]:
-    """Wrap every key anew that was wrapped under `old_secret`; how many, and how many are under neither."""
+    """Wrap again every key that was wrapped under `old_secret`.
+
+    Return how many, and how many are under neither.
+    """
     secret, done, left = session.info[SIGNING_KEY](), 0, 0
     for key in session.scalars(select(IdentityKey)):
         try:

@@ -270,7 +270,7 @@ class Intake:
         what: evidence_repository.RefusalEvents,
     ) -> None:
         """Note once a run that something of it was refused for this reason, and limit how often it may be."""
-        # Each run has a share of its own: who sends false answers hinders nobody else.
+        # Each run has its own share: a sender of false answers hinders nobody else.
         self._false_answers.hit(sent.run_id)
         # A page that stood open for months, or that was loaded again before its clip was there, sends nothing
         # false: noted, and no word on the run.
@@ -282,7 +282,8 @@ class Intake:
         if given is None:
             raise TicketMissing("Expected a ticket with the answer, got none; please reload the page.")
         where = (answer.run_id, answer.trial_index, answer.play)
-        # By the client's word, which only tells a late delivery: so old a ticket leaves time for any clip.
+        # By the client's word, which only identifies a late delivery: so old a ticket leaves time for any
+        # clip.
         given_at = min(answer.received_at, answer.answered_at or answer.received_at)
         return check_ticket(self.key, given.batch, given.ticket, *where, given_at), given
 

@@ -99,7 +99,7 @@ def _answer(row: evidence_repository.StoredAnswer, offered: int) -> JudgedAnswer
 # Clips of an object store are read in the background from the moment a run gets its tickets. Who answers
 # sooner is taken at their word until the end of the run, whose verdict then rests on every digest that
 # could be checked. Where the store is away at that moment, or slow, the rest are judged when it answers
-# again: the verdict is given anew, and an event of the run says so. Of several workers that look at once,
+# again: the verdict is given again, and an event of the run records it. Of several workers that look at once,
 # the first to store counts; the others change nothing and note nothing.
 
 LIMIT_S = 5.0
@@ -125,7 +125,7 @@ def judge_waiting(database: Database, intake: Intake, token: str) -> None:
 
 
 def judge_later(database: Database, clips: ClipHashes, stopped: Callable[[], bool] = lambda: False) -> int:
-    """Judge the digests of all runs, and those that are over anew; return how many answers stay unchecked.
+    """Judge the digests of all runs, again those that are over; return how many answers stay unchecked.
 
     Parameters
     ----------

@@ -357,7 +357,7 @@ def _receipt_of_new(connection: Connection, delivery: SubmittedRating, ruling: R
 
 
 def _consequence(connection: Connection, delivery: SubmittedRating) -> warnings.Lapse:
-    """What an answer means for the run beside itself: a failed check may end it, a careless one be told."""
+    """What else an answer means for the run: a failed check may end it, a careless one get a warning."""
     run, experiment = delivery.run.id, delivery.experiment
     if delivery.trial.kind == "attention":
         return warnings.Lapse(None, ends=by_attention(connection, run, experiment))

@@ -176,7 +176,7 @@ def without_refused(recruiter: Recruiter, stored: Mapping[str, Any] | None = Non
     Raises
     ------
     ValueError
-        Another return address has a host that is not written out, or is no web address.
+        Another return address has a host that is not written out, or is not a web address.
     """
     sent = recruiter.model_dump()
     new = [name for name in refused_addresses(sent) if sent[name] != (stored or {}).get(name)]
@@ -197,9 +197,9 @@ def _filled_in(address: str, code: str, run: str, parameters: Mapping[str, str])
 # Signed addresses of recruiters: who shows one has it from the experimenters, and may go on with a visit.
 #
 # secret = HMAC-SHA-256(k, "recruiter signature:" study key ":" name) with k the installation's key and the
-# study's own, so that it is no other study's; another name makes another secret, by which all addresses that
-# were signed before are good no more. The signature of a participant's id is HMAC-SHA-256(secret, id), 64
-# hexadecimal digits.
+# study's own, so that it is not another study's; another name makes another secret, by which all addresses
+# that were signed before are good no more. The signature of a participant's id is HMAC-SHA-256(secret, id),
+# 64 hexadecimal digits.
 
 PURPOSE = "recruiter signature"
 

@@ -33,8 +33,8 @@ from server.participation.versions import Versions
 # every visit of that person to the study, another in every other study, and not to be made or undone
 # without the key.
 #
-# A resume code is twelve signs in three groups. The first four tell the visit (20 bits of its public id),
-# the other eight (40 bits) are derived from the installation's key. What tells a person apart is not what
+# A resume code is twelve signs in three groups. The first four identify the visit (20 bits of its public id),
+# the other eight (40 bits) are derived from the installation's key. What identifies a person is not what
 # lets one in: a recruiter's id is known to many, the code only to whom the page has shown it.
 
 CODE_PURPOSE = "resume"
@@ -63,7 +63,7 @@ def resume_code(key: bytes, public_id: str) -> str:
 
 
 def run_prefix(typed: str) -> str | None:
-    """How the public id of the run of a typed code begins; None where it is no code."""
+    """How the public id of the run of a typed code begins; None if it is not a code."""
     signs = _signs(typed)
     if len(signs) != CODE_SIGNS or not set(signs) <= set(_SIGNS):
         return None
@@ -90,7 +90,7 @@ def _signs(typed: str) -> str:
 #
 # A visit is taken up by the secret its browser keeps (the client id), by a personal link, by the resume
 # code that the page has shown, or by an address that was signed with the study's secret. A recruiter's id
-# says whose visit it is and opens nothing: it stands in addresses, lists and e-mails, and some recruiters
+# says whose visit it is and opens nothing: it is in addresses, lists and e-mails, and some recruiters
 # count it up.
 
 
@@ -104,7 +104,7 @@ def name_of(link: Link, study: Study, identifier: str) -> str | None:
 def settled_id(session: Session, link: Link, recruiter: Recruiter, parameters: Mapping[str, str]) -> str:
     """The id by which visits of one person are known; empty where the address names nobody.
 
-    Earlier releases told ids of different case apart: a person who is known under the id exactly as it is
+    Earlier releases distinguished ids of different case: a person who is known under the id exactly as it is
     written stays known under it. Previews take any id, since nobody is paid or counted by it.
 
     Raises
@@ -191,7 +191,7 @@ def _run_of_code(settings: Settings, session: Session, link: Link, typed: str) -
 
 
 def _refuse_by_id_alone(experiment: Experiment, run: StudyRun, start: RunStart) -> None:
-    """Refuse who has only the recruiter's id of `run`, unless a visit beside it may begin."""
+    """Refuse a person who has only the recruiter's id of `run`, unless another visit may begin."""
     if run.status != "active":
         raise TakenPartAlready(
             "The visit with this sign-up is complete. Its resume code shows the last page again."
@@ -206,7 +206,7 @@ def _refuse_by_id_alone(experiment: Experiment, run: StudyRun, start: RunStart) 
 
 
 def must_restart(experiment: Experiment, run: StudyRun) -> bool:
-    """True where coming back begins anew. Before consent there is nothing to begin anew."""
+    """True if coming back starts over. Before consent there is nothing to start over."""
     return experiment.session.resume == "restart" and run.status == "active" and run.consented_at is not None
 
 

@@ -359,7 +359,7 @@ Winner = Literal["left", "right", "tie"]
 def compared_answers(session: Session, version_id: int, origin: str, lease: timedelta) -> list[Compared]:
     """What was answered, and what was dealt to people seen within the lease who have not answered it yet.
 
-    Of runs of this origin that are not excluded; failed plays are no answers. Ordered, so that equal stored
+    Of runs of this origin that are not excluded; failed plays are not answers. Ordered, so that equal stored
     comparisons give an equal list.
     """
     first, second = aliased(TrialClip), aliased(TrialClip)

@@ -137,7 +137,7 @@ class CalibrationState(BaseModel):
 
 
 class ShownCheck(BaseModel):
-    """What is asked about the clips of one kind of motion check; answers are numbered from 1."""
+    """The question about the clips of one kind of motion check; answers are numbered from 1."""
 
     question: str
     choices: list[str]
@@ -201,7 +201,7 @@ class Saved(BaseModel):
     stage: Stage
     status: RunStatus
     run: "RunState | None" = Field(
-        default=None, description="The run anew, where this answer decided its group and with it its trials."
+        default=None, description="The whole run again, if this answer decided its group and trials."
     )
 
 
@@ -211,7 +211,7 @@ class Completion(BaseModel):
     status: Literal["complete", "screened_out"]
     completion_code: str | None
     redirect_url: str | None
-    reason: str | None = Field(default=None, description="Why the run ended, where the page must tell.")
+    reason: str | None = Field(default=None, description="Why the run ended, if the page must say it.")
 
 
 class Received(BaseModel):

@@ -55,7 +55,7 @@ class Outlook:
     Attributes
     ----------
     known : mapping of str to int
-        Counting answers of each series when this was reckoned.
+        Counting answers of each series when this was computed.
     estimates : mapping of (int, int) to Estimate
         By trial and play.
     closing : tuple of int
@@ -74,11 +74,11 @@ class Outlook:
     remaining: int = 0
 
 
-# Decision 0506: An adaptive series has no state of its own.
+# Decision 0506: An adaptive series has no separate state.
 def follow_series(database: Database, versions: Versions, token: str) -> Outlook | None:
     """Bring the series of a run up to its stored answers; None where other answers came meanwhile.
 
-    Reckoning happens between two transactions, so that no other write waits for it. Doing it again changes
+    This happens between two transactions, so that no other write waits for it. Doing it again changes
     nothing: equal answers give equal choices.
     """
     with database.read() as session:
@@ -174,7 +174,7 @@ def _store_outlook(connection: Connection, token: str, outlook: Outlook) -> Outl
     if closing:
         series_repository.close_trials(connection, run.id, closing)
     remaining = run.trials_total - run.trials_answered - len(closing)
-    # A trial that was played meanwhile stays open: its page must not be told that it needs no answer.
+    # A trial that was played meanwhile stays open: its page must not get the message that it needs no answer.
     closed = (*(row.trial_index for row in stored if row.closed), *closing)
     return replace(outlook, closed=closed, remaining=remaining)
 

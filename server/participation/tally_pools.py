@@ -150,7 +150,7 @@ class _Versions:
         return self._levels[version]
 
 
-# Tallies by a full count of the ratings: to check what was kept with each rating, and to mend it.
+# Tallies by a full count of the ratings: to check what was kept with each rating, and to fix it.
 
 
 class Recount:
@@ -201,7 +201,7 @@ class Recount:
 
 
 def repair(database: Database, versions: Versions) -> tuple[int, int]:
-    """Mend every tally that differs, a run a transaction; return how many were mended, of how many."""
+    """Fix every tally that differs, one run per transaction; return how many were fixed, of how many."""
     compared = Recount(versions)
     with database.snapshot() as session:
         wrong = list(compared.differing(session))

@@ -104,7 +104,7 @@ def runs_after(session: Session, after: int) -> Sequence[int]:
 
 
 def shown_clips(session: Session, runs: Sequence[int]) -> list[ShownClip]:
-    """Every play of these runs (ascending numbers) in order, a row a clip of its trial."""
+    """Every play of these runs (ascending numbers) in order, one row per clip of its trial."""
     query = _SHOWN_PLAYS.where(Rating.study_run_id.between(runs[0], runs[-1]))
     return [ShownClip(*row) for row in session.execute(query)]
 

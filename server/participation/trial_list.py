@@ -30,7 +30,7 @@ _SIZE = ("width_px", "height_px", "width_mm", "inter_ocular_px")
 
 
 def trial_list(session: Session, run: StudyRun, loaded: LoadedVersion) -> list[TrialInfo]:
-    """Every trial of a run; nothing in it tells the participant which cell a clip is of."""
+    """Every trial of a run; nothing in it reveals to the participant which cell a clip is of."""
     done, begun = run_repository.plays(session, run), numbers(session, run)
     unanswered = unanswered_views(session, run) if begun else {}
     max_repeats = loaded.experiment.playback.max_repeats
@@ -77,7 +77,7 @@ def _positions(
 
 
 class _FirstClips(dict[int | None, dict[str, Any]]):
-    """What a trial tells of its first clip, by the clip's id; under None the nulls of a trial without clips.
+    """What a trial says of its first clip, by the clip's id; under None the nulls of a trial without clips.
 
     As with `_Clips`: made when a clip is first shown, and kept with its version, which never changes.
     """
@@ -115,13 +115,13 @@ def _check(loaded: LoadedVersion, clip: int | None) -> CheckName | None:
 
 
 def _prompt(loaded: LoadedVersion, language: str, row: run_repository.StoredTrial) -> str:
-    """What an attention check asks for; the right answer of a motion check is never told."""
+    """The answer that an attention check wants; the right answer of a motion check is never sent."""
     texts = loaded.experiment.attention.text
     text = texts.get(language) or texts.get("en") or next(iter(texts.values()))
     return text.replace("{response}", str(row.expected_response))
 
 
-# What an answer changes of the trials to come, told with its receipt.
+# What an answer changes of the trials to come, sent with its receipt.
 
 log = logging.getLogger("palpebra")
 
@@ -129,7 +129,7 @@ log = logging.getLogger("palpebra")
 def next_trials(
     database: Database, versions: Versions, token: str, receipt: Receipt
 ) -> tuple[Receipt, NextTrials | None]:
-    """The receipt with what remains once ended series are closed, and the trials chosen anew."""
+    """The receipt with what remains once ended series are closed, and the trials chosen again."""
     outlook = follow(database, versions, token)
     if outlook is None:
         return receipt, None
@@ -154,7 +154,7 @@ def follow(database: Database, versions: Versions, token: str) -> Outlook | None
         return None
 
 
-# What the page is told of a study's motion checks: questions and choices, never an answer.
+# What the page gets of a study's motion checks: questions and choices, never an answer.
 
 
 def shown_checks(experiment: Experiment, language: str) -> ShownChecks | None:

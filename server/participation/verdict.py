@@ -133,7 +133,7 @@ def _flagging_rule(rules: PlaybackRules, playback: Playback, frames: int) -> str
         return "video_fallback" if rules.flag_video_fallback else ""
     if playback.frames_missing is None or playback.frames_seen is None:
         return "no_frame_log"
-    # The counts are the page's own; its log of drawn frames must tell the same.
+    # The counts are the page's own; its log of drawn frames must agree.
     return "" if frames - playback.frames_seen == playback.frames_missing else "frame_log_disagrees"
 
 

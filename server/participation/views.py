@@ -287,9 +287,9 @@ def _clip_ms(
 ) -> list[float]:
     """How long each view lasts that was shown to its end, 0 for others.
 
-    As its kind shows its trial's clips: at once or in turn, with what is between. A view is no shorter for
-    naming others. Where answers decide on clips, they are those that it names of all that were chosen for
-    the trial, since others may have been since.
+    As its kind shows the clips of a trial: at once or in turn, with what is between. A view does not become
+    shorter for naming others. Where answers decide on clips, they are those that it names of all that were
+    chosen for the trial, since others may have been since.
     """
     shown = [view for view in views if _shows(view, run)]
     trials = {view.trial_index for view in shown}

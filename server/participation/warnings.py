@@ -1,4 +1,4 @@
-"""Attention checks and warnings: who answers without care is told so, and a run that goes on so ends."""
+"""Attention checks and warnings: careless answers get a warning, and a run that goes on like this ends."""
 
 from collections.abc import Sequence
 from datetime import datetime
@@ -43,7 +43,7 @@ def by_attention(connection: Connection, run_id: int, experiment: Experiment) ->
     return True
 
 
-# Warnings: who answers without care is told so kindly, and a run that goes on so ends.
+# Warnings: careless answers get a friendly warning, and a run that goes on like this ends.
 #
 # A lapse counts for the next warning only by answers that came after the page had shown the last one, so that
 # nobody whose answers are delivered late, and all at once, is ended without having read a word.

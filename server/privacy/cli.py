@@ -46,7 +46,7 @@ def export(
 ) -> None:
     """Write everything that is stored of one person (a request for access under data protection law).
 
-    In all visits to the study that are known to be hers, table by table; the audit log tells of it.
+    In all visits to the study that are known to be theirs, table by table; the audit log records it.
 
     Examples:
 

@@ -69,7 +69,7 @@ def replay(session: Session, settings: Settings) -> int:
 
 
 def forget_identifiers(session: Session, run: StudyRun) -> bool:
-    """Delete who the person of a run is and leave the answers; False where nothing told."""
+    """Delete who the person of a run is and leave the answers; False if nothing identified them."""
     known = identities.drop_key(session, run)
     if run.completion_code:
         run.completion_code, known = "", True

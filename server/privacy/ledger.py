@@ -1,4 +1,4 @@
-"""The ledger of erasures: a file beside the database and outside its backups, replayed at every restore.
+"""The ledger of erasures: a file next to the database and outside its backups, replayed at every restore.
 
 It names runs by their public ids, which say nothing of a person.
 """
@@ -113,7 +113,7 @@ def add_to_ledger(settings: Settings, further: bytes) -> None:
     Parameters
     ----------
     further : bytes
-        The copy, as a backup has it beside it.
+        The copy, as it lies next to a backup.
     """
     both = merge_ledgers(ledger_content(settings), further)
     if both == ledger_content(settings):

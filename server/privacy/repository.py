@@ -29,7 +29,7 @@ from server.privacy.rows import time_text
 
 RUN = "study_run_id"
 KEYS = frozenset({"token_hash", "client_id", "sealed", "wrapped_key", "identifier_hash"})
-"""Columns that open a visit or are the encrypted form of what is told in the open beside them."""
+"""Columns that open a visit or are the encrypted form of what other columns hold unencrypted."""
 OF_LINKS = frozenset({"public_id", "kind", "created_at", "label"})
 """Of a link the rest is the study's: what it pays by, its key, its quota."""
 
@@ -53,7 +53,7 @@ def runs_known_as(session: Session, study: Study, identifier: str) -> list[Study
 def stored_rows(session: Session, run: StudyRun) -> dict[str, list[dict[str, Any]]]:
     """Table -> the rows that hang on a visit, its own and its link's included; empty tables are left out.
 
-    Codes that pay are told once the visit is complete.
+    Codes that pay are shown once the visit is complete.
     """
     views = select(View.id).where(View.study_run_id == run.id)
     tables = {
@@ -92,7 +92,7 @@ def _rows(session: Session, table: Any, condition: Any) -> Iterator[dict[str, An
 
 OF_PERSONS = ("participant", "pilot")
 ERASED = "erased"
-"""What stands in the place of a personal link's label."""
+"""What replaces the label of a personal link."""
 
 
 def every_study(session: Session) -> Sequence[Study]:

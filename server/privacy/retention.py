@@ -196,7 +196,7 @@ def studies_with_period(session: Session) -> list[str]:
 
 
 def _declares_period(session: Session, study: Study) -> bool:
-    """Whether a study declares a period; one that cannot be read is told and passed over."""
+    """Whether a study declares a period; one that cannot be read is reported and skipped."""
     try:
         return next(_rules(session, study), None) is not None
     except Exception:  # of one study: the others keep to what they declare

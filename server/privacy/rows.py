@@ -68,7 +68,7 @@ def time_of(value: str | None, aware: bool) -> datetime | None:
 
 BATCH = 500
 LEFT_OUT = frozenset(("alembic_version", "shared_counts"))
-"""The revision, which is told apart; limits, which are no data."""
+"""The revision, which is stated separately; limits, which are not data."""
 
 
 @contextmanager

@@ -58,7 +58,7 @@ def simulate(
 
     Each goes through consent, forms, calibration and every trial. Answers follow a rater model with effects
     drawn by the seed, so that an analysis has something to find; they say nothing about people.
-    With --as they are held to what people are held to, and the verdict on each run is told.
+    With --as they are held to what people are held to, and the verdict on each run is printed.
 
     Examples:
 

@@ -35,7 +35,7 @@ def get_latest_rehearsal(services: ServicesDep, identity: Viewer, study: str) ->
 
 @router.post("", status_code=202)
 def begin_rehearsal(services: ServicesDep, identity: Writer, study: str, body: NewRehearsal) -> RehearsalOut:
-    """Simulate people in a database of their own; it takes the place of the rehearsal before."""
+    """Simulate people in a separate database; this replaces the previous rehearsal."""
     return service.start(services.database, services.settings, services.locks, study, body, identity)
 
 

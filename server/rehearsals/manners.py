@@ -44,7 +44,7 @@ class Manner:
     rt_ms : callable
         Response time of one answer.
     interaction : callable
-        Presses between two answers, None where none are told.
+        Presses between two answers, None if none are given.
     tickets : bool
         Sends the server's tickets.
     fetches : bool
@@ -158,7 +158,7 @@ person whose network goes away, who reloads, whose clock jumps. assistive: a scr
 browser that a script clicks, on a machine whose other work lengthens its presses."""
 
 
-# A simulated person with a manner: sends evidence, at times of a clock of its own.
+# A simulated person with a manner: sends evidence, at times of a separate clock.
 
 MAX_HELD = 12
 """Answers kept while the network is away."""
@@ -223,7 +223,7 @@ class Actor(Person):
         return state
 
     def rate(self, trial: dict[str, Any], declared: dict[str, Any]) -> bool:
-        """Watch and answer one trial; whether it is asked again shows when the run is read anew."""
+        """Watch and answer one trial; whether it is asked again shows when the run is read again."""
         manner, clips_s = self.manner, view_s(trial, declared)
         self._mishaps()
         rt = manner.rt_ms(self.rng, self.person)

@@ -233,7 +233,7 @@ class Person:
         self.following: dict[str, Any] | None = None
         self.brings_evidence = False
         self.placed: dict[str, Any] | None = None
-        """The run anew, where an answer decided its group."""
+        """The run again, if an answer decided its group."""
 
     def take_part(
         self, link_token: str, *, stop_after: int | None = None, progress: Callable[[], None] = lambda: None
@@ -354,7 +354,7 @@ class Person:
 
 
 def still_due(due: list[dict[str, Any]], following: dict[str, Any] | None) -> list[dict[str, Any]]:
-    """The trials due as the server has chosen them anew, without those of ended series."""
+    """The trials due as the server has chosen them again, without those of ended series."""
     if following is None:
         return due
     anew = {trial["trial_index"]: trial for trial in following["trials"]}
@@ -412,7 +412,7 @@ _CALIBRATION = {
 }
 
 
-# Who takes part in a simulation: a link of its own, and raters who know the levels of every clip.
+# Who takes part in a simulation: a separate link, and raters who know the levels of every clip.
 
 
 def link_and_raters(

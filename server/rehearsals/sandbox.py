@@ -1,4 +1,4 @@
-"""The rehearsal itself, in a process and a database of its own, with the power of the declared plan."""
+"""The rehearsal itself, in a separate process and database, with the power of the declared plan."""
 
 import json
 import secrets
@@ -48,7 +48,7 @@ from server.results.jobs import run_analysis
 from server.studies.creation import add_version, create_study, planned_experiment
 from server.studies.lookup import find_study
 
-# The rehearsal itself, in a process and a database of its own: it is not told where people's data are.
+# The rehearsal itself, in a separate process and database: it does not know where people's data are.
 
 SIMULATIONS = 200
 """Data sets that a plan of power draws."""

@@ -1,4 +1,4 @@
-"""A dress rehearsal: what is asked for, how far it is, and what it showed."""
+"""A dress rehearsal: its settings, its progress, and what it showed."""
 
 from datetime import datetime
 from typing import Any, Literal
@@ -87,7 +87,7 @@ class RehearsalResult(BaseModel):
 
 
 class Order(BaseModel):
-    """What the sandbox is told, beside the definition and the manifest."""
+    """What the sandbox gets, in addition to the definition and the manifest."""
 
     participants: int
     seed: int

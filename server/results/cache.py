@@ -2,7 +2,7 @@
 
 A page asks every quarter of a minute, and a million ratings take seconds to count. What is small is counted
 at once. Where counting is slow the page gets what was counted last, with its time, while a thread counts
-anew, now and then. A change of what counts (exclusion, erasure, version) is never answered with older ones.
+again, now and then. A change of what counts (exclusion, erasure, version) is never answered with older ones.
 """
 
 import hashlib

@@ -24,7 +24,7 @@ from server.models import Job, Study
 from server.results import repository
 from server.results.repository import JobKind
 
-# Run `analysis run` as a process of its own: the server carries no numerics.
+# Run `analysis run` in a separate process: the server carries no numerics.
 
 
 def run_analysis(
@@ -55,12 +55,12 @@ def run_analysis(
     return (lines[-1] if lines else f"the analysis ended with code {done.returncode}")[:500]
 
 
-# Work in the background that a row of `jobs` tells of: reports, capsules and rehearsals.
+# Work in the background that a row of `jobs` describes: reports, capsules and rehearsals.
 
 LOG = logging.getLogger(__name__)
 FORESEEN = (InputError, ApiError, OSError, subprocess.SubprocessError)
-"""Errors whose own words tell the experimenter what to do."""
-UNFORESEEN = "the server met an error that it did not expect; its log says which, please tell its operator"
+"""Errors whose message says what the experimenter can do."""
+UNFORESEEN = "the server met an error that it did not expect; its log says which; please contact its operator"
 UNDER_WAY = ("queued", "running")
 WRITE_AGAIN_S = (1, 2, 4, 8, 15, 30, 60)
 """How long to wait before the end of a job is written again, where the database did not take it."""
@@ -92,7 +92,7 @@ def begin_job(
 
 
 def in_background(database: Database, locks: Locks, public_id: str, work: Callable[[], None]) -> None:
-    """Do a job's work in a thread of its own; an error in it, foreseen or not, ends the job as failed.
+    """Do a job's work in a separate thread; an error in it, foreseen or not, ends the job as failed.
 
     While it goes on a lock is held: where a process dies with its jobs, others see it by that.
     """

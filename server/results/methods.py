@@ -94,7 +94,7 @@ def read_results(folder: Path) -> dict[str, Any] | None:
 
 
 def write(folder: Path, methods: Methods) -> None:
-    """Put the paragraph into a report, and beside it as text, as LaTeX, and with its numbers as JSON."""
+    """Put the paragraph into a report, and next to it as text, as LaTeX, and with its numbers as JSON."""
     page = folder / "report.html"
     written = page.read_text(encoding="utf-8").replace(METHOD_MARK, methods.html(), 1)
     with whole_file(page) as temporary:

@@ -1,6 +1,6 @@
 """The numbers of the Methods paragraph, each with the query that gives it.
 
-The queries are for people who doubt a number: each gives its own. What is asked of the database is less. Runs
+The queries are for people who doubt a number: each gives its own. Fewer queries reach the database. Runs
 are counted in one pass, answers to checks by the index that has them alone, and plays are read from the
 tallies, which are kept with each rating and checked by a full count (`server.participation.tally_pools`).
 """

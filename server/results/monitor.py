@@ -31,7 +31,7 @@ def snapshot(
     """The monitor of `study` at this moment.
 
     It is of one origin: where none is wanted, the pilot while the study is one, else participants.
-    Of the others only their number is told, of previews nothing.
+    Of the others only the number is shown, of previews nothing.
     """
     lease = timedelta(minutes=experiment.session.lease_minutes)
     moment = now()
@@ -122,7 +122,10 @@ def monitored_run(run: Any, moment: datetime, lease: timedelta) -> MonitoredRun:
 
 
 def stage_reached(run: Any) -> str:
-    """The stage of a run or a count of runs; what a page told last stays behind once all is complete."""
+    """The stage of a run or a count of runs.
+
+    What a page reported last no longer counts once all is complete.
+    """
     return "done" if run.status == "complete" else str(run.stage)
 
 

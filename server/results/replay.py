@@ -33,7 +33,7 @@ AT_ONCE = {"left", "right"}
 
 
 def showings_of(drawn: Sequence[Sequence[float]]) -> list[Log]:
-    """The log of an answer, cut where a clip begins anew: where the frame's index falls.
+    """The log of an answer, cut where a clip begins again: where the frame's index falls.
 
     >>> showings_of([[0, 10.0], [1, 43.0], [0, 9.0], [2, 75.0]])
     [[(0, 10.0), (1, 43.0)], [(0, 9.0), (2, 75.0)]]
@@ -104,7 +104,7 @@ def _rebuilt_view(
     )
 
 
-# What was shown in a run, trial by trial: frame logs, answers, verdicts and events beside one another.
+# What was shown in a run, trial by trial: frame logs, answers, verdicts and events side by side.
 
 AROUND = timedelta(seconds=2)
 """Events so long before the first view and after the last answer are shown with a trial."""

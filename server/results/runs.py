@@ -79,7 +79,7 @@ def summary(run: StudyRun, answered: int, not_good: int, refused: int) -> RunSum
 
 
 def _way_in(link: Link) -> str:
-    """What a link is called beside its participant: its label, but not where it is a person's."""
+    """The name of a link next to its participant: its label, unless it is a person's."""
     return link.kind if link.kind == "personal" else link.label or link.kind
 
 

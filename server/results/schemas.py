@@ -179,7 +179,7 @@ class ThresholdResults(StudyResults):
     kind: Literal["threshold"] = "threshold"
     factor: str = Field(description="The factor along which series move.")
     second_factor: str | None = Field(description="The second factor, where series move over two.")
-    second_middle: float | None = Field(description="Its number at which thresholds are told.")
+    second_middle: float | None = Field(description="Its number at which thresholds are given.")
     two_interval: bool
     series_results: list[SeriesResult]
 
@@ -218,7 +218,7 @@ class AnsweredCell(BaseModel):
 
 
 class OtherResults(StudyResults):
-    """Of a kind of trial without a summary of its own."""
+    """Of a kind of trial without its own summary."""
 
     kind: Literal["other"] = "other"
     note: str

@@ -28,14 +28,14 @@ CellMeans = Mapping[str, Mapping[tuple[str, ...], float]]
 
 
 class RatersOfSameCells(NamedTuple):
-    """Participants who rated the same cells: their means by cell, a row a participant."""
+    """Participants who rated the same cells: their means by cell, one row per participant."""
 
     cells: tuple[tuple[str, ...], ...]
     rows: list[tuple[float, ...]]
 
 
 def raters_of_same_cells(cell_means: CellMeans) -> list[RatersOfSameCells]:
-    """Participants by the cells they rated. Thousands are then reckoned with column by column."""
+    """Participants by the cells they rated. Thousands are then computed column by column."""
     groups: dict[tuple[tuple[str, ...], ...], RatersOfSameCells] = {}
     for means in cell_means.values():
         cells = tuple(means)

@@ -229,7 +229,7 @@ def show_secret(
         str | None, typer.Option(help="Name of the secret; that of the recruiter by default.")
     ] = None,
     link: Annotated[
-        str | None, typer.Option(help="Label of a link with a recruiter of its own; the study's by default.")
+        str | None, typer.Option(help="Label of a link with its own recruiter; the study's by default.")
     ] = None,
 ) -> None:
     """Print the secret that signs recruiters' addresses, and how to sign one; the audit log notes it.

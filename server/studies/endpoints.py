@@ -260,7 +260,7 @@ def get_signing(
 ) -> Signing:
     """The secret for signed addresses, with examples; for owners alone, each look is in the audit log.
 
-    Where a link has a recruiter of its own, give its id as `link`; the study's recruiter counts without.
+    If a link has its own recruiter, give its id as `link`; otherwise the study's recruiter counts.
     """
     with database.write() as session:
         known = find_study(session, study, identity, "own")

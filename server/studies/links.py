@@ -45,7 +45,7 @@ RunsOfLink = tuple[int, int]
 
 
 class LinksPage(NamedTuple):
-    """Some links with their runs, how many links there are, and behind which one the rest stands."""
+    """Some links with their runs, how many links there are, and after which one the rest follows."""
 
     links: list[tuple[Link, RunsOfLink]]
     total: int

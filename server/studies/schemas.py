@@ -350,7 +350,7 @@ class StudyDetail(BaseModel):
 
 
 class CloneStudy(RequestBody):
-    """A copy of a study under a name of its own."""
+    """A copy of a study under another name."""
 
     name: StudyName
     version: Number | None = Field(
@@ -358,7 +358,7 @@ class CloneStudy(RequestBody):
     )
     workspace: Annotated[str, StringConstraints(max_length=60)] | None = Field(
         default=None,
-        description="Where the copy goes; needed where one may make no studies beside its source.",
+        description="Where the copy goes; required if the account may make no studies next to the source.",
     )
 
 

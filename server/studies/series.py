@@ -120,7 +120,7 @@ _LINE = re.compile(r"[^\n]*\n|[^\n]+")
 
 
 def word_difference(old: str, new: str) -> list[tuple[Kind, str]]:
-    """Pieces of `old` and `new` in reading order; what went stands before what came in its place.
+    """Pieces of `old` and `new` in reading order; what was removed comes before what replaced it.
 
     Examples
     --------

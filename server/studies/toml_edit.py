@@ -1,7 +1,7 @@
 """Write changed data into a TOML text: what did not change keeps its form, its order and its comments.
 
 tomlkit counts a comment above `[[forms]]` to the table before it. Where elements are moved or removed, such
-comments go with the element that they stand above.
+comments go with the element below them.
 """
 
 import json
@@ -17,7 +17,7 @@ from tomlkit.items import AoT, Array, Comment, InlineTable, Item, Table, Whitesp
 from experiments.errors import InputError
 from experiments.load import MAX_DEPTH, DefinitionError, is_deeper, sum_of_cubes, toml_data
 
-# New values as TOML: a table of its own, or within a line where it is short.
+# New values as TOML: a separate table, or within a line if it is short.
 
 MAX_INLINE = 120
 """Longest table, as JSON, that is written within a line."""
@@ -35,7 +35,7 @@ def is_inline(table: Any) -> bool:
 
 
 def fresh_item(value: Any, in_line: bool = False, top: bool = False) -> Item:
-    """A new value as it is best read: a table of its own, or within a line where it is short."""
+    """A new value as it is best read: a separate table, or within a line if it is short."""
     if in_line:
         return inline_item(value)
     if isinstance(value, Mapping):
@@ -49,7 +49,7 @@ def fresh_item(value: Any, in_line: bool = False, top: bool = False) -> Item:
 
 
 def fresh_table(value: Mapping[str, Any]) -> Table:
-    """A table with a header of its own: short keys first, tables after them."""
+    """A table with its own header: short keys first, tables after them."""
     table = tomlkit.table()
     later = {key: inner for key, inner in value.items() if not isinstance(fresh_item(inner), Table | AoT)}
     for key, inner in later.items():
@@ -85,7 +85,7 @@ def _are_rows(value: Sequence[Mapping[str, Any]]) -> bool:
 
 
 def inline_item(value: Any) -> Item:
-    """A value that stands behind its key; a list of tables takes a line an element."""
+    """A value after its key; a list of tables takes a line an element."""
     if isinstance(value, Mapping):
         table = tomlkit.inline_table()
         for key, inner in value.items():
@@ -308,7 +308,7 @@ def _identity(element: Any) -> str | None:
 
 
 def _merged_tables(old: AoT, edited: Sequence[Mapping[str, Any]]) -> tuple[AoT, list[Any]]:
-    """The elements in their new order, and the comments that now stand above the first."""
+    """The elements in their new order, and the comments that are now above the first."""
     tables = list(old.body)
     above = [[], *[_take_tail(table) for table in tables]]
     known = _known_again([_plain_value(table) for table in tables], edited)
@@ -348,7 +348,7 @@ def _last_container(item: Any) -> Container | None:
 
 
 def _take_tail(item: Any) -> list[Any]:
-    """Cut off the comments and blank lines that stand at the end of a table."""
+    """Cut off the comments and blank lines at the end of a table."""
     container = _last_container(item)
     tail: list[Any] = []
     while (

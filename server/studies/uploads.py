@@ -1,4 +1,4 @@
-"""Uploads of own clips: streamed to a folder of their own, unpacked with limits, and what became of them."""
+"""Uploads of own clips: streamed to a separate folder, unpacked with limits, and what became of them."""
 
 import lzma
 import os
@@ -159,7 +159,7 @@ class Quota:
         return [one for one in folders if sender(one) == str(self.account)]
 
     def _held(self) -> int:
-        # What is made beside the files, and what is set aside, takes room too.
+        # What is made from the files, and what is set aside, takes room, too.
         return sum(size for one in self._own() for size in _sizes(one))
 
     def _full(self, held: int) -> UploadTooLarge:
@@ -258,7 +258,7 @@ def _check_members(members: list[zipfile.ZipInfo]) -> None:
 # Files of an upload that are left out of the study to be made: set aside, and put back when asked for.
 
 ASIDE = ".left_out"
-"""Folder in an upload's folder; what is in it is no file of the upload, and goes with it."""
+"""Folder in an upload's folder; its content is not a file of the upload, and is removed with it."""
 
 
 def files_aside(folder: Path) -> list[Path]:
@@ -438,7 +438,8 @@ def replace(folder: Path, old: str, name: str, source: IO[bytes], limit: int, qu
     Invalid
         It is still being looked into, or the new file's name is that of a third.
     UploadTooLarge
-        The new file is larger than this server takes, or than the account has room for beside the old one.
+        The new file is larger than this server takes, or than the account has room for in addition to the old
+        one.
     """
     target, asked = folder / safe_name(name), one_form(old)
     # Looked up among the names that there are: nothing else that is sent becomes a path.

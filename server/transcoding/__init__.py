@@ -1,1 +1,1 @@
-"""Any video to a clip that every browser plays frame by frame, made in a process of its own."""
+"""Any video to a clip that every browser plays frame by frame, made in a separate process."""

@@ -20,7 +20,7 @@ LOCK = "transcoding"
 
 
 class UploadPreparation:
-    """Has uploaded videos looked into and converted, in a process of its own.
+    """Has uploaded videos looked into and converted, in a separate process.
 
     Parameters
     ----------

@@ -46,7 +46,7 @@ def asked_rate(folder: Path) -> float | None:
 
 
 def ask_rate(folder: Path, fps: float | None) -> None:
-    """Ask for clips of so many frames per second, or for each at its own rate; clips are made anew."""
+    """Ask for clips of so many frames per second, or for each at its own rate; clips are made again."""
     with whole_text(folder / FRAME_RATE) as stream:
         stream.write("" if fps is None else repr(fps))
 

@@ -56,7 +56,7 @@ def simulated(
     if len(seen) == 1:
         chosen = names[0] if rng.random() < seen[0] else names[1]
     else:
-        # The standard is no stimulus, so that nothing is seen in it.
+        # The standard is not a stimulus, so that nothing is seen in it.
         stimulus = 0 if seen[0] >= seen[1] else 1
         chosen = names[stimulus] if rng.random() < seen[stimulus] else names[1 - stimulus]
     return {"kind": "threshold", "chosen": chosen, "known": series["known"]}
