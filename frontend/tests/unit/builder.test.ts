@@ -20,7 +20,18 @@ import {
   withValue,
   suggestionsFor,
 } from "../../src/admin/builder/data";
-import { begun, edited, latestToml, redone, undone, written } from "../../src/admin/builder/history";
+import {
+  begun,
+  changesBetween,
+  edited,
+  latestToml,
+  meetingOf,
+  placeName,
+  redone,
+  undone,
+  withChange,
+  written,
+} from "../../src/admin/builder/history";
 import { sentenceOf } from "../../src/admin/studies/CompareVersions";
 import {
   BASIC,
@@ -273,6 +284,61 @@ describe("what differs between two versions", () => {
     expect(sentenceOf({ path: "trial.scale.maximum", pieces: [piece("gone", "7"), piece("new", "5")] })).toBe(
       "Changed “Maximum” of “Scale” of “Trial” from 7 to 5.",
     );
+  });
+});
+
+describe("edits of two people that meet", () => {
+  const question = (name: string, minimum: number) => ({ name, minimum, label: { en: name } });
+  const base: Data = {
+    title: "a",
+    forms: [{ name: "about", fields: [question("age", 18), question("height", 1)] }],
+    texts: { en: { consent: "c" } },
+  };
+  const changed = (path: Path, value: unknown, of: unknown = base) => withValue(of, path, value) as Data;
+
+  it("are changes of keys and of elements by their names", () => {
+    const fields = [question("weight", 1), question("age", 16), question("height", 1)];
+    const changes = changesBetween(base, changed(["forms", 0, "fields"], fields));
+    expect(changes.map(({ at }) => placeName(at))).toEqual(["forms.about.fields.age.minimum", "forms.about.fields.weight"]);
+    const turned = changesBetween(base, changed(["forms", 0, "fields"], [question("height", 1), question("age", 18)]));
+    expect(turned.map(({ at }) => placeName(at))).toEqual(["forms.about.fields"]);
+  });
+
+  it("are both kept where they are of different fields", () => {
+    const mine = changed(["forms", 0, "fields", 0, "minimum"], 16);
+    const theirs = changed(
+      ["texts", "en", "consent"],
+      "other",
+      changed(["forms", 0, "fields"], [question("height", 1), question("age", 18)]),
+    );
+    const removed = changed(["forms", 0, "fields"], [question("height", 1)]);
+    const meeting = meetingOf(base, mine, changed(["texts", "en", "consent"], "other"));
+    expect(meeting.both).toEqual([]);
+    expect(meeting.merged).toEqual(changed(["texts", "en", "consent"], "other", mine));
+    expect(meeting.theirs.map(({ at }) => placeName(at))).toEqual(["texts.en.consent"]);
+    expect(meeting.mine.map(({ at }) => placeName(at))).toEqual(["forms.about.fields.age.minimum"]);
+    // Their order stays, and my change is in the question that has its name.
+    expect(valueAt(meetingOf(base, mine, theirs).merged, ["forms", 0, "fields", 1])).toEqual(question("age", 16));
+    // A question that they removed, and I edited: mine for now.
+    expect(meetingOf(base, mine, removed).both.map(({ path }) => path)).toEqual(["forms.about.fields.age.minimum"]);
+  });
+
+  it("are shown field by field where both changed the same, and can be taken from either", () => {
+    const meeting = meetingOf(base, changed(["title"], "mine"), changed(["title"], "theirs"));
+    const [edit] = meeting.both;
+    expect(edit?.path).toBe("title");
+    expect(meeting.merged["title"]).toBe("mine");
+    if (edit !== undefined) expect(withChange(meeting.merged, edit.theirs.at, edit.theirs.after)["title"]).toBe("theirs");
+    expect(meetingOf(base, changed(["title"], "same"), changed(["title"], "same")).both).toEqual([]);
+  });
+
+  it("bring back what one removed, and remove what one took out", () => {
+    const without = changed(["forms", 0, "fields", 1], undefined);
+    const [change] = changesBetween(base, without);
+    if (change === undefined) throw new Error("expected a change");
+    expect(withChange(base, change.at, change.after)).toEqual(without);
+    expect(withChange(without, change.at, change.before)).toEqual(base);
+    expect(withChange(without, change.at, undefined)).toEqual(without);
   });
 });
 

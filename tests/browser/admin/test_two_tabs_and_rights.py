@@ -10,6 +10,7 @@ from server.accounts import invitations
 from server.cli_common import migrated_services
 from server.models import AdminSession
 from tests.browser.admin.conftest import Dashboard
+from tests.browser.visit import axe_violations
 from tests.helpers.admins import PASSWORD
 
 pytestmark = pytest.mark.browser
@@ -54,6 +55,46 @@ def test_saving_in_one_tab_keeps_the_unsaved_work_of_the_other(dashboard: Dashbo
     expect(first.get_by_text("was restored")).to_be_visible()
     expect(first.get_by_label(DEBRIEF)).to_have_value("Words of the first tab.")
     expect(first.get_by_text("The study has changed since then")).to_be_visible()
+
+
+def test_edits_of_two_tabs_are_both_kept(dashboard: Dashboard, second: Page) -> None:
+    """The second to save gets the version of the first, with its own changes in it again."""
+    first = builder(dashboard.page, dashboard)
+    builder(second, dashboard, "study")
+    typed(first, "Kept beside another edit.")
+    second.get_by_role("textbox", name="Title", exact=True).fill("A title of the second tab")
+    expect(second.get_by_role("button", name=SAVE)).to_be_enabled()
+    second.get_by_role("button", name=SAVE).click()
+    expect(second.get_by_text(re.compile(r"Saved as version \d+"))).to_be_visible()
+    first.get_by_role("button", name=SAVE).click()
+    met = first.get_by_role("alert").filter(has_text="was saved while you edited")
+    expect(met).to_contain_text("title: A title of the second tab")
+    expect(met).not_to_contain_text("You both changed")
+    expect(first.get_by_label(DEBRIEF)).to_have_value("Kept beside another edit.")
+    first.get_by_role("button", name=SAVE).click()
+    expect(first.get_by_text(re.compile(r"Saved as version \d+"))).to_be_visible()
+    first.reload()
+    expect(first.get_by_role("heading", level=1)).to_have_text("A title of the second tab")
+    expect(first.get_by_label(DEBRIEF)).to_have_value("Kept beside another edit.")
+
+
+def test_a_field_that_both_changed_is_chosen_by_the_second(dashboard: Dashboard, second: Page) -> None:
+    first = builder(dashboard.page, dashboard)
+    builder(second, dashboard)
+    typed(first, "Words of the first.")
+    typed(second, "Words of the second.")
+    expect(second.get_by_role("button", name=SAVE)).to_be_enabled()
+    second.get_by_role("button", name=SAVE).click()
+    expect(second.get_by_text(re.compile(r"Saved as version \d+"))).to_be_visible()
+    first.get_by_role("button", name=SAVE).click()
+    field = first.get_by_role("group", name="texts.en.debrief", exact=True)
+    expect(field).to_contain_text("Words of the second.; yours: Words of the first.")
+    expect(first.get_by_label(DEBRIEF)).to_have_value("Words of the first.")
+    field.get_by_text(re.compile(r"^Version \d+$")).click()
+    expect(first.get_by_label(DEBRIEF)).to_have_value("Words of the second.")
+    field.get_by_text("Yours", exact=True).click()
+    expect(first.get_by_label(DEBRIEF)).to_have_value("Words of the first.")
+    assert axe_violations(first) == []
 
 
 def test_discarding_in_one_tab_keeps_the_unsaved_work_of_the_other(

@@ -8,13 +8,41 @@ import { Answer, onDemand } from "../ui/Answer";
 import { ConfirmButton } from "../ui/ConfirmButton";
 import { when } from "../ui/format";
 import { isTable } from "./data";
-import { type Draft, forgetDraft, forgetWork, keptWork, otherWork } from "./kept";
+import { type Meeting, meetingOf } from "./history";
+import { type Draft, forgetDraft, forgetWork, type Kept, keptWork, otherWork } from "./kept";
 
 const Workbench = onDemand(async () => (await import("./Workbench")).Workbench);
 
 export function BuilderTab() {
   const { study = "" } = useParams({ strict: false });
   return <Answer of={useQuery(studyQuery(study))}>{(detail) => <Begun key={detail.summary.revision} detail={detail} />}</Answer>;
+}
+
+const read = (body: Schemas["EditDefinition"]) => unwrap(api.POST("/api/admin/definitions/edit", { body }));
+
+interface Start {
+  toml: string;
+  data: unknown;
+  /** How edits of two were brought together; null where there was one alone. */
+  meeting: Meeting | null;
+}
+
+async function edit(body: Schemas["EditDefinition"]): Promise<Start> {
+  const { toml, data } = await read(body);
+  return { toml, data, meeting: null };
+}
+
+/** Kept work put into a version that somebody else saved meanwhile. Text that is no TOML stays as it is. */
+async function broughtTogether({ toml, data, base }: Kept, present: string): Promise<Start> {
+  const [mine, before, theirs] = await Promise.all([
+    read({ toml, data }),
+    read({ toml: base ?? "", data: null }),
+    read({ toml: present, data: null }),
+  ]);
+  if (!isTable(mine.data) || !isTable(theirs.data)) return { toml: mine.toml, data: mine.data, meeting: null };
+  const meeting = meetingOf(before.data, mine.data, theirs.data);
+  const merged = await read({ toml: present, data: meeting.merged });
+  return { toml: merged.toml, data: merged.data, meeting };
 }
 
 /** Begins with work kept in this browser, where there is some, else with what is stored. */
@@ -26,9 +54,10 @@ function Begun({ detail }: { detail: Schemas["StudyDetail"] }) {
   });
   const [from, setFrom] = useState({ toml: kept?.toml ?? detail.toml, data: kept?.data ?? null });
   const [others, setOthers] = useState(() => otherWork(name).filter(({ toml, data }) => data !== null || toml !== detail.toml));
+  const isMet = kept !== null && from.toml === kept.toml && kept.base !== null && kept.revision !== revision && kept.base !== detail.toml;
   const start = useQuery({
-    queryKey: ["builder start", from],
-    queryFn: () => unwrap(api.POST("/api/admin/definitions/edit", { body: from })),
+    queryKey: ["builder start", from, isMet, revision],
+    queryFn: () => (isMet ? broughtTogether(kept, detail.toml) : edit(from)),
     staleTime: Infinity,
   });
   const without = (draft: Draft) => setOthers((before) => before.filter((one) => one.key !== draft.key));
@@ -49,11 +78,11 @@ function Begun({ detail }: { detail: Schemas["StudyDetail"] }) {
   const note =
     kept === null || from.toml !== kept.toml
       ? null
-      : `Unsaved work from ${when(kept.at)} was restored.${kept.revision === revision ? "" : " The study has changed since then; the changes that saving would make are listed below."}`;
+      : `Unsaved work from ${when(kept.at)} was restored.${kept.revision === revision ? "" : " The study has changed since then; your changes were put into its present version. The changes that saving would make are listed below."}`;
   return (
     <Answer of={start}>
-      {(read) => (
-        <Stack key={read.toml} gap="sm">
+      {(begun) => (
+        <Stack key={begun.toml} gap="sm">
           {note !== null && (
             <Group gap="xs" role="status">
               <span>{note}</span>
@@ -77,7 +106,7 @@ function Begun({ detail }: { detail: Schemas["StudyDetail"] }) {
               />
             </Group>
           ))}
-          <Workbench detail={detail} start={{ toml: read.toml, data: isTable(read.data) ? read.data : {} }} />
+          <Workbench detail={detail} meeting={begun.meeting} start={{ toml: begun.toml, data: isTable(begun.data) ? begun.data : {} }} />
         </Stack>
       )}
     </Answer>

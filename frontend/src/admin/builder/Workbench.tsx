@@ -1,11 +1,11 @@
 /** What is edited: pages of forms, the Show TOML them, and the bar that saves. */
 
-import { Alert, List, Button, Group, Modal, NavLink, Select, Stack, Switch, Text, TextInput, Title } from "@mantine/core";
+import { Alert, List, Button, Group, Modal, NavLink, SegmentedControl, Select, Stack, Switch, Text, TextInput, Title } from "@mantine/core";
 import { useDebouncedValue, useHotkeys } from "@mantine/hooks";
-import { useQuery } from "@tanstack/react-query";
-import { api, type Schemas, unwrap } from "../api";
+import { useQuery, useQueryClient } from "@tanstack/react-query";
+import { api, Refused, type Schemas, unwrap } from "../api";
 import { adminKind } from "../kinds";
-import { counted } from "../ui/format";
+import { counted, plain } from "../ui/format";
 import { Link, useNavigate, useSearch } from "@tanstack/react-router";
 import { useState } from "react";
 import { DesignLine, TomlText } from "../studies/Design";
@@ -14,6 +14,7 @@ import { useChange } from "../ui/useChange";
 import { type Data, isTable, type Section } from "./data";
 import { Field } from "./fields/Field";
 import { Forms, Texts } from "./Forms";
+import { type Meeting, type MeetingEdit, placeName, withChange } from "./history";
 import { forgetWork } from "./kept";
 import { EXPERIMENT, sectionOf, SECTIONS } from "./schema";
 import { TrialPreview } from "./TrialPreview";
@@ -85,9 +86,10 @@ function effect(edit: Schemas["JudgedEdit"], detail: Schemas["StudyDetail"]): st
 interface Props {
   detail: Schemas["StudyDetail"];
   start: { toml: string; data: Data };
+  meeting: Meeting | null;
 }
 
-export function Workbench({ detail, start }: Props) {
+export function Workbench({ detail, start, meeting }: Props) {
   const { name } = detail.summary;
   const builder = useBuilder(detail, start);
   const [beside, setBeside] = useState(false);
@@ -106,6 +108,7 @@ export function Workbench({ detail, start }: Props) {
   return (
     <BuilderContext value={builder}>
       <Bar detail={detail} builder={builder} beside={beside} onBeside={setBeside} />
+      {meeting !== null && <Met meeting={meeting} version={detail.summary.version} />}
       <div className={beside ? "builder with-toml" : "builder"}>
         <Sections study={name} builder={builder} current={section.id} />
         <Stack gap="sm" className="builder-page">
@@ -130,6 +133,60 @@ export function Workbench({ detail, start }: Props) {
       {builder.design !== null && !wrong && <DesignLine design={builder.design} />}
     </BuilderContext>
   );
+}
+
+/** What somebody else changed meanwhile, and for each field that both changed, whose words stay. */
+function Met({ meeting: { both, theirs }, version }: { meeting: Meeting; version: number }) {
+  const builder = useBuilderHere();
+  const [taken, setTaken] = useState<readonly string[]>([]);
+  const choose = ({ path, mine, theirs: other }: MeetingEdit, whose: string) => {
+    const change = whose === "theirs" ? other : mine;
+    setTaken(whose === "theirs" ? [...taken, path] : taken.filter((one) => one !== path));
+    builder.set([], withChange(builder.data, change.at, change.after));
+  };
+  return (
+    <Alert color={both.length > 0 ? "yellow" : "blue"} variant="light" title={`Version ${String(version)} was saved while you edited`}>
+      {theirs.length > 0 && (
+        <>
+          <Text size="sm">Kept from version {version}:</Text>
+          <List size="sm">
+            {theirs.map((change) => (
+              <List.Item key={placeName(change.at)} className="wrap-anywhere">
+                {placeName(change.at)}: {shortly(change.after)}
+              </List.Item>
+            ))}
+          </List>
+        </>
+      )}
+      {both.length > 0 && <Text size="sm">You both changed {counted(both.length, "field")}. Choose what stays:</Text>}
+      {both.map((edit) => (
+        <Stack key={edit.path} gap={4} mt="xs" role="group" aria-label={edit.path}>
+          <Text size="sm" className="wrap-anywhere">
+            <code>{edit.path}</code> in version {version}: {shortly(edit.theirs.after)}; yours: {shortly(edit.mine.after)}
+          </Text>
+          <SegmentedControl
+            size="xs"
+            aria-label={`What stays of ${edit.path}`}
+            style={{ alignSelf: "flex-start" }}
+            value={taken.includes(edit.path) ? "theirs" : "mine"}
+            onChange={(whose) => choose(edit, whose)}
+            data={[
+              { value: "mine", label: "Yours" },
+              { value: "theirs", label: `Version ${String(version)}` },
+            ]}
+          />
+        </Stack>
+      ))}
+    </Alert>
+  );
+}
+
+const MAX_SHOWN = 160;
+
+function shortly(value: unknown): string {
+  if (value === undefined) return "removed";
+  const text = plain(value);
+  return text.length > MAX_SHOWN ? `${text.slice(0, MAX_SHOWN)} …` : text;
 }
 
 function Page({ section, rendered }: { section: Section; rendered: boolean }) {
@@ -194,6 +251,7 @@ interface BarProps {
 function Bar({ detail, builder, beside, onBeside }: BarProps) {
   const { name, revision, status } = detail.summary;
   const [note, setNote] = useState("");
+  const queries = useQueryClient();
   const save = useChange(
     () =>
       unwrap(
@@ -202,7 +260,17 @@ function Bar({ detail, builder, beside, onBeside }: BarProps) {
           body: { revision, toml: builder.toml, note },
         }),
       ),
-    { touches: [["study", name]], done: "Saved as a new version.", before: () => forgetWork(name) },
+    {
+      touches: [["study", name]],
+      done: "Saved as a new version.",
+      before: () => forgetWork(name),
+      // Somebody else saved meanwhile: their version is loaded, and the work kept here is put into it.
+      refused: (error) => {
+        if (!(error instanceof Refused) || error.status !== 409 || error.code !== "edited_meanwhile") return false;
+        void queries.invalidateQueries({ queryKey: ["study", name] });
+        return true;
+      },
+    },
   );
   const [asked, setAsked] = useState<Schemas["JudgedEdit"] | null>(null);
   // Judged at the press, not while typing: what is saved is what was judged.

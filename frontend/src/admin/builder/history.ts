@@ -1,5 +1,5 @@
-/** States of a declaration under edit, with undo and redo. */
-import { type Data, type Path, pathName, withDerivedName } from "./data";
+/** States of a declaration under edit, with undo and redo; edits of two people that meet. */
+import { type Data, isTable, type Path, pathName, textAt, withDerivedName, withValue } from "./data";
 
 interface State {
   data: Data;
@@ -60,4 +60,110 @@ export function redone(history: History): History {
 /** The newest text that is known: further data are written into it. */
 export function latestToml(history: History): string {
   return [history.now, ...[...history.past].reverse()].find((state) => state.toml !== null)?.toml ?? "";
+}
+
+// Edits of two people, or of two tabs, that began from the same version.
+
+/** A key of a table, or an element of a list by its name: a place that stays the same when elements come and go. */
+type Step = string | { named: string };
+
+export interface Change {
+  at: readonly Step[];
+  before: unknown;
+  after: unknown;
+}
+
+export interface MeetingEdit {
+  /** As the server names places, with the names of elements. */
+  path: string;
+  mine: Change;
+  theirs: Change;
+}
+
+export interface Meeting {
+  /** Their version with every change of mine in it. */
+  merged: Data;
+  /** What they changed and I did not: kept. */
+  theirs: readonly Change[];
+  /** What I changed and they did not: in it again. */
+  mine: readonly Change[];
+  /** What both changed, each in another way: mine for now. */
+  both: readonly MeetingEdit[];
+}
+
+/** Edits that began from `base`, brought together. */
+export function meetingOf(base: unknown, mine: Data, theirs: Data): Meeting {
+  const [my, other] = [changesBetween(base, mine), changesBetween(base, theirs)];
+  const both = my.flatMap((change) => {
+    const met = other.find((one) => isWithin(one.at, change.at) || isWithin(change.at, one.at));
+    return met === undefined || isSame(met.after, change.after) ? [] : [{ path: placeName(change.at), mine: change, theirs: met }];
+  });
+  const met = new Set<Change>(both.flatMap((edit) => [edit.mine, edit.theirs]));
+  return {
+    merged: my.reduce((data, change) => withChange(data, change.at, change.after), theirs),
+    theirs: other.filter((change) => !met.has(change)),
+    mine: my.filter((change) => !met.has(change)),
+    both,
+  };
+}
+
+/** "forms.about.fields.age.minimum" */
+export function placeName(at: readonly Step[]): string {
+  return at.map((step) => (typeof step === "string" ? step : step.named)).join(".");
+}
+
+function isWithin(inner: readonly Step[], outer: readonly Step[]): boolean {
+  return `${placeName(inner)}.`.startsWith(`${placeName(outer)}.`);
+}
+
+/** What differs, as few and as small changes as keys and names of elements tell. */
+export function changesBetween(before: unknown, after: unknown, at: readonly Step[] = []): Change[] {
+  if (isSame(before, after)) return [];
+  if (isTable(before) && isTable(after)) {
+    const keys = new Set([...Object.keys(before), ...Object.keys(after)]);
+    return [...keys].flatMap((key) => changesBetween(before[key], after[key], [...at, key]));
+  }
+  const [old, fresh] = [namesOf(before), namesOf(after)];
+  const inBoth = (names: readonly string[]) => names.filter((name) => old?.includes(name) && fresh?.includes(name));
+  if (old === null || fresh === null || !isSame(inBoth(old), inBoth(fresh))) return [{ at, before, after }];
+  return [...new Set([...old, ...fresh])].flatMap((named) =>
+    changesBetween(elementOf(before, named), elementOf(after, named), [...at, { named }]),
+  );
+}
+
+/** The names of a list's elements; null where it is no list of which each element has one of its own. */
+function namesOf(list: unknown): string[] | null {
+  if (!Array.isArray(list)) return null;
+  const names = (list as unknown[]).map(nameOf);
+  return names.includes("") || new Set(names).size < names.length ? null : names;
+}
+
+const nameOf = (element: unknown) => textAt(element, ["name"]) || textAt(element, ["value"]);
+const elementOf = (list: unknown, named: string) =>
+  Array.isArray(list) ? (list as unknown[]).find((one) => nameOf(one) === named) : undefined;
+
+function isSame(one: unknown, other: unknown): boolean {
+  if (one === other) return true;
+  if (Array.isArray(one) && Array.isArray(other))
+    return one.length === other.length && (one as unknown[]).every((value, index) => isSame(value, (other as unknown[])[index]));
+  if (!isTable(one) || !isTable(other)) return false;
+  const keys = new Set([...Object.keys(one), ...Object.keys(other)]);
+  return [...keys].every((key) => isSame(one[key], other[key]));
+}
+
+/** `data` with another value at a place; undefined takes it out. An element that is not there is put at the end. */
+export function withChange(data: Data, at: readonly Step[], value: unknown): Data {
+  const path: (string | number)[] = [];
+  let here: unknown = data;
+  for (const step of at) {
+    const list = Array.isArray(here) ? (here as unknown[]) : [];
+    const position = typeof step === "string" ? -1 : list.findIndex((one) => nameOf(one) === step.named);
+    const part = typeof step === "string" ? step : position < 0 ? list.length : position;
+    // Nothing is there to be taken out of.
+    if (here === undefined && value === undefined) return data;
+    path.push(part);
+    here = typeof part === "number" ? list[part] : isTable(here) ? here[part] : undefined;
+  }
+  if (value === undefined && here === undefined) return data;
+  return withValue(data, path, value) as Data;
 }

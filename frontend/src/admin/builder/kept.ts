@@ -12,6 +12,8 @@ export interface Kept {
   data: Data | null;
   /** Revision of the study that the work began from. */
   revision: number;
+  /** The stored text that the work began from; null in work that was kept before this was. */
+  base: string | null;
   at: string;
 }
 
@@ -57,9 +59,9 @@ function read(where: string): Kept | null {
   try {
     const stored: unknown = JSON.parse(localStorage.getItem(where) ?? "null");
     if (typeof stored !== "object" || stored === null) return null;
-    const { toml, data, revision, at } = stored as Partial<Kept>;
+    const { toml, data, revision, base, at } = stored as Partial<Kept>;
     if (typeof toml !== "string" || typeof revision !== "number" || typeof at !== "string") return null;
-    return { toml, data: isTable(data) ? data : null, revision, at };
+    return { toml, data: isTable(data) ? data : null, revision, base: typeof base === "string" ? base : null, at };
   } catch {
     return null;
   }

@@ -97,7 +97,7 @@ export function useBuilder({ summary, toml: stored, definition }: Schemas["Study
   const present = text ?? toml;
   useEffect(() => {
     if (present === stored) forgetWork(study);
-    else keepWork(study, { toml: present ?? base, data: present === null ? data : null, revision });
+    else keepWork(study, { toml: present ?? base, data: present === null ? data : null, revision, base: stored });
   }, [present, base, data, stored, study, revision]);
   const travel = (to: (history: History) => History) => () => {
     setText(null);
