@@ -89,13 +89,18 @@ def permutation_tests(
         members = tuple(result.factors.index(name) for name in effect.within)
         others = design.matrix[:, reduced_columns(design, effect.between, result.sum_of_squares)]
         z = scores[:, columns[members]]
+        # Freedman and Lane's: what the other terms explain is taken out before, and only errors are
+        # rearranged.
         residual = z - others @ np.linalg.lstsq(others, z, rcond=None)[0] if others.size else z
         flips = not effect.between
         f_value = effect.univariate.f_value
         if not np.isfinite(f_value):
             tests.append(PermutationTest(effect.effect, f_value, float("nan"), 0, False, flips))
             continue
+        # A generator for each effect: its p must not change with the effects that are tested beside it.
         draws, total, exact = _rearrangements(len(z), flips, n_random, np.random.default_rng(seed))
+        # The observed data are one of the rearrangements, and are compared by the same statistic to the
+        # last digit.
         ratio = _ratio(residual[None], directions[effect.between], basis)[0]
         larger = sum(
             int((_ratio(rearranged, directions[effect.between], basis) >= ratio * (1 - TIE)).sum())
@@ -109,6 +114,7 @@ def permutation_tests(
 def _ratio(scores: Floats, directions: Floats, basis: Floats) -> Floats:
     """Sum of squares of the term over the error, (B,), of scores (B, N, q); F but for a constant."""
     hypothesis = np.square(directions @ scores).sum(axis=(1, 2))
+    # By Pythagoras: the part outside the design is what its orthonormal basis does not hold.
     error = np.square(scores).sum(axis=(1, 2)) - np.square(basis.T @ scores).sum(axis=(1, 2))
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(hypothesis / np.maximum(error, 0.0), dtype=np.float64)
@@ -124,6 +130,7 @@ def _rearrangements(
     n: int, flips: bool, n_random: int, rng: np.random.Generator
 ) -> tuple[Iterator[Floats], int, bool]:
     """Chunks (B, n) of signs or orders of n participants: all where they are few; how many; whether all."""
+    # Where all can be tried none is drawn: the p is then exact, and the same for every seed.
     every = 2**n if flips else factorial(n)
     if every <= n_random + 1:
         orders = product((1.0, -1.0), repeat=n) if flips else permutations(range(n))

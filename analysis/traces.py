@@ -68,6 +68,7 @@ def event_train(events_s: Sequence[float], samples: int, rate_hz: float) -> Arra
     """(samples,) number of events in each sample's interval; an event belongs to the sample at its end."""
     train = np.zeros(samples)
     for time_s in events_s:
+        # Up to the sample at the interval's end, but not over it for a rounding error.
         sample = int(np.ceil(time_s * rate_hz - 1e-9))
         if sample < samples:
             train[sample] += 1.0
@@ -79,7 +80,10 @@ def correlogram(values: Array, train: Array) -> Array:
 
     d(t) = v(t) - v(t - 1), d(0) = 0; z is standardized over the clip. A constant trace has r = 0.
     """
+    # Changes, not levels: slow drifts of a slider correlate with anything.
     change = np.diff(values, axis=1, prepend=values[:, :1])
+    # Circular, by the Fourier transform: every lag at once, and the null distribution by shifts is exact
+    # for it.
     spectrum = np.conj(np.fft.rfft(_standard(train[None, :])))
     together = np.fft.irfft(np.fft.rfft(_standard(change)) * spectrum, n=train.size, axis=1)
     return np.asarray(together / train.size, np.float64)
@@ -144,9 +148,11 @@ def _chance(clips: Sequence[ClipTraces], lags: int, rng: np.random.Generator) ->
         return float(np.average(rows, axis=0, weights=weights).max())
 
     seen = greatest([0] * len(means))
+    # The greatest over lags against the greatest: the p needs no further correction for the many lags.
     times = sum(
         greatest([int(rng.integers(row.size)) for row in means]) >= seen - 1e-12 for _ in range(SHIFTS)
     )
+    # The observed one counts among the shifts, so that p is never 0 (Phipson & Smyth 2010).
     return (1 + times) / (1 + SHIFTS)
 
 
@@ -172,6 +178,7 @@ class MeanTrace:
 def mean_trace(clips: Sequence[ClipTraces]) -> MeanTrace:
     """The mean trace of one cell's clips, as long as the shortest of them."""
     samples = min(clip.values.shape[1] for clip in clips)
+    # A person's clips first, then people: whoever rated more clips must not weigh more.
     of_person: dict[str, list[Array]] = {}
     for clip in clips:
         for person, row in zip(clip.people, clip.values, strict=True):

@@ -95,6 +95,7 @@ class ItemFactors:
             for level in self.names(factor)[1:]
         ]
         design = np.array(columns).T.reshape(len(items), len(columns))
+        # The mean is not identified: comparisons tell of differences alone.
         centred = design - design.mean(axis=0)
         if design.shape[1] and np.linalg.matrix_rank(centred) < design.shape[1]:
             raise InputError(f"{self.source}: the factors are confounded on these items; remove one")
@@ -274,6 +275,7 @@ def goodness_of_fit(model: Model, counts: Counts, fitted: Fit) -> Goodness:
     outcomes, expected = counts.outcomes, counts.totals[:, None] * fitted.shares
     if not model.order_effect:
         outcomes, expected = _unordered(counts, outcomes), _unordered(counts, expected)
+    # An outcome that never came adds 0 log 0 = 0.
     ratio = np.where(outcomes > 0, outcomes / np.where(expected > 0, expected, 1.0), 1.0)
     deviance = float(2 * np.sum(outcomes * np.log(ratio)))
     df = outcomes.shape[0] * (outcomes.shape[1] - 1) - model.names
@@ -387,6 +389,7 @@ def _items(comparisons: Comparisons, fitted: Fit, full: Array, robust: Array | N
     centring = full - full.mean(axis=0)
     centred = np.sqrt(np.clip(np.diag(centring @ fitted.covariance @ centring.T), 0.0, None))
     spread = None if robust is None else np.sqrt(np.clip(np.diag(full @ robust @ full.T), 0.0, None))
+    # Rounded: abilities that are equal by symmetry differ in the last digits.
     ranks = stats.rankdata(-np.round(abilities, 10), method="min").astype(int)
     return tuple(
         Item(
@@ -432,6 +435,8 @@ def _robust(comparisons: Comparisons, model: Model, fitted: Fit, counts: Counts)
     if model.method == "thurstone":
         difference = z[index, LEFT] - z[index, RIGHT]
         eta = difference @ fitted.parameters
+        # By logarithms, since the density and the distribution both vanish far out, where their ratio is
+        # about eta.
         sign = np.where(comparisons.outcome == LEFT, 1.0, -1.0)
         rows = (sign * np.exp(stats.norm.logpdf(eta) - stats.norm.logcdf(sign * eta)))[:, None] * difference
     else:
@@ -455,6 +460,7 @@ def _contrasts(
         z = difference / se if se > 0 else float("nan")
         rows.append((items[first], items[second], difference, se, z, _two_sided(difference, se)))
         clustered.append(_clustered(difference, contrast, robust, len(comparisons.participants)))
+    # A contrast without a standard error is no test, and does not count among those to adjust for.
     p = _holm([row[-1] if np.isfinite(row[-1]) else None for row in rows])
     robust_p = _holm([p for _, p in clustered])
     return tuple(

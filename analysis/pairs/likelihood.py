@@ -75,6 +75,7 @@ def count_outcomes(comparisons: Comparisons, *, ties: bool) -> Counts:
     """Count outcomes by ordered pair."""
     items = len(comparisons.items)
     pair = comparisons.left * items + comparisons.right
+    # Ordered pairs with their counts: the cost of a step depends on items, not on comparisons.
     seen, index = np.unique(pair, return_inverse=True)
     outcomes = np.zeros((seen.size, 3 if ties else 2))
     np.add.at(outcomes, (index, comparisons.outcome), 1.0)
@@ -126,16 +127,19 @@ def fit(model: Model, counts: Counts, *, firth: bool = False) -> Fit:
         Where the likelihood has no maximum.
     """
     step = _thurstone_step if model.method == "thurstone" else _softmax_step
+    # All items alike: for a concave likelihood any start will do, and this one lies inside.
     parameters = np.zeros(model.names)
     previous = -np.inf
     for _ in range(STEPS_MAX):
         value, gradient, information, curvature, shares = step(model, counts, parameters, firth)
+        # Separation shows as abilities that run away, long before the likelihood is flat to the last digit.
         if np.any(np.abs(parameters[: model.design.shape[1]]) > FAR):
             raise no_maximum(firth)
         change = _solved(curvature, gradient)
         if value - previous < TOLERANCE * (1 + abs(value)) and np.max(np.abs(change), initial=0) < 1e-9:
             covariance = np.linalg.inv(information).astype(np.float64)
             return Fit(parameters, covariance, _plain(counts, shares), shares)
+        # Halved where a full Newton step would lose, as it may in Thurstone's model far from the maximum.
         size = 1.0
         while size > 1e-8 and step(model, counts, parameters + size * change, firth)[0] < value - 1e-12:
             size /= 2
@@ -191,6 +195,7 @@ def _softmax_step(
     """Log-likelihood, gradient, information, the curvature that a step goes by, and shares of outcomes."""
     z = scores(model, counts.left, counts.right)
     eta = z @ parameters
+    # Softmax is the same for shifted predictors, and exp cannot overflow below 0.
     eta -= eta.max(axis=1, keepdims=True)
     shares = np.exp(eta)
     shares /= shares.sum(axis=1, keepdims=True)
@@ -203,6 +208,8 @@ def _softmax_step(
     if firth:
         difference = z[:, LEFT] - z[:, RIGHT]
         spread = counts.totals * shares[:, LEFT] * shares[:, RIGHT]
+        # Firth's penalty is half the log determinant of the information; its gradient needs these alone
+        # (Heinze & Schemper 2002).
         leverage = spread * np.einsum("mp,pq,mq->m", difference, np.linalg.inv(information), difference)
         gradient = gradient + (leverage * (0.5 - shares[:, LEFT])) @ difference
         value += 0.5 * float(np.linalg.slogdet(information)[1])

@@ -76,6 +76,8 @@ class PlaneLikelihood:
             variance = p * (1 - p)
             information = x.T @ (x * (self.n * slope**2 / variance)[:, None])
             score = x.T @ ((self.k - self.n * p) / variance * slope)
+            # Least squares, as the information of a step-like function is singular to rounding on its way
+            # to the maximum.
             step: Array = np.asarray(np.linalg.lstsq(information, score, rcond=None)[0], dtype=np.float64)
             beta, value, gained = self._stepped(x, offset, beta, step, value)
             if gained < TOLERANCE * (1 + abs(value)):
@@ -86,6 +88,7 @@ class PlaneLikelihood:
         self, x: Array, offset: Array | float, beta: Array, step: Array, before: float
     ) -> tuple[Array, float, float]:
         """The step, halved until the likelihood rises."""
+        # Scoring may overshoot where guesses make the likelihood not concave; 2^-40 of a step is none.
         for halving in range(40):
             moved = beta + step * 0.5**halving
             value = self.value(x @ moved + offset)
@@ -95,6 +98,7 @@ class PlaneLikelihood:
 
     def start(self, x: Array) -> Array:
         """Least squares on smoothed shares, put back on the predictor's scale."""
+        # Half an answer of either kind: shares of 0 and 1 have no finite predictor.
         share = ((self.k + 0.5) / (self.n + 1) - self.guess) / self.scale
         share = np.clip(share, 0.02, 0.98)
         eta = special.ndtri(share) if self.shape == "normal" else special.logit(share)
@@ -103,6 +107,7 @@ class PlaneLikelihood:
 
     def steepest(self, beta: Array, x: Array) -> float:
         """The greatest dP/d eta at a stimulus."""
+        # Of F itself: guesses and lapses flatten P, and say nothing of overlap.
         return float(self._share(x @ beta)[1].max()) / self.scale
 
     def deviance(self, beta: Array, x: Array) -> float:
@@ -287,6 +292,8 @@ def fit_plane(
     width = float(np.ptp(points.x))
     columns = np.column_stack([np.ones_like(x), x, away])
     beta, value, information = link.best(columns, [link.start(columns), *_broad(x, width)])
+    # Falling functions were turned round above: a slope of the other sign contradicts the declared
+    # direction.
     if not beta[1] > 1e-6 / width:
         raise InputError(
             "the answers do not change with x in the expected direction, so there is no threshold"
@@ -297,6 +304,8 @@ def fit_plane(
         )
     threshold, tilt, spread = -beta[0] / beta[1], -beta[2] / beta[1], 1 / beta[1]
     covariance = np.linalg.inv(information)
+    # The delta method: t = -b0 / b1 and tilt = -b2 / b1, differentiated by (b0, b1, b2) with spread = 1 /
+    # b1.
     gradients = np.array([[-spread, -threshold * spread, 0.0], [0.0, -tilt * spread, -spread]])
     errors = np.sqrt(np.einsum("ij,jk,ik->i", gradients, covariance, gradients))
     profile = PlaneProfiles(link, x, points.z, value, (float(beta[0] - beta[2] * middle), beta[1], beta[2]))

@@ -113,6 +113,7 @@ class MarginalLikelihood:
 
     def __init__(self, people: Sequence[Points], pooled: Plane) -> None:
         self.pooled, self.sign = pooled, -1.0 if pooled.falling else 1.0
+        # One grid of stimuli for all people: P is computed once per node, whoever answered.
         stimuli = np.unique(np.concatenate([np.column_stack([one.x, one.z]) for one in people]), axis=0)
         rows = {(x, z): row for row, (x, z) in enumerate(stimuli.tolist())}
         self.n, self.k = np.zeros((2, len(people), len(stimuli)))
@@ -123,6 +124,8 @@ class MarginalLikelihood:
         u, v = (np.linspace(-end, end, count) for end, count in zip(END, NODES, strict=True))
         self.u, self.v = (grid.ravel() for grid in np.meshgrid(u, v, indexing="ij"))
         weights = stats.norm.logpdf(self.u) + stats.norm.logpdf(self.v)
+        # Normalized, so that even nodes, unlike Gauss and Hermite's, still give a mean: the ends of the
+        # grid lose nothing that counts.
         self.log_weights = weights - special.logsumexp(weights)
         self.width = float(np.ptp(self.x))
         self.slope_unit = self.width / float(np.ptp(self.away))
@@ -158,6 +161,7 @@ class MarginalLikelihood:
         given = self.k @ np.log(p) + (self.n - self.k) @ np.log1p(-p) + self.log_weights
         each = special.logsumexp(given, axis=1)
         weights = np.exp(given - each[:, None])
+        # Sums over people first: the matrix of stimuli by nodes is then multiplied once.
         score = (self.k.T @ weights / p - (self.n - self.k).T @ weights / (1 - p)) * slope
         by_node, by_tilt = score.sum(axis=0), (score * self.away).sum(axis=0)
         gradient = -np.array(
@@ -185,6 +189,7 @@ class MarginalLikelihood:
     def maximum(self, start: Array, held: int | None = None) -> tuple[Array, float]:
         """The best parameters and their log-likelihood; the `held` one stays as it is at the start."""
         free = [part for part in range(5) if part != held]
+        # The search's tolerances are absolute; thresholds are in anybody's unit.
         units = np.array([self.width, self.slope_unit, 1.0, 1.0, 1.0])
 
         def negative(scaled: Array) -> tuple[float, Array]:
@@ -220,6 +225,8 @@ class MarginalLikelihood:
         for _ in range(SECANTS):
             held = best.copy()
             held[part] += away
+            # The root of the fall is linear where the profile is a parabola, so that secants arrive in a
+            # few steps.
             height = float(np.sqrt(max(0.0, 2 * (value - self.maximum(held, part)[1]))))
             if abs(height - root) < CLOSE * root:
                 return float(best[part] + away)

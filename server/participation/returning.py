@@ -49,8 +49,12 @@ CODE_SIGNS = _GROUP + _SECRET_SIGNS
 def pseudonym(study_key: str, identifier: str) -> str:
     """The name of a person within one study."""
     digest = hmac.digest(
-        bytes.fromhex(study_key), identifier.encode("utf-8", "surrogatepass"), hashlib.sha256
+        # Addresses may hold halves of characters; a person who has one must still get a name.
+        bytes.fromhex(study_key),
+        identifier.encode("utf-8", "surrogatepass"),
+        hashlib.sha256,
     )
+    # 48 bits: among a million people the chance that two share a name is 0.2 %.
     return f"p{digest.hex()[:12]}"
 
 
@@ -75,6 +79,8 @@ def run_prefix(typed: str) -> str | None:
 
 def code_fits(key: bytes, public_id: str, typed: str) -> bool:
     """Whether the typed code is that of this run."""
+    # In constant time, as the code is a secret: the time of an answer must not tell how much of it was
+    # right.
     return hmac.compare_digest(_signs(resume_code(key, public_id)).encode(), _signs(typed).encode())
 
 
@@ -138,6 +144,7 @@ def known_run(
     start: RunStart,
 ) -> StudyRun | None:
     """The run that this visitor has shown to be theirs; None where one begins."""
+    # From the strongest proof to the weakest; the browser's own secret needs nobody to type anything.
     run = run_repository.run_of_client(session, link, str(start.client_id))
     if run is None and start.resume_code is not None:
         return _run_of_code(settings, session, link, start.resume_code)

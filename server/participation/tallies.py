@@ -51,6 +51,7 @@ class ClipTime(NamedTuple):
     def plus(self, clip_ms: float, issued_at: datetime, received_at: datetime) -> "ClipTime":
         """With one more answer: the same in whatever order they come."""
         first, newest, last = self[2:]
+        # Two sums are enough: tickets come from the page that was loaded last, but for those it replaced.
         is_newer = newest is None or issued_at > newest
         before_ms = 0.0 if is_newer else self.newest_clip_ms
         return ClipTime(
@@ -119,11 +120,13 @@ class TallyEntry(NamedTuple):
     def packed(self) -> int:
         """As one number of 64 bits."""
         second = 0 if self.second is None else self.second + 1
+        # One number per answer: a million ratings are then 8 MB, which results read in one piece.
         return (self.clip << _CLIP_BITS | second) << _VALUE_BITS | (self.units + _ZERO)
 
     @property
     def units(self) -> int:
         """The value in whole thousandths, within what 28 bits hold."""
+        # Held at the ends: a value that does not fit must not spill into the clip's bits.
         return min(_ZERO - 1, max(-_ZERO, round(UNIT * self.value)))
 
 
@@ -204,6 +207,7 @@ class Tally:
             return
         key = f"{play.verdict} {play.method} {play.rule}"
         self.plays[key] = self.plays.get(key, 0) + 1
+        # What is counted for results is what the analysis keeps; a failed play counts in `plays` alone.
         if play.verdict == "failed" or not play.answers:
             return
         if play.rt is not None:
@@ -269,6 +273,7 @@ def packed_codes(packed: bytes | bytearray) -> "array[int]":
 
 
 def _little(codes: "array[int]") -> "array[int]":
+    # A database may move between machines: what is stored has one order of bytes.
     if sys.byteorder == "little":
         return codes
     turned = array("Q", codes)

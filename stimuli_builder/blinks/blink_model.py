@@ -82,6 +82,7 @@ class BlinkModel:
                 f"{len(profiles)} profiles allow 1 to {len(profiles) - 1} components, got {components}"
             )
         eyes = 2 if all(profile.closure_other is not None for profile in profiles) else 1
+        # Means of the phases, so that the scaling factors vary about 1.
         down = round(float(np.mean([profile.down_frames for profile in profiles])))
         up = round(float(np.mean([profile.up_frames for profile in profiles])))
         form = np.array([_normalised(profile, down, up, eyes) for profile in profiles])
@@ -128,6 +129,7 @@ class BlinkModel:
         """
         form, down_scale, up_scale = self.normalised_forms(coefficients)
         down, up = round(self.down_frames * down_scale), round(self.up_frames * up_scale)
+        # Dropped, not cut: cut blinks would all close by exactly 1, which no recorded set does.
         if form.max() > 1.0 or down < 1 or up < 1:
             return None
         closure = np.round(np.maximum(form, 0.0), 9)
@@ -158,6 +160,7 @@ class BlinkModel:
         """
         generator = np.random.default_rng() if rng is None else rng
         for _ in range(MAX_DRAWS):
+            # Even within one SD, after the paper: normal draws would often leave what was recorded.
             relative = generator.uniform(-1.0, 1.0, self.coefficient_sd.size)
             name = profile_id or "model-" + "-".join(f"{value * 1000:+.0f}" for value in relative)
             blink = self.profile(relative * self.coefficient_sd, name)
@@ -302,8 +305,12 @@ class PhaseModel:
         spread = np.maximum(self.numbers.std(axis=0), 1e-6)
         one = int(rng.integers(len(self.numbers)))
         away = (((self.numbers - self.numbers[one]) / spread) ** 2).sum(1)
+        # A stable sort: ties, as of blinks that are copies, come in one order on every machine. The first
+        # is the blink itself.
         near = np.argsort(away, kind="stable")[1 : 1 + NEIGHBOURS]
         two = int(near[rng.integers(near.size)])
+        # Nearer to the one than to the other, else most blinks would be averages, whose closed phase is too
+        # smooth.
         weight = float(rng.uniform(0.5, 1.0))
         numbers = weight * self.numbers[one] + (1 - weight) * self.numbers[two]
         numbers = numbers + rng.normal(0, SPREAD, 4) * spread

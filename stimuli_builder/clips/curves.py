@@ -38,6 +38,7 @@ def frame_windows(sample_count: int, fps: float, blur: bool) -> Iterator[tuple[N
         Rate of the output, 24 to 60.
     """
     step = samples_per_frame(fps)
+    # 300 / 29.97 and its like leave a whole number of frames a rounding error short.
     frames = int(sample_count / step + 1e-9)
     if frames < 1:
         raise InputError(
@@ -48,6 +49,7 @@ def frame_windows(sample_count: int, fps: float, blur: bool) -> Iterator[tuple[N
             yield np.array([int(start + step / 2 + 1e-9)]), np.ones(1)
             continue
         sample = np.arange(int(start), min(sample_count, int(np.ceil(start + step)) + 1))
+        # How much of each sample's own time, one 300th of a second, lies within the frame's.
         covered = np.clip(np.minimum(start + step, sample + 1) - np.maximum(start, sample), 0.0, 1.0)
         used = covered > 0
         yield sample[used], covered[used] / covered.sum()
@@ -67,6 +69,7 @@ def frame_weights(sample_count: int, fps: float, blur: bool) -> Array:
 
 def generator(*parts: str | int) -> np.random.Generator:
     """A generator seeded by the given names and numbers."""
+    # A separator that no name holds, else "a1" + "2" and "a" + "12" would draw the same numbers.
     text = "\x1f".join(str(part) for part in parts)
     return np.random.default_rng(int.from_bytes(hashlib.sha256(text.encode()).digest()[:16], "little"))
 
@@ -76,6 +79,8 @@ Reach = tuple[tuple[float, float], tuple[float, float]]
 LEAD_IN_S = (0.35, 0.80)
 LEAD_OUT_S = (0.35, 0.60)
 """Shortest and longest open-eye time before and after a blink; drawn for every clip by its seed."""
+# Far finer than any level of light, and coarse enough that every machine writes the same digits into the
+# hash of a clip.
 DECIMALS = 6
 HELD_MM = 0.3
 """The tolerance of the picture itself (`stimuli verify`)."""
@@ -183,6 +188,7 @@ def clip_curve(
         )
 
     def held(values: Array) -> Array:
+        # The eye rests as the recording left it: a jump to the mean opening would be a movement of its own.
         return np.pad(values, (onset, total - end), mode="edge")
 
     def laid(values: Array) -> Array:

@@ -184,7 +184,9 @@ def eye_light(
     weights: NDArray[np.float64],
 ) -> Light:
     """(h, w, 3) linear light (of 65535) of the window where both eyes follow one signal of the curve."""
+    # Linear in light, so the mean over the shutter's time is one set of weights over levels.
     level_weights = weights @ character.level_weights(closure[samples])
+    # Less than a hundredth of a 16-bit step in any pixel.
     chosen = np.flatnonzero(level_weights > 1e-7)
     flat = character.levels.reshape(len(character.levels), -1)
     light = np.empty(flat.shape[1], np.float32)
@@ -201,4 +203,5 @@ def same_picture(curve: ClipCurve, samples: NDArray[np.int64], weights: NDArray[
     motion = curve.motion(samples)
     if np.all(motion == motion[:, :1]):
         return motion[:, 0].tobytes()
+    # Rounded, as the weights of equal frames differ in the last digits by where in the clip they are.
     return motion.tobytes() + np.round(weights, 12).tobytes()

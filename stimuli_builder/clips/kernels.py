@@ -13,6 +13,7 @@ _BLOCK = 4096
 def gamma_table() -> NDArray[np.float32]:
     """Gamma-encoded sRGB in 0-1 of every 16-bit linear value."""
     linear = np.arange(FULL_SCALE + 1) / FULL_SCALE
+    # IEC 61966-2-1. Tables, as the power takes longer than all the rest of a pixel.
     encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
     return encoded.astype(np.float32)
 
@@ -83,8 +84,12 @@ def to_yuv(
             r = gamma[int(min(max(light[y, x, 0], 0.0), 65535.0) + 0.5)]
             g = gamma[int(min(max(light[y, x, 1], 0.0), 65535.0) + 0.5)]
             b = gamma[int(min(max(light[y, x, 2], 0.0), 65535.0) + 0.5)]
+            # BT.709's luma, of gamma-encoded values as the standard asks, not of light.
             grey = np.float32(0.2126) * r + np.float32(0.7152) * g + np.float32(0.0722) * b
+            # Limited range, 16 to 235, with half a level for rounding: players stretch it, and treat full
+            # range each in their own way.
             luma[y, x] = np.uint8(np.float32(16.5) + np.float32(219.0) * grey)
+            # 2 (1 - 0.0722) = 1.8556 is the span of b - grey, 2 (1 - 0.2126) = 1.5748 that of r - grey.
             row_blue[side, x] = (b - grey) * np.float32(224.0 / 1.8556)
             row_red[side, x] = (r - grey) * np.float32(224.0 / 1.5748)
         if side == 1:

@@ -78,6 +78,7 @@ def compare(appearance, weights, c, sampled, look, error, out):
         looks, samples = look[first:last], sampled[first:last]
         errors, counted = error[first:last], weights[first:last]
         for x in range(errors.shape[0]):
+            # Model minus picture, weighted once here: `project` and `accumulate` need only this product.
             errors[x] = counted[x] * (looks[x] - samples[x])
         project(appearance, error, first, last, out)
         first = last
@@ -88,12 +89,16 @@ def step(c, pose, change, limits, scales, centre):
     """Additive step in c, kept within +-limits; similarity composed in the base frame, in place."""
     count = c.shape[0]
     for i in range(count):
+        # Held within the limits at every step: a fit that once left them draws a shape from which no
+        # gradient leads back.
         c[i] = min(max(c[i] - change[i], -limits[i]), limits[i])
+    # By the norms, as `similarity_directions` gives unit movements.
     a = 1.0 - change[count] / scales[0]
     b = -change[count + 1] / scales[1]
     tx = centre[0] - (a * centre[0] - b * centre[1]) - change[count + 2] / scales[2]
     ty = centre[1] - (b * centre[0] + a * centre[1]) - change[count + 3] / scales[3]
     p, q, u, w = pose[0], pose[1], pose[2], pose[3]
+    # Composed, not added: the steepest-descent images are those of the base frame.
     pose[0] = p * a - q * b
     pose[1] = q * a + p * b
     pose[2] = p * tx - q * ty + u
@@ -124,6 +129,7 @@ def moved_by(vertices, before):
     for v in range(vertices.shape[0]):
         for axis in range(2):
             distance = abs(vertices[v, axis] - before[v, axis])
+            # NaN included: a comparison with it is false.
             if not distance < np.float32(1e6):
                 return np.float32(np.inf)
             furthest = max(furthest, distance)
@@ -152,6 +158,7 @@ def fit(picture, c, pose, max_iterations, tolerance, mesh, model, buffers):
     while iteration < max_iterations:
         iteration += 1
         bounds(vertices, height, width, 1, needed)
+        # Packing costs as much as an iteration; within MARGIN the mesh moves without it.
         if outside(needed, box):
             bounds(vertices, height, width, MARGIN, box)
             cells = pack_pixels(picture, box)
@@ -166,6 +173,7 @@ def fit(picture, c, pose, max_iterations, tolerance, mesh, model, buffers):
         hessian(model.hessian_forms, c, matrix)
         for k in range(c.shape[0]):
             matrix[k, k] += model.prior[k]
+            # The gradient of the prior's penalty, prior c^2 / 2, beside its Hessian on the diagonal.
             change[k] += model.prior[k] * c[k]
         if not solve(matrix, change):
             return 0

@@ -39,6 +39,7 @@ def bounds(vertices, height, width, margin, out):
             low = min(low, vertices[v, 1 - axis])
             high = max(high, vertices[v, 1 - axis])
         cells = (height if axis == 0 else width) - 1
+        # Within the picture even where the mesh has left it: a box is never empty.
         first = min(max(int(low) - margin, 0), cells - 1)
         out[2 * axis] = first
         out[2 * axis + 1] = min(max(int(high) + 1 + margin, first + 1), cells)
@@ -59,6 +60,7 @@ def pack_pixels(picture, box):
         below = picture[box[0] + row + 1, box[2] : box[3] + 1]
         line = cells[row]
         for x in range(line.shape[0]):
+            # Neighbors side by side in one word: a sample then touches memory once, not in two rows.
             upper = np.uint32(above[x]) | (np.uint32(above[x + 1]) << np.uint32(8))
             lower = np.uint32(below[x]) | (np.uint32(below[x + 1]) << np.uint32(8))
             line[x] = np.int32(upper | (lower << np.uint32(16)))
@@ -76,6 +78,7 @@ def warp(vertices, triangles, starts, forms, px, py, out_x, out_y):
         ay = zero
         by = zero
         cy = zero
+        # The affine map of the triangle, from its corners' places: one product per pixel and axis follows.
         for k in range(3):
             vx = vertices[triangles[t, k], 0]
             vy = vertices[triangles[t, k], 1]
@@ -102,6 +105,7 @@ def locate(xs, ys, box, height, width, out):
     """
     left = np.float32(box[2])
     top = np.float32(box[0])
+    # A thousandth inside the last cell, so that its number, cut to a whole one, is still that of a cell.
     right = min(np.float32(width - 1.001), np.float32(box[3] - 0.001))
     bottom = min(np.float32(height - 1.001), np.float32(box[1] - 0.001))
     stride = np.int32(box[3] - box[2])
@@ -130,6 +134,7 @@ def blend(cells, xs, ys, out):
         p01 = np.float32((cell >> np.int32(8)) & byte)
         p10 = np.float32((cell >> np.int32(16)) & byte)
         p11 = np.float32((cell >> np.int32(24)) & byte)
+        # Three products in place of the four of weights.
         upper = p00 + xs[i] * (p01 - p00)
         out[i] = upper + ys[i] * (p10 + xs[i] * (p11 - p10) - upper)
 
@@ -145,6 +150,7 @@ def look_up(cells, box, height, width, xs, ys, out):
         block = numbers[: last - first]
         locate(xs[first:last], ys[first:last], box, height, width, block)
         for i in range(block.shape[0]):
+            # Unsigned: the compiler then leaves out the test for numbers that count from the end.
             block[i] = flat[np.uint32(block[i])]
         blend(block, xs[first:last], ys[first:last], out[first:last])
         first = last

@@ -48,6 +48,7 @@ def project(modes, error, first, last, out):
     count = modes.shape[0] - 1
     part = error[first:last]
     i = 0
+    # Four modes at a time, so that every error is read once for four sums.
     while i + 4 <= count:
         m0 = modes[i + 1, first:last]
         m1 = modes[i + 2, first:last]
@@ -128,6 +129,7 @@ def solve(matrix, right):
         diagonal = matrix[j, j]
         for k in range(j):
             diagonal -= matrix[j, k] * matrix[j, k]
+        # Written so that NaN fails too.
         if not diagonal > 0.0:
             return False
         root = np.sqrt(diagonal)

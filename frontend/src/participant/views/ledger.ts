@@ -33,6 +33,7 @@ const RELOADED = "scale_reloaded";
 
 /** Begin a view of a trial that starts now. */
 export function beginView(session: Session, trial: TrialInfo, play: number): OpenView {
+  // Counted before it is kept: a view whose beginning is lost leaves a gap, never a number that two have.
   trial.views_begun += 1;
   const view: ViewIn = {
     id: crypto.randomUUID(),
@@ -56,6 +57,7 @@ export function beginView(session: Session, trial: TrialInfo, play: number): Ope
 
 async function send(session: Session, view: ViewIn): Promise<void> {
   const { receipt } = await session.outbox.put("POST", PATH, { views: [view] });
+  // On disk it survives whatever happens to the page; only without a disk must the server have it first.
   if (session.outbox.durable) return;
   await Promise.race([receipt, new Promise((resolve) => setTimeout(resolve, NOT_KEPT_WAIT_MS))]);
 }
@@ -86,6 +88,7 @@ function seenClips(trial: TrialInfo, shown: readonly RolesShown[]): NonNullable<
     const showing = shown.find(({ roles }) => roles.includes(role))?.showing;
     const start = showing?.key_at_ms ?? 0;
     const log = frameLog((showing?.drawn ?? []).map(([index, at_ms]): [number, number] => [Math.min(index, frames - 1), at_ms - start]));
+    // A shorter clip holds its last frame while the longer goes on: it is drawn again, but it is seen once.
     const first = log.filter(([index], row) => row === 0 || log[row - 1]?.[0] !== index);
     return { role, clip_sha256, drawn: first };
   });
@@ -141,6 +144,7 @@ function restored(view: ViewState): RolesShown[] {
  */
 export async function settleInterrupted(session: Session, file: (trial: TrialInfo, play: number) => Promise<void>): Promise<void> {
   for (const trial of session.run.trials) {
+    // Under the id of the view that began: the server completes it, and counts no second one.
     for (const { id, number, play, started_at_client } of trial.views.filter(({ ended }) => !ended)) {
       const start = { id, trial_index: trial.trial_index, number, play, started_at_client, evidence: ticketOf(session, trial, play) };
       await send(session, { ...start, ...INTERRUPTED });

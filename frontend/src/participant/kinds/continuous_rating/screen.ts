@@ -48,6 +48,7 @@ async function watch(session: Session, stage: Stage, { trial, play, number, tota
   const { signal, done } = screenSignal(session);
   const track = makeTrack(declared, session.language, signal);
   const ledger = beginView(session, trial, play);
+  // Begun before the slider is put in place: the layout of both is one, before the first frame.
   const shown = showOnce(session, stage, sha256, key_at_ms, 0, ledger.kept);
   stage.below.replaceChildren(...track.parts);
   track.focus();

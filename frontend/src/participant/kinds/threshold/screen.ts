@@ -31,6 +31,7 @@ function thresholdTrial(session: Session): PluginClass<TrialParameters> {
 
 async function runTrial(session: Session, display: HTMLElement, parameters: TrialParameters): Promise<ThresholdData> {
   const { trial, play, next } = parameters;
+  // The server may still be choosing this trial's clip from the answer before.
   await awaitChoice(session, display, trial);
   begin(trial);
   const body = await watchAndAnswer(session, display, parameters).catch(
