@@ -179,6 +179,7 @@ def reliability(data: ItemAnswers) -> Reliability:
     omega = None
     if loadings is not None:
         common = float((loadings * spread).sum()) ** 2
+        # In the items' own units, as scale scores are sums of raw answers and not of standardized ones.
         omega = common / (common + float(((1 - loadings**2) * spread**2).sum()))
     own = [None] * len(data.items) if loadings is None else list(map(float, loadings))
     items = tuple(_item(data, i, loading) for i, loading in enumerate(own))
@@ -210,6 +211,7 @@ def _one_factor(answers: Floats) -> tuple[Floats | None, str]:
         return None, f"omega needs {MIN_OMEGA_ITEMS} items or more"
     if n <= items:
         return None, f"omega needs more cases than items, got {n} and {items}"
+    # Maximum likelihood does not depend on the items' scales, so that correlations are enough.
     correlations: Floats = np.atleast_2d(np.corrcoef(answers, rowvar=False))
     if np.linalg.cond(correlations) > 1e8:
         return None, "an item is determined by the others, so omega is not defined"
@@ -218,6 +220,7 @@ def _one_factor(answers: Floats) -> tuple[Floats | None, str]:
         return None, "one factor explains an item completely (a Heywood case), so omega is not defined"
     if not _is_maximum(correlations, loadings):
         return None, "the one-factor fit did not converge, so omega is not defined"
+    # The sign of a factor is arbitrary.
     return loadings * (np.sign(loadings.sum()) or 1.0), ""
 
 

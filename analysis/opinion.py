@@ -138,6 +138,7 @@ def _put(values: NDArray[Any], at: Flags, beside: float) -> NDArray[Any]:
 def _projected(scores: Array, counts: Array, squares: Array) -> Projection:
     """The same where everybody has voted on two items or more."""
     seen = np.isfinite(scores)
+    # Votes in units of their range: the limits above then hold for any scale.
     middle = float(np.nanmean(scores))
     unit = float(np.nanmax(scores) - np.nanmin(scores)) or 1.0
     votes = np.where(seen, (scores - middle) / unit, 0.0)
@@ -150,6 +151,7 @@ def _projected(scores: Array, counts: Array, squares: Array) -> Projection:
         fallen = (fit.spread <= COLLAPSED * common) & ~held
         if not fallen.any() or common == 0:
             break
+        # Held for good, so that the outer loop ends after as many rounds as there are people at most.
         held |= fallen
     error = _errors(votes - fit.bias[:, None], number, apart)
     return Projection(
@@ -186,11 +188,14 @@ def _errors(unbiased: Array, number: Array, apart: Array) -> Array:
 def _weighted(votes: Array, number: Array, apart: Array, groups: Codes, held: Flags) -> _Fit:
     """Alternate until the qualities stand still; people `held` are weighted by the common inconsistency."""
     of_person, seen = number.sum(axis=1), number > 0
+    # From the mean opinion scores, which the projection leaves only as far as people differ.
     quality = (votes * number).sum(axis=0) / number.sum(axis=0)
     iterations, change = 0, np.inf
     while True:
         iterations += 1
         bias = np.sum((votes - quality) * number, axis=1) / of_person
+        # Qualities and biases share a constant in each group of people tied by votes: here it is given to
+        # the qualities.
         bias -= (np.bincount(groups, weights=bias) / np.bincount(groups))[groups]
         residual = (votes - quality - bias[:, None]) * seen
         centred = residual - ((residual * number).sum(axis=1) / of_person)[:, None]

@@ -36,6 +36,10 @@ class Interval:
     low: float | None
     high: float | None
 
+    def changed(self, change: Callable[[float], float]) -> "Interval":
+        """The same interval of a parameter written in another way, which rises with this one."""
+        return Interval(*(None if end is None else change(end) for end in (self.low, self.high)))
+
 
 def normal_density(eta: Array) -> Array:
     """The standard normal density; scipy's takes ten times as long for a few values."""

@@ -169,7 +169,7 @@ class PlaneProfiles:
             return self._loss(columns, starts, self.x / s)
 
         ends = self._ends(loss, float(np.log(best)), 0.1, 8.0)
-        return Interval(*(None if end is None else float(np.exp(end)) for end in (ends.low, ends.high)))
+        return ends.changed(lambda end: float(np.exp(end)))
 
     def _loss(
         self, columns: Array, starts: Sequence[tuple[float, ...]], offset: Array | float = 0.0

@@ -106,11 +106,7 @@ def fit_threshold(
     lapsed = best[2] if lapse is None else lapse
     step = _is_step(model, trials, best)
     notes = _doubts(trials, location, log_spread, shape, lapsed, lapse is None, step) + _below(trials, guess)
-    if trials.x.size > len(best) and too_few_repeats(trials.n):
-        notes.append(
-            f"no fit p: {int(trials.n.sum())} answers at {trials.x.size} levels are too few per stimulus for "
-            "a test of fit"
-        )
+    notes += _untested(trials, len(best))
     low, high = float(trials.x.min()), float(trials.x.max())
     # Three ranges away F is as good as straight over the levels: its place would follow from its assumed
     # shape alone.
@@ -137,13 +133,9 @@ def fit_threshold(
         lapse is None,
         float(location),
         None if error is None else unit * error,
-        Interval(
-            *(None if end is None else centre + unit * end for end in (location_ci.low, location_ci.high))
-        ),
+        location_ci.changed(lambda end: centre + unit * end),
         float(np.exp(log_spread)),
-        Interval(
-            *(None if end is None else grown * float(np.exp(end)) for end in (spread_ci.low, spread_ci.high))
-        ),
+        spread_ci.changed(lambda end: grown * float(np.exp(end))),
         _slope(shape, location, log_spread) * (-1.0 if model.falling else 1.0),
         None if level is None else centre + unit * level,
         float(value),
@@ -255,6 +247,16 @@ def _doubts(
     if shape != "weibull" and np.exp(log_spread) > 10 * (trials.x.max() - trials.x.min()):
         notes.append("the answers hardly change over the levels shown")
     return notes
+
+
+def _untested(trials: Trials, parameters: int) -> list[str]:
+    """Say that the fit is not tested where stimuli were repeated too rarely."""
+    if trials.x.size <= parameters or not too_few_repeats(trials.n):
+        return []
+    return [
+        f"no fit p: {int(trials.n.sum())} answers at {trials.x.size} levels are too few per stimulus for "
+        "a test of fit"
+    ]
 
 
 def _below(trials: Trials, guess: float) -> list[str]:

@@ -34,6 +34,7 @@ def find_run(session: Session, token: str, *, lock: bool = False) -> StudyRun:
 def open_run(session: Session, token: str) -> StudyRun:
     """The run with this token, marked as seen; RunClosed where it is over."""
     run = find_run(session, token, lock=True)
+    # Under the lock: a run that ends at this moment takes nothing more.
     if run.status != "active":
         raise RunClosed(f"This visit is over ({run.status.replace('_', ' ')}); nothing more is stored.")
     run.last_seen_at = now()
@@ -95,6 +96,7 @@ def check_calibrations(stored: int) -> None:
 
 
 def _check_size(value: Mapping[str, Any], limit: int, what: str) -> None:
+    # Before the size: a text of brackets may be small and still exhaust the stack of whoever reads it.
     if _depth(value) > MAX_DEPTH:
         raise RunDataTooLarge(f"Expected {what} at most {MAX_DEPTH} levels deep.")
     size = len(json.dumps(value))
@@ -105,6 +107,7 @@ def _check_size(value: Mapping[str, Any], limit: int, what: str) -> None:
 def _depth(value: Any) -> int:
     """Levels of nesting, counted up to one more than is allowed."""
     level, depth = [value], 0
+    # Level by level and not by recursion, for the same reason.
     while level and depth <= MAX_DEPTH:
         inner = [one for one in level if isinstance(one, dict | list)]
         level = [part for one in inner for part in (one.values() if isinstance(one, dict) else one)]

@@ -30,6 +30,7 @@ from server.studies.lookup import definition_of
 
 def judge_run(session: Session, run: StudyRun) -> Judgement:
     """The judgement on a run as it is stored; runs whose page was not asked for evidence are not judged."""
+    # Of an erased run only counts are left: a new verdict would be made of nothing.
     if run.evidence != "asked" or run.erased_at is not None:
         return NOT_JUDGED
     rows = evidence_repository.answers(session, run)
@@ -71,6 +72,7 @@ def _answer(row: evidence_repository.StoredAnswer, offered: int) -> JudgedAnswer
     if trial.kind == "check":
         response = row.rating.payload.get("check")
     given = (evidence.interaction if evidence else None) or {}
+    # A digest that nobody could check counts neither for nor against the run.
     unchecked = evidence is not None and evidence.digest is not None and evidence.digest_right is None
     return JudgedAnswer(
         trial_index=trial.trial_index,

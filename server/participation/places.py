@@ -56,6 +56,7 @@ def open_turns(
     if not quotas or origin not in COUNTED_ORIGINS:
         return turns
     lease = timedelta(minutes=experiment.session.lease_minutes)
+    # Each origin for itself: pilot runs must not take the places that people are recruited for.
     taken = run_repository.places_by_group(session, version_id, origin, lease)
     return [turn for turn in turns if every[turn] not in quotas or taken[every[turn]] < quotas[every[turn]]]
 
@@ -78,8 +79,10 @@ def assign_slot(session: Session, run: StudyRun, loaded: LoadedVersion, turns: S
         run.slot = run_repository.free_slot_of(session, run.version_id, run.origin, lease, every, turns)
     run.group_name = name_of(seat_of(experiment, run.slot).levels)
     trials = _trials(session, run, experiment, lease)
+    # After the kind has assigned its trials: checks go between them, and change none.
     trials = with_checks(experiment, trials, run.seed, len(loaded.checks))
     run.trials_total = len(trials)
+    # The run has to be stored before rows that refer to it.
     session.flush()
     run_repository.add_trials(session, _trial_rows(run, loaded, trials), _clip_rows(run, loaded, trials))
     if KINDS[experiment.trial.kind].adapts:

@@ -75,12 +75,14 @@ def after_answer(
     if not rules:
         return NO_LAPSE
     rows = rating_repository.latest_answers(connection, run, max(rule.answers for rule in rules))
+    # Without events at first: nearly every answer ends here, and costs one query.
     if _broken_rule(rules, rows) is None:
         return NO_LAPSE
     events = rating_repository.events_of(connection, run, (WARNED, SHOWN))
     warned = sum(event.type == WARNED for event in events)
     shown = [event.received_at for event in events if event.type == SHOWN]
     rule = _broken_rule(rules, [row for row in rows if not shown or row.saved_at > max(shown)])
+    # One warning at a time: while the last is unread, no other is given, and nobody is ended.
     if rule is None or len(shown) < warned:
         return NO_LAPSE
     if warned < experiment.warnings.maximum:
@@ -125,6 +127,7 @@ def _as_told(
 def _broken_rule(rules: Sequence[WarningRule], rows: Sequence[Any]) -> WarningRule | None:
     """The first rule that the latest of these answers (the latest first) break."""
     values = [(comparable_answer(row.payload), row.rt) for row in rows]
+    # Back in the order of answering, in which patterns are looked for.
     given = [GivenAnswer(str(value), rt) for value, rt in values if value is not None][::-1]
     for rule in rules:
         if len(given) >= rule.answers and rule.lapses(given[-rule.answers :]):

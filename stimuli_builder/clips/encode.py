@@ -106,7 +106,9 @@ def _write(
     fps: float,
     alone_qp: int | None,
 ) -> None:
+    # 30000/1001 and its like come out exact.
     rate = Fraction(fps).limit_denominator(1001)
+    # Without the muxer's version and time, which would make equal clips differ.
     container_options = {"movflags": "+faststart", "fflags": "+bitexact"}
     with av.open(str(path), "w", format="mp4", options=container_options) as container:
         stream: Any = container.add_stream("libx264", rate=rate)
@@ -116,6 +118,8 @@ def _write(
         rated = usual if alone_qp is None else {"x264-params": _alone(alone_qp)}
         stream.options = {"preset": PRESET, "profile": "high", **rated}
         context = stream.codec_context
+        # More threads would change x264's decisions, and so the bytes; clips are encoded side by side
+        # instead.
         context.thread_count = 1
         context.time_base = 1 / rate
         context.color_range = LIMITED_RANGE

@@ -132,6 +132,8 @@ class Fissures:
         covered = np.full(opened.shape[:2], np.nan, np.float32)
         for index in chosen:
             picture = _blurred(character, int(index))
+            # Nearer to the shut picture than to the open one: no threshold that would hang on skin or
+            # light.
             looks_shut = ((picture - opened) ** 2).sum(2) > ((picture - shut) ** 2).sum(2)
             covered[looks_shut & np.isnan(covered)] = character.closures[index]
         return cls(character, opening_mm, covered, ((opened - shut) ** 2).sum(2) > _CLEAR)
@@ -157,6 +159,8 @@ class Fissures:
                 return None
             fitted = np.linalg.lstsq(terms[kept], upper_rows[kept], rcond=None)[0]
             off = np.abs(terms @ fitted - upper_rows)
+            # Lashes and highlights are covered at other closures than the skin about them: they are dropped
+            # round by round.
             kept = off < max(_NEAR_MM * scale, 2 * float(np.median(off)))
         upper = fitted[:3]
         return Fissure(column, upper, upper + np.append(fitted[3:], opening))
@@ -305,6 +309,7 @@ def _fetch(level: Light, shift: Shift) -> None:
     rows = np.flatnonzero(moves.any(axis=1))
     if len(rows):
         part = slice(int(rows[0]), int(rows[-1]) + 1)
+        # Fetched, not pushed: every pixel of the result gets a value, with no holes between.
         at = _pixels(level.shape[:2])[part] - shift[part]
         fetched = cv2.remap(level, at, None, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REFLECT_101)
         np.copyto(level[part], fetched, where=moves[part, :, None])

@@ -48,6 +48,7 @@ def plausible(labels: dict[int, Points]) -> dict[int, Points]:
     rows = np.array([apply_pose(shape, similarity_between(shape, mean)) for shape in shapes])
     rows = rows.reshape(len(rows), -1)
     rest = np.array([_unexplained(np.delete(rows, k, axis=0), rows[k]) for k in range(len(rows))])
+    # A robust limit, by the median and its deviations: the bad detections sought must not set it.
     limit = max(
         float(np.median(rest) + SPREADS * 1.4826 * np.median(np.abs(rest - np.median(rest)))),
         UNLIKE_SHARE * widths(mean),
@@ -68,6 +69,8 @@ def most_varied(shapes: dict[int, Points], count: int) -> list[int]:
     numbers = sorted(shapes)
     first = shapes[numbers[0]]
     rows = np.array([apply_pose(shapes[n], similarity_between(shapes[n], first)).ravel() for n in numbers])
+    # The most usual shape first; every next one is the farthest from those chosen, so that blinks are among
+    # them.
     chosen = [int(((rows - np.median(rows, axis=0)) ** 2).sum(1).argmin())]
     distance: NDArray[np.float64] = np.full(len(numbers), np.inf)
     while len(chosen) < min(count, len(numbers)):
@@ -123,6 +126,7 @@ def label_free_lesson(
         return lesson
     width = np.mean([widths(points) for points in labels.frames.values()])
     share = CLOSE_UP_SHARE if one_eye else FACE_SHARE
+    # Held-out frames are compared with the detector that trained the model: its own error has to be added.
     errors = np.hypot(lesson.model.point_errors, share * float(width))
     return replace(lesson, model=replace(lesson.model, point_errors=errors))
 

@@ -87,10 +87,13 @@ def lesson_from(
     """Train on labels that are at hand, a person's or a detector's; see `learn`."""
     pictures = read_frames(info, list(labels.frames))
     given = (pictures, labels.frames, labels.markers, options)
+    # Always on frames that were left out: errors on the training frames are of the model's size, not of its
+    # truth.
     held_out = cross_validate(*given, folds, refine=bool(refine), advance=advance)
     refined = bool(refine)
     if refine is None:
         trial = cross_validate(*given, folds, refine=True, advance=advance)
+        # Judged against the labels as given, else refining would be praised for agreeing with itself.
         if _typical(trial) < WORTH_REFINING * _typical(held_out):
             held_out, refined = trial, True
     points = refined_labels(*given) if refined else labels.frames

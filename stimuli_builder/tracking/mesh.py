@@ -116,6 +116,7 @@ def build_mesh(mean: Points, base_pixels: int) -> BaseMesh:
     """
     eyes = len(mean) // (EYE_POINTS + BORDER_POINTS)
     groups = [_eye_vertices(eye, eyes) for eye in range(eyes)]
+    # Each eye for itself: one triangulation of both would stretch triangles over the nose.
     triangles = [group[Delaunay(mean[group]).simplices] for group in groups]
     area = sum(_area(mean, part) for part in triangles)
     scale = float(np.sqrt(base_pixels / area))
@@ -144,6 +145,8 @@ def mesh_from(vertices: Points, triangles: NDArray[np.int64], eye_of: NDArray[np
         _claim(owner, number, form, vertices[triangles[number]])
     rows, columns = np.nonzero(owner >= 0)
     owners = owner[rows, columns]
+    # By triangle, so that a warp is six numbers per run of pixels; stable, so that models are equal on
+    # every machine.
     order = np.argsort(owners, kind="stable")
     starts = np.searchsorted(owners[order], np.arange(len(triangles) + 1)).astype(np.int64)
     x, y = columns[order].astype(np.float32), rows[order].astype(np.float32)
@@ -156,6 +159,7 @@ def _barycentric_forms(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     system = np.concatenate([corners, np.ones((len(corners), 3, 1))], axis=2)
     if np.abs(np.linalg.det(system)).min() < 1e-9:
         raise InputError("the mean of the labeled shapes has a flat triangle; check the labels' point order")
+    # Barycentric coordinates are linear in (x, y, 1): their forms are the inverse of the corners' matrix.
     return np.asarray(np.linalg.inv(system).transpose(0, 2, 1))
 
 
@@ -179,6 +183,7 @@ def reduce_picture(picture: Picture, factor: int) -> Picture:
         return picture
     height, width = (side // factor for side in picture.shape)
     whole = picture[: height * factor, : width * factor]
+    # Whole blocks, as a block cut at the edge would be a mean of fewer pixels, and shift its center.
     return np.asarray(cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
 
 

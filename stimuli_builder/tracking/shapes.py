@@ -112,6 +112,7 @@ def _border(eye: Points) -> Points:
     along, down, width = eye_axis(eye)
     centre = (eye[CANTHI[0]] + eye[CANTHI[1]]) / 2
     angle = np.linspace(0, 2 * np.pi, BORDER_POINTS, endpoint=False)
+    # y points down, so that a positive sine lies below the eye.
     height = np.where(np.sin(angle) > 0, BORDER_BELOW, BORDER_ABOVE)
     across = np.outer(np.cos(angle) * BORDER_HALF_WIDTH * width, along)
     return np.asarray(centre + across + np.outer(np.sin(angle) * height * width, down))
@@ -125,6 +126,7 @@ def similarity_between(source: Points, target: Points) -> NDArray[np.float64]:
     from_mean, to_mean = source.mean(0), target.mean(0)
     z = (source - from_mean) @ np.array([1, 1j])
     w = (target - to_mean) @ np.array([1, 1j])
+    # As complex numbers a scaling with a turn is one factor, and least squares is a projection.
     turn = np.vdot(z, w) / np.vdot(z, z).real
     shift = to_mean @ np.array([1, 1j]) - turn * (from_mean @ np.array([1, 1j]))
     return np.array([turn.real, turn.imag, shift.real, shift.imag])
@@ -148,6 +150,7 @@ def mean_shape(shapes: Points, rounds: int = 20) -> Points:
     size = np.mean([_size(shape) for shape in shapes])
     for _ in range(rounds):
         mean = np.mean([apply_pose(shape, similarity_between(shape, mean)) for shape in shapes], axis=0)
+        # Back onto the first shape at each round, else the mean drifts, turns and shrinks freely.
         mean = apply_pose(mean, similarity_between(mean, shapes[0]))
         mean = mean.mean(0) + (mean - mean.mean(0)) * size / _size(mean)
     return np.asarray(mean)

@@ -129,6 +129,7 @@ def covered(spreads: Values, numbers: NDArray[np.int64], surroundings: Looks | N
     -------
     bool array (looks, eyes)
     """
+    # The lower quartile: half of a recording may show a hand without making it usual.
     limits = np.clip(UNUSUAL * np.percentile(spreads, 25, axis=0), LEAST_SPREAD, MAX_SPREAD)
     alike = _likeness_to_steady(spreads, BESIDE * limits, surroundings)
     above = (spreads > limits) & (alike < np.interp(spreads, UNSTEADIER, FAMILIAR))
@@ -159,6 +160,7 @@ def _likeness_to_steady(spreads: Values, least: Values, surroundings: Looks | No
         steady = surroundings[_steady(spreads)[:, eye], eye]
         if len(steady) >= WITNESSES:
             for look in np.flatnonzero((spreads[:, eye] > least[eye]) & unsteady.all(1)):
+                # The fifth best of them: a single lucky match does not speak for an eye.
                 alike[look, eye] = np.sort(likenesses(surroundings[look, eye], steady))[-WITNESSES]
     return alike
 
@@ -171,6 +173,7 @@ def likenesses(one: Looks, others: Looks) -> Values:
     known = np.isfinite(one) & np.isfinite(others)
     count = np.maximum(known.sum(1), 1)
     first, second = (np.where(known, values, 0.0) for values in (one, others))
+    # Freed of its mean, and by the norm of its contrast: light may change, edges stay.
     first = np.where(known, first - (first.sum(1) / count)[:, None], 0.0)
     second = np.where(known, second - (second.sum(1) / count)[:, None], 0.0)
     norm = np.sqrt((first**2).sum(1) * (second**2).sum(1))
@@ -269,6 +272,7 @@ def survey(info: VideoInfo, *, one_eye: bool, advance: Callable[[int], None] | N
     InputError
         Too few frames show a face, or what was found is not a face.
     """
+    # One pass over the video: decoding takes longer than looking.
     seen, further = _looked(info, one_eye, advance)
     several = sum(len(faces) > 1 for faces in seen.values())
     of_face = {n: one for n, one in one_face(seen).items() if _inside(one.points, info)}
@@ -378,6 +382,7 @@ def _require_face(info: VideoInfo, labels: dict[int, Points], looked: int, one_e
             f"labels{more}; or label frames by hand (--labels)"
         )
     wide = np.array([np.hypot(*(points[5] - points[0])) for points in labels.values()])
+    # Without the outermost looks: single misreadings do not make a second face.
     low, high = np.percentile(wide, [5, 95])
     if not one_eye and high > STEADY * max(low, 1e-6):
         raise InputError(

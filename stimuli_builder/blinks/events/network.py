@@ -50,11 +50,14 @@ class Network:
 
     def probabilities(self, features: Array) -> Array:
         """Probability (rows, kinds) of each kind for features (rows, features)."""
+        # As in training: beyond six spreads a feature says "far", and an outlier must not decide by its
+        # size.
         values = np.clip((features - self.mean) / self.spread, -6, 6)
         for number, (weights, offsets) in enumerate(self.layers):
             values = values @ weights + offsets
             if number < len(self.layers) - 1:
                 values = np.tanh(values)
+        # Softmax is the same for shifted values, and exp cannot overflow below 0.
         values = np.exp(values - values.max(axis=1, keepdims=True))
         return np.asarray(values / values.sum(axis=1, keepdims=True))
 
@@ -169,6 +172,7 @@ def _whole(pieces: Sequence[MeasuredPiece]) -> Array:
     ends = [piece.start + piece.depth.smooth.size for piece in pieces]
     whole = np.full(max(ends, default=0), np.nan)
     for piece, end in zip(pieces, ends, strict=True):
+        # As parts of the eye's own blinks: one eye may open wider than the other, or be seen from the side.
         whole[piece.start : end] = piece.depth.smooth / piece.deep
     return whole
 
@@ -193,6 +197,7 @@ SAME_DIP_S = 0.2
 """A dip of the other eye within this time of one is the same event."""
 ROUNDING_S = 1e-6
 FAR_S, NEAR_S = 10.0, 0.02
+# The first look is hardly ever so sure; its logarithm stays within the range that the second one learned.
 MIN_PROBABILITY = 1e-4
 STEPS_S = (0.008, 0.025, 0.045, 0.07, 0.1, 0.14, 0.2, 0.3)
 EDGES_S = np.concatenate([-np.array(STEPS_S[::-1]), STEPS_S])

@@ -106,6 +106,7 @@ def recognise(eyes: Sequence[BlinkSeries]) -> list[RecognisedEvents]:
 
 def _of_one_face(eyes: Sequence[BlinkSeries]) -> list[RecognisedEvents]:
     """The events of both eyes; one is judged by itself where it does not move, or its fellow much less."""
+    # Both ways are computed: which one counts is known only once either eye was judged by itself.
     together = _looks(eyes)
     alone = [_looks([eye])[0] for eye in eyes]
     sides = [asymmetry(alone[k].pieces, alone[1 - k].pieces, alone[1 - k].told) for k in range(2)]
@@ -113,6 +114,8 @@ def _of_one_face(eyes: Sequence[BlinkSeries]) -> list[RecognisedEvents]:
     results = []
     for k, eye in enumerate(eyes):
         own, other = sides[k], sides[1 - k]
+        # A weak eye's partner is judged alone, and an eye that does not move is not called blinking for its
+        # partner's blinks.
         by_itself = (other is not None and other.is_weak) or (own is not None and not own.moves)
         result = _recognised((alone if by_itself else together)[k], eye, own)
         if not by_itself and not (own is not None and own.is_weak):
@@ -150,6 +153,7 @@ def _judged(piece: Piece, probabilities: Array, fps: float) -> _PieceEvents:
     told = _PieceEvents([], {}, [])
     bounds = bounds_of(piece.candidates, piece.depth)
     for candidate, row, bound in zip(piece.candidates, probabilities, bounds, strict=True):
+        # A blink at its own limit first, as blinks are what is counted; only then the likeliest of all.
         shares = dict(zip(CLASSES, row.tolist(), strict=True))
         sure = shares["blink"] >= LEAST_PROBABILITY
         likeliest = "blink" if sure else max(shares, key=shares.__getitem__)
@@ -238,6 +242,8 @@ def _timed(candidate: Candidate, depth: Depth, bounds: tuple[int, int]) -> Timin
     """Phases of a blink by the template, or by its crossings where the template slid off the dip."""
     rests = rests_about(candidate, depth, bounds)
     timing = timing_of(candidate, depth, rests)
+    # The template may slide to a neighbor that is deeper: its middle must stay within the half height of
+    # this dip.
     inside = candidate.left[1] <= timing.minimum_s * depth.fps <= candidate.right[1]
     onset, end = timing.onset_s * depth.fps, timing.end_s * depth.fps
     seen = rests[0].far <= onset and end <= rests[1].far + 1
