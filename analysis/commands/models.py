@@ -1,9 +1,9 @@
 """`analysis mixed` and `analysis ordinal`."""
 
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
@@ -15,8 +15,10 @@ from analysis.commands.output import (
     save_json,
     show_tables,
 )
+from experiments.errors import InputError
 
 if TYPE_CHECKING:
+    from analysis.models.columns import Slopes
     from analysis.read.model_csv import ModelInput
 
 
@@ -66,6 +68,16 @@ RandomOption = Annotated[
 ]
 
 
+FormulaOption = Annotated[
+    str | None,
+    typer.Option(
+        help=(
+            "The model as R writes it, instead of the options for columns and slopes: "
+            "'rating ~ a*b*age + (1 + a | person) + (1 | clip)'. Columns of numbers are covariates; "
+            "factor(x) makes one a factor."
+        )
+    ),
+]
 MeansOption = Annotated[
     bool,
     typer.Option("--means", help="Add marginal means, their pairs (Tukey, Holm), and trends of covariates."),
@@ -136,6 +148,7 @@ def mixed(
         bool,
         typer.Option("--intervals", help="Add profile likelihood intervals of coefficients and SDs."),
     ] = False,
+    formula: FormulaOption = None,
     means: MeansOption = False,
     likelihood_ratio: RatioOption = False,
     levels: LevelsOption = None,
@@ -154,6 +167,8 @@ def mixed(
       analysis mixed ratings.csv --df kenward-roger --intervals
 
       analysis mixed ratings.csv --means --likelihood-ratio
+
+      analysis mixed table.csv --formula 'score ~ face*age + (1 + face | id) + (1 | clip)' --means
     """
     from analysis.models.mixed import fit_mixed
     from analysis.report.rating_tables import (
@@ -164,19 +179,30 @@ def mixed(
         mixed_text,
     )
 
-    groups, numbers, further = names_in(between), names_in(covariate), names_in(random)
-    data = _read_model_input(file, participant, rating, within, item, levels, groups, numbers, further)
+    model = _Model(
+        participant,
+        rating,
+        names_in(within),
+        names_in(item),
+        names_in(between),
+        names_in(covariate),
+        names_in(random),
+        None if slopes is SlopesChoice.ALL else slopes.value,
+    )
+    model, data = _read_model(file, model, formula, levels)
     with progress_spinner("fitting") as say:
         result = fit_mixed(
             data.rows,
-            participant,
-            rating,
+            model.participant,
+            model.rating,
             data.within,
             data.item,
-            slopes.value,
-            groups,
-            numbers,
-            further,
+            cast("Slopes", model.slopes or "all"),
+            model.between,
+            model.covariates,
+            model.random,
+            effects=model.effects,
+            slope_effects=model.slope_effects,
             df_method=df.value,
             intervals=intervals,
             means=means,
@@ -219,6 +245,7 @@ def ordinal(
             max=100,
         ),
     ] = None,
+    formula: FormulaOption = None,
     means: MeansOption = False,
     likelihood_ratio: RatioOption = False,
     levels: LevelsOption = None,
@@ -235,6 +262,8 @@ def ordinal(
       analysis ordinal table.csv --participant id --rating score --within face --quadrature 10
 
       analysis ordinal ratings.csv --means --likelihood-ratio
+
+      analysis ordinal table.csv --formula 'score ~ face + age + (1 | id) + (1 | clip)'
     """
     from analysis.models.ordinal import fit_ordinal
     from analysis.report.rating_tables import (
@@ -245,20 +274,34 @@ def ordinal(
         ordinal_text,
     )
 
-    groups, numbers = names_in(between), names_in(covariate)
-    data = _read_model_input(file, participant, rating, within, item, levels, groups, numbers)
-    clips = data.item if quadrature in (None, 1) or item else ()
+    model = _Model(
+        participant,
+        rating,
+        names_in(within),
+        names_in(item),
+        names_in(between),
+        names_in(covariate),
+        [],
+        None if slopes is OrdinalSlopesChoice.NONE else slopes.value,
+    )
+    model, data = _read_model(file, model, formula, levels)
+    if model.random:
+        more = ", ".join(model.random)
+        raise InputError(f"the ordinal model has participants and one more grouping; remove {more}")
+    clips = data.item if quadrature in (None, 1) or model.item else ()
     with progress_spinner("fitting"):
         result = fit_ordinal(
             data.rows,
-            participant,
-            rating,
+            model.participant,
+            model.rating,
             data.within,
             clips,
-            slopes.value,
-            groups,
-            numbers,
+            cast("Slopes", model.slopes or "none"),
+            model.between,
+            model.covariates,
             quadrature,
+            effects=model.effects,
+            slope_effects=model.slope_effects,
             means=means,
             likelihood_ratio=likelihood_ratio,
         )
@@ -269,33 +312,61 @@ def ordinal(
     show_tables(*(table(*named) for table in tables), *means_tables(*named))
 
 
-def _read_model_input(
-    file: Path,
-    participant: str,
-    rating: str,
-    within: str,
-    item: str,
-    levels: list[str] | None,
-    *further: list[str],
-) -> "ModelInput":
-    """What a model is fitted to, from a file of any kind that is read.
+@dataclass(frozen=True)
+class _Model:
+    """Which columns a model is of; `slopes`, `effects` and `slope_effects` are None where not given."""
 
-    Parameters
-    ----------
-    levels : list of str or None
-        Orders of levels.
-    further : list of str
-        Factors between participants, covariates, and more groupings.
-    """
-    from analysis.read.model_csv import read_model_input
+    participant: str
+    rating: str
+    within: list[str]
+    item: list[str]
+    between: list[str]
+    covariates: list[str]
+    random: list[str]
+    slopes: str | None
+    effects: tuple[str, ...] | None = None
+    slope_effects: tuple[str, ...] = ()
+
+
+def _read_model(
+    file: Path, model: _Model, formula: str | None, levels: list[str] | None
+) -> "tuple[_Model, ModelInput]":
+    """What a model is fitted to, from a file of any kind that is read; a formula replaces the options."""
+    from analysis.models.formula import model_options, parse_formula
+    from analysis.read.model_csv import header_and_numbers, read_model_input
     from analysis.read.text_table import refuse_ids_once
     from analysis.within.level_codes import in_given_order
 
+    if formula is not None:
+        given = (model.within, model.item, model.between, model.covariates, model.random, model.slopes)
+        if any(given) or (model.participant, model.rating) != ("participant", "response"):
+            raise InputError("--formula names all columns and slopes; remove the other options for them")
+        options = model_options(parse_formula(formula), *header_and_numbers(file))
+        model = _Model(
+            options.participant,
+            options.rating,
+            list(options.factors),
+            list(options.item),
+            [],
+            list(options.covariates),
+            list(options.random),
+            options.slopes,
+            options.effects,
+            options.slope_effects,
+        )
+    columns = (model.within, model.item, model.between, model.covariates, model.random)
     with progress_spinner("reading ratings"):
-        data = read_model_input(file, participant, rating, names_in(within), names_in(item), *further)
-    refuse_ids_once(data.rows, participant, data.header, file.name)
+        data = read_model_input(
+            file, model.participant, model.rating, *columns, no_predictors=formula is not None
+        )
+    refuse_ids_once(data.rows, model.participant, data.header, file.name)
     rows, ordered = in_given_order(data.rows, levels or ())
-    return replace(data, rows=rows, decisions=(*data.decisions, *ordered))
+    decisions = [*data.decisions, *ordered]
+    if formula is not None and (numbers := [name for name in model.covariates if ":" not in name]):
+        decisions.append(
+            f"columns of numbers are covariates: {', '.join(numbers)}; factor(x) makes one a factor"
+        )
+    return model, replace(data, rows=rows, decisions=tuple(decisions))
 
 
 def _show(file: Path, data: "ModelInput", text: str) -> None:

@@ -47,10 +47,10 @@ def names_in(text: str) -> list[str]:
 
 
 def show_tables(*tables: "Table") -> None:
-    """Print tables, at most 80 columns wide."""
+    """Print tables that have rows, at most 80 columns wide."""
     from analysis.report.formats import as_text
 
-    for table in tables:
+    for table in (table for table in tables if table.rows):
         typer.echo("\n" + as_text(table))
 
 

@@ -34,6 +34,8 @@ class ModelTerms:
     covariates: tuple[str, ...] = ()
     random: tuple[str, ...] = ()
     interactions: tuple[tuple[str, ...], ...] = ()
+    effects: tuple[str, ...] | None = None
+    slope_effects: tuple[str, ...] | None = None
 
 
 def split_covariates(

@@ -174,6 +174,8 @@ class ModelData:
     def fixed_part(self) -> str:
         """The right-hand side of the formula, without random terms."""
         factorial = [" * ".join(self.factors)] if self.factors else []
+        if self.terms.effects is not None:
+            factorial = self.factorial_effects
         return " + ".join([*factorial, *(effect.name for effect in self.number_effects)]) or "1"
 
     @property
@@ -319,8 +321,16 @@ def model_data(rows: pd.DataFrame, terms: ModelTerms) -> ModelData:
     cell = np.zeros(len(values), np.int64)
     if factors:
         cell = np.ravel_multi_index(tuple(codes for codes, _ in coded), shape).astype(np.int64)
-    _refuse_empty_cells(cell, factors, levels)
+    if terms.effects is None:
+        _refuse_empty_cells(cell, factors, levels)
     fixed, spread, effect_of, names = coded_cells(list(factors), levels)
+    if terms.effects is not None:
+        known = {frozenset(), *(frozenset(name.split(":")) for name in terms.effects)}
+        has = [frozenset(name.split(":")) - {"intercept"} in known for name in effect_of]
+        fixed, spread = fixed[:, has], spread[:, has]
+        effect_of, names = (
+            tuple(one for one, k in zip(of, has, strict=True) if k) for of in (effect_of, names)
+        )
     numbers, centred = covariate_columns(rows, terms, groups[0].codes)
     effects = _number_effects(terms, factors, numbers, groups[0].codes)
     sizes = {factor: of[:-1] for factor, of in zip(factors, levels, strict=True)}
@@ -411,11 +421,13 @@ def _refuse_empty_cells(cell: Integers, factors: Sequence[str], levels: Sequence
 
 
 def _refuse_collinear(data: ModelData) -> None:
-    if not data.terms.covariates:
+    if not data.terms.covariates and data.terms.effects is None:
         return
     x = data.x
     scaled = x / np.linalg.norm(x, axis=0)
     if np.linalg.matrix_rank(scaled.T @ scaled, tol=1e-10) < x.shape[1]:
+        if data.terms.effects is not None:
+            _refuse_empty_cells(data.cell, data.factors, data.levels)
         raise InputError(
             f"the covariates {', '.join(data.terms.covariates)} are determined by the factors or by one "
             "another; remove one"
@@ -426,14 +438,23 @@ def _refuse_collinear(data: ModelData) -> None:
 
 
 def slope_groups(data: ModelData, slopes: Slopes) -> tuple[list[str], list[str]]:
-    """Effects with a by-participant slope (`intercept` first), and what had to be left out."""
+    """Effects with a by-participant slope (`intercept` first), and what had to be left out.
+
+    Raises
+    ------
+    InputError
+        More correlated coefficients than ratings or participants determine; a slope that is asked for by name
+        and that the ratings do not determine.
+    """
+    if data.terms.slope_effects:
+        return _named_slopes(data, slopes)
     if slopes == "none":
         return ["intercept"], []
     if slopes != "all":
         effects = ["intercept", *data.covariate_slopes, *data.terms.within]
         if slopes == "correlated":
             _refuse_too_few(data, effects)
-            return effects, []
+            return effects, _many_covariances(data, effects)
         return _without_residual_slopes(data, effects)
     inside = data.slope_effects
     kept, said = _without_residual_slopes(data, ["intercept", *_without_last(data, inside)])
@@ -441,6 +462,43 @@ def slope_groups(data: ModelData, slopes: Slopes) -> tuple[list[str], list[str]]
     return kept, [
         *(f"no slope of {name}: with one rating per cell it is the residual" for name in last),
         *said,
+    ]
+
+
+def _named_slopes(data: ModelData, slopes: Slopes) -> tuple[list[str], list[str]]:
+    """The slopes that a formula names, or one line on the first that the ratings do not determine."""
+    known = {frozenset(name.split(":")): name for name in data.effects}
+    named = [known[frozenset(name.split(":"))] for name in data.terms.slope_effects or ()]
+    who = data.terms.participant
+    for name in named:
+        if name not in data.slope_effects:
+            raise InputError(
+                f"the slope of {name} by {who} is not determined: it does not vary within a {who}; write it "
+                "outside the brackets only"
+            )
+        if name not in _without_last(data, data.slope_effects):
+            raise InputError(
+                f"the slope of {name} by {who} is not determined: with one rating per cell it is the "
+                "residual; remove it"
+            )
+    effects = ["intercept", *named]
+    if slopes == "correlated":
+        _refuse_too_few(data, effects)
+        return effects, _many_covariances(data, effects)
+    kept, said = _without_residual_slopes(data, effects)
+    if said:
+        raise InputError(f"{said[0].replace('no slope', 'the slope')}; remove it")
+    return kept, []
+
+
+def _many_covariances(data: ModelData, effects: Sequence[str]) -> list[str]:
+    """What is said of a covariance matrix that few participants hardly determine."""
+    own, people = sum(len(data.columns(effect)) for effect in effects), len(data.participants.names)
+    if own * (own + 1) // 2 <= people:
+        return []
+    return [
+        f"{own * (own + 1) // 2} variances and covariances are estimated from {people} participants, who "
+        "hardly determine them; slopes that do not correlate (||, or --slopes all) need fewer"
     ]
 
 
@@ -472,6 +530,11 @@ def _refuse_too_few(data: ModelData, effects: Sequence[str]) -> None:
     """As many correlated random coefficients as ratings leave no residual."""
     own = sum(len(data.columns(effect)) for effect in effects)
     people, ratings = len(data.participants.names), len(data.rating)
+    if own >= people:
+        raise InputError(
+            f"{people} participants do not determine the covariances of {own} correlated coefficients; use "
+            "--slopes all or none, or || in a formula"
+        )
     if own * people >= ratings:
         raise InputError(
             f"expected more than {own * people} ratings for {own} correlated coefficients of each of "

@@ -79,6 +79,8 @@ def fit_mixed(
     intervals: bool = False,
     means: bool = False,
     likelihood_ratio: bool = False,
+    effects: Sequence[str] | None = None,
+    slope_effects: Sequence[str] = (),
     progress: Callable[[str], None] | None = None,
 ) -> MixedResult:
     """Fit rating ~ full factorial of the factors + covariates with crossed random groupings by REML.
@@ -118,6 +120,10 @@ def fit_mixed(
         Add marginal means, their pairs, and trends of covariates.
     likelihood_ratio : bool, optional
         Add likelihood-ratio tests (maximum likelihood, without an effect's sum-coded columns).
+    effects : sequence of str, optional
+        The effects of factors that the model has, such as a and a:b; default: all.
+    slope_effects : sequence of str, optional
+        The effects with by-participant slopes, correlated if `slopes` says so; default: as `slopes` says.
     progress : callable, optional
         Takes a word on every interval before it is computed.
 
@@ -129,11 +135,20 @@ def fit_mixed(
     items = (item,) if isinstance(item, str) else tuple(item or ())
     numbers, interactions = split_covariates(covariates, (*within, *between))
     terms = ModelTerms(
-        participant, rating, tuple(within), items, tuple(between), numbers, tuple(random), interactions
+        participant,
+        rating,
+        tuple(within),
+        items,
+        tuple(between),
+        numbers,
+        tuple(random),
+        interactions,
+        None if effects is None else tuple(effects),
+        tuple(slope_effects) or None,
     )
     data = model_data(rows, terms)
-    effects, notes = slope_groups(data, slopes)
-    random_terms = data.random_terms(slopes, effects, random_slopes)
+    sloped, notes = slope_groups(data, slopes)
+    random_terms = data.random_terms(slopes, sloped, random_slopes)
     parameters = sum(len(term.patterns) for term in random_terms)
     x = data.x
     if len(data.rating) <= x.shape[1] + parameters + 1:
@@ -146,7 +161,7 @@ def fit_mixed(
             theta = fit_theta(c)
         fitted = _RemlFit(data, random_terms, c, theta, units)
         notes += unmodelled_slopes(data, slopes)
-        result = _result(fitted, effects, slopes, random_slopes, df_method, (*data.notes, *notes), means)
+        result = _result(fitted, sloped, slopes, random_slopes, df_method, (*data.notes, *notes), means)
         if likelihood_ratio:
             result = replace(result, ratio_tests=ratio_tests(data, Profile(c, theta).chi2_without))
         if not intervals:

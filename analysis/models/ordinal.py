@@ -275,6 +275,8 @@ def fit_ordinal(
     quadrature: int | None = None,
     means: bool = False,
     likelihood_ratio: bool = False,
+    effects: Sequence[str] | None = None,
+    slope_effects: Sequence[str] = (),
 ) -> OrdinalResult:
     """Fit ordered ratings ~ full factorial of the factors + covariates with crossed random effects.
 
@@ -298,7 +300,15 @@ def fit_ordinal(
     _refuse_quadrature(quadrature or 1, items, slopes)
     numbers, interactions = split_covariates(covariates, (*within, *between))
     columns = ModelTerms(
-        participant, rating, tuple(within), items, tuple(between), numbers, interactions=interactions
+        participant,
+        rating,
+        tuple(within),
+        items,
+        tuple(between),
+        numbers,
+        interactions=interactions,
+        effects=None if effects is None else tuple(effects),
+        slope_effects=tuple(slope_effects) or None,
     )
     data = model_data(rows, columns)
     categories, codes = np.unique(data.rating, return_inverse=True)

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.models.columns import split_covariates
-from analysis.read.number_columns import IN_COVARIATE, numbers, unusual_numbers
+from analysis.read.number_columns import IN_COVARIATE, MISSING_MARKS, numbers, unusual_numbers
 from analysis.read.reading import EXPORT_COLUMNS, rows_that_count
 from analysis.read.text_table import TextTable, read_text_table, texts_required
 from experiments.errors import InputError
@@ -36,12 +36,16 @@ def read_model_input(
     between: Sequence[str] = (),
     covariates: Sequence[str] = (),
     random: Sequence[str] = (),
+    *,
+    no_predictors: bool = False,
 ) -> ModelInput:
     """Read one row per trial.
 
     Of an export (it has the column `kind`) only main trials count, without failed plays and runs excluded by
     hand; its factor columns are the default of `within`, its `profile_id` (the blink shown) that of `item`.
     Other tables may have no item. Rows without a covariate are left out, and counted.
+
+    With `no_predictors` a model may have none, and an export has no defaults.
 
     Raises
     ------
@@ -51,12 +55,15 @@ def read_model_input(
     """
     header = read_text_table(path, [participant, rating], copies=False).header
     exported = "kind" in header and "profile_id" in header
-    if not within and exported and not between:
+    if not within and exported and not between and not no_predictors:
         within = RATINGS.factors_in_header(header)
-    if not item and exported:
+    if not item and exported and not no_predictors:
         item = ["profile_id"]
-    if not within and not between and not covariates:
-        raise InputError("--within names no column; expected, for example, --within face,blur")
+    if not within and not between and not covariates and not no_predictors:
+        raise InputError(
+            "--within names no column; expected, for example, --within face,blur (a model of the mean alone: "
+            f"--formula '{rating} ~ 1 + (1 | {participant})')"
+        )
     covariates, _ = split_covariates(covariates, (*within, *between))
     _refuse_shared_roles(participant, rating, [*within, *between, *covariates], item)
     nested = list(dict.fromkeys(part for name in random for part in name.split("/")))
@@ -118,3 +125,15 @@ def _refuse_participants_as_items(table: TextTable, participant: str, item: Sequ
             f"every item of '{'/'.join(item)}' belongs to one participant and every participant has one, so "
             "items and participants are the same; name the column of clips, or omit --item"
         )
+
+
+def header_and_numbers(path: Path) -> tuple[tuple[str, ...], frozenset[str]]:
+    """The columns of a table, and those that hold numbers alone (and missing marks)."""
+    table = read_text_table(path, None, copies=False)
+    of_numbers = set()
+    for name in table.header:
+        texts = pd.Series(table.columns[name].cat.categories.astype(str))
+        values = pd.to_numeric(texts[~texts.isin(MISSING_MARKS)].str.replace(",", "."), errors="coerce")
+        if len(values) and values.notna().all():
+            of_numbers.add(name)
+    return table.header, frozenset(of_numbers)

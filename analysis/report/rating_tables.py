@@ -153,7 +153,7 @@ def ordinal_text(result: OrdinalResult) -> str:
         f"{result.formula} link, flexible thresholds, {_integral(result.quadrature)} (log-likelihood "
         f"{result.log_likelihood:.2f}, AIC {result.aic:.2f}). Wald tests."
     ]
-    if result.slopes == "none":
+    if result.slopes == "none" and result.effects:
         said.append(
             "Random intercepts only: if people differ in the size of an effect, its p is too small. Add "
             "--slopes all to model these differences."

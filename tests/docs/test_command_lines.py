@@ -24,7 +24,9 @@ def command_lines(text: str) -> list[str]:
     lines = [
         line.strip() for block in FENCED.findall(text) for line in block.replace("\\\n", " ").splitlines()
     ]
-    commands = [piece for line in lines for piece in re.split(r"&&|\|\||;|\|", line)]
+    # what is between quotation marks, such as a formula with |, stays whole
+    pieces = re.compile(r"(?:'[^']*'|[^'|;&]|&(?!&)|'(?![^']*'))+")
+    commands = [piece for line in lines for piece in pieces.findall(line)]
     inline = [piece for code in INLINE.findall(text) for piece in code.split("&&")]
     return [
         re.sub(r"\$\([^)]*\)", "X", command).strip()

@@ -1,0 +1,171 @@
+"""A model as R writes it: `rating ~ a*b*age + (1 + a | person) + (1 | clip)`."""
+
+import re
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from itertools import chain, combinations
+
+from analysis.models.columns import Slopes
+from experiments.errors import InputError, did_you_mean
+
+EXAMPLE = "rating ~ a*b*age + (1 + a | person) + (1 | clip)"
+_RANDOM = re.compile(r"\(([^()|]*)(\|\|?)([^()|]*)\)")
+_FACTOR = re.compile(r"\b(?:factor|C)\(\s*([^()]+?)\s*\)")
+_NAME = re.compile(r"(?:[^\W\d]|\.)[\w.]*")
+
+Effect = tuple[str, ...]
+"""Names of the columns of an effect; none for the intercept."""
+
+
+@dataclass(frozen=True)
+class RandomPart:
+    """What differs between levels of a grouping: effects, whether they correlate, and `a` or `a/b`."""
+
+    effects: tuple[Effect, ...]
+    correlated: bool
+    grouping: str
+
+    @property
+    def slopes(self) -> tuple[Effect, ...]:
+        """Effects without the intercept."""
+        return tuple(effect for effect in self.effects if effect)
+
+
+@dataclass(frozen=True)
+class Formula:
+    """A parsed formula; `as_factors` are the columns written as factor(x)."""
+
+    text: str
+    rating: str
+    effects: tuple[Effect, ...]
+    random: tuple[RandomPart, ...]
+    as_factors: frozenset[str]
+
+    @property
+    def predictors(self) -> tuple[str, ...]:
+        """Columns of the fixed part, in order."""
+        return tuple(dict.fromkeys(name for effect in self.effects for name in effect))
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Every column that is named."""
+        groupings = [name for part in self.random for name in part.grouping.split("/")]
+        return tuple(dict.fromkeys((self.rating, *self.predictors, *groupings)))
+
+
+@dataclass(frozen=True)
+class ModelOptions:
+    """A formula in the words of the commands' options."""
+
+    participant: str
+    rating: str
+    factors: tuple[str, ...]
+    covariates: tuple[str, ...]
+    item: tuple[str, ...]
+    random: tuple[str, ...]
+    slopes: Slopes
+    effects: tuple[str, ...]
+    slope_effects: tuple[str, ...]
+
+
+def parse_formula(text: str) -> Formula:
+    """Read a formula.
+
+    Raises
+    ------
+    InputError
+        What is not written as names, +, *, :, and (effects | grouping); a model without an intercept or a
+        grouping; an interaction without its parts.
+    """
+    rating, tilde, right = text.partition("~")
+    if not tilde or not _NAME.fullmatch(rating.strip()):
+        raise InputError(f"expected a formula such as {EXAMPLE}, got '{text}'")
+    as_factors = frozenset(_FACTOR.findall(right))
+    right = _FACTOR.sub(r"\1", right)
+    random = tuple(
+        RandomPart(_effects_of(effects, text), bar == "|", _grouping_of(grouping, text))
+        for effects, bar, grouping in _RANDOM.findall(right)
+    )
+    fixed = _effects_of(_RANDOM.sub("1", right), text)
+    if not random:
+        raise InputError(f"'{text}' has no random term; add one, such as (1 | participant)")
+    known = {frozenset(effect) for effect in fixed}
+    for effect in fixed:
+        for part in (p for size in range(1, len(effect)) for p in combinations(effect, size)):
+            if frozenset(part) not in known:
+                raise InputError(
+                    f"'{text}' has {':'.join(effect)} without {':'.join(part)}; add it, or write "
+                    f"{'*'.join(effect)}"
+                )
+    for bracket in random:
+        for effect in bracket.slopes:
+            if frozenset(effect) not in known:
+                raise InputError(
+                    f"the slope of {':'.join(effect)} needs {':'.join(effect)} outside the brackets too"
+                )
+    return Formula(text, rating.strip(), tuple(effect for effect in fixed if effect), random, as_factors)
+
+
+def model_options(formula: Formula, header: Sequence[str], numeric: Collection[str]) -> ModelOptions:
+    """What the formula means for a table: columns of numbers are covariates, others factors.
+
+    Raises
+    ------
+    InputError
+        A name that is not a column; slopes of more than one grouping, or without an intercept.
+    """
+    for name in formula.columns:
+        if name not in header:
+            raise InputError(f"'{name}' in the formula is not a column{did_you_mean(name, header)}")
+    with_slopes = [part for part in formula.random if part.slopes]
+    if len(with_slopes) > 1 or any(() not in part.effects for part in formula.random):
+        raise InputError(
+            "expected an intercept in every bracket and slopes in one of them, such as (1 + a | person) + "
+            f"(1 | clip), got '{formula.text}'"
+        )
+    people = (with_slopes or list(formula.random))[0]
+    if "/" in people.grouping:
+        raise InputError(f"the nested grouping {people.grouping} has no slopes; name another grouping first")
+    others = [part.grouping for part in formula.random if part is not people]
+    factors = tuple(n for n in formula.predictors if n in formula.as_factors or n not in numeric)
+    named = [":".join(effect) for effect in formula.effects if not set(effect) <= set(factors)]
+    slopes: Slopes = "none" if not people.slopes else "correlated" if people.correlated else "all"
+    first_item = next((name for name in others if "/" not in name), None)
+    return ModelOptions(
+        people.grouping,
+        formula.rating,
+        factors,
+        tuple(named),
+        () if first_item is None else (first_item,),
+        tuple(name for name in others if name != first_item),
+        slopes,
+        tuple(":".join(effect) for effect in formula.effects if set(effect) <= set(factors)),
+        tuple(":".join(effect) for effect in people.slopes),
+    )
+
+
+def _effects_of(text: str, whole: str) -> tuple[Effect, ...]:
+    """Effects of `a*b + c`, the intercept as an empty one; a*b is a + b + a:b."""
+    effects: dict[frozenset[str], Effect] = {}
+    without_intercept = False
+    for term in (part.strip() for part in text.split("+")):
+        without_intercept |= term == "0"
+        factors = [] if term in ("0", "1") else [part.strip() for part in re.split(r"[*:]", term)]
+        if not all(_NAME.fullmatch(name) for name in factors) or ("*" in term and ":" in term):
+            raise InputError(
+                f"'{term}' in '{whole}' is not understood; expected names joined by +, * or :, as in "
+                f"{EXAMPLE}"
+            )
+        sizes = range(1, len(factors) + 1) if "*" in term else [len(factors)]
+        for effect in chain.from_iterable(combinations(dict.fromkeys(factors), size) for size in sizes):
+            effects.setdefault(frozenset(effect), effect)
+    if without_intercept:
+        raise InputError(f"'{whole}' has a term without an intercept (0 +), which is not supported")
+    return tuple(sorted(effects.values(), key=len))
+
+
+def _grouping_of(text: str, whole: str) -> str:
+    parts = [part.strip() for part in text.split("/")]
+    if not all(_NAME.fullmatch(part) for part in parts):
+        raise InputError(f"'{text.strip()}' in '{whole}' is not a grouping; expected person, or lab/room")
+    return "/".join(parts)
