@@ -469,16 +469,16 @@ def _named_slopes(data: ModelData, slopes: Slopes) -> tuple[list[str], list[str]
     """The slopes that a formula names, or one line on the first that the ratings do not determine."""
     known = {frozenset(name.split(":")): name for name in data.effects}
     named = [known[frozenset(name.split(":"))] for name in data.terms.slope_effects or ()]
-    who = data.terms.participant
+    participant = data.terms.participant
     for name in named:
         if name not in data.slope_effects:
             raise InputError(
-                f"the slope of {name} by {who} is not determined: it does not vary within a {who}; write it "
-                "outside the brackets only"
+                f"the slope of {name} by {participant} is not determined: it does not vary within a "
+                f"{participant}; write it outside the brackets only"
             )
         if name not in _without_last(data, data.slope_effects):
             raise InputError(
-                f"the slope of {name} by {who} is not determined: with one rating per cell it is the "
+                f"the slope of {name} by {participant} is not determined: with one rating per cell it is the "
                 "residual; remove it"
             )
     effects = ["intercept", *named]

@@ -1,4 +1,4 @@
-"""What is asked after a model: marginal means, their pairs, trends of covariates, likelihood-ratio tests."""
+"""Questions after a model: marginal means, their pairs, trends of covariates, likelihood-ratio tests."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
