@@ -19,6 +19,8 @@ SIGMA = 1.4826
 PRIOR_FLOOR, MEAN_WEIGHT = 0.1, 0.01
 """pwcmp's constants: added to the prior of each pair, and the weight of the squared mean."""
 SEED = 53
+TRIES = 4
+"""Samples of raters that are drawn for each one that is used."""
 FAR_FROM_QUARTILE = 1.5
 """Interquartile ranges below the first quartile beyond which pwcmp's authors leave out an observer."""
 DOMINANT = 0.5
@@ -242,12 +244,17 @@ def _resampled(wins: Array, prior: Prior, start: Array, number: int) -> Array:
     """Scores (number, k) of raters drawn with replacement; draws without a maximum are drawn again."""
     random = np.random.default_rng(SEED)
     draws: list[Array] = []
-    while len(draws) < number:
+    for _ in range(TRIES * number):
+        if len(draws) == number:
+            return np.array(draws)
         counts = np.bincount(random.integers(len(wins), size=len(wins)), minlength=len(wins))
         total = np.tensordot(counts, wins, axes=1)
         if prior == "gaussian" or _has_maximum(total):
             draws.append(_maximum(total, prior, start)[0])
-    return np.array(draws)
+    raise InputError(
+        f"in most samples of the {len(wins)} raters an item wins or loses every comparison, so there is no "
+        "interval without a prior; use --prior gaussian, or --bootstrap 0"
+    )
 
 
 def _has_maximum(total: Array) -> bool:

@@ -83,6 +83,17 @@ def test_prior_keeps_an_item_that_always_wins_finite_and_says_so(tmp_path: Path)
         scale_jod(comparisons.by_content(), "none")
 
 
+def test_samples_of_raters_without_a_maximum_end_in_one_line(tmp_path: Path) -> None:
+    rows = [f"r{k},x,a,b,left" for k in range(20)] + ["odd,x,a,b,right"]
+    comparisons = _read(_file(tmp_path / "pairs.csv", *rows))
+    assert scale_jod(comparisons.by_content(), "none", bootstrap=50).scales[0].items[0].jod_low is not None
+    few = _read(
+        _file(tmp_path / "few.csv", "r1,x,a,b,left", "r1,x,b,c,left", "r2,x,b,a,left", "r3,x,c,b,left")
+    )
+    with pytest.raises(InputError, match="in most samples of the 3 raters an item wins or loses every"):
+        scale_jod(few.by_content(), "none", bootstrap=50)
+
+
 def test_a_prior_that_dominates_is_reported(tmp_path: Path) -> None:
     random = np.random.default_rng(0)
     rows = [
