@@ -147,7 +147,7 @@ def _store_outlook(connection: Connection, token: str, outlook: Outlook) -> Outl
     now: dict[str, int] = dict.fromkeys(outlook.known, 0)
     for row in series_repository.answers(connection, run.id):
         now[row.series] += 1
-    # Other answers came while this was reckoned: their own request brings the series up to date.
+    # Other answers came while this was computed: their own request brings the series up to date.
     if run.status != "active" or now != outlook.known:
         return None
     for (trial_index, play), estimate in outlook.estimates.items():
