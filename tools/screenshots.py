@@ -9,6 +9,7 @@ Real servers, the real Experiment 3, a real Chromium. Ratings are synthetic or s
 from __future__ import annotations
 
 import argparse
+import base64
 import io
 import os
 import shutil
@@ -19,6 +20,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import av
 import cv2
@@ -305,6 +307,80 @@ def builder_pictures(folder: Path) -> None:
         process.stop()
 
 
+RECORDED_SIZE, RECORDED_FPS = (1280, 720), 10
+MOST_BYTES = 2_000_000
+
+
+def recording_pictures(folder: Path) -> None:
+    """A silent screen recording: from twelve clips of one's own to the link for participants."""
+    process = ServerProcess(folder / "data").start()
+    shown: list[tuple[float, bytes]] = []
+    try:
+        with sync_playwright() as playwright:
+            browser = playwright.chromium.launch(
+                executable_path=shutil.which("chromium"), args=CHROMIUM_FLAGS, slow_mo=350
+            )
+            page = browser.new_page(viewport=dict(zip(("width", "height"), RECORDED_SIZE, strict=True)))
+            sign_in(page, process.address, process.settings)
+            session = page.context.new_cdp_session(page)
+
+            def take(event: dict[str, Any]) -> None:
+                shown.append((event["metadata"]["timestamp"], base64.b64decode(event["data"])))
+                session.send("Page.screencastFrameAck", {"sessionId": event["sessionId"]})
+
+            session.on("Page.screencastFrame", take)
+            session.send("Page.startScreencast", {"format": "jpeg", "quality": 90})
+            record_own_clips(page, process.address, robot_clips(folder))
+            session.send("Page.stopScreencast")
+            browser.close()
+    finally:
+        process.stop()
+    target = ROOT / "docs" / "_static" / "own-clips.mp4"
+    write_small_video(shown, target)
+    if target.stat().st_size > MOST_BYTES:
+        sys.exit(f"error: {target} has {target.stat().st_size} bytes, expected at most {MOST_BYTES}")
+
+
+def record_own_clips(page: Page, address: str, files: list[Path]) -> None:
+    """The steps of the lesson, slowly."""
+    page.goto(f"{address}/admin/studies/new")
+    page.get_by_label("Short name").press_sequentially("robots", delay=80)
+    page.get_by_role("tab", name="From your own clips").click()
+    page.locator('input[type="file"]:not([accept=".zip"])').first.set_input_files(files)
+    page.get_by_text("12 clips received").wait_for()
+    page.get_by_label("Pattern", exact=True).fill("{robot}_{speed}_{exemplar}.mp4")
+    page.get_by_label("Title of the study").press_sequentially("Blinking robots", delay=60)
+    page.get_by_label("Question", exact=True).clear()
+    page.get_by_label("Question", exact=True).press_sequentially("How alive does it look?", delay=50)
+    page.get_by_role("button", name="Create").click()
+    page.get_by_text("robots, version 1").wait_for()
+    page.wait_for_timeout(1500)
+    page.get_by_role("tab", name="Build").click()
+    page.wait_for_timeout(1500)
+    page.get_by_role("link", name="Trial").click()
+    page.wait_for_timeout(2500)
+    page.get_by_role("button", name="Set live").click()
+    dialog = page.get_by_role("dialog")
+    dialog.get_by_role("button", name="Set live").click()
+    dialog.locator("code").first.wait_for()
+    page.wait_for_timeout(3000)
+
+
+def write_small_video(shown: list[tuple[float, bytes]], target: Path) -> None:
+    """Write pictures with their times (s) as H.264 at a few frames per second, enough for pages."""
+    with av.open(str(target), "w", options={"movflags": "faststart"}) as container:
+        stream = container.add_stream("libx264", rate=RECORDED_FPS, options={"crf": "28", "preset": "slow"})
+        stream.width, stream.height = RECORDED_SIZE
+        stream.pix_fmt = "yuv420p"
+        start = shown[0][0]
+        ends = [time_s for time_s, _ in shown[1:]] + [shown[-1][0] + 2.0]
+        for (_, picture), end in zip(shown, ends, strict=True):
+            frame = av.VideoFrame.from_image(Image.open(BytesIO(picture)).convert("RGB"))
+            while stream.frames / RECORDED_FPS < end - start:
+                container.mux(stream.encode(frame.reformat(*RECORDED_SIZE, format="yuv420p")))
+        container.mux(stream.encode())
+
+
 SIZE = (960, 360)
 CLOSURES = (0.0, 0.25, 0.5, 0.75, 1.0)
 MOVED, LOWERED = "hazel@5", "alder@8"
@@ -495,6 +571,7 @@ PARTS: dict[str, Callable[[Path], None]] = {
     "performance": performance_pictures,
     "admin": admin_pictures,
     "builder": builder_pictures,
+    "recording": recording_pictures,
 }
 
 
