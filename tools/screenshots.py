@@ -76,6 +76,9 @@ def analysis_pictures(folder: Path) -> None:
     call("analysis", "run", "exp3", "--csv", ratings, "--out", report)
     with browser_page(900, 760) as page:
         page.goto(next(report.glob("*.html")).as_uri())
+        page.get_by_role("heading", name="Results", exact=True).evaluate(
+            "element => element.scrollIntoView()"
+        )
         keep(page, "table")
 
 
@@ -151,7 +154,7 @@ def admin_pictures(folder: Path) -> None:
     process.start()
     try:
         simulate(process.settings.data_folder, process.settings.secret_key, process.address)
-        with browser_page(1280, 800) as page:
+        with browser_page(1440, 900) as page:
             sign_in(page, process.address, process.settings)
             for name, path in PAGES.items():
                 page.goto(f"{process.address}/admin{path}")

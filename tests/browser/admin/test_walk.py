@@ -20,7 +20,7 @@ pytestmark = pytest.mark.browser
 PAGES = {
     "studies": ("/", "A short study"),
     "new": ("/studies/new", "New study"),
-    "design": ("/studies/short", "trials a participant"),
+    "design": ("/studies/short", "trials per participant"),
     "build": ("/studies/short/build", "Save as a new version"),
     "build-factors": ("/studies/short/build?section=factors", "Add factor"),
     "build-trial": ("/studies/short/build?section=trial", "As participants see it"),

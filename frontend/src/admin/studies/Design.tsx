@@ -29,9 +29,9 @@ export function Figures({ figures }: { figures: readonly [label: string, value: 
 export function Design({ design }: { design: Schemas["DesignOut"] }) {
   const figures: [string, string | number][] = [
     ["cells", design.cells],
-    ["clips a cell", design.exemplars],
+    ["clips per cell", design.exemplars],
     ["clips", design.unique_clips],
-    ["trials a participant", design.trials_per_participant],
+    ["trials per participant", design.trials_per_participant],
     ["expected minutes", design.expected_minutes.toFixed(0)],
   ];
   return (
