@@ -45,13 +45,13 @@ from server.studies.schemas import (
     Label,
     LinkOut,
     LinkPage,
+    ListedStudy,
     NewLinks,
     NewStudy,
     NewVersion,
     ShippedExperiment,
     Signing,
     StudyDetail,
-    StudySummary,
 )
 from table_files.formulas import guarded_table
 
@@ -79,7 +79,7 @@ def edit_definition(_identity: Viewer, body: EditDefinition) -> EditedDefinition
 
 
 @router.get("/studies")
-def list_studies(database: DatabaseDep, identity: Viewer) -> list[StudySummary]:
+def list_studies(database: DatabaseDep, identity: Viewer) -> list[ListedStudy]:
     """The studies that are open to the account, the latest first."""
     with database.read() as session:
         return service.summaries(session, identity)

@@ -3,13 +3,14 @@
 import json
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from datetime import datetime
 from typing import Any, NamedTuple
 
 from sqlalchemy import ColumnElement, Select, case, func, insert, select
 from sqlalchemy.orm import Session, joinedload
 
 from experiments.checks import CHECK_CELL
-from server.models import Clip, Link, Study, StudyRun, StudyVersion, VersionClip
+from server.models import Account, Clip, Link, Study, StudyRun, StudyVersion, VersionClip
 
 # Studies, their versions and clips, and how many runs each has.
 
@@ -129,6 +130,32 @@ def shown_runs_by_status(session: Session, study: Study | None = None) -> Status
     """The runs of all studies, or of one: of a pilot those of the pilot, else those of participants."""
     shown = StudyRun.origin == case((Study.status == "pilot", "pilot"), else_="participant")
     return _by_status(session, shown if study is None else shown & (StudyRun.study_id == study.id))
+
+
+def owners(session: Session) -> dict[int, str]:
+    """Study number -> name of the account that created it."""
+    query = select(Study.id, Account.name).join(Account, Account.id == Study.created_by)
+    return {row.id: row.name for row in session.execute(query)}
+
+
+def last_activities(session: Session) -> dict[int, datetime]:
+    """Study number -> when a participant was last seen in it, or its last version was made."""
+    seen = select(StudyRun.study_id, func.max(StudyRun.last_seen_at)).group_by(StudyRun.study_id)
+    made = select(StudyVersion.study_id, func.max(StudyVersion.created_at)).group_by(StudyVersion.study_id)
+    latest: dict[int, datetime] = {}
+    for study, moment in (*session.execute(seen), *session.execute(made)):
+        latest[study] = max(latest.get(study, moment), moment)
+    return latest
+
+
+def completions_since(session: Session, moment: datetime) -> list[tuple[int, datetime]]:
+    """Study number and moment of every run but previews and simulated ones that was completed since."""
+    query = select(StudyRun.study_id, StudyRun.completed_at).where(
+        StudyRun.origin.in_(("participant", "pilot")),
+        StudyRun.status == "complete",
+        StudyRun.completed_at >= moment,
+    )
+    return [(study, completed) for study, completed in session.execute(query) if completed is not None]
 
 
 def _by_status(session: Session, counted: ColumnElement[bool]) -> StatusCounts:

@@ -332,6 +332,16 @@ class StudySummary(BaseModel):
     rights: list[Right] = Field(description="What the account that asks may do with it.")
 
 
+class ListedStudy(StudySummary):
+    """A study in the list, with who made it and what goes on in it."""
+
+    owner: str = Field(description="Name of the account that created it; empty if it is gone.")
+    last_activity: datetime = Field(description="When a participant was last seen, or a version was saved.")
+    completed_by_day: list[int] = Field(
+        description="Complete runs of each of the last 14 days (UTC), today last; previews left out."
+    )
+
+
 class StudyDetail(BaseModel):
     """A study with its declaration."""
 

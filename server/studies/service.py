@@ -1,5 +1,7 @@
 """Studies on the dashboard: checked, listed, shown, opened and closed, deleted."""
 
+from collections import Counter
+from datetime import UTC, datetime, time, timedelta
 from typing import Any
 
 from sqlalchemy.orm import Session
@@ -45,6 +47,7 @@ from server.studies.schemas import (
     FactorOut,
     JudgedEdit,
     LevelOut,
+    ListedStudy,
     ProblemOut,
     StudyDetail,
     StudySummary,
@@ -175,11 +178,30 @@ def delete(session: Session, name: str, identity: Identity) -> None:
     record(session, identity, "study deleted", "study", name)
 
 
-def summaries(session: Session, identity: Identity) -> list[StudySummary]:
+SHOWN_DAYS = 14
+"""Days of complete runs in the list of studies."""
+
+
+def summaries(session: Session, identity: Identity) -> list[ListedStudy]:
     """The studies that are open to her, the latest first."""
     studies = studies_opened_to(session, identity)
     counts, standing = repository.shown_runs_by_status(session), standing_of(session, studies, identity)
-    return [summary(study, counts, standing[study.id]) for study in studies]
+    owners, active = repository.owners(session), repository.last_activities(session)
+    today = now().date()
+    since = datetime.combine(today - timedelta(days=SHOWN_DAYS - 1), time(), UTC)
+    by_day = Counter(
+        (study, (today - moment.date()).days)
+        for study, moment in repository.completions_since(session, since)
+    )
+    return [
+        ListedStudy(
+            **summary(study, counts, standing[study.id]).model_dump(),
+            owner=owners.get(study.id, ""),
+            last_activity=active.get(study.id, study.created_at),
+            completed_by_day=[by_day[study.id, ago] for ago in reversed(range(SHOWN_DAYS))],
+        )
+        for study in studies
+    ]
 
 
 def summary(study: Study, counts: repository.StatusCounts, standing: Standing) -> StudySummary:

@@ -1810,6 +1810,27 @@ export interface components {
    background: string;
    expected_minutes: number;
   };
+  ListedStudy: {
+   name: string;
+   title: string;
+   /** @enum {string} */
+   status: "draft" | "pilot" | "live" | "closed";
+   paused: boolean;
+   quota: number | null;
+   version: number;
+   revision: number;
+   complete: number;
+   active: number;
+   /** Format: date-time */
+   created_at: string;
+   archived_at: string | null;
+   workspace: string;
+   rights: ("view" | "run" | "edit" | "export" | "own")[];
+   owner: string;
+   /** Format: date-time */
+   last_activity: string;
+   completed_by_day: number[];
+  };
   LoginOut: {
    id: number;
    provider: string;
@@ -3853,6 +3874,7 @@ export type LinkOut = components['schemas']['LinkOut'];
 export type LinkPage = components['schemas']['LinkPage'];
 export type LinkState = components['schemas']['LinkState'];
 export type LinkedStudy = components['schemas']['LinkedStudy'];
+export type ListedStudy = components['schemas']['ListedStudy'];
 export type LoginOut = components['schemas']['LoginOut'];
 export type Margin = components['schemas']['Margin'];
 export type Me = components['schemas']['Me'];
@@ -6372,7 +6394,7 @@ export interface operations {
      [name: string]: unknown;
     };
     content: {
-     "application/json": components["schemas"]["StudySummary"][];
+     "application/json": components["schemas"]["ListedStudy"][];
     };
    };
    422: {

@@ -2,6 +2,7 @@ import { describe, expect, it } from "vitest";
 import { clipFindings, factsOf, pictureProblems, repeatedFiles } from "../../src/admin/clips/examine";
 import { sizeRemark } from "../../src/admin/clips/UploadClips";
 import { languageFindings, summaryOf } from "../../src/admin/studies/Preflight";
+import { matching } from "../../src/admin/studies/StudiesPage";
 import { nextStep } from "../../src/admin/studies/StatusBadge";
 import {
   declaredPattern,
@@ -145,6 +146,18 @@ describe("the checklist", () => {
       expect.stringContaining("in English for"),
       expect.stringContaining("not reviewed by a speaker"),
     ]);
+  });
+});
+
+describe("the list of studies", () => {
+  it("is searched by every word of title, name, owner and workspace", () => {
+    const row = (title: string, name: string, owner: string) => ({ title, name, owner, workspace: "lab" });
+    const rows = [row("Lower lids", "exp3", "Ada"), row("Blink timing", "timing", "Grace")];
+    const names = (search: string) => matching(rows, search).map(({ name }) => name);
+    expect(names("")).toEqual(["exp3", "timing"]);
+    expect(names(" ada LIDS ")).toEqual(["exp3"]);
+    expect(names("ada timing")).toEqual([]);
+    expect(names("lab")).toEqual(["exp3", "timing"]);
   });
 });
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from fastapi.testclient import TestClient
 
 from experiments.load import parse_experiment
 from server.context import Services
@@ -499,3 +500,22 @@ def test_a_comments_form_after_the_last_trial_keeps_the_data_series(
     likert = 'type = "likert"\nlow = { en = "no" }\nhigh = { en = "yes" }'
     assert _saved_series(experimenter, SHORT + COMMENTS.replace('type = "text"', likert)) == 2
     assert _saved_series(experimenter, SHORT + COMMENTS) == 1
+
+
+def test_the_list_says_who_made_a_study_and_what_goes_on_in_it(
+    owner: Admin, client: TestClient, study: StudyInDatabase
+) -> None:
+    for _ in range(2):
+        person = Participant(client, study.link_token).agree()
+        person.answer_all()
+        assert person.request("POST", "/complete").status_code == 200
+    preview = Participant(client, study.link("preview")).agree()
+    preview.answer_all()
+    assert preview.request("POST", "/complete").status_code == 200
+    assert owner.send("POST", "/studies/short/copies", {"name": "copied", "version": 1}).status_code == 201
+    copied, short = owner.get("/studies").json()
+    assert (copied["name"], copied["completed_by_day"]) == ("copied", [0] * 14)
+    assert copied["owner"] == owner.get("/session").json()["account"]["name"]
+    assert copied["last_activity"] >= copied["created_at"]
+    assert (short["owner"], short["completed_by_day"]) == ("", [0] * 13 + [2])
+    assert short["last_activity"] > short["created_at"]

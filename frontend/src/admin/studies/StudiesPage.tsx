@@ -1,10 +1,11 @@
-import { Alert, Anchor, Badge, Button, Group, Paper, Stack, Switch, Text, Title } from "@mantine/core";
+import { Alert, Anchor, Badge, Button, Group, Paper, Stack, Text, TextInput, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
 import { useState } from "react";
 import { type Schemas, sessionQuery, studiesQuery, useOwnWorkspaces } from "../api";
 import { Answer } from "../ui/Answer";
 import { type Column, DataTable } from "../ui/DataTable";
+import { ago, counted } from "../ui/format";
 import { StatusBadge } from "./StatusBadge";
 
 export function StudiesPage() {
@@ -36,7 +37,7 @@ export function StudiesPage() {
           rows.length === 0 ? (
             <Nothing mayCreate={mayCreate} />
           ) : (
-            <Listed rows={rows} columns={mine.length > 1 ? WITH_WORKSPACE : COLUMNS} />
+            <StudyGroups rows={rows} columns={mine.length > 1 ? WITH_WORKSPACE : COLUMNS} />
           )
         }
       </Answer>
@@ -44,34 +45,114 @@ export function StudiesPage() {
   );
 }
 
-/** The studies, those in the archive where asked for. */
-function Listed({ rows, columns }: { rows: Schemas["StudySummary"][]; columns: typeof COLUMNS }) {
-  const [all, setAll] = useState(false);
-  const archived = rows.filter((row) => row.archived_at !== null).length;
-  const shown = all ? rows : rows.filter((row) => row.archived_at === null);
+type Listed = Schemas["ListedStudy"];
+
+const GROUPS = [
+  ["live", "Live"],
+  ["pilot", "Pilot"],
+  ["draft", "Drafts"],
+  ["closed", "Closed"],
+  ["archived", "Archive"],
+] as const;
+const groupOf = (row: Listed) => (row.archived_at === null ? row.status : "archived");
+
+/** Those whose title, name, owner or workspace has every word that is searched for. */
+export function matching<Row extends Pick<Listed, "title" | "name" | "owner" | "workspace">>(rows: readonly Row[], search: string): Row[] {
+  const parts = search.toLowerCase().split(/\s+/);
+  return rows.filter((row) => {
+    const text = [row.title, row.name, row.owner, row.workspace].join(" ").toLowerCase();
+    return parts.every((part) => text.includes(part));
+  });
+}
+
+const SEARCHED_FROM = 6;
+
+/** The studies by status; the archive is folded. */
+function StudyGroups({ rows, columns }: { rows: Listed[]; columns: typeof COLUMNS }) {
+  const [search, setSearch] = useState("");
+  const shown = matching(rows, search);
   return (
     <>
-      {archived > 0 && (
-        <Switch checked={all} onChange={(event) => setAll(event.currentTarget.checked)} label={`Include archived studies (${archived})`} />
+      {rows.length >= SEARCHED_FROM && (
+        <TextInput
+          type="search"
+          aria-label="Search studies"
+          placeholder="Search by title, name, owner or workspace"
+          value={search}
+          onChange={(event) => setSearch(event.currentTarget.value)}
+          maw={420}
+        />
       )}
-      <DataTable rows={shown} rowKey={(row) => row.name} columns={columns} empty="All studies are archived." />
+      <Text size="sm" role="status" hidden={search === ""}>
+        {counted(shown.length, "study", "studies")} found.
+      </Text>
+      {GROUPS.map(([group, label]) => {
+        const members = shown.filter((row) => groupOf(row) === group);
+        if (members.length === 0) return null;
+        const table = <DataTable rows={members} rowKey={(row) => row.name} columns={columns} empty="" label={`Studies: ${label}`} />;
+        return group === "archived" ? (
+          <details key={group}>
+            <summary>
+              {label} ({members.length})
+            </summary>
+            {table}
+          </details>
+        ) : (
+          <section key={group} aria-label={label}>
+            <Title order={2} size="h4">
+              {label}
+            </Title>
+            {table}
+          </section>
+        );
+      })}
     </>
   );
 }
 
+/** Before the first study: what belongs here, and the first step. */
 function Nothing({ mayCreate }: { mayCreate: boolean }) {
   return (
     <Paper withBorder p="xl">
-      <Text>
-        {mayCreate
-          ? "No studies yet. Start with one of the three that ship with Palpebra, a definition, or your own clips."
-          : "You have no access to any study yet. Ask an owner of your workspace."}
-      </Text>
+      <Stack align="flex-start">
+        <Text>
+          {mayCreate
+            ? "Your studies appear here. Start with your own clips, with a study that ships with Palpebra, or with a definition."
+            : "You have no access to any study yet. Ask an owner of your workspace."}
+        </Text>
+        {mayCreate && (
+          <Button component={Link} to="/studies/new">
+            Create the first study
+          </Button>
+        )}
+      </Stack>
     </Paper>
   );
 }
 
-const COLUMNS: Column<Schemas["StudySummary"]>[] = [
+/** A bar a day, today at the right; the numbers are in its name. */
+function Days({ counts }: { counts: readonly number[] }) {
+  const most = Math.max(1, ...counts);
+  const total = counts.reduce((sum, count) => sum + count, 0);
+  const label = `${counted(total, "complete run")} in ${String(counts.length)} days; today ${String(counts.at(-1) ?? 0)}, at most ${String(most)} a day`;
+  if (total === 0)
+    return (
+      <Text span c="dimmed" size="sm">
+        –
+      </Text>
+    );
+  return (
+    <svg width={counts.length * 6} height={22} role="img" aria-label={label}>
+      <title>{label}</title>
+      {counts.map((count, day) => {
+        const height = count === 0 ? 1 : Math.max(3, (20 * count) / most);
+        return <rect key={day} x={day * 6} y={21 - height} width={4} height={height} fill="currentColor" opacity={count === 0 ? 0.3 : 1} />;
+      })}
+    </svg>
+  );
+}
+
+const COLUMNS: Column<Listed>[] = [
   {
     title: "Study",
     wrap: true,
@@ -106,7 +187,9 @@ const COLUMNS: Column<Schemas["StudySummary"]>[] = [
   },
   { title: "Complete", number: true, cell: (row) => `${row.complete}${row.quota === null ? "" : ` of ${row.quota}`}` },
   { title: "Under way", number: true, wide: true, cell: (row) => row.active },
-  { title: "Version", number: true, wide: true, cell: (row) => row.version },
+  { title: "Complete per day", wide: true, cell: (row) => <Days counts={row.completed_by_day} /> },
+  { title: "Last activity", wide: true, cell: (row) => ago(row.last_activity, new Date().toISOString()) },
+  { title: "Owner", wide: true, cell: (row) => row.owner || "–" },
 ];
 const WITH_WORKSPACE: typeof COLUMNS = [
   ...COLUMNS.slice(0, 1),
