@@ -14,21 +14,16 @@ _FACTOR = re.compile(r"\b(?:factor|C)\(\s*([^()]+?)\s*\)")
 _NAME = re.compile(r"(?:[^\W\d]|\.)[\w.]*")
 
 Effect = tuple[str, ...]
-"""Names of the columns of an effect; none for the intercept."""
+"""Names of the columns of an effect."""
 
 
 @dataclass(frozen=True)
 class RandomPart:
-    """What differs between levels of a grouping: effects, whether they correlate, and `a` or `a/b`."""
+    """A grouping (`a` or `a/b`), its slopes in addition to the intercept, and whether they correlate."""
 
-    effects: tuple[Effect, ...]
+    slopes: tuple[Effect, ...]
     correlated: bool
     grouping: str
-
-    @property
-    def slopes(self) -> tuple[Effect, ...]:
-        """Effects without the intercept."""
-        return tuple(effect for effect in self.effects if effect)
 
 
 @dataclass(frozen=True)
@@ -103,7 +98,7 @@ def parse_formula(text: str) -> Formula:
                 raise InputError(
                     f"the slope of {':'.join(effect)} needs {':'.join(effect)} outside the brackets too"
                 )
-    return Formula(text, rating.strip(), tuple(effect for effect in fixed if effect), random, as_factors)
+    return Formula(text, rating.strip(), fixed, random, as_factors)
 
 
 def model_options(formula: Formula, header: Sequence[str], numeric: Collection[str]) -> ModelOptions:
@@ -112,16 +107,15 @@ def model_options(formula: Formula, header: Sequence[str], numeric: Collection[s
     Raises
     ------
     InputError
-        A name that is not a column; slopes of more than one grouping, or without an intercept.
+        A name that is not a column; slopes of more than one grouping.
     """
     for name in formula.columns:
         if name not in header:
             raise InputError(f"'{name}' in the formula is not a column{did_you_mean(name, header)}")
     with_slopes = [part for part in formula.random if part.slopes]
-    if len(with_slopes) > 1 or any(() not in part.effects for part in formula.random):
+    if len(with_slopes) > 1:
         raise InputError(
-            "expected an intercept in every bracket and slopes in one of them, such as (1 + a | person) + "
-            f"(1 | clip), got '{formula.text}'"
+            f"expected slopes of one grouping, such as (1 + a | person) + (1 | clip), got '{formula.text}'"
         )
     people = (with_slopes or list(formula.random))[0]
     if "/" in people.grouping:
@@ -145,7 +139,7 @@ def model_options(formula: Formula, header: Sequence[str], numeric: Collection[s
 
 
 def _effects_of(text: str, whole: str) -> tuple[Effect, ...]:
-    """Effects of `a*b + c`, the intercept as an empty one; a*b is a + b + a:b."""
+    """Effects of `a*b + c` without the intercept, which every term has; a*b is a + b + a:b."""
     effects: dict[frozenset[str], Effect] = {}
     without_intercept = False
     for term in (part.strip() for part in text.split("+")):
@@ -161,7 +155,7 @@ def _effects_of(text: str, whole: str) -> tuple[Effect, ...]:
             effects.setdefault(frozenset(effect), effect)
     if without_intercept:
         raise InputError(f"'{whole}' has a term without an intercept (0 +), which is not supported")
-    return tuple(sorted(effects.values(), key=len))
+    return tuple(sorted((effect for effect in effects.values() if effect), key=len))
 
 
 def _grouping_of(text: str, whole: str) -> str:

@@ -76,6 +76,8 @@ def test_formulas_are_read_as_r_reads_them() -> None:
     assert options.covariates == ("b", "age", "a:b", "a:age", "b:age", "a:b:age")
     assert (options.participant, options.item, options.random) == ("person", ("clip",), ("lab/room",))
     assert (options.slopes, options.slope_effects) == ("correlated", ("a",))
+    implied = model_options(parse_formula("y ~ a + (a | person)"), header, {"y", "age", "b"})
+    assert (implied.slopes, implied.slope_effects) == ("correlated", ("a",))
     forced = model_options(parse_formula("y ~ factor(b) + (1 | person)"), header, {"y", "b"})
     assert (forced.factors, forced.covariates, forced.slopes) == (("b",), (), "none")
 
@@ -100,7 +102,10 @@ def test_formulas_are_read_as_r_reads_them() -> None:
         ),
         ("rating ~ blur + (0 + blur | participant)", "has a term without an intercept (0 +)"),
         ("rating ~ group + (1 + group | participant)", "it does not vary within a participant"),
-        ("rating ~ blur + (1 + blur | participant) + (1 + blur | clip)", "slopes in one of them"),
+        (
+            "rating ~ blur + (1 + blur | participant) + (1 + blur | clip)",
+            "expected slopes of one grouping, such as",
+        ),
     ],
 )
 def test_wrong_formulas_are_one_line(tmp_path: Path, formula: str, said: str) -> None:
