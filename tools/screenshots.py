@@ -311,7 +311,7 @@ def builder_pictures(folder: Path) -> None:
 
 
 RECORDED_SIZE, RECORDED_FPS = (1280, 720), 10
-MOST_BYTES = 2_000_000
+MAX_BYTES = 2_000_000
 
 
 def recording_pictures(folder: Path) -> None:
@@ -340,8 +340,8 @@ def recording_pictures(folder: Path) -> None:
         process.stop()
     target = ROOT / "docs" / "_static" / "own-clips.mp4"
     write_small_video(shown, target)
-    if target.stat().st_size > MOST_BYTES:
-        sys.exit(f"error: {target} has {target.stat().st_size} bytes, expected at most {MOST_BYTES}")
+    if target.stat().st_size > MAX_BYTES:
+        sys.exit(f"error: {target} has {target.stat().st_size} bytes, expected at most {MAX_BYTES}")
 
 
 def record_own_clips(page: Page, address: str, files: list[Path]) -> None:
