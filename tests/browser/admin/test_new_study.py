@@ -10,7 +10,7 @@ from tests.browser.admin.conftest import Dashboard
 from tests.helpers.tiny_clips import encoded_video
 
 pytestmark = pytest.mark.browser
-MAX_INTERACTIONS = 40
+MAX_INTERACTIONS = 20
 
 
 class Hand:
@@ -91,7 +91,7 @@ def test_own_clips_to_a_live_link(dashboard: Dashboard, clips: list[Path]) -> No
 
     hand.press("Set live")
     asked = page.get_by_role("dialog")
-    expect(asked.get_by_text("The plan is not sealed. You can seal it only before")).to_be_visible()
+    expect(asked.get_by_text("The analysis plan is not sealed.")).to_be_visible()
     expect(
         asked.get_by_text("Phones are turned away: the study requires a window of at least 800 x 500 px")
     ).to_be_visible()
