@@ -323,7 +323,8 @@ def recording_pictures(folder: Path) -> None:
             browser = playwright.chromium.launch(
                 executable_path=shutil.which("chromium"), args=CHROMIUM_FLAGS, slow_mo=350
             )
-            page = browser.new_page(viewport=dict(zip(("width", "height"), RECORDED_SIZE, strict=True)))
+            width, height = RECORDED_SIZE
+            page = browser.new_page(viewport={"width": width, "height": height})
             sign_in(page, process.address, process.settings)
             session = page.context.new_cdp_session(page)
 
