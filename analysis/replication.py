@@ -10,7 +10,7 @@ import operator
 import re
 import tempfile
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -26,6 +26,8 @@ from experiments.errors import InputError
 
 SHIPPED = Path(__file__).parent / "published"
 DECLARATION = "study.toml"
+CommandLine = Callable[[list[str]], object]
+"""Runs a command line, and raises its errors."""
 WRONG_CALLS: tuple[Any, ...] = typer.BadParameter.__bases__
 """Errors of a command line, such as an unknown option; typer gives the class no public name."""
 
@@ -202,11 +204,13 @@ def load_study(name: str) -> tuple[Path, Study]:
         raise InputError(f"{file}: {where}: {detail['msg']}") from error
 
 
-def replicate_study(name: str, data: Path | None = None, slow: bool = False) -> Replication:
+def replicate_study(run: CommandLine, name: str, data: Path | None = None, slow: bool = False) -> Replication:
     """Rebuild every printed number of a study.
 
     Parameters
     ----------
+    run : callable
+        Runs a command of `analysis`, given its name and arguments.
     name : str
         A shipped study, or a folder.
     data : Path, optional
@@ -228,7 +232,7 @@ def replicate_study(name: str, data: Path | None = None, slow: bool = False) -> 
         return Replication(folder.name, study, (), said)
     contents = {file: _verified(file, path, study.files[file]) for file, path in files.items() if path}
     chosen = [one for one in study.analysis if slow or not one.slow]
-    rows = [row for one in chosen for case in _cases(one) for row in _compared(case, contents)]
+    rows = [row for one in chosen for case in _cases(one) for row in _compared(run, case, contents)]
     named = {one.figure: one.reason for one in study.not_reproduced}
     explained = tuple(_explained(row, named) for row in rows)
     return Replication(folder.name, study, explained, left_out=len(study.analysis) - len(chosen))
@@ -268,16 +272,18 @@ def _cases(analysis: StudyAnalysis) -> Iterator[StudyAnalysis]:
         yield StudyAnalysis.model_validate({**filled, **{k: v for k, v in case.items() if k == "printed"}})
 
 
-def _compared(analysis: StudyAnalysis, contents: Mapping[str, bytes]) -> Iterator[Comparison]:
+def _compared(
+    run: CommandLine, analysis: StudyAnalysis, contents: Mapping[str, bytes]
+) -> Iterator[Comparison]:
     """Run the command on the table, and put each printed number next to ours."""
     with tempfile.TemporaryDirectory() as scratch:
         table, out = Path(scratch) / (analysis.table or "made.csv"), Path(scratch) / "out.json"
         if analysis.made_by:
-            _run_command(analysis, [*analysis.made_by, "--out", str(table)])
+            _run_command(run, analysis, [*analysis.made_by, "--out", str(table)])
         elif analysis.table:
             _table(analysis, contents).to_csv(table, index=False)
         command, *options = analysis.run
-        _run_command(analysis, [command, str(table), *options, "--json", str(out)])
+        _run_command(run, analysis, [command, str(table), *options, "--json", str(out)])
         numbers = json.loads(out.read_text(encoding="utf-8"))
     for figure in (*_sentence(analysis), *analysis.figures):
         at, _, decimals = figure.at.rpartition(":") if re.search(r":\d$", figure.at) else (figure.at, "", "")
@@ -291,12 +297,10 @@ def _compared(analysis: StudyAnalysis, contents: Mapping[str, bytes]) -> Iterato
             yield _comparison(analysis.name, label, str(row[name]), numbers, own)
 
 
-def _run_command(analysis: StudyAnalysis, arguments: Sequence[str]) -> None:
-    from analysis.cli import app
-
+def _run_command(run: CommandLine, analysis: StudyAnalysis, arguments: Sequence[str]) -> None:
     try:
         with contextlib.redirect_stdout(io.StringIO()):
-            app(list(arguments), standalone_mode=False)
+            run(list(arguments))
     except (InputError, *WRONG_CALLS) as error:
         raise InputError(f"{analysis.name}: {error}") from error
 

@@ -18,7 +18,7 @@ from server.accounts.endpoints import invitation_url
 from server.cli_common import migrated_services, out
 from server.context import Services
 from server.core.logs import logging_configuration
-from server.core.settings import Settings, close_to_others, note_address
+from server.core.settings import ADDRESS_FILE, Settings, close_to_others
 from server.operations.doctor import late_entry
 from server.operations.metrics import MULTIPROCESS_VARIABLE
 from server.privacy.ledger import begin_ledger
@@ -86,6 +86,12 @@ def run(
             # uvicorn by itself believes what anybody on this machine says of the sender's address.
             proxy_headers=TRUSTED_PROXIES in os.environ,
         )
+
+
+def note_address(settings: Settings) -> None:
+    """Store the server's URL in its data folder, for the links that commands print."""
+    settings.data_folder.mkdir(parents=True, exist_ok=True)
+    (settings.data_folder / ADDRESS_FILE).write_text(f"{settings.public_url}\n", encoding="utf-8")
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from dataclasses import asdict
 from datetime import date
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated
@@ -214,6 +215,7 @@ def register_replicate(app: typer.Typer) -> None:
 
 
 def replicate(
+    context: typer.Context,
     study: Annotated[
         list[str] | None,
         typer.Argument(help="Shipped studies, or folders with a study.toml. Default: every shipped study."),
@@ -254,9 +256,10 @@ def replicate(
         check_folder(out)
     with progress_spinner("replicating") as say:
         results = []
+        run = partial(context.find_root().command.main, standalone_mode=False)
         for name in study or shipped_studies():
             say(name)
-            results.append(replicate_study(name, data, slow))
+            results.append(replicate_study(run, name, data, slow))
     save_json(
         json, {"studies": [one.summary() | {"rows": [asdict(row) for row in one.rows]} for one in results]}
     )

@@ -203,12 +203,6 @@ class Provider(_DeclaredTable):
         return self.client_secret_file.read_text(encoding="utf-8").strip()
 
 
-def note_address(settings: "Settings") -> None:
-    """Store the server's URL in its data folder, for the links that commands print."""
-    settings.data_folder.mkdir(parents=True, exist_ok=True)
-    (settings.data_folder / ADDRESS_FILE).write_text(f"{settings.public_url}\n", encoding="utf-8")
-
-
 def is_safe(address: str) -> bool:
     """True for https, and for http that does not leave this machine."""
     parts = urlsplit(address)

@@ -482,3 +482,8 @@ def examine(services: Services) -> list[Finding]:
             advice = "see DATABASE_URL, then run: server database upgrade"
             findings.append(Finding(check.__name__.replace("_", " "), "failed", said, advice))
     return findings
+
+
+def findings_for_studies(services: Services) -> list[Finding]:
+    """What matters before a study goes live: room on the disk, backups, and the address of links."""
+    return [finding for check in (data_folder, backups, public_address) for finding in check(services)]

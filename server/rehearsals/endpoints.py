@@ -8,6 +8,7 @@ from server.context import ServicesDep
 from server.core.errors import ERROR_RESPONSES
 from server.core.requests import DatabaseDep, SettingsDep
 from server.exports.reports import REPORT_POLICY
+from server.operations.doctor import findings_for_studies
 from server.rehearsals import service
 from server.rehearsals.schemas import NewRehearsal, RehearsalOut, RehearsalResult
 from server.studies.schemas import LaunchCheck
@@ -18,7 +19,8 @@ launch_router = APIRouter(prefix="/api/admin", tags=["studies"], responses=ERROR
 @launch_router.get("/studies/{study}/launch-checks")
 def list_launch_checks(services: ServicesDep, identity: Viewer, study: str) -> list[LaunchCheck]:
     """What to look at before the study goes live."""
-    return service.preflight(services, study, identity)
+    found = findings_for_studies(services)
+    return service.preflight(services.database, services.settings, found, study, identity)
 
 
 router = APIRouter(

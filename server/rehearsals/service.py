@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -19,7 +19,6 @@ from sqlalchemy.orm import Session
 from experiments.files import json_text
 from server.accounts.audit import record
 from server.accounts.identity import OPERATOR, Identity
-from server.context import Services
 from server.core.db import Database
 from server.core.errors import NotFound
 from server.core.locks import LONGEST_S, Locks, file_lock
@@ -27,7 +26,7 @@ from server.core.settings import Settings
 from server.core.values import now
 from server.exports.seals import people_begun, seal_of
 from server.models import Job, Study
-from server.operations.doctor import Finding, backups, data_folder, public_address
+from server.operations.doctor import Finding
 from server.rehearsals.schemas import (
     DEFINITION,
     MANIFEST,
@@ -248,13 +247,18 @@ def _kill(group: int) -> None:
 # The checklist before a study goes live: its declaration, rehearsal and plan, and the server.
 
 
-def preflight(services: Services, name: str, identity: Identity) -> list[LaunchCheck]:
-    """Everything that speaks against opening the active version of a study, blocking findings first."""
-    with services.database.read() as session:
+def preflight(
+    database: Database, settings: Settings, of_server: Sequence[Finding], name: str, identity: Identity
+) -> list[LaunchCheck]:
+    """Everything that speaks against opening the active version of a study, blocking findings first.
+
+    `of_server` is what the doctor found (`server.operations.doctor.findings_for_studies`).
+    """
+    with database.read() as session:
         findings = launch_checks(session, name, identity)
         study = find_study(session, name, identity, "view")
         findings += [*_plan(session, study), *_rehearsal(session, study)]
-    return sorted([*findings, *_server(services)], key=lambda finding: not finding.blocks)
+    return sorted([*findings, *_server(settings, of_server)], key=lambda finding: not finding.blocks)
 
 
 def _plan(session: Session, study: Study) -> Iterator[LaunchCheck]:
@@ -298,22 +302,21 @@ _OF_SERVER = {
 """Findings of `server doctor` that matter for a study, and the kind of their check."""
 
 
-def _server(services: Services) -> Iterator[LaunchCheck]:
+def _server(settings: Settings, of_server: Sequence[Finding]) -> Iterator[LaunchCheck]:
     """A full disk, old backups, an address that participants cannot reach."""
-    for examine in (data_folder, backups, public_address):
-        for finding in examine(services):
-            kind = _OF_SERVER.get(finding.subject)
-            if kind is not None and finding.verdict != "ok":
-                yield _of_finding(kind, finding)
-    if services.settings.is_local:
+    for finding in of_server:
+        kind = _OF_SERVER.get(finding.subject)
+        if kind is not None and finding.verdict != "ok":
+            yield _of_finding(kind, finding)
+    if settings.is_local:
         yield LaunchCheck(
             kind="address",
             blocks=False,
-            text=f"Links begin with {services.settings.public_url}, which opens only on this machine. Set "
+            text=f"Links begin with {settings.public_url}, which opens only on this machine. Set "
             "PALPEBRA_PUBLIC_URL before you send links to people on other machines.",
             page="server",
         )
-    if not _has_backups(services.settings):
+    if not _has_backups(settings):
         yield LaunchCheck(
             kind="backups",
             blocks=False,

@@ -14,6 +14,7 @@ KNOW_EVERY_PART = {
     "app",
     "cli",
     "cli_common",
+    "cli_run",
     "cli_backups",
     "request_limits",
     "web",

@@ -1,6 +1,7 @@
 """Published studies: every shipped one to its printed digits, a new one as one folder, bad declarations."""
 
 import hashlib
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,8 @@ from typer.testing import CliRunner
 from analysis.cli import app
 from analysis.replication import SHIPPED, load_study, number_at, replicate_study, shipped_studies
 from experiments.errors import InputError
+
+run = partial(app, standalone_mode=False)
 
 STUDY = """
 title = "A study"
@@ -41,7 +44,7 @@ def _folder(path: Path, text: str = STUDY, printed: str = PRINTED) -> Path:
 
 @pytest.mark.parametrize("name", shipped_studies())
 def test_shipped_studies_are_rebuilt_to_the_printed_digits(name: str) -> None:
-    result = replicate_study(name)
+    result = replicate_study(run, name)
     if name == "p1203-acr":
         assert "non-commercial" in result.missing
         assert not result.rows
@@ -53,14 +56,14 @@ def test_shipped_studies_are_rebuilt_to_the_printed_digits(name: str) -> None:
 
 
 def test_bootstrap_limits_are_those_printed_within_simulation_error() -> None:
-    result = replicate_study("hdr-vdc-pairs", slow=True)
+    result = replicate_study(run, "hdr-vdc-pairs", slow=True)
     limits = [row for row in result.rows if row.analysis.startswith("Bootstrap")]
     assert len(limits) == 928
     assert all(row.equal for row in limits)
 
 
 def test_a_study_that_may_not_be_shipped_takes_the_users_copy(shared_data: Path) -> None:
-    result = replicate_study("p1203-acr", shared_data / "published" / "p1203-acr")
+    result = replicate_study(run, "p1203-acr", shared_data / "published" / "p1203-acr")
     assert (len(result.rows), result.n_equal) == (956, 956)
 
 
@@ -98,10 +101,10 @@ def test_a_new_study_is_one_folder(tmp_path: Path) -> None:
     assert "printed 4.34, ours 4.33013: study.toml gives no" in ended.output
     more = '\n[[not_reproduced]]\nfigure = "t$"\nreason = "a misprint"\n'
     _folder(folder, STUDY + more, PRINTED.replace("4.33", "4.34"))
-    assert not replicate_study(str(folder)).unexplained
+    assert not replicate_study(run, str(folder)).unexplained
     # a number that is equal although a difference was declared is a wrong declaration
     _folder(folder, STUDY + more)
-    assert len(replicate_study(str(folder)).unexplained) == 1
+    assert len(replicate_study(run, str(folder)).unexplained) == 1
 
 
 @pytest.mark.parametrize(
@@ -126,7 +129,7 @@ def test_wrong_declarations_are_one_line(tmp_path: Path, before: str, after: str
     folder = _folder(tmp_path / "ours", STUDY.replace(before, after))
     (folder / "ratings.csv").write_text(CSV, encoding="utf-8")
     with pytest.raises(InputError) as error:
-        replicate_study(str(folder))
+        replicate_study(run, str(folder))
     assert said in str(error.value)
     assert "\n" not in str(error.value)
 

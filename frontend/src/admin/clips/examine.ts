@@ -1,6 +1,8 @@
 /** Clips tried by the participant page's own decoder in the experimenter's browser, and what is wrong with them. */
 
-import type { Schemas } from "../api";
+import type { components } from "../../api/schema";
+
+type Schemas = components["schemas"];
 
 /** What the server says of a clip, and where its bytes are. */
 export interface ExpectedClip {
