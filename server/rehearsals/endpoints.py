@@ -19,8 +19,8 @@ launch_router = APIRouter(prefix="/api/admin", tags=["studies"], responses=ERROR
 @launch_router.get("/studies/{study}/launch-checks")
 def list_launch_checks(services: ServicesDep, identity: Viewer, study: str) -> list[LaunchCheck]:
     """What to look at before the study goes live."""
-    found = findings_for_studies(services)
-    return service.preflight(services.database, services.settings, found, study, identity)
+    findings = findings_for_studies(services)
+    return service.preflight(services.database, services.settings, findings, study, identity)
 
 
 router = APIRouter(
