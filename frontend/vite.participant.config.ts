@@ -4,14 +4,14 @@ import { defineConfig, type Plugin } from "vite";
 
 const BASE = "/assets/participant/";
 const OFFLINE = "service-worker";
-/** Short: the names stand in the page and in the service worker, gzipped badly. What loads later goes by its hash alone. */
+/** Short: the names appear in the page and in the service worker, gzipped badly. What loads later goes by its hash alone. */
 const NAMED = "[name]-[hash:6].js";
 const LATER = "[hash:6].js";
-/** What every kind of trial and the pages beside them need. */
+/** What every kind of trial and the other pages need. */
 const SHARED =
   /src\/ui\/|participant\/(session|request|screens\/support|jspsych|playback\/(protocol|record)|views\/|trials\/(rating|showing|trial)\.)/;
 
-/** Tells the service worker the names of the built files, which it keeps. */
+/** Gives the service worker the names of the built files, which it keeps. */
 function listFiles(): Plugin {
   return {
     name: "list-files",
@@ -69,7 +69,7 @@ export default defineConfig({
         entryFileNames: ({ name }) => (name === OFFLINE ? "[name].js" : NAMED),
         chunkFileNames: LATER,
         assetFileNames: "[name]-[hash:6][extname]",
-        // Left alone, every module that two pages share becomes a file of its own, and small files compress badly.
+        // By default, every module that two pages share becomes a separate file, and small files compress badly.
         codeSplitting: { groups: [{ name: "base", test: SHARED }] },
       },
     },

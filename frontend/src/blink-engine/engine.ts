@@ -215,7 +215,7 @@ export class BlinkEngine {
     this.plan.setState(state, this.reach(time_s ?? this.time_s));
   }
 
-  /** Tell of an event, in the order of time; one in the past counts as happening at the last frame. */
+  /** Report an event, in the order of time; one in the past counts as happening at the last frame. */
   notify(event: BlinkEvent): void {
     this.plan.notify({ ...event, time_s: this.reach(event.time_s) });
   }

@@ -10,7 +10,7 @@ const files = import.meta.glob<Messages>("./languages/*.json", { import: "defaul
 const loaders = Object.fromEntries(Object.entries(files).map(([path, load]) => [tagIn(path), load]));
 const catalogues: Partial<Record<string, Messages>> = {};
 
-/** Languages that the page speaks itself. English first: it stands in for all others. */
+/** Languages of the page itself. English comes first: it is the fallback for all others. */
 export const SHIPPED = ["en", ...Object.keys(loaders).filter((tag) => tag !== "en")];
 
 const RIGHT_TO_LEFT = new Set(["ar", "dv", "fa", "he", "ku", "ps", "sd", "ug", "ur", "yi"]);

@@ -1,4 +1,4 @@
-/** Beside the page: looks for eyes, which takes seconds, while the page stays usable. */
+/** Looks for eyes in the background, which takes seconds, while the page stays usable. */
 
 import type { EyesOfVideo } from "./eyes";
 import type { Grey } from "./grey";
@@ -11,14 +11,14 @@ export interface ToEyes {
 
 export type FromEyes = { readonly percent: number } | { readonly eyes: EyesOfVideo };
 
-const tell = (message: FromEyes): void => self.postMessage(message);
+const send = (message: FromEyes): void => self.postMessage(message);
 
 self.onmessage = ({ data }: MessageEvent<ToEyes>) => {
-  let told = -1;
+  let reported = -1;
   const eyes = seeEyes(data.pictures, data.seconds, (share) => {
     const percent = Math.floor(100 * share);
-    if (percent > told) tell({ percent });
-    told = Math.max(told, percent);
+    if (percent > reported) send({ percent });
+    reported = Math.max(reported, percent);
   });
-  tell({ eyes });
+  send({ eyes });
 };

@@ -1,4 +1,4 @@
-/** Where eyes may be: spots that change together for a moment, again and again. Which of them are eyes, following them tells. */
+/** Where eyes may be: spots that change together for a moment, again and again. Following them shows which of them are eyes. */
 import { type EyePlaces, WIDTH_OF_DISTANCE } from "./eyes";
 import { type Grey, cut, type Patch, searchFinely, type BlockMeans, blockMeans } from "./grey";
 import type { Point } from "./points";
@@ -12,10 +12,10 @@ const MARGIN = 0.75;
 /** Half the width and height of what lids change, in widths of an eye. */
 const LIDS: Point = [0.55, 0.34];
 
-/** Change of each eye and of the region beside them, as means over their area, in grey levels. */
+/** Change of each eye and of the region around them, as means over their area, in gray levels. */
 interface AlignedChange {
   readonly eyes: readonly number[];
-  readonly beside: number;
+  readonly around: number;
 }
 
 /** Middle of the eyes and a grid of points over them and what surrounds them. */
@@ -59,7 +59,7 @@ function meansOf(change: Float64Array, { centres, width }: EyePlaces, middle: Po
     if (sum !== undefined) [sum[0], sum[1]] = [sum[0] + value, sum[1] + 1];
   });
   const means = sums.map(([sum, count]) => sum / Math.max(1, count));
-  return { eyes: means.slice(0, centres.length), beside: means[centres.length] ?? 0 };
+  return { eyes: means.slice(0, centres.length), around: means[centres.length] ?? 0 };
 }
 
 // Spots of a picture that change for a moment and are then as before: what blinking eyes do.
@@ -120,7 +120,7 @@ function clamp(value: number, most: number): number {
   return Math.min(most, Math.max(0, Math.round(value)));
 }
 
-/** The strongest spots as wide as an eye of `width` squares, none beside a stronger one. */
+/** The strongest spots as wide as an eye of `width` squares, none next to a stronger one. */
 function spotsOf(map: BlockMeans, sums: Sums, width: number): Spot[] {
   const height = Math.max(1, Math.round(HEIGHT_OF_WIDTH * width));
   const [wide, high] = [Math.round(RING * width), Math.round(RING * height) + 1];
@@ -160,7 +160,7 @@ const MAX_TILT = 0.35;
 const LEAST_BALANCE = 0.35;
 /** Grey levels by the share of all change nearby; noise of sensors stays below. */
 const LEAST_SCORE = 0.6;
-/** Grey levels by which the eyes change more than twice what is beside them. */
+/** Gray levels by which the eyes change more than twice the region around them. */
 const LEAST_STILLED = 1;
 const GUESSES_A_PICTURE = 3;
 const GUESSES = 4;
@@ -188,10 +188,15 @@ export interface Guess {
 }
 
 /** The likeliest places of two eyes, or of one; `aside` pictures before and after a blink the lids are open. */
-export function guessEyes(pictures: readonly Grey[], eyes: 1 | 2, aside: number, tell: (share: number) => void = () => undefined): Guess[] {
+export function guessEyes(
+  pictures: readonly Grey[],
+  eyes: 1 | 2,
+  aside: number,
+  report: (share: number) => void = () => undefined,
+): Guess[] {
   const coarse = pictures.map((picture) => blockMeans(picture, BLOCK_PX));
   const moments = coarse.flatMap((now, index) => {
-    tell(index / coarse.length);
+    report(index / coarse.length);
     const [before, after] = [coarse[Math.max(0, index - aside)], coarse[Math.min(coarse.length - 1, index + aside)]];
     if (before === undefined || after === undefined || coarse.length < 3) return [];
     return momentsOf(briefChange(before, now, after), index, eyes);
@@ -213,9 +218,9 @@ export function guessEyes(pictures: readonly Grey[], eyes: 1 | 2, aside: number,
 /** A moment judged by what is left of its change once the region's motion is taken out; none where that is little. */
 function stilled(moment: Moment, sides: readonly [Grey, Grey, Grey] | null): Moment[] {
   if (sides === null) return [];
-  const { eyes, beside } = alignedChange(sides, placesOf(moment));
+  const { eyes, around } = alignedChange(sides, placesOf(moment));
   const [weakest, strongest] = [Math.min(...eyes), Math.max(...eyes)];
-  const score = weakest - 2 * beside;
+  const score = weakest - 2 * around;
   return score >= LEAST_STILLED && weakest >= LEAST_BALANCE * strongest ? [{ ...moment, score }] : [];
 }
 

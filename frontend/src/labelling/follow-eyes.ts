@@ -6,7 +6,7 @@ import type { Point } from "./points";
 
 /** Steps of the region's grid that a head may move from one picture to the next. */
 const REACH = 5;
-/** Likeness from which a region is the same one; below `RENEWED` its look is taken anew once it stays so. */
+/** Likeness from which a region is the same one; below `RENEWED` its look is taken again once it stays so. */
 const LEAST_LIKE = 0.5;
 const RENEWED = 0.88;
 
@@ -233,21 +233,21 @@ interface Seen extends FoundEyes {
   readonly score: number;
 }
 
-/** Two eyes and one eye of a video; `seconds` from one picture to the next, `tell` hears the share that is done. */
-export function seeEyes(pictures: readonly Grey[], seconds: number, tell: (share: number) => void): EyesOfVideo {
+/** Two eyes and one eye of a video; `seconds` from one picture to the next, `report` receives the share that is done. */
+export function seeEyes(pictures: readonly Grey[], seconds: number, report: (share: number) => void): EyesOfVideo {
   const first = pictures[0];
   const size = [first?.width ?? 1, first?.height ?? 1] as const;
   const aside = Math.max(1, Math.round(ASIDE_SECONDS / seconds));
   const minutes = (pictures.length * seconds) / 60;
-  const two = seen(pictures, 2, aside, minutes, (share) => tell(share / 2));
-  const one = seen(pictures, 1, aside, minutes, (share) => tell((1 + share) / 2));
+  const two = seen(pictures, 2, aside, minutes, (share) => report(share / 2));
+  const one = seen(pictures, 1, aside, minutes, (share) => report((1 + share) / 2));
   return { size, two: two !== null && one !== null && isPartOf(two, one) ? null : two, one, problem: null };
 }
 
-function seen(pictures: readonly Grey[], eyes: 1 | 2, aside: number, minutes: number, tell: (share: number) => void): Seen | null {
-  const guesses = guessEyes(pictures, eyes, aside, (share) => tell(0.6 * share)).slice(0, TRIED);
+function seen(pictures: readonly Grey[], eyes: 1 | 2, aside: number, minutes: number, report: (share: number) => void): Seen | null {
+  const guesses = guessEyes(pictures, eyes, aside, (share) => report(0.6 * share)).slice(0, TRIED);
   for (const [tried, guess] of guesses.entries()) {
-    tell(0.6 + (0.4 * tried) / TRIED);
+    report(0.6 + (0.4 * tried) / TRIED);
     const followed = followEyes(pictures, guess.index, guess.places, aside);
     const lids = lidChanges(pictures, followed, guess.moments, aside);
     if (areLids(lids, followed, Math.max(1, minutes))) return foundOf(guess, followed, lids);

@@ -101,7 +101,7 @@ export function cut(picture: Grey, [x, y]: Point, { columns, rows, step }: Patch
     const left = Math.max(0, Math.min(width - 2, Math.floor(at)));
     [lefts[column], shares[column]] = [left, at - left];
   }
-  const beside = width > 1 ? 1 : 0;
+  const right = width > 1 ? 1 : 0;
   for (let row = 0; row < rows; row += 1) {
     const at = Math.min(picture.height - 1, Math.max(0, y + (row - (rows - 1) / 2) * step));
     const top = Math.max(0, Math.min(picture.height - 2, Math.floor(at)));
@@ -109,8 +109,8 @@ export function cut(picture: Grey, [x, y]: Point, { columns, rows, step }: Patch
     const lower = upper + (picture.height > 1 ? width : 0);
     for (let column = 0; column < columns; column += 1) {
       const [left, across] = [lefts[column] ?? 0, shares[column] ?? 0];
-      const above = (values[upper + left] ?? 0) * (1 - across) + (values[upper + left + beside] ?? 0) * across;
-      const below = (values[lower + left] ?? 0) * (1 - across) + (values[lower + left + beside] ?? 0) * across;
+      const above = (values[upper + left] ?? 0) * (1 - across) + (values[upper + left + right] ?? 0) * across;
+      const below = (values[lower + left] ?? 0) * (1 - across) + (values[lower + left + right] ?? 0) * across;
       out[row * columns + column] = above * (1 - share) + below * share;
     }
   }

@@ -166,19 +166,19 @@ export function problemOf(number: number, shape: Shape, video: OpenedVideo): str
 
 // A video opened for labelling, with the frames looked at to find unlike ones.
 
-/** Open a video and look at frames of it; `tell` hears how far that is. */
-export async function openForLabelling(file: File, tell: (progress: string) => void): Promise<{ video: OpenedVideo; looked: Looked }> {
+/** Open a video and look at frames of it; `report` receives how far that is. */
+export async function openForLabelling(file: File, report: (progress: string) => void): Promise<{ video: OpenedVideo; looked: Looked }> {
   // The readers of video files load when the first one is opened.
   const { openVideo } = await import("./video");
   const video = await openVideo(file);
   try {
     const candidates = candidateFrames(video.frameCount);
     const pictures = await video.smallPictures(candidates, (count) =>
-      tell(`Looking for frames unlike one another: ${count} of ${candidates.length}`),
+      report(`Looking for frames unlike one another: ${count} of ${candidates.length}`),
     );
     const thumbnails = pictures.map(thumbnailOf);
     const seconds = video.seconds / Math.max(1, candidates.length - 1);
-    const eyes = await eyesOf({ pictures, seconds }, (percent) => tell(`Looking for eyes that blink: ${percent}%`));
+    const eyes = await eyesOf({ pictures, seconds }, (percent) => report(`Looking for eyes that blink: ${percent}%`));
     return { video, looked: { candidates, pictures: thumbnails, eyes } };
   } catch (error) {
     video.close();
@@ -187,13 +187,13 @@ export async function openForLabelling(file: File, tell: (progress: string) => v
 }
 
 /** Eyes that blink, looked for in a worker. Without one, labelling goes on from a fixed place. */
-function eyesOf(task: ToEyes, tell: (percent: number) => void): Promise<EyesOfVideo> {
+function eyesOf(task: ToEyes, report: (percent: number) => void): Promise<EyesOfVideo> {
   if (task.pictures.length < 3 || !(task.seconds > 0)) return Promise.resolve(NO_EYES);
   const worker = new Worker(new URL("./eyes-worker.ts", import.meta.url), { type: "module" });
   return new Promise<EyesOfVideo>((resolve) => {
     worker.onerror = (event) => resolve({ ...NO_EYES, problem: event.message || "their worker stopped" });
     worker.onmessage = ({ data }: MessageEvent<FromEyes>) => {
-      if ("percent" in data) tell(data.percent);
+      if ("percent" in data) report(data.percent);
       else resolve(data.eyes);
     };
     // The pictures are not needed here any more: handed over, they are not copied.

@@ -34,7 +34,7 @@ export function templateEye(closed = 0): Shape {
   });
 }
 
-/** A first shape in the middle of the picture: one eye, or two beside each other. */
+/** A first shape in the middle of the picture: one eye, or two next to each other. */
 export function templateShape(eyes: 1 | 2, [width, height]: Size): Shape {
   if (eyes === 1) return OPEN_EYE.map(([x, y]) => [width * (0.2 + 0.6 * x), height / 2 + 0.6 * width * y]);
   const size = 0.13 * width;

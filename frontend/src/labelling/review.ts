@@ -31,7 +31,7 @@ export interface ReviewRow extends Decision {
 export interface BlinkTable {
   readonly blinks: readonly Blink[];
   readonly fps: number;
-  /** Decisions the table itself tells of, from a review that it was written with. */
+  /** Decisions that the table itself records, from the review that it was written with. */
   readonly decisions: Decisions;
 }
 

@@ -106,7 +106,7 @@ export function withLabels(work: Work, name: string, labels: LabelFile): Work {
   };
 }
 
-/** Another number of eyes: the points begin anew, and so do the frames, for other blinks may be known. */
+/** Another number of eyes: points and frames start over, because other blinks may be known. */
 export function withEyes(work: Work, eyes: EyeCount): Work {
   const next = begunWith(work, NO_FRAMES, eyes);
   if (work.opened === null) return next;

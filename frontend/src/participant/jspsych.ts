@@ -12,7 +12,7 @@ export type SimulationMode = "visual" | "data-only";
 
 export interface Screen<Parameters extends object, Data extends object> {
   name: string;
-  /** What the timeline gives, and what the trial records, by type; what each is stands beside it. */
+  /** What the timeline gives, and what the trial records, by type; a comment follows each. */
   parameters: { [Name in keyof Required<Parameters>]: ParameterType };
   data: { [Name in keyof Required<Data>]: ParameterType };
   show(display: HTMLElement, parameters: Parameters): Promise<Data>;
@@ -41,7 +41,7 @@ export function plugin<Parameters extends object, Data extends object>(screen: S
     constructor(private readonly jsPsych: JsPsych) {}
 
     trial(display: HTMLElement, trial: Parameters): void {
-      // A failure reaches the page's own handler of unhandled rejections, which tells the participant.
+      // A failure reaches the page's own handler of unhandled rejections, which shows it to the participant.
       void screen.show(display, trial).then((data) => this.jsPsych.finishTrial(data));
     }
 

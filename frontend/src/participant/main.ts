@@ -87,7 +87,7 @@ async function goesOn({ root, t, link, language }: Entry, identity: Identity): P
   });
 }
 
-/** Begin anew, as somebody whom this browser does not know. */
+/** Start over, as somebody whom this browser does not know. */
 function anotherPerson(keeping: KeptVisit, identity: Identity): void {
   keeping.forget();
   identity.forget();

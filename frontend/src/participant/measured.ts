@@ -9,7 +9,7 @@ const MAX_PX = 100_000;
 const EARLIEST_MS = 0;
 const LATEST_MS = Date.UTC(9000, 0, 1);
 
-/** The number where it lies between the bounds; null for any other, and for what is no number. */
+/** The number if it lies between the bounds; null otherwise, also for what is not a number. */
 export function within(value: unknown, low: number, high: number): number | null {
   return typeof value === "number" && Number.isFinite(value) && value >= low && value <= high ? value : null;
 }

@@ -59,7 +59,7 @@ function parsed(text: string): unknown {
   try {
     return JSON.parse(text);
   } catch {
-    // A proxy's error page stands where JSON was expected: its status says enough.
+    // A proxy sent an error page instead of JSON: its status says enough.
     return null;
   }
 }

@@ -20,7 +20,7 @@ interface Scope {
 // Decision 0221: A service worker keeps the page, and only the page.
 const scope = self as unknown as Scope;
 
-/** The built files beside this one; the build puts them here. */
+/** The built files next to this one; the build lists them here. */
 declare const __FILES__: string[];
 const FILES = __FILES__;
 /** Any link gives the same page, which reads its link from the address. */

@@ -159,18 +159,18 @@ export function receiptOf(outcome: Outcome): Receipt | null {
 
 // A run whose group an answer has just decided: its trials are known from now on.
 
-/** The run as the page sees it: practice is no block. */
+/** The run as the page sees it: practice is not a block. */
 export function withoutPractice(run: RunState): RunState {
   return { ...run, blocks: run.blocks.filter(({ block }) => block > 0) };
 }
 
 /** Take over the run that the answer to a form brings, if it brings one. */
 export function placed(run: RunState, answer: unknown): void {
-  const anew = (answer as Saved | null)?.run;
-  if (anew) Object.assign(run, withoutPractice(anew));
+  const chosen = (answer as Saved | null)?.run;
+  if (chosen) Object.assign(run, withoutPractice(chosen));
 }
 
-// What the server has chosen anew after an answer, put in the place of trials that have not begun.
+// What the server has chosen after an answer, put in the place of trials that have not begun.
 
 const begun = new WeakSet<TrialInfo>();
 

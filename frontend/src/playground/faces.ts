@@ -17,7 +17,7 @@ export function nearest(steps: readonly number[], value: number): number {
   return best;
 }
 
-/** One character on a canvas of its own. */
+/** One character on its own canvas. */
 export class Face {
   readonly canvas = document.createElement("canvas");
   private readonly picture = new Image();

@@ -1,4 +1,4 @@
-/** The playground as a page of its own, whose pictures stand in it (`make playground`). */
+/** The playground as a separate page that contains its pictures (`make playground`). */
 import "./page.css";
 import "./playground.css";
 import type { Strips } from "./faces";

@@ -1,4 +1,4 @@
-/** The blink engine live: every parameter under a slider, both characters at once, beside a uniform timer. */
+/** The blink engine live: a slider for every parameter, both characters at once, next to a uniform timer. */
 import {
   DEFAULT_PARAMETERS,
   type Parameters,
@@ -14,7 +14,7 @@ import { Face, type Strips } from "./faces";
 // One control for each number the engine draws by.
 
 interface Control {
-  /** Where the number stands in `Parameters`, such as `profile.closing_s.median`. */
+  /** The path of the number in `Parameters`, such as `profile.closing_s.median`. */
   path: string;
   label: string;
   group: string;
@@ -103,7 +103,7 @@ export function valueAt(parameters: Parameters, path: string): number {
   return value as number;
 }
 
-/** The same with one number changed; what lies beside the path is shared. */
+/** The same with one number changed; everything off the path is shared. */
 export function withValue(parameters: Parameters, path: string, value: number): Parameters {
   const changed = (tree: object, [key = "", ...rest]: readonly string[]): object => ({
     ...tree,
@@ -177,7 +177,7 @@ function chooser<Choice extends string>(name: string, choices: readonly Choice[]
   return labelled(name, select);
 }
 
-/** A slider with its value beside it, and a way to set it from outside. */
+/** A slider with its value next to it, and a way to set it from outside. */
 function slider(
   name: string,
   { min, max, step }: RangeOptions,
@@ -327,7 +327,7 @@ class Playground {
     });
   }
 
-  /** Begin anew with what the sliders say: the same seed gives the same blinks. */
+  /** Start over with the values of the sliders: the same seed gives the same blinks. */
   private restart(): void {
     this.engine = new BlinkEngine({ seed: this.seed, state: this.state, parameters: this.parameters });
     this.timer = new UniformTimer();

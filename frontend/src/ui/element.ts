@@ -89,7 +89,7 @@ export function alertLine(): HTMLParagraphElement {
   return h("p", { class: "alert", role: "alert" });
 }
 
-// A progress bar without movement of its own: a ruler with a tick a part.
+// A progress bar that does not move by itself: a ruler with one tick per part.
 
 export interface ProgressBar {
   element: HTMLElement;

@@ -38,7 +38,7 @@ export function listenKeys(handler: (event: KeyboardEvent) => void, signal: Abor
   const listener = (event: KeyboardEvent): void => {
     const target = event.target instanceof Element ? event.target : null;
     if (event.repeat || event.ctrlKey || event.altKey || event.metaKey || target?.closest(TYPING)) return;
-    // Enter and Space on a focused button are its click; a dialog has keys of its own.
+    // Enter and Space on a focused button are its click; a dialog has its own keys.
     const button = target?.closest(PRESSABLE);
     if (isStartKey(event) && button && button !== own) return;
     if (document.querySelector("dialog[open]")) return;
@@ -89,7 +89,7 @@ export function clickNothing(press: KeyboardEvent): void {
 }
 
 // Whether a press was meant for what is on the screen. A mouse that still lies where it pressed last chooses nothing:
-// it must have moved since, or the declared delay must have passed. Keys, touch and pens aim anew each time.
+// it must have moved since, or the declared delay must have passed. Keys, touch and pens aim afresh each time.
 
 const MOVED_PX = 3;
 
@@ -110,7 +110,7 @@ export class MeantPress {
     return this.travelled_px >= MOVED_PX || performance.now() - this.from_ms >= this.delay_ms;
   }
 
-  /** Browsers also tell of a move where the page has moved under a resting pointer: its place then stays the same. */
+  /** Browsers also report a move where the page has moved under a resting pointer: its place then stays the same. */
   private moved({ pointerType, screenX: x, screenY: y, movementX, movementY }: PointerEvent): void {
     if (pointerType !== "mouse") return;
     const step = this.last ? Math.hypot(x - this.last.x, y - this.last.y) : Math.hypot(movementX, movementY);

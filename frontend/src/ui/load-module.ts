@@ -3,7 +3,7 @@
 const TRIES = 5;
 const AGAIN_MS = 1_000;
 
-/** What `load` gives, an `import()` of its own at each call. Throws what the last try threw. */
+/** What `load` gives, with a new `import()` at each call. Throws what the last try threw. */
 export async function loadModule<Module>(load: () => Promise<Module>, tries = TRIES): Promise<Module> {
   try {
     return await load();

@@ -1,6 +1,6 @@
 /**
  * The part of Markdown that study texts need: headings, paragraphs, lists, bold, italic, code, links, rules.
- * It builds DOM nodes and never HTML, so a text cannot carry markup or scripts of its own.
+ * It builds DOM nodes and never HTML, so a text cannot contain markup or scripts.
  */
 import { h, type Child } from "./element";
 

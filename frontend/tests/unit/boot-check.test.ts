@@ -7,7 +7,7 @@ const OWN = "https://study.example/assets/participant/index.js";
 
 /** A page in which the script has run, before anything else has; `storage` is what the tab keeps over reloads. */
 class Opened {
-  told = "";
+  page = "";
   reports: string[] = [];
   reloads = 0;
   started = false;
@@ -19,10 +19,10 @@ class Opened {
     const root = {
       getAttribute: () => (this.started ? "yes" : null),
       set innerHTML(text: string) {
-        tell(text);
+        show(text);
       },
     };
-    const tell = (text: string): void => void (this.told = text);
+    const show = (text: string): void => void (this.page = text);
     const sent = (body: string): void => void this.reports.push(body);
     const window = { addEventListener: (type: string, listener: (event: object) => void) => (this.listeners[type] = listener) };
     const page = {
@@ -58,27 +58,27 @@ describe("a page that has not begun", () => {
     const storage = {};
     const opened = [1, 2, 3, 4].map(() => lose(storage));
     expect(opened.map(({ reloads }) => reloads)).toEqual([1, 1, 1, 0]);
-    for (const { told, reports } of opened) {
-      expect(told).toContain('The connection failed</h1><p><a href="">Reload the page');
+    for (const { page, reports } of opened) {
+      expect(page).toContain('The connection failed</h1><p><a href="">Reload the page');
       expect(reports).toEqual([]);
     }
     expect(lose(storage).reloads, "by hand the count begins anew").toBe(1);
   });
   it("is not loaded again by itself where nothing can be counted", () => {
-    const { told, reloads } = lose();
-    expect([told.includes("The connection failed"), reloads]).toEqual([true, 0]);
+    const { page, reloads } = lose();
+    expect([page.includes("The connection failed"), reloads]).toEqual([true, 0]);
   });
   it.each([
     ["knows no modules", new Opened({ modules: false })],
     ["cannot read the script", new Opened({ storage: {} }).happens("error").happens("load")],
-  ])("is too old where it %s, and the server learns it", (_what, { told, reports, reloads }) => {
-    expect(told).toContain("too old for the study");
+  ])("is too old where it %s, and the server learns it", (_what, { page, reports, reloads }) => {
+    expect(page).toContain("too old for the study");
     expect(reports.map((body) => JSON.parse(body) as object)).toMatchObject([{ link_token: "abc", reason: "old_browser" }]);
     expect(reloads).toBe(0);
   });
   it("is left alone where the script of somebody else was lost, and where it begins after all", () => {
     const others = new Opened({ storage: {} });
-    expect(others.happens("error", "SCRIPT", "https://extension.example/extra.js")).toMatchObject({ told: "", reloads: 0 });
+    expect(others.happens("error", "SCRIPT", "https://extension.example/extra.js")).toMatchObject({ page: "", reloads: 0 });
     const late = new Opened({ storage: {} });
     late.starts_meanwhile = true;
     expect(late.happens("error", "SCRIPT").reloads).toBe(0);
@@ -86,6 +86,6 @@ describe("a page that has not begun", () => {
   it("is left alone once it has begun, whatever is lost then", () => {
     const opened = new Opened({ storage: {} });
     opened.started = true;
-    expect(opened.happens("error", "SCRIPT").happens("load")).toMatchObject({ told: "", reports: [], reloads: 0 });
+    expect(opened.happens("error", "SCRIPT").happens("load")).toMatchObject({ page: "", reports: [], reloads: 0 });
   });
 });

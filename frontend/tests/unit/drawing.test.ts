@@ -19,7 +19,7 @@ class FakeScope {
 
   postMessage = (message: FromWorker): void => void this.messages.push(message);
   requestAnimationFrame = (callback: (now: number) => void): number => this.waiting.push(callback);
-  tell = (data: ToWorker): void => this.onmessage?.({ data });
+  receive = (data: ToWorker): void => this.onmessage?.({ data });
 
   canvas(): OffscreenCanvas {
     const canvas = { width: 8, height: 4 };
@@ -50,11 +50,11 @@ async function workerIn(browser: string): Promise<FakeScope> {
   vi.stubGlobal("navigator", { userAgent: `Mozilla/5.0 ${browser}` });
   vi.resetModules();
   await import("../../src/participant/playback/worker");
-  scope.tell({ type: "canvas", canvas: scope.canvas(), background: "#808080", sync_patch: false });
-  scope.tell({ type: "prepare", request: 1, sha256: SHA256, bytes: new ArrayBuffer(1), fps: 60 });
+  scope.receive({ type: "canvas", canvas: scope.canvas(), background: "#808080", sync_patch: false });
+  scope.receive({ type: "prepare", request: 1, sha256: SHA256, bytes: new ArrayBuffer(1), fps: 60 });
   await vi.waitFor(() => expect(scope.messages.at(-1)?.type).toBe("prepared"));
-  scope.tell({ type: "warm" });
-  scope.tell({ type: "play", request: 2, sha256: SHA256, refresh_ms: REFRESH_MS, fixation_ms: 0 });
+  scope.receive({ type: "warm" });
+  scope.receive({ type: "play", request: 2, sha256: SHA256, refresh_ms: REFRESH_MS, fixation_ms: 0 });
   return scope;
 }
 
@@ -128,14 +128,14 @@ describe("a clip that is given up", () => {
   it("keeps no picture where it was given up before it was decoded, and is there where it is asked for again", async () => {
     const scope = await workerIn("Chrome");
     closed.mockClear();
-    scope.tell({ type: "release", sha256: SHA256 });
+    scope.receive({ type: "release", sha256: SHA256 });
     expect(closed).toHaveBeenCalledTimes(FRAMES);
-    scope.tell(prepare(3));
-    scope.tell({ type: "release", sha256: SHA256 });
-    scope.tell(prepare(4));
+    scope.receive(prepare(3));
+    scope.receive({ type: "release", sha256: SHA256 });
+    scope.receive(prepare(4));
     await vi.waitFor(() => expect(scope.messages.at(-1)).toMatchObject({ type: "prepared", request: 4 }));
     expect(closed).toHaveBeenCalledTimes(2 * FRAMES);
-    scope.tell({ type: "release", sha256: SHA256 });
+    scope.receive({ type: "release", sha256: SHA256 });
     expect(closed).toHaveBeenCalledTimes(3 * FRAMES);
   });
 });

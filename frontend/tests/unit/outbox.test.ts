@@ -6,7 +6,7 @@ import { IndexedDbStore, type OutboxItem } from "../../src/participant/outbox/st
 
 type Reply = number | "silence";
 
-/** A server that answers as told, then with 200 for ever, and remembers what it stored. */
+/** A server that gives these answers, then 200 for ever, and remembers what it stored. */
 function server(replies: Reply[] = []) {
   const got: { path: string; body: unknown; token: string }[] = [];
   const send = (_method: string, path: string, options: { token: string; body: unknown }): Promise<Answer> => {
@@ -160,8 +160,8 @@ describe("a record that is refused for good", () => {
     expect(outbox.state.pending).toBe(1);
     await outbox.drained();
     expect(paths(got)).toEqual([rating, "/api/run/refused"]);
-    const told = { id: "one", path: rating, status, code: "refused", message: "no", body: { trial_index: 1 } };
-    expect(got[1]?.body).toEqual(told);
+    const refusal = { id: "one", path: rating, status, code: "refused", message: "no", body: { trial_index: 1 } };
+    expect(got[1]?.body).toEqual(refusal);
     expect(await store.all()).toEqual([]);
   });
 

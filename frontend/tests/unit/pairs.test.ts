@@ -14,13 +14,13 @@ vi.mock("jspsych", () => ({ initJsPsych: vi.fn(), ParameterType: {} }));
 vi.mock("../../src/participant/screens/screen-setup", () => ({ askRoom: vi.fn() }));
 vi.mock(import("../../src/participant/trials/showing"), async (load) => ({ ...(await load()), showStage: vi.fn() }));
 
-const BESIDE = { arrangement: "side_by_side", gap_mm: 10, if_too_narrow: "stack" } as const;
+const SIDE_BY_SIDE = { arrangement: "side_by_side", gap_mm: 10, if_too_narrow: "stack" } as const;
 const PIXELS = { width: 960, height: 360 };
 const SHOWN = { width: 480, height: 180 };
 
 describe("layout of a pair", () => {
   it("puts two clips beside one another at their own size, the gap in millimetres", () => {
-    const layout = layoutOf(BESIDE, PIXELS, SHOWN, { width: 1440, height: 900 }, 4);
+    const layout = layoutOf(SIDE_BY_SIDE, PIXELS, SHOWN, { width: 1440, height: 900 }, 4);
     expect(layout?.canvas).toEqual({ width: 2 * 960 + 80, height: 360 });
     expect(layout?.shown).toEqual({ width: 1000, height: 180 });
     expect(layout?.boxes.map(({ x, y, width, height }) => [x, y, width, height])).toEqual([
@@ -32,10 +32,10 @@ describe("layout of a pair", () => {
 
   it("stacks them on a narrow screen only where that is declared", () => {
     const narrow = { width: 900, height: 900 };
-    expect(layoutOf(BESIDE, PIXELS, SHOWN, narrow, 4)?.arrangement).toBe("stacked");
-    expect(layoutOf({ ...BESIDE, if_too_narrow: "refuse" }, PIXELS, SHOWN, narrow, 4)).toBeNull();
-    expect(layoutOf(BESIDE, PIXELS, SHOWN, { width: 900, height: 500 }, 4)).toBeNull();
-    expect(roomNeeded(BESIDE, SHOWN, 4).width).toBe(1000);
+    expect(layoutOf(SIDE_BY_SIDE, PIXELS, SHOWN, narrow, 4)?.arrangement).toBe("stacked");
+    expect(layoutOf({ ...SIDE_BY_SIDE, if_too_narrow: "refuse" }, PIXELS, SHOWN, narrow, 4)).toBeNull();
+    expect(layoutOf(SIDE_BY_SIDE, PIXELS, SHOWN, { width: 900, height: 500 }, 4)).toBeNull();
+    expect(roomNeeded(SIDE_BY_SIDE, SHOWN, 4).width).toBe(1000);
   });
 
   it("has one place for two clips in turn", () => {
@@ -55,7 +55,7 @@ describe("place of a pair in a window that is made narrower", () => {
     });
     const window = { innerWidth: 1_800, innerHeight: 900 };
     vi.stubGlobal("window", window);
-    const declared = { kind: "paired_comparison", presentation: BESIDE };
+    const declared = { kind: "paired_comparison", presentation: SIDE_BY_SIDE };
     const run = { display: { inter_ocular_mm: 60 }, trial: declared };
     await stageFor({ run, screen: { px_per_mm } } as unknown as Session, {} as HTMLElement, aTrial());
     const before = sizes[0]?.();

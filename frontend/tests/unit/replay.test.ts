@@ -71,7 +71,7 @@ function aPlay(rest: Partial<Play> = {}): Play {
   };
 }
 
-const frameAt = (play: Play, at_ms: number): number | undefined => shownAt(playedBack(play, [CLIP]), at_ms).frames[0]?.stand.index;
+const frameAt = (play: Play, at_ms: number): number | undefined => shownAt(playedBack(play, [CLIP]), at_ms).frames[0]?.frame.index;
 
 describe("what stood on the screen", () => {
   it("is the frame drawn last, until the clip's end", () => {
@@ -146,8 +146,8 @@ describe("the size of a clip there", () => {
     const trial = { kind: "paired_comparison", presentation } as Schemas["Replay"]["trial"];
     const clips = ["left", "right"].map((role) => ({ role, clip_sha256: "ab", drawn: LOG })) as View["clips"];
     const views = [aView({ clips })];
-    const beside = arrange({ trial, display }, [CLIP], aPlay({ views }));
-    expect(beside?.boxOf("right")).toMatchObject({ x: 800 + Math.round(40 * (800 / 480)), y: 0 });
+    const sideBySide = arrange({ trial, display }, [CLIP], aPlay({ views }));
+    expect(sideBySide?.boxOf("right")).toMatchObject({ x: 800 + Math.round(40 * (800 / 480)), y: 0 });
     const stacked = arrange({ trial, display }, [CLIP], aPlay({ views, answer: { arrangement: "stacked" } }));
     expect(stacked?.boxOf("right")).toMatchObject({ x: 0, y: 300 + Math.round(40 * (800 / 480)) });
   });

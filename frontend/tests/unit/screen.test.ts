@@ -79,30 +79,30 @@ describe("the refresh rate of a page that nobody looked at", () => {
       await Promise.resolve();
     };
     const rates = [null, null, 59.9, 120];
-    const told: (number | null)[] = [];
+    const reported: (number | null)[] = [];
     const over = new AbortController();
     const measure = (): Promise<number | null> => Promise.resolve(rates.shift() ?? null);
-    const measured = untilMeasured(page as unknown as Document, (rate) => told.push(rate), over.signal, measure);
+    const measured = untilMeasured(page as unknown as Document, (rate) => reported.push(rate), over.signal, measure);
     for (const state of ["hidden", "visible", "hidden", "visible", "visible", "hidden", "visible"]) {
       await new Promise((resolve) => setTimeout(resolve));
       await look(state);
     }
     await measured;
-    expect([told, rates]).toEqual([[null, null, 59.9], [120]]);
+    expect([reported, rates]).toEqual([[null, null, 59.9], [120]]);
   });
 
   it("stays unknown where the run is over before that", async () => {
     const over = new AbortController();
-    const told: (number | null)[] = [];
+    const reported: (number | null)[] = [];
     const measured = untilMeasured(
       new EventTarget() as Document,
-      (rate) => told.push(rate),
+      (rate) => reported.push(rate),
       over.signal,
       () => Promise.resolve(null),
     );
     over.abort();
     await measured;
-    expect(told).toEqual([]);
+    expect(reported).toEqual([]);
   });
 });
 

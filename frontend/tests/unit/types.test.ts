@@ -15,8 +15,8 @@ function filesIn(paths: string[]): string[] {
 describe("what the page draws by name", () => {
   it("has a module for every type of field", () => {
     const files = Object.keys(import.meta.glob("../../src/participant/screens/fields/*.ts"));
-    const beside = ["field", "options"];
-    expect(filesIn(files).filter((name) => !beside.includes(name))).toEqual(namesOf("type", "required"));
+    const folders = ["field", "options"];
+    expect(filesIn(files).filter((name) => !folders.includes(name))).toEqual(namesOf("type", "required"));
   });
   it("has a module for every type of scale", () => {
     const files = Object.keys(import.meta.glob("../../src/participant/trials/scales/*.ts"));

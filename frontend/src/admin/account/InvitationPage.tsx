@@ -1,4 +1,4 @@
-/** Where a one-time link leads: make an account. The token stands behind '#', so no log ever sees it. */
+/** The page of a one-time link: create an account. The token follows '#', so no log ever contains it. */
 import { Alert, Anchor, Text } from "@mantine/core";
 import { useMutation, useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";

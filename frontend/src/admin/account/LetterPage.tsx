@@ -60,7 +60,7 @@ function MailPage() {
   );
 }
 
-// Where the link of a letter leads: choose a new password. The token stands behind '#', so no log ever sees it.
+// The page of an emailed link: choose a new password. The token follows '#', so no log ever contains it.
 
 function NewPasswordPage() {
   const [token] = useState(() => window.location.hash.slice(1));

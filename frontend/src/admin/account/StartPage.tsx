@@ -1,4 +1,4 @@
-/** The first page that `palpebra` opens: three ways to begin. What it knows stands behind '#', so no log ever sees it. */
+/** The first page that `palpebra` opens: three ways to begin. Its secrets follow '#', so no log ever contains them. */
 import { Anchor, Button, Card, Container, Group, SimpleGrid, Stack, Text, Title } from "@mantine/core";
 import { useDocumentTitle } from "@mantine/hooks";
 import { useState } from "react";

@@ -1,4 +1,4 @@
-/** Clips of one's own: chosen or dropped, sent, looked into; what becomes of each. */
+/** The user's own clips: choose or drop them, upload and examine them, and see the result of each. */
 
 import type { Schemas } from "../api";
 import { Alert, Button, FileInput, Group, Progress, Select, Stack, Text } from "@mantine/core";

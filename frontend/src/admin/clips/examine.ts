@@ -40,7 +40,7 @@ export interface ClipProgress {
 }
 
 export interface ClipCheck extends ClipProgress {
-  /** False where this browser has no decoder that could tell. */
+  /** False where this browser has no decoder that could check. */
   canTell: boolean;
   /** In words what the clips have in common, such as their length. */
   facts: string;

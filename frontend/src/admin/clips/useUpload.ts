@@ -13,7 +13,7 @@ const WAITS_MS = [1000, 2000, 4000, 8000, 15_000];
 /** A name in the form in which the server keeps it. */
 const formOf = (name: string) => name.normalize("NFC");
 
-/** Files in requests of limited size, in order; a file above the limit is a request of its own. */
+/** Files in requests of limited size, in order; a file above the limit gets a separate request. */
 export function batchesOf<F extends { size: number }>(files: readonly F[], most = MAX_BATCH): F[][] {
   const batches: F[][] = [];
   let bytes = 0;
@@ -62,7 +62,7 @@ export class LeftOut extends Error {
   }
 }
 
-/** Send what the upload does not hold yet; `onSent` is told how many files are there. LeftOut where it refuses some. */
+/** Send what the upload does not hold yet; `onSent` gets the number of files sent. Throws LeftOut if the server refuses some. */
 async function sendFiles(id: string, files: readonly File[], onSent: (count: number) => void): Promise<void> {
   const missing = await missingOf(id, files);
   const reasons: string[] = [];
@@ -116,7 +116,7 @@ type UploadedFile = Schemas["UploadedFile"];
 interface Tried {
   /** By the name of a file: why its clip does not play. */
   problems: ReadonlyMap<string, string>;
-  /** False where this browser has no decoder that could tell. */
+  /** False where this browser has no decoder that could check. */
   canTell: boolean;
   /** What else is odd about clips that play, a sentence each. */
   remarks: readonly string[];
@@ -166,7 +166,7 @@ export interface Upload {
   progress: Schemas["UploadProgress"] | null;
   /** Result for each file, once none waits. */
   received: Schemas["UploadOut"] | null;
-  /** The same as it was last, while files are sent or looked into: what stands beside it need not go. */
+  /** The last state, while files are sent or examined: the rest of the page need not disappear. */
   last: Schemas["UploadOut"] | null;
   /** Whether the clips that came play in this browser; null until all have been tried. */
   plays: "all" | "not all" | "unknown" | null;
@@ -250,16 +250,16 @@ export function useUpload(purpose: string): Upload {
   });
   const replaced = useMutation<Schemas["UploadProgress"], Error, { name: string; file: File }>({
     mutationFn: ({ name, file }) => replaceFile(id ?? "", name, file),
-    onSuccess: async (told) => {
-      queries.setQueryData(["upload", id, "progress"], told);
+    onSuccess: async (progress) => {
+      queries.setQueryData(["upload", id, "progress"], progress);
       queries.removeQueries({ queryKey: ["upload", id, "files"] });
       await queries.invalidateQueries({ queryKey: ["upload", id, "progress"] });
     },
   });
   const left = useMutation<Schemas["UploadProgress"], Error, { file: string; left_out: boolean }>({
     mutationFn: (body) => unwrap(api.PUT("/api/admin/uploads/{upload}/left-out", { ...path, body })),
-    onSuccess: async (told) => {
-      queries.setQueryData(["upload", id, "progress"], told);
+    onSuccess: async (progress) => {
+      queries.setQueryData(["upload", id, "progress"], progress);
       await queries.invalidateQueries({ queryKey: ["upload", id, "files"] });
     },
   });

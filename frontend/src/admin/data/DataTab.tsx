@@ -25,7 +25,7 @@ import { useChange, notify } from "../ui/useChange";
 import { useParams } from "@tanstack/react-router";
 import { SeriesChooser } from "../ui/SeriesChooser";
 
-// The capsule of a study: made in the background, downloaded, verified by whoever has it.
+// The capsule of a study: made in the background, downloaded, and verifiable by anyone who has it.
 
 const isUnderWay = ({ status }: Schemas["CapsuleOut"]) => status === "queued" || status === "running";
 
@@ -206,7 +206,7 @@ function Unsealed({ study, seal }: Props) {
   );
 }
 
-/** The JSON object in a file; null, and said so, where there is none. */
+/** The JSON object in a file; null, after a message, if there is none. */
 async function readObject(file: File | null): Promise<Record<string, unknown> | null> {
   if (file === null) return null;
   try {

@@ -45,7 +45,7 @@ export function FiguresPage() {
   );
 }
 
-/** "21 + 9 in both eyes": as `stimuli profiles` counts, which tells pairs apart. */
+/** "21 + 9 in both eyes": as `stimuli profiles` counts, which separates single blinks from pairs. */
 function numberOf({ profiles }: Schemas["BlinkLibrary"]): string {
   const pairs = profiles.filter(({ eye }) => eye === "both").length;
   return `${profiles.length - pairs}${pairs > 0 ? ` + ${pairs} in both eyes` : ""}`;

@@ -141,7 +141,7 @@ function One({ profile, chosen, onChoose }: { profile: Profile; chosen: boolean;
   );
 }
 
-/** A curve as the clip builder reads it: one closure sample a line, the right eye's beside it where there is one. */
+/** A curve as the clip builder reads it: one closure sample per line, with the right eye's next to it if there is one. */
 export function curveCsv(closure: readonly number[], other: readonly number[] = []): string {
   const lines = closure.map((value, index) =>
     [value, other[index]]

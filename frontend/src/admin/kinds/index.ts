@@ -1,4 +1,4 @@
-/** The kinds of trial as the admin site knows them: a folder each here, found by its name. */
+/** The kinds of trial as the admin site knows them: one folder each here, found by name. */
 
 import { isTable, textAt } from "../builder/data";
 import type { AdminKind, ShownClips } from "./kind";
@@ -13,7 +13,7 @@ export function adminKind(name: string): AdminKind {
   return folders[`./${name}/facts.ts`] ?? {};
 }
 
-/** The clips that one trial shows, in words, and whether they stand below one another. */
+/** The clips that one trial shows, in words, and whether they are listed one below the other. */
 export function shownClips(trial: unknown): ShownClips {
   if (!isTable(trial)) return { words: ["clip"], stacked: false };
   const single = { words: isTable(trial["reference"]) ? ["reference", "clip"] : ["clip"], stacked: false };

@@ -18,7 +18,7 @@ interface Range {
 export interface AdminKind {
   /** The clips of a trial in the builder's preview; null where they are those of a single view. */
   preview?(trial: Data): ShownClips | null;
-  /** Whether exports have a table with a row a visit and a column a cell. */
+  /** Whether exports have a table with one row per participant and one column per cell. */
   hasWideTable?: boolean;
   /** The ends of the scale, which are what its answers mean. */
   scaleEnds?(trial: Declared): Range | null;

@@ -111,7 +111,7 @@ export function BlinkReviewPage() {
     <Stack>
       <Title order={1}>Review blinks</Title>
       <Text maw={720}>
-        The blinks that <code>stimuli blinks</code> found in a series or track: leave out what is no blink, correct starts and ends, and
+        The blinks that <code>stimuli blinks</code> found in a series or track: exclude what is not a blink, correct starts and ends, and
         give the saved file to <code>stimuli blinks --review</code>. The files are opened in this page only: nothing is uploaded.
       </Text>
       <Group>

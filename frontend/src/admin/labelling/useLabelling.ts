@@ -37,8 +37,8 @@ function message(error: unknown): string {
   return error instanceof Error ? error.message : String(error);
 }
 
-/** Null until the frame `current` of `video` is decoded; a frame that cannot be is told to `tell`. */
-function usePicture(video: OpenedVideo | null, current: number, tell: (problem: string) => void): Picture | null {
+/** Null until the frame `current` of `video` is decoded; if decoding fails, the problem goes to `report`. */
+function usePicture(video: OpenedVideo | null, current: number, report: (problem: string) => void): Picture | null {
   const [shown, setShown] = useState<{ video: OpenedVideo; picture: Picture } | null>(null);
   useEffect(() => {
     if (video === null) return;
@@ -46,11 +46,11 @@ function usePicture(video: OpenedVideo | null, current: number, tell: (problem: 
     video
       .frame(current)
       .then((canvas) => live && setShown({ video, picture: { number: current, canvas } }))
-      .catch((error: unknown) => live && tell(message(error)));
+      .catch((error: unknown) => live && report(message(error)));
     return () => {
       live = false;
     };
-  }, [video, current, tell]);
+  }, [video, current, report]);
   return shown?.video === video && shown.picture.number === current ? shown.picture : null;
 }
 
@@ -61,8 +61,8 @@ interface Begun extends Start {
   readonly eyes: 1 | 2;
 }
 
-/** Null for a labelled frame, and until the start of another is known; one that fails is told to `tell`. */
-function useStart({ opened, eyes, history, current }: Work, picture: Picture | null, tell: (problem: string) => void): Start | null {
+/** Null for a labelled frame, and until the start of another is known; a failure goes to `report`. */
+function useStart({ opened, eyes, history, current }: Work, picture: Picture | null, report: (problem: string) => void): Start | null {
   const [start, setStart] = useState<Begun | null>(null);
   const video = opened?.video ?? null;
   const labelled = history.now.has(current);
@@ -75,11 +75,11 @@ function useStart({ opened, eyes, history, current }: Work, picture: Picture | n
     let live = true;
     propose(opened, picture)
       .then((proposal) => live && setStart({ ...proposal, video, eyes }))
-      .catch((error: unknown) => live && tell(message(error)));
+      .catch((error: unknown) => live && report(message(error)));
     return () => {
       live = false;
     };
-  }, [opened, video, picture, labelled, eyes, tell]);
+  }, [opened, video, picture, labelled, eyes, report]);
   const fits = start !== null && start.video === video && start.eyes === eyes && start.number === current;
   return fits && !labelled ? start : null;
 }
@@ -96,10 +96,10 @@ function greysOf(video: OpenedVideo): Map<number, Grey> {
 export function useLabelling() {
   const [work, setWork] = useState<Work>(NO_WORK);
   const [busy, setBusy] = useState<string | null>(null);
-  const tell = useCallback((problem: string | null) => setWork((before) => ({ ...before, problem })), []);
+  const report = useCallback((problem: string | null) => setWork((before) => ({ ...before, problem })), []);
   const video = work.opened?.video ?? null;
-  const picture = usePicture(video, work.current, tell);
-  const start = useStart(work, picture, tell);
+  const picture = usePicture(video, work.current, report);
+  const start = useStart(work, picture, report);
   const shape = work.history.now.get(work.current)?.shape ?? start?.shape ?? null;
   return {
     ...factsOf(work),
@@ -109,7 +109,7 @@ export function useLabelling() {
     shape,
     startedFrom: start?.from ?? null,
     notice: work.opened === null ? null : noticeOf(work.opened.looked.eyes, work.eyes),
-    ...openings(work, setWork, setBusy, tell),
+    ...openings(work, setWork, setBusy, report),
     ...edits(work, shape, setWork),
   };
 }
@@ -131,30 +131,30 @@ function factsOf({ problem, eyes, history, saved, chosen, current, selected }: W
 
 type Change = (change: (before: Work) => Work) => void;
 
-function openings(work: Work, change: Change, setBusy: (doing: string | null) => void, tell: (problem: string | null) => void) {
+function openings(work: Work, change: Change, setBusy: (doing: string | null) => void, report: (problem: string | null) => void) {
   const unsaved = work.history.now !== work.saved;
   const open = async (file: File): Promise<void> => {
     if (!mayReplace(unsaved)) return;
-    tell(null);
+    report(null);
     setBusy("Opening the video");
     try {
       const { video, looked } = await openForLabelling(file, setBusy);
       work.opened?.video.close();
       change((before) => withVideo(before, video, looked));
     } catch (error) {
-      tell(message(error));
+      report(message(error));
     } finally {
       setBusy(null);
     }
   };
   const openLabels = async (file: File): Promise<void> => {
     if (!mayReplace(unsaved)) return;
-    tell(null);
+    report(null);
     try {
       const next = withLabels(work, file.name, parseLabels(file.name, await file.text()));
       change((before) => (before.opened === work.opened ? next : before));
     } catch (error) {
-      tell(message(error));
+      report(message(error));
     }
   };
   return { open, openLabels };

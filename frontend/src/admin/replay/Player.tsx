@@ -175,7 +175,7 @@ function OnePlay({ replay, trial, play, pictures, isReady }: OnePlayProps) {
   };
   const arranged = useMemo(() => arrange(replay, trial.clips, play), [replay, trial, play]);
   const shown = shownAt(played, at_ms);
-  const hasLog = played.scenes.some(({ lanes }) => lanes.some(({ stands }) => stands.length > 0));
+  const hasLog = played.scenes.some(({ lanes }) => lanes.some(({ shown }) => shown.length > 0));
   return (
     <Stack gap="md">
       {arranged === null ? (

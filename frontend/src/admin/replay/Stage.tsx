@@ -1,4 +1,4 @@
-/** The clip as it stood on the participant's screen, alone or at its place in the window. */
+/** The clip as it was on the participant's screen, alone or at its place in the window. */
 
 import { drawSyncPatch } from "../../participant/playback/sync-patch";
 import type { Schemas } from "../api";
@@ -18,11 +18,11 @@ interface Painted {
   display: Schemas["Display"];
 }
 
-/** Paint a moment; resolves when it stands there. `current` says whether it is still the one asked for. */
+/** Paint a moment; resolves once it is painted. `current` says whether it is still the requested one. */
 async function paint({ canvas, arranged, pictures, display }: Painted, { frames }: Shown, current: () => boolean): Promise<void> {
   const context = canvas.getContext("2d", { alpha: false });
   if (!context) return;
-  const sources = frames.map(({ lane, stand }) => pictures.get(lane.sha256)?.picture(stand.index) ?? null);
+  const sources = frames.map(({ lane, frame }) => pictures.get(lane.sha256)?.picture(frame.index) ?? null);
   // Without a wait where everything is decoded: the picture and its time change together.
   const ready: (CanvasImageSource | null)[] = [];
   for (const source of sources) ready.push(source instanceof Promise ? await source : source);
@@ -34,7 +34,7 @@ async function paint({ canvas, arranged, pictures, display }: Painted, { frames 
     const picture = ready[row];
     if (picture) context.drawImage(picture, x, y, width, height);
   });
-  if (display.sync_patch) drawSyncPatch(context, frames.length ? Math.max(...frames.map(({ stand }) => stand.index)) : null);
+  if (display.sync_patch) drawSyncPatch(context, frames.length ? Math.max(...frames.map(({ frame }) => frame.index)) : null);
 }
 
 interface Props {
@@ -107,8 +107,8 @@ export function Stage({ arranged, display, pictures, play, shown, at_ms }: Props
 }
 
 function labelOf({ frames }: Shown): string {
-  const stood = frames.map(({ lane, stand }) => `${lane.role === "shown" ? "" : `${lane.role}: `}frame ${stand.index}`);
-  return stood.length > 0 ? `On their screen: ${stood.join(", ")}` : "On their screen: the surround, no clip";
+  const labels = frames.map(({ lane, frame }) => `${lane.role === "shown" ? "" : `${lane.role}: `}frame ${frame.index}`);
+  return labels.length > 0 ? `On their screen: ${labels.join(", ")}` : "On their screen: the surround, no clip";
 }
 
 /** How large the clip was there; in mm where the screen was measured. */

@@ -2,7 +2,7 @@
 
 import { Group, Text, Badge, Stack, Table, Title } from "@mantine/core";
 import { memo, type PointerEvent } from "react";
-import { type Folding, type Lane, type PlayedBack, type Stand, longestWords, missingWords, type Play, type Scene } from "./shown";
+import { type Folding, type Lane, type PlayedBack, type ShownFrame, longestWords, missingWords, type Play, type Scene } from "./shown";
 import type { Schemas } from "../api";
 import { words, ruleWords, VERDICT_COLOURS } from "../ui/format";
 
@@ -93,15 +93,15 @@ function Row({ label, children }: { label: string; children: React.ReactNode }) 
 }
 
 function LaneRow({ role, lanes, x }: { role: string; lanes: readonly Lane[]; x: (at_ms: number) => number }) {
-  const stands = lanes.flatMap((lane) => lane.stands);
+  const shown = lanes.flatMap((lane) => lane.shown);
   const held = lanes.flatMap((lane) => lane.held);
-  const skipped = lanes.flatMap((lane) => lane.stands.filter(({ index }) => lane.missing.some(([, last]) => last === index - 1)));
-  const path = (some: readonly Stand[]): string =>
+  const skipped = lanes.flatMap((lane) => lane.shown.filter(({ index }) => lane.missing.some(([, last]) => last === index - 1)));
+  const path = (some: readonly ShownFrame[]): string =>
     some.map(({ from_ms, to_ms }) => `M${x(from_ms)} 2H${x(to_ms)}V${HEIGHT - 2}H${x(from_ms)}Z`).join("");
   return (
-    <Row label={`${role === "shown" ? "clip" : role}: ${stands.length} frames shown, ${held.length} too long`}>
-      <path d={path(stands.filter((_, row) => row % 2 === 0))} className="replay-even" />
-      <path d={path(stands.filter((_, row) => row % 2 === 1))} className="replay-odd" />
+    <Row label={`${role === "shown" ? "clip" : role}: ${shown.length} frames shown, ${held.length} too long`}>
+      <path d={path(shown.filter((_, row) => row % 2 === 0))} className="replay-even" />
+      <path d={path(shown.filter((_, row) => row % 2 === 1))} className="replay-odd" />
       <path d={path(held)} className="replay-held" />
       <path d={skipped.map(({ from_ms }) => `M${x(from_ms)} 0V${HEIGHT}`).join("")} className="replay-skip" />
     </Row>

@@ -29,11 +29,11 @@ export function arrange({ trial, display }: Pick<Replay, "trial" | "display">, c
   const first = clips[0];
   if (!first) return null;
   const pixels = { width: first.width_px, height: first.height_px };
-  // As the page is told a trial: the sizes are those of its first clip.
-  const told = { ...first } as Clip & TrialInfo;
+  // As the page receives a trial: the sizes are those of its first clip.
+  const received = { ...first } as Clip & TrialInfo;
   const window_px = windowOf(play)?.width ?? Infinity;
-  const width = Math.min(clipWidth(told, display.inter_ocular_mm, play.px_per_mm), window_px);
-  const shown = { width, height: clipHeight(told, width) };
+  const width = Math.min(clipWidth(received, display.inter_ocular_mm, play.px_per_mm), window_px);
+  const shown = { width, height: clipHeight(received, width) };
   const layout = pairLayout(trial, play, pixels, shown);
   if (layout) return { canvas: layout.canvas, shown: layout.shown, boxOf: (role) => boxIn(layout, role) };
   return { canvas: pixels, shown, boxOf: () => ({ x: 0, y: 0, ...pixels }) };

@@ -39,10 +39,10 @@ function allDecoded(bitmaps: readonly ImageBitmap[]): Pictures {
   };
 }
 
-/** Frames to decode on to, instead of beginning anew at the key frame before. */
+/** Frames to continue decoding over, before starting again at the previous key frame is faster. */
 const GO_ON_WITHIN = 60;
 
-/** A clip too long to be kept as pictures: decoded on from where it is, anew from the key frame before where it must. */
+/** A clip too long to keep as pictures: decoding continues from the current place, or starts again at the previous key frame. */
 class LongClip implements Pictures {
   private frames: AsyncGenerator<{ canvas: CanvasImageSource }, void> | null = null;
   private next = 0;

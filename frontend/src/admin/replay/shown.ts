@@ -1,5 +1,5 @@
 /**
- * What stood on the screen when, from the stored logs: every frame from the moment it was drawn to the next one's.
+ * What was on the screen when, from the stored logs: every frame from the moment it was drawn to the next one's.
  * Times are ms since the start key of a play's first view, by the participant's clock.
  */
 
@@ -11,8 +11,8 @@ export type Play = Schemas["ReplayedPlay"];
 export type Clip = Schemas["ReplayedClip"];
 export type View = Schemas["ReplayedView"];
 
-/** Frame `index` stood from `from_ms` until `to_ms`. */
-export interface Stand {
+/** Frame `index` was shown from `from_ms` until `to_ms`. */
+export interface ShownFrame {
   index: number;
   from_ms: number;
   to_ms: number;
@@ -21,11 +21,11 @@ export interface Stand {
 export interface Lane {
   role: string;
   sha256: string;
-  stands: Stand[];
+  shown: ShownFrame[];
   /** Frames of the clip that its log does not have, in ranges. */
   missing: [first: number, last: number][];
-  /** Stands of more than a frame's period and one refresh. */
-  held: Stand[];
+  /** Frames shown longer than a frame's period and one refresh. */
+  held: ShownFrame[];
 }
 export interface Scene {
   view: View;
@@ -40,10 +40,10 @@ export interface PlayedBack {
   end_ms: number;
 }
 
-/** Views without a clock of their own stand so far apart. */
+/** The gap drawn before a view that has no times. */
 const UNKNOWN_GAP_MS = 500;
 const ASSUMED_REFRESH_MS = 1000 / 60;
-/** Scheduling jitter of a time stamp that is no lateness. */
+/** Scheduling jitter of a time stamp that does not count as lateness. */
 const JITTER_MS = 2;
 
 export function playedBack(play: Play, clips: readonly Clip[]): PlayedBack {
@@ -52,9 +52,9 @@ export function playedBack(play: Play, clips: readonly Clip[]): PlayedBack {
   for (const view of play.views) {
     const after = scenes.at(-1)?.end_ms;
     const began = momentOf(view.started_at_client);
-    const told = began === null || origin === null ? null : began - origin;
+    const known_ms = began === null || origin === null ? null : began - origin;
     const earliest = after === undefined ? 0 : after;
-    const start_ms = told === null ? (after === undefined ? 0 : after + UNKNOWN_GAP_MS) : Math.max(told, earliest);
+    const start_ms = known_ms === null ? (after === undefined ? 0 : after + UNKNOWN_GAP_MS) : Math.max(known_ms, earliest);
     scenes.push(sceneOf(view, start_ms, clips, refreshOf(play)));
   }
   const answered_ms = answeredAt(play, scenes.at(-1), origin);
@@ -70,24 +70,26 @@ function sceneOf(view: View, start_ms: number, clips: readonly Clip[], refresh_m
     const clip = clips.find((one) => one.clip_sha256 === clip_sha256);
     const showing = view.showings?.find(({ roles }) => roles.some((one) => one === role));
     const period_ms = 1000 / (showing?.fps ?? clip?.fps ?? 30);
-    const stands = standsOf(drawn, start_ms, showing?.ended_ms ?? null, period_ms);
+    const shown = framesOf(drawn, start_ms, showing?.ended_ms ?? null, period_ms);
     return {
       role,
       sha256: clip_sha256,
-      stands,
-      missing: missingOf(stands, clip?.frames ?? 0),
-      held: stands.filter(({ from_ms, to_ms }) => to_ms - from_ms > period_ms + refresh_ms + JITTER_MS),
+      shown,
+      missing: missingOf(shown, clip?.frames ?? 0),
+      held: shown.filter(({ from_ms, to_ms }) => to_ms - from_ms > period_ms + refresh_ms + JITTER_MS),
     };
   });
-  const ends = [
-    ...lanes.flatMap(({ stands }) => stands.at(-1)?.to_ms ?? []),
-    ...(view.showings ?? []).map((one) => start_ms + one.ended_ms),
-  ];
+  const ends = [...lanes.flatMap(({ shown }) => shown.at(-1)?.to_ms ?? []), ...(view.showings ?? []).map((one) => start_ms + one.ended_ms)];
   return { view, start_ms, end_ms: Math.max(start_ms, ...ends), lanes };
 }
 
-/** Entries of one frame in a row are one stand; the last lasts until the clip's end, or for a period where that is not known. */
-function standsOf(drawn: readonly (readonly [number, number])[], start_ms: number, ended_ms: number | null, period_ms: number): Stand[] {
+/** Repeated entries of one frame make one shown frame; the last one lasts until the clip's end, or for one period if that is not known. */
+function framesOf(
+  drawn: readonly (readonly [number, number])[],
+  start_ms: number,
+  ended_ms: number | null,
+  period_ms: number,
+): ShownFrame[] {
   const firsts = drawn.filter(([index], row) => row === 0 || drawn[row - 1]?.[0] !== index);
   return firsts.map(([index, ms], row) => {
     const next = firsts[row + 1]?.[1] ?? Math.max(ms, ended_ms ?? ms + period_ms);
@@ -95,8 +97,8 @@ function standsOf(drawn: readonly (readonly [number, number])[], start_ms: numbe
   });
 }
 
-function missingOf(stands: readonly Stand[], frames: number): [number, number][] {
-  const drawn = new Set(stands.map(({ index }) => index));
+function missingOf(shown: readonly ShownFrame[], frames: number): [number, number][] {
+  const drawn = new Set(shown.map(({ index }) => index));
   const ranges: [number, number][] = [];
   for (let index = 0; index < frames; index += 1) {
     if (drawn.has(index)) continue;
@@ -109,7 +111,7 @@ function missingOf(stands: readonly Stand[], frames: number): [number, number][]
 
 /** Response times count from what the last view drew; without them the clock's own moment counts. */
 function answeredAt(play: Play, last: Scene | undefined, origin: number | null): number | null {
-  const starts = last?.lanes.flatMap(({ stands }) => stands[0] ?? []) ?? [];
+  const starts = last?.lanes.flatMap(({ shown }) => shown[0] ?? []) ?? [];
   // In turn, the answer's times are those of the clip shown last.
   const first = starts.toSorted((one, other) => other.from_ms - one.from_ms)[0];
   if (first && play.rt_from_first_frame !== null) return first.from_ms + play.rt_from_first_frame;
@@ -117,30 +119,30 @@ function answeredAt(play: Play, last: Scene | undefined, origin: number | null):
   return answered === null || origin === null ? null : Math.max(0, answered - origin);
 }
 
-/** The frame that stood at a moment; null where the lane showed nothing. */
-function standAt({ stands }: Lane, at_ms: number): Stand | null {
+/** The frame on the screen at a moment; null where the lane showed nothing. */
+function frameAt({ shown }: Lane, at_ms: number): ShownFrame | null {
   let low = 0;
-  let high = stands.length;
+  let high = shown.length;
   while (low < high) {
     const middle = (low + high) >> 1;
-    if ((stands[middle]?.from_ms ?? Infinity) <= at_ms) low = middle + 1;
+    if ((shown[middle]?.from_ms ?? Infinity) <= at_ms) low = middle + 1;
     else high = middle;
   }
-  const stand = stands[low - 1];
-  return stand && at_ms < stand.to_ms ? stand : null;
+  const frame = shown[low - 1];
+  return frame && at_ms < frame.to_ms ? frame : null;
 }
 
 export interface Shown {
   scene: Scene | null;
-  /** The clips that stood on the canvas. */
-  frames: { lane: Lane; stand: Stand }[];
+  /** The clips on the canvas. */
+  frames: { lane: Lane; frame: ShownFrame }[];
 }
 
 export function shownAt({ scenes }: PlayedBack, at_ms: number): Shown {
   const scene = scenes.findLast(({ start_ms, end_ms }) => start_ms <= at_ms && at_ms < end_ms) ?? null;
   const frames = (scene?.lanes ?? []).flatMap((lane) => {
-    const stand = standAt(lane, at_ms);
-    return stand ? [{ lane, stand }] : [];
+    const frame = frameAt(lane, at_ms);
+    return frame ? [{ lane, frame }] : [];
   });
   return { scene, frames };
 }
@@ -149,7 +151,7 @@ export function shownAt({ scenes }: PlayedBack, at_ms: number): Shown {
 export function changesOf({ scenes }: PlayedBack): number[] {
   const moments = scenes.flatMap(({ start_ms, end_ms, lanes }) => [
     start_ms,
-    ...lanes.flatMap(({ stands }) => stands.flatMap(({ from_ms, to_ms }) => [from_ms, to_ms])),
+    ...lanes.flatMap(({ shown }) => shown.flatMap(({ from_ms, to_ms }) => [from_ms, to_ms])),
     end_ms,
   ]);
   return [...new Set(moments)].sort((one, other) => one - other);
@@ -163,7 +165,7 @@ export function changeBefore(changes: readonly number[], at_ms: number): number 
   return changes.findLast((moment) => moment < at_ms) ?? at_ms;
 }
 
-// What is said in words beside a replay.
+// The words next to a replay.
 
 /** What was answered, whatever the kind of trial: each key of the answer that says something. */
 export function answerWords({ answer }: Play): string {
@@ -197,12 +199,12 @@ export function missingWords({ missing }: Lane): string {
   return missing.map(([first, last]) => (first === last ? String(first) : `${first} to ${last}`)).join(", ") || "none";
 }
 
-export function longestWords({ stands }: Lane): string {
-  const longest = stands.toSorted((one, other) => other.to_ms - other.from_ms - (one.to_ms - one.from_ms))[0];
+export function longestWords({ shown }: Lane): string {
+  const longest = shown.toSorted((one, other) => other.to_ms - other.from_ms - (one.to_ms - one.from_ms))[0];
   return longest ? `frame ${longest.index}, ${fixed(longest.to_ms - longest.from_ms, 1)} ms` : "–";
 }
 
-/** The slider of a continuous rating over the time line: when each sampled frame stood, and how far up the slider was. */
+/** The slider of a continuous rating over the time line: when each sampled frame was shown, and how far up the slider was. */
 export function traceOf(play: Play, played: PlayedBack, trial: Schemas["Replay"]["trial"]): [number, number][] {
   const { values, step_frames } = play.answer ?? {};
   const lane = played.scenes.at(-1)?.lanes[0];
@@ -210,8 +212,8 @@ export function traceOf(play: Play, played: PlayedBack, trial: Schemas["Replay"]
   if (!slider || !lane || !Array.isArray(values) || typeof step_frames !== "number") return [];
   const range = Math.max(1e-9, slider.maximum - slider.minimum);
   return values.flatMap((value: unknown, sample): [number, number][] => {
-    const stand = lane.stands.find(({ index }) => index >= sample * step_frames);
-    return stand && typeof value === "number" ? [[stand.from_ms, (value - slider.minimum) / range]] : [];
+    const frame = lane.shown.find(({ index }) => index >= sample * step_frames);
+    return frame && typeof value === "number" ? [[frame.from_ms, (value - slider.minimum) / range]] : [];
   });
 }
 

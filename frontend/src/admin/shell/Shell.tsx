@@ -13,7 +13,7 @@ function AccountMenu({ account }: { account: Schemas["AccountOut"] }) {
   const { colorScheme, setColorScheme } = useMantineColorScheme();
   const signOut = useChange(() => unwrap(api.DELETE("/api/admin/session")), {
     touches: [],
-    // A fresh page: nothing of what was loaded stays in memory for whoever comes next.
+    // A fresh page: no loaded data stay in memory for the next person.
     then: () => window.location.assign("/admin/sign-in"),
   });
   return (

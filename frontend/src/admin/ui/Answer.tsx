@@ -1,4 +1,4 @@
-/** What stands in a page's place while it waits, where the server refused, and where there is no page. */
+/** What a page shows while it waits, when the server refused, and when there is no page. */
 
 import { Alert, Button, Center, Loader, Group, Text, Anchor, Container, Title } from "@mantine/core";
 import type { UseQueryResult, InfiniteData, UseInfiniteQueryResult } from "@tanstack/react-query";
@@ -86,7 +86,7 @@ export function NotFound() {
 
 // Parts of a page whose code loads when they are first shown: charts, the builder's forms.
 
-/** `load`'s component; a loader stands in its place until its code is there. */
+/** `load`'s component; a loader takes its place until its code is here. */
 export function onDemand<Props extends object>(load: () => Promise<ComponentType<Props>>): ComponentType<Props> {
   const Loaded = lazy(async () => ({ default: await load() }));
   return function OnDemand(props: Props) {

@@ -18,7 +18,7 @@ interface Props<Row> {
   columns: readonly Column<Row>[];
   rows: readonly Row[];
   rowKey: (row: Row) => string | number;
-  /** What stands in the place of a table without rows. */
+  /** What replaces a table without rows. */
   empty: string;
   label?: string;
   dense?: boolean;

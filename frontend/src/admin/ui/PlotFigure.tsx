@@ -30,7 +30,7 @@ export function PlotFigure({ options, label, rows }: PlotProps) {
     allowStyles(figure);
     // Plot labels its inner groups, which may carry no label without a role; the figure has one as a whole.
     for (const group of figure.querySelectorAll("[aria-label]")) group.removeAttribute("aria-label");
-    // Where a caption stands below, it is read as text, and the picture above it is the image.
+    // A caption below is read as text, and then the picture above it is the image.
     const picture = figure.querySelector("figcaption") === null ? figure : (figure.querySelector(":scope > svg:last-of-type") ?? figure);
     picture.setAttribute("role", "img");
     picture.setAttribute("aria-label", label);

@@ -5,7 +5,7 @@ interface Props {
   every: Schemas["SeriesOut"][] | undefined;
   chosen: number | null;
   choose: (series: number | null) => void;
-  /** What stands there while none is chosen. */
+  /** The text shown while none is chosen. */
   without: string;
 }
 

@@ -1,4 +1,4 @@
-/** A figure of the page as a file of its own: its picture as SVG, its numbers as CSV. */
+/** A figure of the page as files: its picture as SVG, its numbers as CSV. */
 
 import * as Plot from "@observablehq/plot";
 

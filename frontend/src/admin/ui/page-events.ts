@@ -7,7 +7,7 @@ import { useBlocker } from "@tanstack/react-router";
 
 export type Shortcuts = Readonly<Record<string, (event: KeyboardEvent) => void>>;
 
-/** Name of a pressed key: "n", "arrowleft", "ctrl+z", "ctrl+shift+z"; Shift alone is told by the event. */
+/** Name of a pressed key: "n", "arrowleft", "ctrl+z", "ctrl+shift+z"; for Shift alone, look at the event. */
 function nameOf(event: KeyboardEvent): string {
   const key = event.key.toLowerCase();
   if (!event.ctrlKey && !event.metaKey) return key;

@@ -1,4 +1,4 @@
-/** A change on the server and what comes of it: loaded again, told in the corner, saved as a file. */
+/** A change on the server and its consequences: data loaded again, a message in the corner, a saved file. */
 
 import type { NotificationData } from "@mantine/notifications";
 import { type QueryKey, useMutation, useQueryClient } from "@tanstack/react-query";
@@ -11,7 +11,7 @@ export function notify(message: NotificationData): void {
   void loadNotifications().then(({ notifications }) => notifications.show({ closeButtonProps: { "aria-label": "Dismiss" }, ...message }));
 }
 
-// A change on the server: what it touches is loaded again, and a refusal is told.
+// A change on the server: what it touches is loaded again, and a refusal is reported.
 
 interface Options<T> {
   touches: QueryKey[];
@@ -20,7 +20,7 @@ interface Options<T> {
   then?: (result: T) => void;
   /** Done before what it touches is loaded again. */
   before?: () => void;
-  /** Tells a refusal in the page itself and says so; any other is told in the corner. */
+  /** Shows a refusal in the page itself and returns true; any other refusal is reported in the corner. */
   refused?: (error: Error) => boolean;
 }
 

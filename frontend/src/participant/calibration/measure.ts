@@ -32,7 +32,7 @@ export interface CardView {
   touched: () => boolean;
 }
 
-/** The card of measurement `round`, in a size of its own: what an earlier one (`last`, px a mm) ended with is not shown again. */
+/** The card of measurement `round`, in a new size: the final size of an earlier one (`last`, px per mm) is not shown again. */
 function cardView(t: Translate, round: number, last: number | null): CardView {
   const upright = window.innerWidth < UPRIGHT_BELOW_PX;
   const largest = upright ? (window.innerWidth - 60) / SHAPE : Math.min(LARGEST_PX, window.innerWidth - 110);
@@ -243,11 +243,11 @@ export async function calibrate(session: Session, display: HTMLElement, eyebrow:
     recheck_percent = await lookAgain(session, display, before);
     const holds = recheck_percent <= SPREAD_MAX_PERCENT;
     if (holds) return keep(session, display, { ...before, occasion, recheck_percent }, true);
-    await tell(session, display, "recheck_title", session.t("recheck_differs", { percent: Math.round(recheck_percent) }));
+    await showNotice(session, display, "recheck_title", session.t("recheck_differs", { percent: Math.round(recheck_percent) }));
   }
   if (occasion === "screen_changed") {
-    await tell(session, display, "screen_changed_title", session.t("screen_changed"));
-    // Beside the card, which takes longer: the other screen may refresh at another rate.
+    await showNotice(session, display, "screen_changed_title", session.t("screen_changed"));
+    // While the card is measured, which takes longer: the other screen may refresh at another rate.
     void untilMeasured(document, (rate) => (session.screen.refresh_rate_hz = rate), session.over.signal);
   }
   const measured = await measureUntilItFits(session, display, eyebrow);
@@ -269,7 +269,7 @@ async function keep(session: Session, display: HTMLElement, body: CalibrationSta
   return { px_per_mm: body.px_per_mm, method: body.method, checked };
 }
 
-async function tell(session: Session, display: HTMLElement, title: TitleKey, text: string): Promise<void> {
+async function showNotice(session: Session, display: HTMLElement, title: TitleKey, text: string): Promise<void> {
   const footer = h("footer", { class: "actions" });
   page({ session, display, eyebrow: "" }, title, [h("p", {}, text), footer]);
   await choose(session, footer, [{ label: session.t("measure_again"), value: true }]);

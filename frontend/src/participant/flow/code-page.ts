@@ -9,7 +9,7 @@ import { isNoAnswer, type Claim, type Start } from "./link";
 
 const WRONG: Record<string, MessageKey> = { resume_code_wrong: "code_wrong", too_many_requests: "code_wait" };
 
-/** Ask for the code until one fits, or the rater begins anew; other refusals are thrown. */
+/** Ask for the code until one fits, or the rater starts over; other refusals are thrown. */
 export function codePage(root: HTMLElement, t: Translate, why: MessageKey, identity: Identity, start: Start): Promise<RunStarted> {
   const alert = alertLine();
   alert.id = uniqueId("alert");
@@ -45,15 +45,15 @@ export function codePage(root: HTMLElement, t: Translate, why: MessageKey, ident
       claim({ resume_code: input.value });
     };
     const go = h("button", { type: "submit", class: "button primary" }, t("continue"));
-    // Who came by a code of their own has begun nothing under a recruiter's id.
-    const anew = why === "code_needed" ? button(t("code_anew"), () => claim({ anew: true }), "quiet") : null;
+    // Somebody who entered a code has begun nothing under a recruiter's id.
+    const startOver = why === "code_needed" ? button(t("code_anew"), () => claim({ anew: true }), "quiet") : null;
     const back = why === "code_enter" ? button(t("code_back"), () => location.reload(), "quiet") : null;
     const form = h(
       "form",
       { onsubmit: enter },
       h("p", { class: "field" }, h("label", { for: input.id }, t("code_label")), input),
       alert,
-      h("footer", { class: "actions" }, go, anew, back),
+      h("footer", { class: "actions" }, go, startOver, back),
     );
     showPage(emptied(root), { title: t("code_title"), body: [h("p", {}, t(why)), form] });
     input.focus();

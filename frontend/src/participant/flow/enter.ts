@@ -122,17 +122,17 @@ export async function enter(
   showCompletion(session, emptied(root), session.completion, nextPerson(session.t, identity));
 }
 
-/** An outbox whose answers keep the visit up to date, and tell where the run ends or goes on elsewhere. */
+/** An outbox whose answers keep the visit up to date, and announce that the run ends or goes on elsewhere. */
 function outboxOf(root: HTMLElement, store: OutboxStore, keeping: KeptVisit): Outbox {
-  const tell = (what: "run-over" | "taken-over"): void => void root.dispatchEvent(new CustomEvent(what));
+  const announce = (what: "run-over" | "taken-over"): void => void root.dispatchEvent(new CustomEvent(what));
   return new Outbox(store, {
     onAccepted(item, body) {
       keeping.note(item, body);
-      if (statusIn(body) === "screened_out") tell("run-over");
+      if (statusIn(body) === "screened_out") announce("run-over");
     },
     onRefused({ status, code }) {
-      if (status === 401) tell("taken-over");
-      else if (code === "run_closed") tell("run-over");
+      if (status === 401) announce("taken-over");
+      else if (code === "run_closed") announce("run-over");
     },
   });
 }

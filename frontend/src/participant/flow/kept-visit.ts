@@ -105,7 +105,7 @@ function applyRating(run: RunState, body: RatingBody, answer: unknown): void {
   const trial = run.trials.find((one) => one.trial_index === body.trial_index);
   if (!trial) return;
   const receipt = (answer as { receipt?: Receipt } | null)?.receipt;
-  // A view that was broken off fails its play by a rule that needs no server to tell.
+  // An interrupted view fails its play by a rule that needs no server.
   const failed = Boolean(body.playback.disturbances?.["interrupted"]) && body.play <= run.playback.max_repeats;
   const again = receipt ? receipt.again : failed && trial.kind === "main";
   const plays_done = Math.max(trial.plays_done, body.play);

@@ -44,7 +44,7 @@ export function isNoAnswer(error: unknown): boolean {
 const fetchLink = (token: string, timeout_ms = 10_000): Promise<LinkState> =>
   call("GET", `/api/links/${encodeURIComponent(token)}`, { timeout_ms });
 
-/** The run as it stands. */
+/** The run in its present state. */
 export async function fetchRun(token: string): Promise<RunState> {
   return withoutPractice(await call<RunState>("GET", "/api/run", { token, timeout_ms: 30_000 }));
 }
@@ -75,7 +75,7 @@ export async function reach(
 
 // Taking up a visit by its resume code, where the browser and the link do not say whose it is.
 
-/** What a start says beside what every start says. */
+/** What a start says in addition to what every start says. */
 export type Claim = { resume_code: string } | { anew: true } | Record<string, never>;
 export type Start = (claim: Claim) => Promise<RunStarted>;
 

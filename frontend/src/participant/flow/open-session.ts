@@ -67,14 +67,14 @@ export function openSession({ root, link, run, kind, checks, player, outbox, uns
   return session;
 }
 
-/** Measure the refresh rate, and tell the server what it deals with. */
+/** Measure the refresh rate, and report the device to the server. */
 export function describeDevice(session: Session, storage: boolean): Promise<void> {
-  const tell = (rate: number | null): void => {
+  const report = (rate: number | null): void => {
     session.screen.refresh_rate_hz = rate;
     // A simulated visit may be over by now.
     if (!session.completion) void sendDevice(session, storage);
   };
-  return untilMeasured(document, tell, session.over.signal);
+  return untilMeasured(document, report, session.over.signal);
 }
 
 function sendDevice(session: Session, storage: boolean): Promise<unknown> {

@@ -1,4 +1,4 @@
-/** What stands in a visit's way before it has begun: a link that leads nowhere, a browser that cannot, or can only nearly, show the study. */
+/** What stops a visit before it has begun: a link that leads nowhere, a browser that cannot, or can only nearly, show the study. */
 import { call, Refused, request } from "../request";
 import type { MessageKey, Translate } from "../../i18n";
 import { type Back, showNotice } from "../screens/support";
@@ -23,14 +23,14 @@ const REFUSALS: Record<string, MessageKey> = {
   used: "link_used",
 };
 
-/** Tell why this link leads nowhere: by the link's status or the server's refusal. */
+/** Explain why this link leads nowhere: by the link's status or the server's refusal. */
 export function showRefusal(root: HTMLElement, t: Translate, code: string, message = "", back: Back = null): void {
   const key = REFUSALS[code];
   const title = t(code === "link_unknown" ? "link_unknown_title" : "link_title");
   showNotice(root, { title, text: key ? t(key) : message || t("link_closed"), back });
 }
 
-/** Tell why this browser cannot show the study, and tell the server. */
+/** Explain why this browser cannot show the study, and report it to the server. */
 function showClosedGate(root: HTMLElement, t: Translate, link_token: string, closed: GateFinding, device: Abilities, back: Back): void {
   showNotice(root, { title: t("gate_title"), text: t(closed.reason, closed.values), back });
   // Nothing waits for this: the participant reads the page, the experimenter the count.

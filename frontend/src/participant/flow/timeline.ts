@@ -10,7 +10,7 @@ import { finish } from "../screens/finish";
 import { formPage } from "../screens/form";
 import { codeNote } from "../screens/support";
 
-// Tells the server how far the participant has come, once a stage.
+// Reports the participant's progress to the server, once per stage.
 
 function enterStage(session: Session, stage: Stage): void {
   if (session.run.stage === stage) return;

@@ -1,4 +1,4 @@
-/** The registry of trial kinds: every folder here with a screen.ts, found by its name and loaded when a run needs it. */
+/** The registry of trial kinds: every folder here with a screen.ts, found by name and loaded when a run needs it. */
 import type { TrialInfo } from "../../api/schema";
 import type { Node } from "../jspsych";
 import { loadModule } from "../../ui/load-module";

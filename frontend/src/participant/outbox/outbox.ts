@@ -81,12 +81,12 @@ const REFUSED = "/api/run/refused";
 /** Refusals that say something of the visit, not of the record: the page acts on them. */
 const OF_THE_VISIT = ["run_unknown", "run_closed", "consent_missing", "rating_differs", "view_differs"];
 
-/** What tells the server of a record that it, or something on the way to it, will never accept; null where nothing is to be told. */
+/** The report of a record that the server, or something on the way, will never accept; null if there is nothing to report. */
 function reportOf(item: OutboxItem, { status, code, message }: Refused): OutboxItem | null {
   const isRecord = item.path.startsWith("/api/run/ratings/") || item.path === "/api/run/views";
   if (!isRecord || status < 400 || status === 401 || OF_THE_VISIT.includes(code)) return null;
-  const told = { code: code.slice(0, 100), message: message.slice(0, 2000) };
-  return { ...item, method: "POST", path: REFUSED, body: { id: item.id, path: item.path, status, ...told, body: item.body } };
+  const reason = { code: code.slice(0, 100), message: message.slice(0, 2000) };
+  return { ...item, method: "POST", path: REFUSED, body: { id: item.id, path: item.path, status, ...reason, body: item.body } };
 }
 
 export class Outbox {
@@ -260,7 +260,7 @@ export class Outbox {
   }
 }
 
-// What happened on the page beside the answers: kept and sent like them, after them.
+// What happened on the page apart from the answers: kept and sent like them, after them.
 
 /** What the page reports; the server takes any word, so that an older page is still heard. */
 export type EventType =

@@ -55,7 +55,7 @@ async function decodeAll(config: VideoDecoderConfig, sink: EncodedPacketSink): P
     if (decoder.state !== "closed") decoder.close();
   }
   const frames = await Promise.all(pending);
-  // The pictures become ready in any order, as each is made by a promise of its own.
+  // The pictures become ready in any order, because a separate promise makes each.
   return frames.sort((a, b) => a.timestamp - b.timestamp);
 }
 

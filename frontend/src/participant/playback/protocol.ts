@@ -38,7 +38,7 @@ export interface ClipPlayer {
   /** Make a clip ready to start at once. Rejects with ClipBroken. */
   prepare(sha256: string, bytes: ArrayBuffer, fps: number | null): Promise<Prepared>;
   /**
-   * Put prepared clips on one canvas under a name of its own: it is then played as a clip, one clock drawing frame k of
+   * Put prepared clips on one canvas under a new name: it is then played as a clip, one clock drawing frame k of
    * each in the same refresh. A shorter one holds its last frame. Rejects with ClipBroken.
    */
   compose(name: string, parts: readonly Part[], width: number, height: number): Promise<Prepared>;
@@ -128,7 +128,7 @@ export class EvennessMeter {
   }
 }
 
-/** Mean time between refreshes, those missed left out: stamps may be rounded to a millisecond, so that it tells more than the median. */
+/** Mean time between refreshes without the missed ones. Stamps may be rounded to a millisecond, so the mean is more precise than the median. */
 export function meanGap(stamps: readonly number[]): number | null {
   const gaps = stamps.slice(1).map((stamp, index) => stamp - (stamps[index] ?? stamp));
   const median = [...gaps].sort((a, b) => a - b)[Math.floor(gaps.length / 2)];

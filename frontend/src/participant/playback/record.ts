@@ -116,7 +116,7 @@ export interface Screen {
 }
 
 const ASSUMED_REFRESH_MS = 1000 / 60;
-/** Scheduling jitter of a time stamp that is no lateness. */
+/** Scheduling jitter of a time stamp that does not count as lateness. */
 const JITTER_MS = 2;
 
 /** The record of all showings of a trial: counts are totals, `drawn` counts from each showing's start key. */
@@ -176,7 +176,7 @@ function late({ method, drawn, fps, refresh_ms }: Showing, believed_ms: number):
   // The shorter of both: a page that missed refreshes must not be allowed more for it.
   const allowed_ms = Math.min(refresh_ms ?? believed_ms, believed_ms) + JITTER_MS;
   const began_ms = drawn.map(([index, at_ms]) => at_ms - index * period_ms);
-  // A video element holds its first frame until it runs, for a time of its own: most frames tell when it began to.
+  // A video element holds its first frame for some time until it runs: most frames show when it began to.
   const clip_at_ms = (method === "video" ? median(began_ms) : began_ms[0]) ?? 0;
   return began_ms.filter((one) => Math.abs(one - clip_at_ms) > allowed_ms).length;
 }

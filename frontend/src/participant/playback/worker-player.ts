@@ -27,12 +27,12 @@ interface Waiting {
   limit: ReturnType<typeof setTimeout> | undefined;
 }
 
-/** A page laid out anew while a clip's first frames are drawn takes their place on the way to the screen. */
+/** A change of the page's layout delays the clip's first frames on their way to the screen. */
 function layoutShown(): Promise<void> {
   return new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(() => resolve())));
 }
 
-/** A worker whose script has run: it is fetched anew where it was lost on the way. Rejects where it never comes. */
+/** A worker whose script has run: the script is fetched again if it was lost on the way. Rejects if it never comes. */
 async function startedWorker(): Promise<Worker> {
   for (let failures = 1; failures <= MAX_STARTS; failures++) {
     const worker = new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
@@ -41,7 +41,7 @@ async function startedWorker(): Promise<Worker> {
       worker.onerror = () => resolve("lost");
       setTimeout(resolve, START_LIMIT_MS, "silent");
     });
-    // The first message says that the script ran; `onerror` alone does not tell a slow network from a blocked one.
+    // The first message says that the script ran; `onerror` alone does not separate a slow network from a blocked one.
     if (outcome === "started") return worker;
     worker.terminate();
     // A worker that is blocked says nothing: another one would not either.
@@ -55,7 +55,7 @@ export class WorkerPlayer implements ClipPlayer {
   readonly method = "webcodecs";
   readonly element = document.createElement("canvas");
   private readonly prepared = new Map<string, Promise<Prepared>>();
-  /** By request: a clip that is released and prepared anew is asked for twice, and an old answer may be on its way. */
+  /** By request: a clip that is released and prepared again has two requests, and an old answer may be on its way. */
   private readonly waiting = new Map<number, Waiting>();
   private requests = 0;
 
@@ -68,7 +68,7 @@ export class WorkerPlayer implements ClipPlayer {
     this.worker.onerror = (event) => this.broken(event.message || "the worker stopped");
     // From here on the page cannot draw on it: only the worker does, whatever the page's own thread is busy with.
     const canvas = this.element.transferControlToOffscreen();
-    this.tell({ type: "canvas", canvas, background, sync_patch }, [canvas]);
+    this.send({ type: "canvas", canvas, background, sync_patch }, [canvas]);
   }
 
   prepare(sha256: string, bytes: ArrayBuffer, fps: number | null): Promise<Prepared> {
@@ -84,7 +84,7 @@ export class WorkerPlayer implements ClipPlayer {
 
   blank(sha256: string): void {
     void this.prepared.get(sha256)?.then(
-      ({ width, height }) => this.tell({ type: "blank", width, height }),
+      ({ width, height }) => this.send({ type: "blank", width, height }),
       () => {},
     );
   }
@@ -92,7 +92,7 @@ export class WorkerPlayer implements ClipPlayer {
   async play(sha256: string, { ready, ...options }: PlayOptions): Promise<ShownClip> {
     const { frames, fps } = (await this.prepared.get(sha256)) ?? { frames: 0, fps: 30 };
     // While the view is still being kept: its way to the disk and the screen's warming up take place at once.
-    this.tell({ type: "warm" });
+    this.send({ type: "warm" });
     // A hidden page gets no refreshes: it then ends when it is looked at again, and the gap says so.
     const asked = this.ask({ type: "play", sha256, ...options }, null, Promise.all([layoutShown(), ready]));
     const message = (await asked) as FromWorker & { type: "played" };
@@ -102,7 +102,7 @@ export class WorkerPlayer implements ClipPlayer {
 
   release(sha256: string): void {
     this.prepared.delete(sha256);
-    this.tell({ type: "release", sha256 });
+    this.send({ type: "release", sha256 });
   }
 
   private keep(name: string, asked: Promise<FromWorker>): Promise<Prepared> {
@@ -121,10 +121,10 @@ export class WorkerPlayer implements ClipPlayer {
       const limit = limit_ms === null ? undefined : setTimeout(tooLate, limit_ms);
       this.waiting.set(request, { resolve, reject, limit });
     });
-    const tell = (): void => this.tell({ ...asked, request });
+    const ask = (): void => this.send({ ...asked, request });
     if (after)
-      after.then(tell).catch((error: unknown) => this.settle(request, error instanceof Error ? error : new ClipBroken(String(error))));
-    else tell();
+      after.then(ask).catch((error: unknown) => this.settle(request, error instanceof Error ? error : new ClipBroken(String(error))));
+    else ask();
     return answer;
   }
 
@@ -144,7 +144,7 @@ export class WorkerPlayer implements ClipPlayer {
     for (const request of [...this.waiting.keys()]) this.settle(request, new ClipBroken(reason));
   }
 
-  private tell(message: ToWorker, transfer: Transferable[] = []): void {
+  private send(message: ToWorker, transfer: Transferable[] = []): void {
     this.worker.postMessage(message, transfer);
   }
 }

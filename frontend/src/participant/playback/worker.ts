@@ -52,7 +52,7 @@ function failed(request: number, reason: unknown): void {
   scope.postMessage({ type: "failed", request, reason: String(reason) });
 }
 
-/** Put decoded clips on one canvas, under a name of their own. */
+/** Put decoded clips on one canvas, under a new name. */
 function compose(request: number, name: string, parts: readonly Part[], width: number, height: number): void {
   try {
     const composed = composition(parts, (sha256) => clips.get(sha256), width, height);

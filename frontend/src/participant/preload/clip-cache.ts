@@ -57,7 +57,7 @@ async function attemptOnce(url: string, stall_ms: number, cache: RequestCache, s
   signal?.addEventListener("abort", abort);
   try {
     const response = await fetch(url, { cache, signal: stop.signal });
-    // Told apart from a bad connection, since the participant can do something about that one only.
+    // Separate from a bad connection, since the participant can only do something about the latter.
     if (response.status === 404 || response.status === 410) return "missing";
     if (!response.ok || !response.body) return "offline";
     return await readAll(response.body, moving);

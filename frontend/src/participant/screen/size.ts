@@ -1,4 +1,4 @@
-/** The screen as it was measured, and how large a clip stands on it. */
+/** The screen as it was measured, and how large a clip is on it. */
 import { pixelRatio, pixels, within } from "../measured";
 import type { CalibrationState, TrialInfo } from "../../api/schema";
 

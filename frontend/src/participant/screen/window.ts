@@ -7,7 +7,7 @@ export interface Watch {
   stop: () => number;
 }
 
-/** From now until `stop`, which tells how often the page was hidden or lost focus meanwhile. */
+/** From now until `stop`, which returns how often the page was hidden or lost focus meanwhile. */
 export function watchFocus(): Watch {
   let lost = document.hidden ? 1 : 0;
   const losing = (): void => void (lost += 1);
@@ -48,7 +48,7 @@ export async function leaveFullScreen(): Promise<void> {
   if (document.fullscreenElement) await document.exitFullscreen().catch(() => {});
 }
 
-// One tab at a time, by a Web Lock: a second one is told, and may take over.
+// One tab at a time, by a Web Lock: a second one gets a message, and may take over.
 
 export type Claim = "held" | "elsewhere";
 
@@ -106,7 +106,7 @@ function measureRefreshRate(): Promise<number | null> {
 /** Measures now, and again each time the page is looked at until the rate is known: a hidden page gets no refreshes. */
 export async function untilMeasured(
   page: Document,
-  tell: (rate: number | null) => unknown,
+  report: (rate: number | null) => unknown,
   over: AbortSignal,
   measure = measureRefreshRate,
 ): Promise<void> {
@@ -114,8 +114,8 @@ export async function untilMeasured(
   const looked = lookedAt(page, over);
   const rate = await measure();
   if (over.aborted) return;
-  tell(rate);
-  if (rate === null && (await looked)) await untilMeasured(page, tell, over, measure);
+  report(rate);
+  if (rate === null && (await looked)) await untilMeasured(page, report, over, measure);
 }
 
 /** False where the run is over before that. */
@@ -129,7 +129,7 @@ function lookedAt(page: Document, over: AbortSignal): Promise<boolean> {
   });
 }
 
-/** Null where there are too few stamps to tell, for instance in a hidden page. Missed refreshes are left out. */
+/** Null where there are too few stamps, for instance in a hidden page. Missed refreshes are left out. */
 export function refreshRate(stamps: readonly number[]): number | null {
   const mean = stamps.length > 10 ? meanGap(stamps) : null;
   return mean && Math.round(10_000 / mean) / 10;

@@ -42,13 +42,13 @@ async function complete(session: Session, display: HTMLElement, token: string): 
   const { t } = session;
   const count = h("p", { class: "count", role: "status" });
   showPage(display, { title: t("finishing_title"), body: [count] });
-  const tell = setInterval(() => {
+  const timer = setInterval(() => {
     const { pending, failures } = session.outbox.state;
     count.textContent = (pending ? t("finishing_wait", { count: pending }) : t("saving")) + (failures > 1 ? ` ${trouble(session)}` : "");
   }, 500);
   await session.outbox.drained();
   const done = await completed(token);
-  clearInterval(tell);
+  clearInterval(timer);
   await leaveFullScreen();
   session.completion = done;
   return { completion_code: done.completion_code ?? "" };

@@ -163,11 +163,11 @@ function showForm(session: Session, display: HTMLElement, form: Form, eyebrow: s
     ...views.map((view) => view.element),
   );
   const draft = keepDraft(body, session.run.run_id, form.name);
-  const mended = (): void => {
+  const clearFault = (): void => {
     if (!body.querySelector(".fault:not(:empty)")) alert.textContent = "";
   };
-  body.addEventListener("input", mended);
-  body.addEventListener("change", mended);
+  body.addEventListener("input", clearFault);
+  body.addEventListener("change", clearFault);
   const section = showPage(display, { title: pick(form.title, language), eyebrow, body: [body, alert, status], actions: [go] });
   section.append(stopButton(session));
 }

@@ -98,15 +98,15 @@ export function settle(session: Session): PluginClass<SettleParameters> {
     data: { settled: BOOL }, // true where the server had everything
     async show(display, { limit_ms }) {
       let said: string | null = null;
-      const tell = (): void => {
+      const showProgress = (): void => {
         const why = trouble(session);
         // What is written again may be spoken again.
         if (why !== said) showPage(display, { title: session.t("saving"), body: [h("p", { role: "status" }, why)] });
         said = why;
       };
-      const say = setInterval(tell, SEEN_MS * (session.outbox.state.failures > 0 ? 1 : 8));
+      const timer = setInterval(showProgress, SEEN_MS * (session.outbox.state.failures > 0 ? 1 : 8));
       const settled = await session.outbox.drained(limit_ms);
-      clearInterval(say);
+      clearInterval(timer);
       return { settled };
     },
     simulate: async ({ limit_ms }) => ({ settled: await session.outbox.drained(limit_ms) }),

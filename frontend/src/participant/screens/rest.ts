@@ -1,4 +1,4 @@
-/** The rest between blocks: where one stands, and at least as long as declared. */
+/** The rest between blocks: it shows the progress, and lasts at least as long as declared. */
 import { h, button, showPage, progressBar } from "../../ui/element";
 import { markdown } from "../../ui/markdown";
 import { counted, done, type Session } from "../session";

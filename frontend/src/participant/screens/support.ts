@@ -68,14 +68,14 @@ export function trouble({ outbox, t }: Pick<Session, "outbox" | "t">): string {
 export async function waitShown<Value>(session: Session, work: Promise<Value>): Promise<Value> {
   const line = h("p", { class: "waiting", role: "status" });
   const began = performance.now();
-  const tell = setInterval(() => {
+  const timer = setInterval(() => {
     if (!line.isConnected) session.root.append(line);
     if (performance.now() - began > SLOW_MS) say(line, trouble(session) || session.t("saving"));
   }, LOOK_MS);
   try {
     return await work;
   } finally {
-    clearInterval(tell);
+    clearInterval(timer);
     line.remove();
   }
 }
@@ -83,13 +83,13 @@ export async function waitShown<Value>(session: Session, work: Promise<Value>): 
 /** Wait for the server's answer to a write and say so in `status` where it takes long. */
 export async function saveShown(session: Session, status: HTMLElement, saving: Promise<Outcome>): Promise<Outcome> {
   const began = performance.now();
-  const tell = setInterval(() => {
+  const timer = setInterval(() => {
     const waited = performance.now() - began;
     const why = waited > OFFLINE_MS ? trouble(session) : "";
     if (waited > SLOW_MS) say(status, why || session.t("saving"));
   }, LOOK_MS);
   const outcome = await saving;
-  clearInterval(tell);
+  clearInterval(timer);
   status.textContent = outcome.accepted ? "" : session.t("not_saved", { message: outcome.refused.message });
   return outcome;
 }

@@ -100,7 +100,7 @@ async function decline(session: Session, status: HTMLElement): Promise<void> {
   showNotice(root, { title: t("declined_title"), text: t("declined"), back: wayBack(t, session.link) });
 }
 
-// The rest between blocks; what draws it is loaded beside the first trials.
+// The rest between blocks; its code loads during the first trials.
 
 /** Fetched with the first clips, so that it is here when its turn comes, also without a connection. */
 export const loadRest = (): Promise<typeof import("./rest")> => loadModule(() => import("./rest"));

@@ -15,7 +15,7 @@ interface Choice<Name extends string> {
   label: string;
 }
 export interface AskOptions<Name extends string> {
-  /** Beside one another, and those below them. */
+  /** Next to one another, and those below them. */
   choices: Choice<Name>[];
   further?: Choice<Name>[];
   /** The answer that a key stands for. */

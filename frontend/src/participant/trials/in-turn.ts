@@ -13,7 +13,7 @@ interface InTurn {
   gap_ms: number;
   /** A fixation cross before the first clip, where there is one. */
   fixation_ms?: number;
-  /** What stands below a clip while it runs, by its role. */
+  /** What is below a clip while it runs, by its role. */
   labels?: Record<string, string>;
 }
 
@@ -57,7 +57,7 @@ async function plainBackground(session: Session, stage: Stage, next_sha256: stri
   return focus.stop();
 }
 
-/** Who looks away between two clips saw neither of them beside the other: it disturbs the clip that follows. */
+/** A rater who looks away between two clips cannot compare them: it disturbs the clip that follows. */
 function withFocusLost(showing: Shown, lost: number): Shown {
   if (lost === 0) return showing;
   const focus_lost = showing.focus_lost + lost;

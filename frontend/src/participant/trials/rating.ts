@@ -73,7 +73,7 @@ export async function saveInterrupted(session: Session, trial: TrialInfo, play: 
   if (trial.kind === "main" && play <= session.run.playback.max_repeats) session.replays.add(trial, play + 1);
 }
 
-/** Where answers decide what is shown: the trials chosen anew, and their clips fetched before their turn. */
+/** Where answers decide what comes next: the chosen trials, and their clips fetched before their turn. */
 function takeNext(session: Session, outcome: Outcome): void {
   const next = outcome.accepted ? nextOf(outcome.body) : null;
   if (!next) return;

@@ -96,7 +96,7 @@ export async function decodeAll(session: Session, trial: TrialInfo): Promise<voi
 
 const READ_MS = 1_000;
 
-/** For `catch` of a trial: where its clip could not be shown the participant is told, and the play has no answer. */
+/** For `catch` of a trial: if its clip could not be shown, the participant gets a message, and the play has no answer. */
 export function unlessBroken(session: Session, display: HTMLElement, trial: TrialInfo, unrated: () => RatingBody) {
   return async (error: unknown): Promise<RatingBody> => {
     if (!(error instanceof ClipBroken)) throw error;

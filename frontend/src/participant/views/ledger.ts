@@ -132,7 +132,7 @@ function restored(view: ViewState): RolesShown[] {
     const log = logs.reduce((longest, one) => (one.length > longest.length ? one : longest), []);
     const drawn = log.map(([index, ms]): [number, number] => [index, key_at_ms + ms]);
     const kept = { visible_share: visible_share ?? 1, refresh_ms: refresh_ms ?? null, early_keys: 0, logs_frames: drawn.length > 1 };
-    // The view's own counts are those of all its showings: they are told once.
+    // The view's own counts are those of all its showings: they are reported once.
     const disturbances: Record<string, number> = number === length - 1 ? { ...view.disturbances, [RELOADED]: 1 } : {};
     return { roles, showing: { ...measured, ...kept, drawn, key_at_ms, ended_at_ms: key_at_ms + ended_ms, disturbances } };
   });

@@ -75,7 +75,7 @@ function MarginCard({ margin, data, factors }: MarginProps) {
   );
 }
 
-/** Every clip with its answers; the chosen one plays beside them. */
+/** Every clip with its answers; the chosen one plays next to them. */
 function ClipResults({ study, data, factors }: { study: string; data: Schemas["Results"]; factors: Factors }) {
   const clips = useQuery(clipsQuery(study));
   const labels = useCellLabels(data.clips, factors);

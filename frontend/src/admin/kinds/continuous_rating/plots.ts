@@ -44,7 +44,7 @@ export function tracesPlot({ cells, minimum, maximum }: Data, labels: Map<string
 const STRIP = 0.16;
 const GAP = 0.3;
 
-/** A tick a blink, in a row a clip below the scale. */
+/** One tick per blink, and one row per clip below the scale. */
 export function ticksOf({ blinks_s }: Cell, { minimum, maximum }: Data): { time_s: number; from: number; to: number }[] {
   const row = (STRIP * (maximum - minimum)) / Math.max(1, blinks_s.length);
   return blinks_s.flatMap((times, lane) =>
@@ -52,7 +52,7 @@ export function ticksOf({ blinks_s }: Cell, { minimum, maximum }: Data): { time_
   );
 }
 
-/** One cell's mean trace with its interval; below it a row a clip, a tick where it blinks. */
+/** One cell's mean trace with its interval; below it one row per clip, with a tick at each blink. */
 export function cellTracePlot(cell: Cell, data: Data): Plot.PlotOptions {
   const { minimum, maximum } = data;
   const [rows, ticks] = [pointsOf(cell, ""), ticksOf(cell, data)];

@@ -41,7 +41,7 @@ function ThresholdResults({ data, factors }: { data: Data; factors: Factors }) {
         <Text size="sm">
           Latest estimate of each person's series. The posterior SD shows its uncertainty.{" "}
           {along.second && `It is the threshold at ${along.second.middle} along ${along.second.title}. `}
-          The report fits the psychometric functions anew.
+          The report fits the psychometric functions again.
         </Text>
         <DataTable
           label="Thresholds"

@@ -8,13 +8,13 @@ type Series = Schemas["SeriesResult"];
 
 /** A series in words: the labels of its levels, or its name; both where two series have the same levels. */
 export function seriesLabels(every: Series[], factors: Factors): Map<string, string> {
-  const told = every.map(({ name, levels }) => {
+  const named = every.map(({ name, levels }) => {
     const words = Object.entries(levels).map(([factor, level]) => labelsOf(factors, factor).of(level));
     return { name, words: words.join(", ") };
   });
-  const times = (words: string) => told.filter((one) => one.words === words).length;
+  const times = (words: string) => named.filter((one) => one.words === words).length;
   return new Map(
-    told.map(({ name, words }) => {
+    named.map(({ name, words }) => {
       if (words === "") return [name, name];
       return [name, times(words) > 1 ? `${words} (${name})` : words];
     }),

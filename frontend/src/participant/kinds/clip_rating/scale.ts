@@ -69,7 +69,7 @@ export interface ScaleOptions {
   language: string;
   t: Translate;
   signal: AbortSignal;
-  /** Stands above the scale in the place of its own question. */
+  /** Shown above the scale instead of the scale's question. */
   question?: HTMLElement;
 }
 

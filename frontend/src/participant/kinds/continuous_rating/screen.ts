@@ -75,7 +75,7 @@ function unrated(session: Session, trial: TrialInfo, play: number): RatingBody {
 
 // The continuous rating as the registry of trial kinds finds it.
 
-/** What it draws comes beside the first trial, which does not wait for it, and is here when a check is. */
+/** The code that draws checks loads during the first trial, which does not wait for it. It is here before a check. */
 function continuousCheck(session: Session): PluginClass<{ trial: TrialInfo }> {
   const loaded = loadModule(() => import("./attention-check"));
   return plugin<{ trial: TrialInfo }, { chosen: number }>({

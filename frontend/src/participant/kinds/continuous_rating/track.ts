@@ -7,7 +7,7 @@ import "./track.css";
 
 // From the slider's movements to its place at sampled frames: both have times of one clock, so nothing is timed again.
 
-/** The slider stands at `value` from `at_ms` (absolute) on. */
+/** The slider is at `value` from `at_ms` (absolute) on. */
 interface Move {
   at_ms: number;
   value: number;
@@ -26,7 +26,7 @@ export function stepFrames(fps: number, sample_hz: number): number {
 }
 
 /**
- * The slider's place when frames 0, `step`, 2 `step` and so on were drawn. A frame that was not drawn stands between its
+ * The slider's place when frames 0, `step`, 2 `step` and so on were drawn. A frame that was not drawn lies between its
  * neighbours in time; after the last one that was, frames follow at the clip's rate.
  */
 export function traceOf(

@@ -1,4 +1,4 @@
-/** Where two clips stand on their one canvas, in pixels of the clips, and how large that canvas is on the screen. */
+/** Where two clips are on their one canvas, in pixels of the clips, and how large that canvas is on the screen. */
 import type { ShownPairedComparison } from "../../../api/schema";
 import type { Size } from "../../trials/showing";
 
@@ -15,7 +15,7 @@ export interface Layout {
   shown: Size;
   /** Left and right (upper and lower) clip; in turn, the same place twice. */
   boxes: [ClipBox, ClipBox];
-  /** Where a single clip stands, such as a reference. */
+  /** Where a single clip, such as a reference, is shown. */
   single: ClipBox;
 }
 
@@ -46,18 +46,18 @@ export function layoutOf(
 function arranged(arrangement: Arrangement, pixels: Size, shown: Size, gap_px: number): Layout {
   const scale = pixels.width / shown.width;
   const gap = Math.round(gap_px * scale);
-  const beside = arrangement === "side_by_side" ? pixels.width + gap : 0;
+  const across = arrangement === "side_by_side" ? pixels.width + gap : 0;
   const below = arrangement === "stacked" ? pixels.height + gap : 0;
-  const canvas = { width: pixels.width + beside, height: pixels.height + below };
+  const canvas = { width: pixels.width + across, height: pixels.height + below };
   return {
     arrangement,
     canvas,
     shown: { width: canvas.width / scale, height: canvas.height / scale },
     boxes: [
       { x: 0, y: 0, ...pixels },
-      { x: beside, y: below, ...pixels },
+      { x: across, y: below, ...pixels },
     ],
-    single: { x: Math.round(beside / 2), y: Math.round(below / 2), ...pixels },
+    single: { x: Math.round(across / 2), y: Math.round(below / 2), ...pixels },
   };
 }
 
