@@ -97,7 +97,7 @@ def permutation_tests(
         if not np.isfinite(f_value):
             tests.append(PermutationTest(effect.effect, f_value, float("nan"), 0, False, flips))
             continue
-        # A generator for each effect: its p must not change with the effects that are tested beside it.
+        # One generator per effect: its p must not change with the other tested effects.
         draws, total, exact = _rearrangements(len(z), flips, n_random, np.random.default_rng(seed))
         # The observed data are one of the rearrangements, and are compared by the same statistic to the
         # last digit.

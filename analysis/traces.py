@@ -178,7 +178,7 @@ class MeanTrace:
 def mean_trace(clips: Sequence[ClipTraces]) -> MeanTrace:
     """The mean trace of one cell's clips, as long as the shortest of them."""
     samples = min(clip.values.shape[1] for clip in clips)
-    # A person's clips first, then people: whoever rated more clips must not weigh more.
+    # A person's clips first, then people: a person with more ratings must not weigh more.
     of_person: dict[str, list[Array]] = {}
     for clip in clips:
         for person, row in zip(clip.people, clip.values, strict=True):

@@ -209,7 +209,7 @@ def perform(
         raise ValueError(f"expected a duration above 0 s and below 10,000,000 s, got {duration_s}")
     chosen = parameters or default_parameters()
     blinks = plan_blinks(duration_s, BlinkPlan(chosen, state, seed), events, changes)
-    # The last frame of n stands at duration - 1 / fps.
+    # The last frame of n is at duration - 1 / fps.
     if ends_open:
         blinks = [blink for blink in blinks if blink.end_s <= duration_s - 1.0 / fps]
     count = max(1, round(duration_s * fps))

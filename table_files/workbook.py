@@ -193,7 +193,7 @@ def _header(path: Path, page: Page) -> list[str]:
         if low <= page.first <= high and right > left:
             raise InputError(
                 f"{path.name}: the first row has merged cells ({text}); expected one row that names every "
-                "column: unmerge them, give each column a name of its own (blur_calm), and delete rows above"
+                "column: unmerge them, give each column its own name (blur_calm), and delete rows above"
             )
     names = ["" if value is None else str(value).strip() for value in page.rows[0]] if page.rows else []
     while names and not names[-1]:

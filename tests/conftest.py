@@ -1,4 +1,4 @@
-"""What every test may use: the folder of real recordings, where it lies beside the checkout."""
+"""What every test may use: the folder of real recordings, if it is next to the checkout."""
 
 import os
 import tomllib
@@ -139,8 +139,8 @@ def fixtures_of(item: pytest.Item) -> Collection[str]:
 
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
-    """Folder of real recordings beside the checkout; the test skips where it is absent."""
+    """Folder of real recordings next to the checkout; the test skips where it is absent."""
     folder = REPOSITORY.parent / "shared" / "data"
     if not folder.is_dir():
-        pytest.skip(f"real recordings are not here (looked for ../shared/data beside {REPOSITORY.name})")
+        pytest.skip(f"real recordings are not here (looked for ../shared/data next to {REPOSITORY.name})")
     return folder

@@ -17,7 +17,7 @@ LONG: dict[str, str] = {test: group["reason"] for group in _TABLE["long"] for te
 POSTGRES: frozenset[str] = frozenset(_TABLE["postgres"])
 """Files whose tests on PostgreSQL are not long."""
 REAL_RECORDINGS = "shared_data"
-"""Fixture of the folder beside the checkout, which no clone has."""
+"""Fixture of the folder next to the checkout, which no clone has."""
 
 
 def is_long(name: str, markers: Collection[str], fixtures: Collection[str] = ()) -> bool:

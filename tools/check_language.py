@@ -65,7 +65,7 @@ UNCHANGED = (
     "stimuli_builder/characters/cartoon",
     "tests/docs/test_language.py",
 )
-"""Sources that must stay byte-identical (the cartoon's are hashed into clips), are generated, or test this lint."""
+"""Sources that stay byte-identical (the cartoon's are hashed into clips), are generated or test this lint."""
 BANNED_WORDS = tuple((re.compile(pattern, re.IGNORECASE), better) for pattern, better in BANNED.items())
 BRITISH_WORDS = tuple((re.compile(pattern, re.IGNORECASE), better) for pattern, better in BRITISH.items())
 CODE_BLOCK = re.compile(r"^```.*?^```", re.MULTILINE | re.DOTALL)
@@ -73,7 +73,7 @@ CODE = re.compile(
     r"`[^`\n]*`|\"[^\"\n]*\"|“[^”\n]*”|\]\([^)]*\)|^\[[^\]]+\]: .*"
     r"|--[a-z][a-z-]*|^ *[a-z_]+(?:, [a-z_]+)* : |\banew: true\b"
 )
-"""Code, quotations, addresses, options of commands, names of parameters in docstrings, and a key of the API."""
+"""Code, quotations, addresses, options, names of parameters in docstrings, and a key of the API."""
 
 
 @dataclass(frozen=True)

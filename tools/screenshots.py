@@ -315,7 +315,7 @@ MAX_BYTES = 2_000_000
 
 
 def recording_pictures(folder: Path) -> None:
-    """A silent screen recording: from twelve clips of one's own to the link for participants."""
+    """A silent screen recording: from twelve own clips to the link for participants."""
     process = ServerProcess(folder / "data").start()
     shown: list[tuple[float, bytes]] = []
     try:

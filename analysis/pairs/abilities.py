@@ -95,7 +95,7 @@ class ItemFactors:
             for level in self.names(factor)[1:]
         ]
         design = np.array(columns).T.reshape(len(items), len(columns))
-        # The mean is not identified: comparisons tell of differences alone.
+        # The mean is not identified: comparisons only say something about differences.
         centred = design - design.mean(axis=0)
         if design.shape[1] and np.linalg.matrix_rank(centred) < design.shape[1]:
             raise InputError(f"{self.source}: the factors are confounded on these items; remove one")
@@ -460,7 +460,7 @@ def _contrasts(
         z = difference / se if se > 0 else float("nan")
         rows.append((items[first], items[second], difference, se, z, _two_sided(difference, se)))
         clustered.append(_clustered(difference, contrast, robust, len(comparisons.participants)))
-    # A contrast without a standard error is no test, and does not count among those to adjust for.
+    # A contrast without a standard error is not tested, and does not count among those to adjust for.
     p = _holm([row[-1] if np.isfinite(row[-1]) else None for row in rows])
     robust_p = _holm([p for _, p in clustered])
     return tuple(

@@ -163,7 +163,7 @@ class Likelihood:
 
     def _bounds(self) -> list[tuple[float, float]]:
         x = self.trials.x
-        # Wider than the three ranges that `fit_threshold` takes, so that a refusal is told from a search
+        # Wider than the three ranges that `fit_threshold` takes, so that a refusal differs from a search
         # that was held.
         low, high = float(x.min() - 5 * self.width), float(x.max() + 5 * self.width)
         if self.shape == "weibull":

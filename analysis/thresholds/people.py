@@ -192,7 +192,7 @@ class PopulationLikelihood:
             gradient, hessian = self._differences(values, u)
             curvature = _positive(-hessian)
             step = np.linalg.solve(curvature, gradient[:, :, None])[:, :, 0]
-            # At most 1.5 prior SDs at once: far from its mode a posterior is no parabola.
+            # At most 1.5 prior SDs at once: far from its mode a posterior is not a parabola.
             step *= np.minimum(1.0, 1.5 / np.maximum(np.abs(step).max(axis=1, keepdims=True), 1e-12))
             better = self.joint(values, (u + step)[:, None])[:, 0] >= self.joint(values, u[:, None])[:, 0]
             # All people move together in one array, so a step that would lose is cut, not searched along.
@@ -256,7 +256,7 @@ def fit_population(
 
 
 def _maximum(model: PopulationLikelihood, start: Array, width: float, mu: float | None) -> Array:
-    # The search's tolerances are absolute: mu is brought to the size of the logarithms beside it.
+    # The search's tolerances are absolute: mu is brought to the size of the logarithms next to it.
     scale = np.array([width, 1.0, 1.0, 1.0])
 
     def negative(scaled: NDArray[np.float64]) -> float:

@@ -113,7 +113,7 @@ class MarginalLikelihood:
 
     def __init__(self, people: Sequence[Points], pooled: Plane) -> None:
         self.pooled, self.sign = pooled, -1.0 if pooled.falling else 1.0
-        # One grid of stimuli for all people: P is computed once per node, whoever answered.
+        # One grid of stimuli for all people: P is computed once per node, not once per person.
         stimuli = np.unique(np.concatenate([np.column_stack([one.x, one.z]) for one in people]), axis=0)
         rows = {(x, z): row for row, (x, z) in enumerate(stimuli.tolist())}
         self.n, self.k = np.zeros((2, len(people), len(stimuli)))

@@ -21,7 +21,7 @@ from experiments.errors import InputError
 
 NORMAL_95 = float(special.ndtri(0.975))
 
-# Far below what any number of answers can tell from 0 or 1, far above the rounding of F.
+# Far below what any number of answers can distinguish from 0 or 1, far above the rounding of F.
 STEP = 1e-6
 """How near its ends a function is that has reached them."""
 

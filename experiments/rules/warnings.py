@@ -62,7 +62,7 @@ HEADINGS = {
 }
 SAME_ANSWER = {
     "en": "Your last answers were all the same. If that is how you saw the clips, all is well. If your "
-    "thoughts have wandered: take a short break, and then look at each clip anew.",
+    "thoughts have wandered: take a short break, and then look at each clip with fresh eyes.",
     "de": "Ihre letzten Antworten waren alle gleich. Wenn Sie die Clips so gesehen haben, ist alles gut. "
     "Wenn "
     "Sie mit den Gedanken woanders waren: Machen Sie eine kurze Pause, und sehen Sie dann jeden "

@@ -73,7 +73,7 @@ class ApiError(Exception):
     """Base of every refusal: a status, a code for programs, a sentence for people.
 
     A subclass names what differs from its base: `class NotFound(ApiError, status=404, code="not_found")`. The
-    message says what was expected, what came, and what to do. Those that tell of somebody who tries what is
+    message says what was expected, what came, and what to do. Refusals of somebody who tries what is
     not hers are `audited`.
     """
 

@@ -96,7 +96,7 @@ def check_calibrations(stored: int) -> None:
 
 
 def _check_size(value: Mapping[str, Any], limit: int, what: str) -> None:
-    # Before the size: a text of brackets may be small and still exhaust the stack of whoever reads it.
+    # Before the size: a text of brackets may be small and still exhaust the stack of its reader.
     if _depth(value) > MAX_DEPTH:
         raise RunDataTooLarge(f"Expected {what} at most {MAX_DEPTH} levels deep.")
     size = len(json.dumps(value))

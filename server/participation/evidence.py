@@ -228,7 +228,7 @@ def _guessed_together(checks: Sequence[JudgedAnswer], wrong: Sequence[int]) -> f
 
 def checks_tell(answers: Sequence[JudgedAnswer], passed_over: Sequence[int] = ()) -> bool:
     """Whether all motion checks asked, also void and skipped ones, can distinguish guesses from people."""
-    # Void ones are counted in: whether checks can tell must not hang on how many of them a page lets fail.
+    # Void ones count too: a page that lets some checks fail must not change whether checks can decide.
     asked = [one.choices for one in answers if one.part == "check" and one.choices and not one.other_way]
     return _can_tell([*asked, *passed_over])
 

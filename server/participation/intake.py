@@ -333,7 +333,7 @@ def _in_time(connection: Connection, answer: Answer, batch: Batch, before: ClipT
     of_batch = before.since(batch.issued_at)
     if of_batch is None:  # tickets of a page before a reload, after answers by those of a page after it
         of_batch = evidence_repository.clip_ms_since(connection, answer.run, batch.issued_at)
-    # Counted twice (decision 0420). From this batch on: time spent idle before a reload is no credit for
+    # Counted twice (decision 0420). From this batch on: time spent idle before a reload does not count for
     # what is shown after it. From the first batch on: several batches at once do not multiply the time
     # there was.
     for issued_at, before_ms in ((batch.issued_at, of_batch), (first, before.clip_ms)):

@@ -79,7 +79,7 @@ def run_prefix(typed: str) -> str | None:
 
 def code_fits(key: bytes, public_id: str, typed: str) -> bool:
     """Whether the typed code is that of this run."""
-    # In constant time, as the code is a secret: the time of an answer must not tell how much of it was
+    # In constant time, as the code is a secret: the time of an answer must not show how much of it was
     # right.
     return hmac.compare_digest(_signs(resume_code(key, public_id)).encode(), _signs(typed).encode())
 

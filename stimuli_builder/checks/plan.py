@@ -74,7 +74,7 @@ def _planned(
         background=bt709(experiment.display.background),
         look=look,
     )
-    scale = geometry(settings.character, options.beside).px_per_mm_at(settings.width_px)
+    scale = geometry(settings.character, options.base_folder).px_per_mm_at(settings.width_px)
     return PlannedCheck(job, round(job.size_px[0] / scale, 4))
 
 

@@ -119,7 +119,7 @@ def build_command(
     from stimuli_builder.clips.plan import experiment_folder
 
     declared = load_experiment(experiment)
-    options = Options(seed=seed, barcode=barcode, beside=experiment_folder(experiment))
+    options = Options(seed=seed, barcode=barcode, base_folder=experiment_folder(experiment))
     with progress_bar(f"building {declared.name}") as progress:
         report = build(declared, out, options, Machines(workers, dask), progress)
     if preview:
@@ -241,7 +241,7 @@ def checks_command(
     if anew and seed is not None:
         raise InputError("--anew draws a new seed; remove --seed")
     declared = load_experiment(experiment)
-    options = Options(checks_seed=seed, beside=experiment_folder(experiment))
+    options = Options(checks_seed=seed, base_folder=experiment_folder(experiment))
     with progress_bar(f"checks of {declared.name}") as progress:
         report = build_checks(declared, out, options, progress, anew=anew)
     size_mb = sum({clip.file: clip.bytes for clip in report.manifest.checks}.values()) / 1e6

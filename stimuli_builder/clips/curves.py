@@ -188,7 +188,7 @@ def clip_curve(
         )
 
     def held(values: Array) -> Array:
-        # The eye rests as the recording left it: a jump to the mean opening would be a movement of its own.
+        # The eye rests as the recording left it: a jump to the mean opening would be an extra movement.
         return np.pad(values, (onset, total - end), mode="edge")
 
     def laid(values: Array) -> Array:

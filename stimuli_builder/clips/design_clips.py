@@ -192,7 +192,7 @@ class Options:
     seed: int | None = None
     checks_seed: int | None = None
     barcode: bool = False
-    beside: Path | None = None
+    base_folder: Path | None = None
 
     def seed_for(self, experiment: Experiment) -> int:
         """The seed in use: the option's, else the declared one."""
@@ -238,13 +238,13 @@ def _planned(experiment: Experiment, options: Options) -> Iterator[PlannedClip]:
 def _plan(experiment: Experiment, spec: ClipSpec, options: Options) -> PlannedClip:
     settings = design.render_settings(experiment, spec)
     seed = options.seed_for(experiment)
-    character = geometry(settings.character, options.beside)
+    character = geometry(settings.character, options.base_folder)
     check_look(settings, character)
     family = exemplar_family(design.exemplar_key(experiment, spec))
     if settings.performance is not None:
-        curve, repeated = performance_curve(settings, family, spec.exemplar, seed, options.beside), False
+        curve, repeated = performance_curve(settings, family, spec.exemplar, seed, options.base_folder), False
     else:
-        shown = exemplar(settings, family, spec.exemplar, seed, options.beside)
+        shown = exemplar(settings, family, spec.exemplar, seed, options.base_folder)
         timing = Timing.drawn(settings.fps, shown.phase_samples, seed, spec.cell, spec.exemplar)
         curve, repeated = clip_curve(shown.profile, timing, settings.lower_lid), shown.repeated
     curve, held = shown_by(curve, settings, character.lower_range_mm)
@@ -279,13 +279,13 @@ def look_of(settings: RenderSettings, options: Options) -> Look:
     """How clips with these settings are rendered."""
     return Look(
         character=settings.character,
-        fingerprint=fingerprint(settings.character, options.beside),
+        fingerprint=fingerprint(settings.character, options.base_folder),
         encoder=_encoder(),
         size_px=(settings.width_px, settings.height_px),
         fps=settings.fps,
         motion_blur=settings.motion_blur,
         barcode=options.barcode,
-        beside=options.beside,
+        beside=options.base_folder,
         movement=Movement.of_settings(settings),
         life=settings.life,
     )

@@ -173,7 +173,7 @@ def fit(picture, c, pose, max_iterations, tolerance, mesh, model, buffers):
         hessian(model.hessian_forms, c, matrix)
         for k in range(c.shape[0]):
             matrix[k, k] += model.prior[k]
-            # The gradient of the prior's penalty, prior c^2 / 2, beside its Hessian on the diagonal.
+            # The gradient of the prior's penalty, prior c^2 / 2; its Hessian is on the diagonal.
             change[k] += model.prior[k] * c[k]
         if not solve(matrix, change):
             return 0

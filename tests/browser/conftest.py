@@ -57,7 +57,7 @@ def chromium() -> Iterator[Browser]:
 
 @pytest.fixture
 def server(tmp_path: Path, built_page: Path) -> Iterator[ServerProcess]:
-    """A server process with a data folder of its own, not yet started, so that studies can be added."""
+    """A server process with its own data folder, not yet started, so that studies can be added."""
     process = ForkedServer(tmp_path / "data")
     yield process
     process.stop()

@@ -127,7 +127,7 @@ async def _closed(writer: asyncio.StreamWriter) -> None:
 
 
 async def _read_request(reader: asyncio.StreamReader) -> bytes:
-    """One request with its body, told to close the connection after it."""
+    """One request with its body, with the header that closes the connection after it."""
     head = await reader.readuntil(HEAD_END)
     lines = [
         line for line in head[: -len(HEAD_END)].split(b"\r\n") if not line.lower().startswith(b"connection:")

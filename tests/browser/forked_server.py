@@ -14,7 +14,7 @@ _FORKS.set_forkserver_preload(["server.cli_run", "server.app", "tests.browser.pr
 
 
 class ForkedServer(ServerProcess):
-    """`server run` in a process of its own, forked from one that has imported the server.
+    """`server run` in a separate process, forked from one that has imported the server.
 
     What it does from the command line on is what `python -m server run` does; only the imports are shared.
     """

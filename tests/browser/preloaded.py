@@ -1,4 +1,4 @@
-"""Imported by the process that servers are forked from: work that each of them would do anew."""
+"""Imported by the process that servers are forked from: work that each of them would do again."""
 
 import gc
 

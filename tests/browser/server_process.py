@@ -1,4 +1,4 @@
-"""A real `server run` in a process of its own, that can be killed and started again on the same data."""
+"""A real `server run` in a separate process, that can be killed and started again on the same data."""
 
 import os
 import shutil

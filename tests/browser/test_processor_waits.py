@@ -1,4 +1,4 @@
-"""The kernel's count tells a program that waits for a processor from one that sleeps."""
+"""The kernel's count separates a program that waits for a processor from one that sleeps."""
 
 import os
 import subprocess

@@ -133,7 +133,7 @@ CARD_PX = 324
 
 
 def fit_card(page: Page, *widths: int) -> None:
-    """Measure the card, twice unless told otherwise, each time from the size that it begins with."""
+    """Measure the card, twice by default, each time from the size that it begins with."""
     for number, width in enumerate(widths or (CARD_PX, CARD_PX), start=1):
         page.wait_for_selector(f".card-area[data-round='{number}']")
         page.fill(".card-area input", str(width))

@@ -1,4 +1,4 @@
-"""`make check` keeps docstrings that numpydoc cannot read, or that are no numpydoc, out of the code."""
+"""`make check` refuses docstrings that numpydoc cannot read, or that are not in its format."""
 
 import ast
 

@@ -103,7 +103,7 @@ class Deployment:
 @pytest.fixture
 def deployment(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Deployment]:
     if os.environ.get("TEST_DATABASE_URL"):
-        pytest.skip("it renames the database `palpebra`, so it only runs on a PostgreSQL of its own")
+        pytest.skip("it renames the database `palpebra`, so it only runs on a separate PostgreSQL")
     if shutil.which("psql") is None:
         pytest.skip("no psql on this machine")
     made = Deployment(tmp_path, request.getfixturevalue("postgres_server"))

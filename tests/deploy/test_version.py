@@ -1,4 +1,4 @@
-"""The version is one number, wherever it stands."""
+"""The version is one number, wherever it appears."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""Which devices a study turns away, said in the builder and beside its links."""
+"""Which devices a study turns away, as shown in the builder and next to its links."""
 
 import pytest
 

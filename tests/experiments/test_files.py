@@ -1,4 +1,4 @@
-"""Output that cannot be written is told in one line, whatever the reason."""
+"""Output that cannot be written is reported in one line, whatever the reason."""
 
 from pathlib import Path
 

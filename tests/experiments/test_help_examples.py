@@ -78,8 +78,8 @@ def test_a_command_is_broken_before_options():
     [
         ("short", "  a bc --long value \\\n      --more x  # short"),
         (
-            "a comment too long to stand",
-            "  # a comment too long to stand\n  a bc --long value \\\n      --more x",
+            "a comment too long to fit",
+            "  # a comment too long to fit\n  a bc --long value \\\n      --more x",
         ),
     ],
 )

@@ -1,4 +1,4 @@
-"""Levels that were read from names stand in the order that a reader expects."""
+"""Levels that were read from names are in the order that a reader expects."""
 
 import pytest
 

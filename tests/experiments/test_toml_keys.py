@@ -20,7 +20,7 @@ from experiments.load import (
 
 LONGEST = 500_000
 SOON_S = 5.0
-"""Hundredths of a second on an idle machine; by a search that pairs quotes anew, minutes."""
+"""Hundredths of a second on an idle machine; by a search that pairs quotes again and again, minutes."""
 
 
 @pytest.mark.parametrize(

@@ -68,7 +68,7 @@ def test_the_added_kind_goes_from_its_declaration_to_results_and_report(copy: Pa
     assert [(cell["cell"], cell["n"]) for cell in seen["results"]["cells"]] == [
         (cell, 6) for cell in ("a/fast", "a/slow", "b/fast", "b/slow")
     ]
-    # Results and the report tell the same of the same answers.
+    # Results and the report say the same about the same answers.
     means = {cell["cell"]: pytest.approx(cell["mean"]) for cell in seen["results"]["cells"]}
     assert seen["numbers"]["shares"] == means
     assert "| word | text |" in seen["codebook"]

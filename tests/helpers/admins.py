@@ -50,7 +50,7 @@ def fresh_browser(client: TestClient, settings: Settings) -> TestClient:
 
 
 def signed_in(client: TestClient, services: Services, role: Role, name: str = "") -> Admin:
-    """A new account of this role, signed in through a one-time link in a browser of its own."""
+    """A new account of this role, signed in through a one-time link in a separate browser."""
     name = name or f"the {role}"
     client = fresh_browser(client, services.settings)
     _, token = invitations.invite(services.database, role, "", None)
@@ -60,7 +60,7 @@ def signed_in(client: TestClient, services: Services, role: Role, name: str = ""
 
 
 def wrong_code(secret: str) -> str:
-    """Six digits that are no code of this second factor within the next minutes."""
+    """Six digits that are not a code of this second factor within the next minutes."""
     moment, totp = int(time.time()), pyotp.TOTP(secret)
     right = {totp.at(moment + seconds) for seconds in range(-60, 300, 30)}
     return next(code for code in map("{:06}".format, range(1000)) if code not in right)

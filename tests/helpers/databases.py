@@ -149,7 +149,7 @@ def database_of_its_own(server: URL) -> Iterator[str]:
 
 @pytest.fixture
 def settings(quick_folder: Path, tmp_path: Path, database_url: str) -> Settings:
-    """Settings with a data folder of their own."""
+    """Settings with a separate data folder."""
     return Settings(
         data_folder=quick_folder / "data",
         database_url=database_url,

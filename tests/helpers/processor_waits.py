@@ -1,4 +1,4 @@
-"""How long a browser's drawing threads waited for a processor: told by the kernel, not by the page.
+"""How long a browser's drawing threads waited for a processor: reported by the kernel, not by the page.
 
 A picture can be lost for two reasons: the page was wrong, or other programs held the processors. The kernel
 counts for each thread the time it was ready and did not run; a hypervisor that takes the processor away is
@@ -15,7 +15,7 @@ import psutil
 
 SAMPLE_S = 0.005
 TREE_EVERY_S = 0.5
-"""How often the browser's threads are listed anew."""
+"""How often the browser's threads are listed again."""
 DRAWING_THREADS = (
     "DedicatedWorker",
     "Compositor",
@@ -35,7 +35,7 @@ DRAWING_THREADS = (
 
 
 class ProcessorWaits:
-    """Samples in a thread of its own from ``with`` to its end.
+    """Samples in a separate thread from ``with`` to its end.
 
     own_lateness: count the sampler's late waking as a wait; not where the browser goes before every
     ordinary program, the sampler too.

@@ -11,7 +11,7 @@ from tests.helpers.studies import StudyInDatabase
 
 
 class Api:
-    """Requests to a server within this process; an answer that is no success fails the test."""
+    """Requests to a server within this process; an answer without success fails the test."""
 
     token: str | None = None
 

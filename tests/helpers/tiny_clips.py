@@ -35,7 +35,7 @@ def make_clip_folder(
     folder.mkdir(parents=True, exist_ok=True)
     video, clips = encoded_video(frames, fps, *size_px), []
     for spec in design.clips(experiment):
-        # A box that players skip makes each file its own, without encoding each anew.
+        # A box that players skip makes each file unique, without encoding each again.
         own = f"{spec.cell}/{spec.exemplar}".encode()
         data = video + _free_box(own.ljust(clip_bytes - len(video) - BOX_HEAD_BYTES, b"."))
         sha256 = hashlib.sha256(data).hexdigest()

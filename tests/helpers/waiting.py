@@ -18,7 +18,7 @@ def until(holds: Callable[[], object], limit_s: float = 60.0) -> None:
 
 
 def run_in_own_loop(work: Coroutine[Any, Any, Result]) -> Result:
-    """Run a coroutine in an event loop and a thread of its own.
+    """Run a coroutine in a separate thread with its own event loop.
 
     `asyncio.run` fails in a test that comes after a browser test: Playwright's loop still runs in that
     thread.

@@ -56,7 +56,7 @@ def test_a_study_from_files_to_data(settings: Settings, services: Services, sour
     assert exported.returncode == 0, exported.stderr
     rows = list(csv.DictReader(io.StringIO(out.read_text(encoding="utf-8"))))
     assert f"{out.stat().st_size:,} bytes" in exported.stdout.replace("\n", "")
-    # A play that failed is offered again and is a row of its own.
+    # A play that failed is offered again and has a separate row.
     assert len({(row["run"], row["trial_index"]) for row in rows if row["verdict"] != "failed"}) == 2 * 12
     assert list(rows[0]) == RATINGS.csv_header(["character", "speed"])
     call = ("export", "short", "--origin", "simulated", "--old-order", "--out", str(out))

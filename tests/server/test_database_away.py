@@ -1,4 +1,4 @@
-"""A database that is away is told by 503, so that pages send again, and by one line in the log."""
+"""An unreachable database is reported by 503, so that pages send again, and by one line in the log."""
 
 import logging
 import sqlite3

@@ -202,7 +202,7 @@ def test_what_others_may_do_with_a_view_outlives_it(database: Database) -> None:
             f'GRANT SELECT (study, rt), UPDATE (study) ON ratings TO "{reader}"',
             "GRANT SELECT ON thresholds TO PUBLIC",
             "ALTER VIEW traces SET (security_barrier = true)",
-            # Whoever makes a view gives it to the third role, from whom the owner took this one.
+            # The user who makes a view gives it to the third role, from whom the owner took this one.
             f'ALTER DEFAULT PRIVILEGES GRANT SELECT ON TABLES TO "{third}"',
         )
         before, options = rights(database), options_of(database)

@@ -13,7 +13,7 @@ CALLED_TO_RUN_ONE = {"execute", "scalar", "scalars", "query", "get_one", "exec_d
 ABOUT_ROWS = {"privacy/rows.py", "operations/key_escrow.py", "operations/snapshots.py"}
 """Whole databases, copied row for row or kept as files of SQLite."""
 BEGINS_TRANSACTIONS = {"db.py": {"exec_driver_sql"}}
-"""BEGIN and BEGIN IMMEDIATE, which are no queries."""
+"""BEGIN and BEGIN IMMEDIATE, which are not queries."""
 
 
 def queries_in(path: Path) -> list[str]:

@@ -1,4 +1,4 @@
-"""/readyz tells a full disk, a locked database and one that may not be written to apart."""
+"""/readyz distinguishes a full disk, a locked database and one that may not be written to."""
 
 import os
 import shutil

@@ -31,7 +31,7 @@ LOGINS_PER_MINUTE = 12
 PATIENCE_S = 300.0
 pytestmark = [
     pytest.mark.postgres,
-    # boto3 tells of the end of its support for this Python; requirements say 3.11.
+    # boto3 announces the end of its support for this Python; requirements say 3.11.
     pytest.mark.filterwarnings("ignore::boto3.exceptions.PythonDeprecationWarning"),
     pytest.mark.filterwarnings("ignore:datetime.datetime.utcnow:DeprecationWarning"),
 ]
@@ -78,7 +78,7 @@ def hosts(services: Services, study: StudyInDatabase) -> Iterator[tuple[Host, Ho
 
 @contextmanager
 def host(services: Services, name: str) -> Iterator[Host]:
-    """A host with a data folder of its own."""
+    """A host with its own data folder."""
     folder = services.settings.data_folder.with_name(name)
     with running(services.settings.model_copy(update={"data_folder": folder})) as started:
         yield started
@@ -135,7 +135,7 @@ class Visit:
 
 
 def soon(ask: Any, wanted: Any) -> Any:
-    """What is asked for once it is as it should be."""
+    """The result of `ask` once it is as `wanted`."""
     until = time.monotonic() + PATIENCE_S
     while not wanted(answer := ask()):
         assert time.monotonic() < until, answer

@@ -78,7 +78,7 @@ def kernels_of(source):
 
 
 def uncovered(source):
-    """Names of other files that kernels hold, through kernels of their own file too, and are not over."""
+    """Names of other files that kernels hold, even through kernels of the same file, and are not over."""
     modules, origin = {}, {}
     for node in ast.parse(source).body:
         if isinstance(node, ast.ImportFrom) and str(node.module).startswith("stimuli_builder"):

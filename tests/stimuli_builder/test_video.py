@@ -11,7 +11,7 @@ from stimuli_builder.video import VideoWriter, clock_of, frames, read_frames, rg
 
 
 def ramp(number, width=64, height=48):
-    """A picture that tells its frame number and which way is up."""
+    """A picture that shows its frame number and which way is up."""
     picture = np.full((height, width), 20 + 4 * number % 200, np.uint8)
     picture[: height // 4, : width // 4] = 230
     return picture

@@ -62,7 +62,7 @@ def test_files_of_which_the_native_reader_died_end_in_one_line(tmp_path, name, s
     assert "\n" not in said
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="a shell script stands in for Python")
+@pytest.mark.skipif(sys.platform == "win32", reason="a shell script replaces Python")
 @pytest.mark.parametrize("death", ["kill -SEGV $$", "exit 3", "echo '{'"])
 def test_a_reader_that_dies_is_no_end_of_the_analysis(tmp_path, monkeypatch, death) -> None:
     path = written(tmp_path / "a.sav")
@@ -73,7 +73,7 @@ def test_a_reader_that_dies_is_no_end_of_the_analysis(tmp_path, monkeypatch, dea
     assert "it is damaged: reading it ended the reader" in said_of(path)
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="a shell script stands in for Python")
+@pytest.mark.skipif(sys.platform == "win32", reason="a shell script replaces Python")
 def test_a_reader_that_goes_in_circles_is_ended(tmp_path, monkeypatch) -> None:
     path = written(tmp_path / "a.sav")
     stand_in = tmp_path / "python"

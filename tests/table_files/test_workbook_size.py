@@ -17,7 +17,7 @@ FURTHEST = "XFD1048576"
 
 
 def workbook(path, old: str, new: str, first: dict[str, bytes] | None = None, name: str = SHEET):
-    """A small table; in its sheet's XML, called `name`, `old` gives way to `new`; `first` stands before."""
+    """A small table; in its sheet's XML, called `name`, `new` replaces `old`; `first` comes before."""
     book = openpyxl.Workbook()
     for row in [("id", "face", "score"), ("a", "x", 1), ("b", "x", 2)]:
         book.active.append(row)

@@ -91,7 +91,7 @@ def test_a_header_of_100000_x_100000_pixels(tmp_path: Path) -> None:
 
 
 def examine(path: Path) -> str:
-    """Prepare a file in a process of its own, which may not take the memory that the file promises."""
+    """Prepare a file in a separate process, which may not take the memory that the file promises."""
 
     def bounded() -> None:
         resource.setrlimit(resource.RLIMIT_AS, (8 << 30, 8 << 30))

@@ -104,7 +104,7 @@ def with_long_closures(distance: Array, fps: float, events: Sequence[LidEvent]) 
         return list(events)
     # By this eye's own blinks: an aspect ratio of shut lids is not 0, and differs between people.
     closed, opening = float(np.median(minima)), float(np.nanpercentile(distance, OPEN_PERCENTILE))
-    # Infinity spreads through the average: beside a gap nothing counts as shut.
+    # Infinity spreads through the average: next to a gap nothing counts as shut.
     level = box_filter(np.where(np.isfinite(distance), distance, np.inf), max(1.0, SMOOTHING_S * fps))
     shut = runs(level < closed + SHUT_SHARE * (opening - closed))
     longer = [

@@ -77,7 +77,7 @@ def test_krippendorffs_own_example(tmp_path, level, alpha) -> None:
     lines = [f"o{i},u{k:02d},{v}" for i, row in enumerate(rows) for k, v in enumerate(row)]
     result = agreement(read_votes(votes_file(tmp_path, lines), "clip", "id", "score"), level)
     assert round(result.krippendorff_alpha, 3) == alpha
-    # the unit that one observer rated tells nothing of agreement
+    # the unit that one observer rated says nothing about agreement
     assert any("1 items were rated by only one person" in decision for decision in result.decisions)
 
 
@@ -197,7 +197,7 @@ def common(seed: int) -> np.ndarray:
 
 @pytest.mark.parametrize("answers", [common(12), common(3), noise(31, (28, 5)), noise(5, (11, 5))])
 def test_omega_is_the_same_in_every_run(answers: np.ndarray) -> None:
-    """From a start drawn anew the fit ended now and then at another maximum, or without one."""
+    """From a start drawn again the fit sometimes ended at another maximum, or without one."""
     ends = {str(_one_factor(answers)) for _ in range(8)}
     assert len(ends) == 1
 

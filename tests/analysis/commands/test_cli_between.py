@@ -182,7 +182,7 @@ def test_a_group_of_one_participant_is_named(tmp_path) -> None:
 
 
 def test_slopes_that_a_group_of_one_does_not_tell_are_named(tmp_path) -> None:
-    """The intercept is not to be told from that group's slope either, and it has no name."""
+    """The intercept cannot be distinguished from that group's slope either, and it has no name."""
     file = tmp_path / "t.csv"
     file.write_text(
         HEAD

@@ -31,7 +31,7 @@ def test_both_forms_agree(monkeypatch) -> None:
 
 
 def test_few_sums_stay_dense_however_many_are_zero() -> None:
-    # twenty clips in every cell of a balanced design: only intercepts meet, and 1,280 numbers are no burden
+    # twenty clips in every cell of a balanced design: only intercepts meet, and 1,280 numbers are few
     cells = np.array([[1.0, a, b, a * b] for a in (-1.0, 1.0) for b in (-1.0, 1.0)])
     people, clips, cell = (codes.ravel() for codes in np.indices((16, 20, 4)))
     patterns = np.stack([np.diag(one) for one in np.eye(4)])

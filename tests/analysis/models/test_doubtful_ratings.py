@@ -1,4 +1,4 @@
-"""Ratings on which a mixed model could be wrong without a word: far origins, variances nobody can tell."""
+"""Ratings on which a mixed model could be silently wrong: far origins, variances that are not identified."""
 
 import numpy as np
 import pandas as pd

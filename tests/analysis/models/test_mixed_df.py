@@ -186,7 +186,7 @@ def test_df_of_one_error_variance_are_its_own_however_rounded(q, df, noise) -> N
 
 
 def test_intervals_of_a_flat_profile_agree_with_lme4() -> None:
-    """Residual SDs held high have a second stationary point, a variance of zero, which is no minimum."""
+    """Residual SDs held high have a second stationary point, a variance of zero. It is not a minimum."""
     rows = pd.read_csv(GOLDEN / "hard_flat_profile.csv")
     ours = fit_mixed(rows, "participant", "score", ["A"], "item", "all", intervals=True)
     golden = {one["name"]: (one["low"], one["high"]) for one in HARD["intervals"]}

@@ -1,4 +1,4 @@
-"""Votes that tell little: people of one vote, groups without a common person, people who decide alone."""
+"""Votes that say little: people with one vote, groups without a common person, people who decide alone."""
 
 import json
 import warnings

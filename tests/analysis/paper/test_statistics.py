@@ -1,4 +1,4 @@
-"""Statistics in running text: read, recomputed, and told when they do not fit."""
+"""Statistics in running text: read, recomputed, and reported when they do not fit."""
 
 from pathlib import Path
 

@@ -61,7 +61,7 @@ def test_means_are_over_the_faces_that_each_saw(analysis: Analysis) -> None:
 
 
 def test_the_mixed_model_counts_faces_as_a_sample(analysis: Analysis) -> None:
-    """What differs between faces is no effect of the profile: its test has the df of a few faces."""
+    """Differences between faces are not an effect of the profile: its test has the df of a few faces."""
     assert analysis.exclusions is not None
     section = mixed_model(analysis)
     (table,) = section.tables

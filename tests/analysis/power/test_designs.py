@@ -63,7 +63,7 @@ def test_groups_alone_are_told_no_correlation() -> None:
 
 
 def test_ties_come_as_often_as_asked_and_cost_power() -> None:
-    """Of two items only decided comparisons tell: power by the normal approximation of their log odds."""
+    """Only decided comparisons of two items count: power by the normal approximation of their log odds."""
     design = PairsDesign((0.0, 0.5), 4, tie=0.3)
     drawn = design._outcomes(5000, np.random.default_rng(1)).sum(axis=(0, 1))
     odds = 2 * 0.3 / 0.7 / (2 * np.cosh(0.25))  # nu over what either side has
@@ -196,7 +196,7 @@ def test_two_items_have_the_power_of_the_binomial_test() -> None:
 
 @pytest.mark.parametrize("abilities", [(0.0, 0.0), (0.0, 0.0, 0.0)])
 def test_items_that_do_not_differ_are_told_apart_at_the_rate_of_alpha(abilities) -> None:
-    """Raters' own preferences, compared five times each, are no evidence of the population's."""
+    """Raters' own preferences, compared five times each, are not evidence about the population."""
     design = PairsDesign(abilities, repeats=5, rater_sd=1.0)
     result = simulate_design(design, "x", [10, 25], 800, seed=3)
     assert np.all(result.power[0] < 0.05 + 3 * np.sqrt(0.05 * 0.95 / 800))

@@ -41,7 +41,7 @@ def workbook(path, rows, merged=()):
     ("rows", "merged", "said"),
     [
         ([("My study", None, None), HEAD, *ROWS], ["A1:C1"], "first row has merged cells (A1:C1)"),
-        ([("id", "blur", None), (None, "a", "b"), ("p1", 1, 2)], ["B1:C1"], "name of its own (blur_calm)"),
+        ([("id", "blur", None), (None, "a", "b"), ("p1", 1, 2)], ["B1:C1"], "its own name (blur_calm)"),
         ([HEAD, ROWS[0], (None, *ROWS[1][1:])], ["A2:A3"], "the cells A2:A3 of 'id' are merged"),
     ],
     ids=["title", "two rows of heads", "ids"],

@@ -1,4 +1,4 @@
-"""The report as a LaTeX document: well formed whatever stands in the data, and set where there is a TeX."""
+"""The report as a LaTeX document: well formed for any data, and typeset where TeX is installed."""
 
 import re
 import shutil

@@ -1,4 +1,4 @@
-"""Names of factors and levels in any script stand in figures as they are, or as numbers, never as boxes."""
+"""Figures show names of factors and levels in any script as they are, or as numbers, never as boxes."""
 
 import re
 import warnings

@@ -1,4 +1,4 @@
-"""The report's R script computes its tables anew: where R is, it agrees, and it finds a changed number."""
+"""The report's R script computes its tables again: where R is, it agrees, and it finds a changed number."""
 
 import re
 from pathlib import Path
@@ -169,7 +169,7 @@ def test_r_finds_each_altered_number_and_no_other(tmp_path) -> None:
 
 
 def test_r_agrees_with_pairs_of_two_factors_and_a_cell_in_which_nobody_differs(tmp_path) -> None:
-    """An error that is zero, or rounding, is no number to compare relatively."""
+    """An error that is zero, or rounding, is not a number to compare relatively."""
     needed("afex", "car", "emmeans")
     rows = read_long_table(GOLDEN / "within/complete_2.csv", "participant", "rating", ["A", "B"]).rows
     first = (rows["A"] == rows["A"].iloc[0]) & (rows["B"] == rows["B"].iloc[0])

@@ -1,4 +1,4 @@
-"""Scripts of a report: the quick ones first, each told as it ends, none cut off."""
+"""Scripts of a report: the quick ones first, each reported as it ends, none cut off."""
 
 from pathlib import Path
 

@@ -51,7 +51,7 @@ def test_the_line_has_the_threshold_and_the_interval_of_a_fit_with_its_middle_th
 
 
 def test_answers_that_lack_a_level_are_fitted_at_the_middle_that_is_said() -> None:
-    """Compared at the middles of their own answers, two series would differ by their tilt alone."""
+    """Compared at the middles of their answers, two series would differ by their tilt alone."""
     answers = read_answers(FOLDER / "yes_no.csv", "duration", "seen", second="asymmetry")
     assert answers.second is not None
     kept = answers.second < answers.second.max()

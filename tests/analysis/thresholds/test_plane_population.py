@@ -45,7 +45,7 @@ def differing() -> tuple[list[Points], PopulationPlane]:
 
 
 def test_the_likelihood_is_the_integral_over_peoples_thresholds_and_tilts() -> None:
-    """Against Simpson's rule on a fine grid, with equation (1) written down anew."""
+    """Against Simpson's rule on a fine grid, with a second implementation of equation (1)."""
     every = people(2, 3, 30, 10) + people(1, 3, 30, 10, seed=9)
     model = MarginalLikelihood(every, together(every))
     mu, tilt, spread, sd, tilt_sd = 290.0, 35.0, 45.0, 28.0, 12.0

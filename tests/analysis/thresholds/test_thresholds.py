@@ -176,7 +176,7 @@ def test_where_slopes_grow_without_end_the_error_is_that_of_the_profile(n: list[
 
 @pytest.mark.parametrize(("k", "lapse"), [([0, 2, 6, 11, 16, 19, 20], 0.0), ([0, 2, 6, 11, 15, 16, 16], 0.1)])
 def test_at_an_end_of_the_lapse_rate_the_error_is_that_of_the_profile(k: list[int], lapse: float) -> None:
-    """There the likelihood is cut off, and its curvature is no error: ordinary people were left out."""
+    """There the likelihood is cut off, and its curvature is not an error: ordinary people were left out."""
     fit = fit_threshold(Trials(np.arange(1.0, 8), np.full(7, 20.0), np.array(k, float)), "normal", 0.0, None)
     assert fit.lapse == pytest.approx(lapse, abs=1e-8)
     assert fit.threshold_ci.low is not None
@@ -200,7 +200,7 @@ def test_thresholds_have_the_decimals_that_their_error_supports(
 
 @pytest.mark.parametrize("guess", [0.0, 0.5])
 def test_stimuli_without_repeats_bound_the_slope_and_say_nothing_of_the_fit(guess: float) -> None:
-    """The spread is that of an optimiser of its own, and its profile interval is finite."""
+    """The spread is that of a second optimizer, and its profile interval is finite."""
     rng = np.random.default_rng(3)
     x = np.linspace(-10, 10, 200)
     k = (rng.uniform(size=200) < guess + (1 - guess) * special.ndtr((x - 0.5) / 3)).astype(float)

@@ -141,7 +141,7 @@ def test_agrees_with_pingouin(data) -> None:
     import pingouin
 
     with warnings.catch_warnings():
-        # pingouin 0.7 on pandas 3 warns of its own internals
+        # pingouin 0.7 on pandas 3 warns about its own internals
         warnings.simplefilter("ignore")
         table = pingouin.rm_anova(long(data, "AB"), dv="y", within=["A", "B"], subject="id", effsize="ng2")
         single = pingouin.rm_anova(

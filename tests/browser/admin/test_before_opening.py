@@ -163,7 +163,7 @@ def named_faults(files: list[str]) -> dict[str, str]:
         "a clip of nothing": rf"1 clip shows nothing: {files[5]}",
         "a clip that begins with nothing": rf"1 clip begins with an empty picture: {files[6]}",
         "one file in two cells": r"1 clip is the same file in several cells",
-        "levels told apart": r"level 'fast' of 'speed' can be recognized by",
+        "recognizable levels": r"level 'fast' of 'speed' can be recognized by",
         "placeholders": r"texts\.en\.consent .*\[Title\]",
         "no contact": r"has no e-mail address",
         "no time": r"does not say how long",

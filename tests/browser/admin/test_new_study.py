@@ -1,4 +1,4 @@
-"""A new user's way without TOML: twelve clips of one's own to a live link with questionnaire and practice."""
+"""A new user's way without TOML: twelve own clips to a live link with questionnaire and practice."""
 
 import re
 from pathlib import Path

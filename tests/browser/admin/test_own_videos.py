@@ -1,4 +1,4 @@
-"""Own videos of several formats in the real page: sent, converted, told of, made a study, shown."""
+"""Own videos of several formats in the real page: uploaded, converted, reported, made a study, shown."""
 
 import hashlib
 import os

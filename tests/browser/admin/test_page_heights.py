@@ -21,7 +21,7 @@ STANDING_FOR_ALL = {"dcr-demo", "exp3", "plane-demo", "threshold-demo"}
 
 
 def lengths(page: Page, pages: str) -> dict[str, int]:
-    """The height of each page that a list of pages leads to, by its name."""
+    """The height of each page that a list of pages links to, by name."""
     links = page.get_by_role("navigation", name=pages).get_by_role("link")
     measured = {}
     for number in range(links.count()):

@@ -52,7 +52,7 @@ READ = """({ corners }) => {
   });
 }"""
 CORNERS = {"pairs": {"right": (True, False)}, "stacked": {"right": (False, True)}}
-"""Where a clip stands that does not stand at the canvas's upper left corner."""
+"""The place of a clip that is not in the canvas's upper left corner."""
 
 
 @dataclass(frozen=True)
@@ -197,7 +197,7 @@ def wait_painted(page: Page, at_ms: float) -> None:
 
 
 def frames_on_canvas(page: Page, kind: str, logs: list[Scripted]) -> list[int]:
-    """The numbers read from the pixels, a clip each; clips in turn stand at one spot and share it."""
+    """The numbers read from the pixels, one per clip; clips in turn are at one place and share it."""
     corners = [CORNERS.get(kind, {}).get(log.role, (False, False)) for log in logs]
     read: list[int] = page.evaluate(READ, {"corners": corners})
     return read

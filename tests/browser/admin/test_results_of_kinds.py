@@ -80,7 +80,7 @@ def test_results_say_whose_answers_there_are_and_show_them_by_label(dashboard: D
     page.set_viewport_size({"width": 390, "height": 844})
     try:
         faults = ["not looked at"]
-        # Figures are drawn anew for the narrower page, a moment after it has become so.
+        # Figures are drawn again for the narrower page, a moment after it has become so.
         for _ in range(50):
             faults = [*page.evaluate(WIDE), *page.evaluate(COVERED)]
             if not faults:

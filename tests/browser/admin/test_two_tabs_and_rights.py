@@ -61,7 +61,7 @@ def test_edits_of_two_tabs_are_both_kept(dashboard: Dashboard, second: Page) -> 
     """The second to save gets the version of the first, with its own changes in it again."""
     first = builder(dashboard.page, dashboard)
     builder(second, dashboard, "study")
-    typed(first, "Kept beside another edit.")
+    typed(first, "Kept next to another edit.")
     second.get_by_role("textbox", name="Title", exact=True).fill("A title of the second tab")
     expect(second.get_by_role("button", name=SAVE)).to_be_enabled()
     second.get_by_role("button", name=SAVE).click()
@@ -70,12 +70,12 @@ def test_edits_of_two_tabs_are_both_kept(dashboard: Dashboard, second: Page) -> 
     met = first.get_by_role("alert").filter(has_text="was saved while you edited")
     expect(met).to_contain_text("title: A title of the second tab")
     expect(met).not_to_contain_text("You both changed")
-    expect(first.get_by_label(DEBRIEF)).to_have_value("Kept beside another edit.")
+    expect(first.get_by_label(DEBRIEF)).to_have_value("Kept next to another edit.")
     first.get_by_role("button", name=SAVE).click()
     expect(first.get_by_text(re.compile(r"Saved as version \d+"))).to_be_visible()
     first.reload()
     expect(first.get_by_role("heading", level=1)).to_have_text("A title of the second tab")
-    expect(first.get_by_label(DEBRIEF)).to_have_value("Kept beside another edit.")
+    expect(first.get_by_label(DEBRIEF)).to_have_value("Kept next to another edit.")
 
 
 def test_a_field_that_both_changed_is_chosen_by_the_second(dashboard: Dashboard, second: Page) -> None:

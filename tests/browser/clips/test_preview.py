@@ -58,7 +58,10 @@ def sheet(tmp_path_factory: pytest.TempPathFactory) -> tuple[Manifest, Path]:
     (folder / "lid.csv").write_text("closure,lower_up_mm,lower_nasal_mm\n" + "\n".join(rows) + "\n")
     (folder / "sheet.toml").write_text(STUDY)
     report = build(
-        load_experiment(str(folder / "sheet.toml")), folder / "clips", Options(beside=folder), Machines(1)
+        load_experiment(str(folder / "sheet.toml")),
+        folder / "clips",
+        Options(base_folder=folder),
+        Machines(1),
     )
     return report.manifest, write_preview(report.manifest, folder / "clips")[1]
 

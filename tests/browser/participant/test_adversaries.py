@@ -87,7 +87,7 @@ def test_a_driven_browser_with_lengthened_presses_and_a_persons_times_is_unclear
 
 
 def with_keys(display: Display, page: Page) -> None:
-    """Go through the trials by keys that a program cannot tell from a keyboard's, and look at nothing."""
+    """Go through the trials by keys that look like a keyboard's, and look at nothing."""
     deadline = time.monotonic() + 300
     while page.query_selector(".code") is None:
         assert time.monotonic() < deadline, page.inner_text("body")

@@ -1,7 +1,7 @@
 """Clips fetched by the browser itself from an object store (moto's server), by signed addresses.
 
 moto lets every page in, whatever the bucket's CORS rule says; that a rule is needed, and which, is Amazon's
-documentation. What a browser does of its own accord is tried here: the redirect to another origin under our
+documentation. The browser's own behavior is tested here: the redirect to another origin under our
 content security policy and cross-origin isolation.
 """
 
@@ -27,7 +27,7 @@ pytestmark = [
 
 @pytest.fixture
 def store() -> Iterator[str]:
-    """The address of a store of its own."""
+    """The address of a separate store."""
     server = moto_server.ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
     server.start()
     host, port = server.get_host_and_port()
@@ -39,7 +39,7 @@ def store() -> Iterator[str]:
 def store_server(
     tmp_path: Path, built_page: Path, store: str, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[ServerProcess]:
-    """A server whose clips lie in a bucket of their own and are fetched from there."""
+    """A server whose clips are in a separate bucket and are fetched from there."""
     monkeypatch.setenv("AWS_ACCESS_KEY_ID", "test")
     monkeypatch.setenv("AWS_SECRET_ACCESS_KEY", "test")
     process = ServerProcess(tmp_path / "data", s3_bucket="browser", s3_endpoint=store, s3_presigned="true")

@@ -1,4 +1,4 @@
-"""Every frame that was drawn, read back from the pixels: the log tells the truth, and nothing is missing.
+"""Every frame that was drawn, read back from the pixels: the log is true, and nothing is missing.
 
 A picture may only be missing where the kernel says that a thread of the browser waited for a processor.
 

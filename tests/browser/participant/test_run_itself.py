@@ -1,4 +1,4 @@
-"""The ways out of a run, and what a participant is told on the way."""
+"""The ways out of a run, and what a participant sees on the way."""
 
 from pathlib import Path
 

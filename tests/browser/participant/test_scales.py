@@ -1,4 +1,4 @@
-"""Several scales on one screen: points, a slider and an answer beside it, by keys, mouse and touch."""
+"""Several scales on one screen: points, a slider and an answer next to it, by keys, mouse and touch."""
 
 import json
 import re

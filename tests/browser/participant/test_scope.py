@@ -27,7 +27,7 @@ TRIES, PAIRS = 5, 3
 
 @pytest.fixture(scope="module")
 def display(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Display]:
-    """A display of its own."""
+    """A separate display."""
     missing = missing_here()
     if missing:
         pytest.skip(missing)

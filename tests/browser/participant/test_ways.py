@@ -150,7 +150,7 @@ def test_arabic_is_spoken_and_runs_from_right_to_left(served: Served, page: Page
     server, studies = served
     visit = Visit(page, server.address).open(studies["arabic"].link_token)
     expect(page.locator("html")).to_have_attribute("dir", "rtl")
-    assert page.evaluate(LAST_SIGN_AFTER_FIRST), "the question mark of an English title stands at its end"
+    assert page.evaluate(LAST_SIGN_AFTER_FIRST), "the question mark of an English title is at its end"
     page.click("text=بدء")
     page.check("input[type=checkbox]")
     assert axe_violations(page) == []

@@ -10,7 +10,7 @@ from tests.conftest import REPOSITORY
 
 
 class Edit(NamedTuple):
-    """A text of an existing file, and what stands there afterwards."""
+    """A text of an existing file, and the text that replaces it."""
 
     before: str
     after: str

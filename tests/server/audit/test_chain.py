@@ -1,4 +1,4 @@
-"""The audit log's chain: whole, broken at each place, under many hands at once, and beside erasures."""
+"""The audit log's chain: whole, broken at each place, under many hands at once, and during erasures."""
 
 import json
 import queue

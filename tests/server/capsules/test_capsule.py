@@ -198,7 +198,7 @@ def test_what_is_no_capsule_gets_one_line(tmp_path: Path, content: bytes) -> Non
 
 
 def relist(folder: Path) -> None:
-    """Write the list anew, as somebody would who means to deceive, or to correct."""
+    """Write the list again, as somebody would to deceive, or to correct."""
     from experiments.capsule import Capsule, listed_files
 
     data = json.loads((folder / CAPSULE_FILE).read_text(encoding="utf-8"))

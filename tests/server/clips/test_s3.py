@@ -20,7 +20,7 @@ CONTENT = bytes(range(256)) * 9000  # more than two pieces
 SHA256 = hashlib.sha256(CONTENT).hexdigest()
 
 pytestmark = [
-    # boto3 tells of the end of its support for this Python; requirements say 3.11.
+    # boto3 announces the end of its support for this Python; requirements say 3.11.
     pytest.mark.filterwarnings("ignore::boto3.exceptions.PythonDeprecationWarning"),
     pytest.mark.filterwarnings("ignore:datetime.datetime.utcnow:DeprecationWarning"),
 ]

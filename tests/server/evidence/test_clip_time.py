@@ -105,7 +105,7 @@ def test_doctor_tells_of_wrong_sums(watcher: Watcher, services: Services) -> Non
 
 
 def test_tickets_between_the_first_and_the_newest_are_summed_up(watcher: Watcher) -> None:
-    """Three batches; the time is judged for the second one, of which the sums kept do not tell."""
+    """Three batches; the time is judged for the second one, which the kept sums do not contain."""
     trials = [one for one in watcher.state()["trials"] if one["clip_sha256"]][:4]
     watcher.wait(60)
     assert watcher.answer(trials[0]).status_code == 201

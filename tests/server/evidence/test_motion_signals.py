@@ -110,7 +110,7 @@ def test_an_answer_of_null_to_a_check_that_was_shown_is_wrong() -> None:
 
 
 def test_somebody_who_guesses_gains_nothing_by_failing_the_most_that_may_fail() -> None:
-    """Of six digits, the fewest that tell anything, one may fail; the five left are still weighed."""
+    """Of six digits, the fewest that say anything, one may fail; the five left are still weighed."""
     rng = random.Random(7)
     person = gamma_person(3)
     digits = [replace(one, choices=9) for one in with_checks(person, rng, 1 / 9) if one.part == "check"][:6]
@@ -122,7 +122,7 @@ def test_somebody_who_guesses_gains_nothing_by_failing_the_most_that_may_fail() 
 
 
 def test_a_failed_play_of_the_only_check_says_nothing_of_an_honest_person() -> None:
-    """One check of four choices cannot tell guesses from people, whether it is answered or not."""
+    """One check of four choices cannot distinguish guesses from people, whether it is answered or not."""
     checked = with_checks(gamma_person(3), random.Random(1), 1.0)
     first = next(one.trial_index for one in checked if one.part == "check")
     alone = [one for one in checked if one.part != "check" or one.trial_index == first]

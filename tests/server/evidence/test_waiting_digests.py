@@ -21,7 +21,7 @@ WRONG = "0" * 64
 
 
 class SlowStore:
-    """An object store that answers nothing until it is told to, and may be away."""
+    """An object store that answers nothing until the test releases it, and may be away."""
 
     def __init__(self, store: ClipStore) -> None:
         self.store, self.answers, self.is_away = store, threading.Event(), False

@@ -1,4 +1,4 @@
-"""Columns stand beside what they belong to, and as they stood until 0.2 where that is asked for."""
+"""Columns are next to what they belong to, or in the order used until 0.2 on request."""
 
 import csv
 import io

@@ -55,7 +55,7 @@ def test_the_python_script_gives_our_own_f(answers: Path) -> None:
 
 @pytest.fixture(scope="module")
 def impure(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Experiment]:
-    """Answers of which declared rules leave some out, by what their rows tell; those would change F."""
+    """Answers of which declared rules leave some out, as their rows show; those would change F."""
     rules = (ExcludeIncomplete(), DropFailedPlays(), DropSlowTrials(above_ms=9000))
     study = EXP3.model_copy(update={"exclusions": rules})
     rows = [

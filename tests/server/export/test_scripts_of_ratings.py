@@ -78,7 +78,7 @@ def test_the_python_script_gives_our_own_tables(studied) -> None:
         [sys.executable, "-W", "error", str(target)], capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
-    # `analysis run` applies all declared exclusions, the script those that a row tells and those it is told.
+    # `analysis run` applies all declared exclusions, the script those that rows or its arguments name.
     of_runs = [rule for rule in study.exclusions if not isinstance(rule, APPLIED)]
     assert ("note: this script does not apply these declared exclusions" in done.stderr) == bool(of_runs)
     for effect in numbers["effects"]:

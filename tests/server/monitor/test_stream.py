@@ -1,4 +1,4 @@
-"""The monitor's stream: it tells what changes, ends by itself, and does not hold up the server's end."""
+"""The monitor's stream: it reports changes, ends by itself, and does not hold up the server's end."""
 
 import http.client
 import json

@@ -184,7 +184,7 @@ class TestRefusals:
     def test_one_file_in_anothers_place(
         self, services: Services, empty_database_url: str, path: str, keys: str | None, tmp_path: Path
     ) -> None:
-        """Backup, key file and the copy of the ledger of erasures beside that are three files."""
+        """Backup, key file and the separate copy of the ledger of erasures are three files."""
         with pytest.raises(InputError, match="already used in this call"):
             back_up(
                 services.database,

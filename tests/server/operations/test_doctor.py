@@ -62,7 +62,7 @@ class TestTroubles:
         verdicts = {item["subject"]: item["verdict"] for item in json.loads(done.stdout)}
         assert verdicts["database"] == "ok"
         assert verdicts["participant page"] == "failed"
-        # In a file or a pipe each finding is whole on a line of its own, however long its paths.
+        # In a file or a pipe each finding is whole on a separate line, however long its paths.
         lines = run_server_command(settings, "doctor").stdout.splitlines()
         for item in json.loads(done.stdout):
             assert any(item["state"] in line and item["advice"] in line for line in lines), item

@@ -44,7 +44,7 @@ from tests.helpers.studies import Participant, StudyInDatabase
 
 pytestmark = [
     pytest.mark.parametrize("database_url", ["sqlite"], indirect=True),
-    # boto3 tells of the end of its support for this Python; requirements say 3.11.
+    # boto3 announces the end of its support for this Python; requirements say 3.11.
     pytest.mark.filterwarnings("ignore::boto3.exceptions.PythonDeprecationWarning"),
     pytest.mark.filterwarnings("ignore:datetime.datetime.utcnow:DeprecationWarning"),
 ]
@@ -252,7 +252,7 @@ def test_a_backup_that_breaks_off_leaves_nothing_and_says_why(
 def test_another_installations_backups_say_nothing_of_ones_own(
     rated: Services, keys: tuple[str, Path], tmp_path: Path
 ) -> None:
-    """Of a shared store the newest is whoever's wrote last; one that stopped must show."""
+    """The newest copy in a shared store may come from another server; one that stopped must show."""
     public, private = keys
     folder = tmp_path / "shared"
     settings = Settings(

@@ -1,4 +1,4 @@
-"""PgBouncer before PostgreSQL: the doctor tells a pool that takes sessions their connection."""
+"""PgBouncer before PostgreSQL: the doctor detects a pool that takes sessions their connection."""
 
 import os
 import shutil
@@ -24,7 +24,7 @@ on_postgres = pytest.mark.parametrize(
 
 @pytest.fixture
 def pooled(settings: Settings, request: pytest.FixtureRequest) -> Iterator[Settings]:
-    """Settings that lead through a PgBouncer of this mode; it runs as whoever may use PostgreSQL's socket."""
+    """Settings that lead through a PgBouncer of this mode; its user may use PostgreSQL's socket."""
     program = shutil.which("pgbouncer") or shutil.which("pgbouncer", path="/usr/sbin")
     if program is None:
         pytest.skip("no pgbouncer on this machine")

@@ -53,7 +53,7 @@ def test_what_is_answered_and_what_is_under_way_both_count(
     assert compare(first, trials[0], "left").status_code == 201
     assert compare(first, trials[1], "tie").status_code == 201
     assert counted(services) == {"left": 1, "tie": 1, None: 1}
-    # A play that failed is no answer; a visit given up, excluded or of another origin does not count.
+    # A play that failed is not an answer; a visit given up, excluded or of another origin does not count.
     compare(first, trials[2], "right", playback={"method": "none"})
     assert counted(services)["right"] == 0
     Participant(client, chosen.link("preview")).agree()

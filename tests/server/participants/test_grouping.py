@@ -73,7 +73,7 @@ def test_a_group_whose_quota_is_full_takes_no_more_turns(
     assert client.get(f"/api/links/{study.link_token}").json()["status"] == "full"
     late = Participant(client, study.link_token)
     assert (late.start().json()["error"]["code"], len(groups_of(services))) == ("study_full", 4)
-    # Whoever drops out gives their place back, in their own group.
+    # A participant who drops out gives their place back, in their own group.
     people[0].request("POST", "/withdraw")
     assert late.agree().state()["awaits_group"] is False
     assert groups_of(services)[-1] == ("slow", "active")

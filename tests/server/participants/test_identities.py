@@ -62,7 +62,7 @@ def test_ids_that_differ_in_case_or_blanks_are_one_persons(
 def test_somebody_known_by_an_id_as_it_is_written_stays_known_by_it(
     client: TestClient, link: str, victim: Participant, services: Services
 ) -> None:
-    """As earlier releases stored it, who told ids of different case apart."""
+    """As earlier releases stored it, which kept ids of different case apart."""
     with services.database.write() as session:
         run = session.query(StudyRun).filter_by(public_id=victim.run_id).one()
         key = run.study.pseudonym_key

@@ -65,7 +65,7 @@ def test_everything_that_is_stored_is_told(
     }
     told = {name: len(rows) for name, rows in visit["stored"].items()}
     expected = rows_of(services, person.run_id) | {"study_runs": 1, "links": 1}
-    # These two hold nothing but what stands under `recruiter`, encrypted.
+    # These two hold nothing but the content of `recruiter`, encrypted.
     assert told == {name: count for name, count in expected.items() if name not in ENCRYPTED}
     assert told["trial_ratings"] == 12
     assert "it looks at me" in answer.text

@@ -62,7 +62,7 @@ def elsewhere(handler: BaseHTTPRequestHandler) -> None:
 
 
 class Hostile(ThreadingHTTPServer):
-    """Answers each path as it is told to; an honest description where nothing else is said."""
+    """Answers each path as configured; an honest description by default."""
 
     daemon_threads = True
 

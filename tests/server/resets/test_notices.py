@@ -1,4 +1,4 @@
-"""Whoever has an address is told of every change of what opens her account."""
+"""The owner of an address gets an email about every change of what opens the account."""
 
 from collections.abc import Callable
 from datetime import timedelta

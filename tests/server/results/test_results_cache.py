@@ -86,7 +86,7 @@ def test_results_of_many_answers_are_counted_before_anybody_asks(
 
 
 class Slow:
-    """Counting that takes as long as it is told, on a clock of its own."""
+    """Counting that takes a given time, on its own clock."""
 
     def __init__(self) -> None:
         self.now, self.done, self.revision = 0.0, 0, Revision((1,), (1,))

@@ -155,7 +155,7 @@ class TestOnSqlite:
         assert looked_at(services, "short")[:2] == (1, 0)
         with services.database.write() as session:
             session.query(Study).one().active_version = 1
-        # What the person was told when the visit began is all there is, then.
+        # Then the information that the person got when the visit began is all there is.
         assert looked_at(services, "short")[:2] == (0, 0)
         assert state(services) == {run: "named"}
 

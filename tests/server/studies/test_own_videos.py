@@ -1,4 +1,4 @@
-"""Own videos of any format on their way to a study: looked into beside the server, kept, told of."""
+"""Own videos of any format on their way to a study: examined outside the server, kept, reported."""
 
 import hashlib
 import time

@@ -1,4 +1,4 @@
-"""Each template of one's own clips becomes a study that a participant can take part in."""
+"""Each template for one's own clips becomes a study that a participant can take part in."""
 
 import tomllib
 from typing import Any

@@ -1,4 +1,4 @@
-"""The walk of docs/how-to/build-a-study.md from a folder of clips to a link, as it stands there."""
+"""The walk of docs/how-to/build-a-study.md from a folder of clips to a link, as the page describes it."""
 
 import re
 import shlex

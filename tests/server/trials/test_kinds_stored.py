@@ -1,4 +1,4 @@
-"""A kind of trial with several clips and an answer of its own is stored without a table of its own."""
+"""A kind of trial with several clips and its own answer is stored without a separate table."""
 
 import re
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""Motion checks through the API: asked between trials of every kind, stored, judged, never told."""
+"""Motion checks through the API: asked between trials of every kind, stored, judged, never revealed."""
 
 import csv
 import json
@@ -197,7 +197,7 @@ def test_a_view_of_a_check_lasts_as_long_as_its_own_clip(
 
 
 def test_the_command_simulates_observers_beside_checks(services: Services, tmp_path: Path) -> None:
-    """Clips of checks are no stimuli of the psychometric function."""
+    """Clips of checks are not stimuli of the psychometric function."""
     study = add_study(services, tmp_path / "clips", checked(text_with(SHORT, YES_NO)))
     called = run_server_command(services.settings, "simulate", study.name, "--participants", "1")
     assert (called.returncode, called.stderr.count("Traceback")) == (0, 0), called.stderr

@@ -1,4 +1,4 @@
-"""Several scales a clip through the API: checked at the door, stored, exported a row a scale, summed up."""
+"""Several scales per clip through the API: checked, stored, exported with one row per scale, summed up."""
 
 import csv
 import io

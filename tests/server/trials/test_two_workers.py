@@ -145,7 +145,7 @@ def _check_series(services: Services) -> None:
                 numbers = [row.number for row in answers if row.series == name]
                 assert numbers == list(range(1, len(numbers) + 1))
                 assert len(numbers) >= 7
-            # Reckoned anew from nothing, everything is as the two workers wrote it in turn.
+            # Computed again from nothing, everything is as the two workers wrote it in turn.
             bare = [SimpleNamespace(**{**row._mapping, "threshold": None}) for row in answers]
             outlook = series.outlook_after(loaded, trials, bare)
             for row in answers:

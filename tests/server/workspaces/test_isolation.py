@@ -35,7 +35,7 @@ OWN: set[str] = {
     f"{ADMIN}/blinks/strips/{{name}}",
     f"{ADMIN}/session/providers/{{provider}}",
 }
-"""Beginnings of paths whose parameter is a secret of one's own, or a file that is everybody's."""
+"""Beginnings of paths whose parameter is the caller's secret, or a file that is everybody's."""
 ADMINISTRATORS = ("accounts", "invitations", "audit", "workspaces", "backups")
 """What the administrator of the server sees of all laboratories: not one of their answers."""
 NEEDED: dict[Right, set[str]] = {

@@ -15,7 +15,7 @@ BAD = slice(300, 420)
 
 
 def spoilt(make_known, name: str, good: object, bad: object) -> pd.DataFrame:
-    """A series whose tracker wrote zeros for a second, and said so in a column."""
+    """A series whose tracker wrote zeros for a second, and marked them in a column."""
     known = make_known(fps=FPS, noise=0.05)
     distance, column = known.distance.copy(), np.full(known.distance.size, good, dtype=object)
     distance[BAD], column[BAD] = 0.0, bad

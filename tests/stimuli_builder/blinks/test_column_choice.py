@@ -33,7 +33,7 @@ def test_two_eyes_are_one_left_and_one_right(columns: tuple[str, ...], pair: tup
     assert eye_pair(columns) == pair
 
 
-@pytest.mark.parametrize("others", [(), ("time_s", "frame", "left_valid")], ids=["alone", "beside times"])
+@pytest.mark.parametrize("others", [(), ("time_s", "frame", "left_valid")], ids=["alone", "with times"])
 def test_one_left_and_one_right_eye_are_taken_without_being_named(tmp_path: Path, others: tuple) -> None:
     values = np.random.default_rng(1).normal(10, 1, (2, 50))
     ones = {name: np.arange(50) / 100 if name == "time_s" else np.ones(50, int) for name in others}

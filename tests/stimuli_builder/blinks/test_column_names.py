@@ -1,4 +1,4 @@
-"""What a column's name tells, and series that are high where the lids are shut."""
+"""What a column's name says, and series that are high where the lids are shut."""
 
 from pathlib import Path
 

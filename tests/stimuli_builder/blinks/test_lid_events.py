@@ -1,4 +1,4 @@
-"""Blinks, squints, gaze shifts and closed eyes told apart, at any rate, on series that trained nothing."""
+"""Blinks, squints, gaze shifts and closed eyes kept apart, at any rate, on series that trained nothing."""
 
 from itertools import pairwise
 

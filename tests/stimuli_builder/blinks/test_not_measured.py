@@ -1,4 +1,4 @@
-"""Values that a tracker repeats, or zeros that it writes where it sees no face, are no lids."""
+"""Values that a tracker repeats, or zeros that it writes where it sees no face, do not measure lids."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What the second look is told of a dip: what goes on about it, in the other eye and in the recording."""
+"""What the second look knows of a dip: its surroundings, in the other eye and in the recording."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def series(onsets: tuple[float, ...] = ONSETS_S, gap: slice | None = None) -> Bl
 
 
 def told(eyes: list[BlinkSeries]) -> tuple[Array, Array]:
-    """Times of the first eye's deep dips and what the second look is told of them."""
+    """Times of the first eye's deep dips and what the second look knows of them."""
     pieces = looked_at(eyes)
     rows = contexts(pieces)
     times = np.concatenate([piece.peaks_s for piece in pieces[0]])

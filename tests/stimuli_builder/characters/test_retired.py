@@ -130,7 +130,7 @@ def test_every_retired_character_is_in_this_clones_history(tmp_path: Path, name:
         ["git", "-C", str(ROOT), "cat-file", "-e", known.commit], capture_output=True, check=False
     )
     if held.returncode:
-        pytest.skip(f"this checkout is no whole clone: its history lacks commit {known.commit[:7]}")
+        pytest.skip(f"this checkout is not a whole clone: its history lacks commit {known.commit[:7]}")
     atlas = load_atlas(restore(name, None, tmp_path / name))
     assert atlas.fingerprint() == known.sha256
     assert atlas.declaration.opening_mm == OPENING_MM[name]

@@ -27,7 +27,7 @@ def test_experiments_1_to_3_have_their_face() -> None:
 
 
 def test_a_face_that_was_given_to_others_never_changes(face: Atlas) -> None:
-    """Pictures that changed need another version, and a folder of their own: studies name the old one."""
+    """Pictures that changed need another version, and a new folder: studies name the old one."""
     pinned = PINNED[face.name]
     assert (pinned["version"], pinned["sha256"]) == (face.declaration.version, face.fingerprint())
 

@@ -1,6 +1,6 @@
 """What programs find in a check's clip as it is delivered: nothing in pictures, everything in their motion.
 
-Seeds are fixed, so that a measurement is the same in every run; limits stand at about four standard errors of
+Seeds are fixed, so that a measurement is the same in every run; limits are about four standard errors of
 a mean over `CLIPS` clips (0.013 measured) around chance.
 """
 

@@ -1,4 +1,4 @@
-"""Making a study's checks: beside its clips, from a secret seed, whole or gone on with."""
+"""Making a study's checks: next to its clips, from a secret seed, whole or continued."""
 
 import json
 import shutil

@@ -1,4 +1,4 @@
-"""A small experiment on the cartoon and on a character of one's own, built once for all tests."""
+"""A small experiment on the cartoon and on an own character, built once for all tests."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -81,7 +81,7 @@ def make_small(folder: Path, text: str = SMALL) -> Small:
     (folder / "mine.csv").write_text("closure\n" + "\n".join(map(str, CURVE)) + "\n")
     toml = folder / "small.toml"
     toml.write_text(text)
-    return Small(folder, toml, load_experiment(str(toml)), Options(beside=folder))
+    return Small(folder, toml, load_experiment(str(toml)), Options(base_folder=folder))
 
 
 @pytest.fixture(scope="session")

@@ -71,7 +71,7 @@ def test_the_same_seed_gives_the_same_folder(small: Small, built: Path, tmp_path
 
 
 def test_another_seed_gives_other_curves(small: Small, built: Path) -> None:
-    planned = planned_clips(small.experiment, Options(seed=1, beside=small.folder))
+    planned = planned_clips(small.experiment, Options(seed=1, base_folder=small.folder))
     assert [clip.job.curve.closure.tolist() for clip in planned] != [
         list(clip.closure) for clip in read_manifest(built).clips
     ]
@@ -171,7 +171,7 @@ main()
 
 
 def on_a_full_disk(*arguments: object) -> str:
-    """Run a command where a limit on file size stands in for the end of the disk; returns its one line."""
+    """Run a command where a limit on file size acts as the end of the disk; returns its one line."""
     command = [sys.executable, "-c", FULL_DISK, *map(str, arguments)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 2
@@ -212,7 +212,7 @@ def stop(done, wanted):
 
 toml, out = sys.argv[1:]
 if __name__ == "__main__":
-    build(load_experiment(toml), Path(out), Options(beside=Path(toml).parent), Machines(2), stop)
+    build(load_experiment(toml), Path(out), Options(base_folder=Path(toml).parent), Machines(2), stop)
 """
 
 

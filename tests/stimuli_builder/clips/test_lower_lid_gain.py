@@ -1,4 +1,4 @@
-"""How far the lower lid is told to move, and what the manifest says that moved."""
+"""How far the lower lid should move, and what the manifest says that moved."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""`stimuli manifest`: clips of one's own become a set that a server takes."""
+"""`stimuli manifest`: your own clips become a set that a server takes."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""Nothing outside the factors of a shipped study tells its levels apart."""
+"""Nothing outside the factors of a shipped study separates its levels."""
 
 from pathlib import Path
 

@@ -1,6 +1,6 @@
 """The snippets for Unity and Unreal in docs/explanation/blink-engine.md, against stand-ins for both.
 
-Neither program can be had from a registry: this shows that the snippets are free of mistakes of their own.
+Neither program can be had from a registry: this shows that the snippets themselves contain no mistakes.
 """
 
 import re

@@ -69,7 +69,7 @@ def test_two_eye_labels_with_one_eye_and_the_reverse(refused, document, tmp_path
 def test_missing_unreadable_and_soundless_videos(refused, tmp_path):
     assert "there is no such video file" in refused(tmp_path / "none.mp4")
     text = tmp_path / "text.mp4"
-    text.write_text("this is no video")
+    text.write_text("this is not a video")
     assert "not a video that can be read" in refused(text)
     empty = tmp_path / "empty.mp4"
     empty.write_bytes(b"")

@@ -1,4 +1,4 @@
-"""A hand, a cup or a cloth over an eye is not called an eye, whatever its texture; a blink is no cover."""
+"""A hand, a cup or a cloth over an eye is not called an eye, whatever its texture; a blink is not a cover."""
 
 import csv
 from pathlib import Path
@@ -253,7 +253,7 @@ def test_without_steady_looks_every_unsteady_eye_is_covered_or_shut():
 
 @pytest.mark.parametrize("kind", ["skin", "cheek"])
 def test_a_model_from_labels_does_not_track_a_textured_cover(kind, lesson, recording, tmp_path):
-    """No detector looks here: the model has never seen the cover, and its residual tells it."""
+    """No detector looks here: the model has never seen the cover, and its residual shows it."""
     pictures = list(recording.pictures[:40])
     for n in range(15, 25):
         pictures[n] = cover(pictures[n], recording.points[n, 9:], kind)
@@ -346,7 +346,7 @@ def test_no_look_at_a_real_close_up_is_called_covered(detector, shared_data):
 
 @pytest.mark.parametrize("eye", [0, 1])
 def test_an_eye_whose_picture_is_flat_is_no_eye(eye, lesson, recording):
-    """A model that has learnt a cover has no residual on it; that its picture is flat then tells it."""
+    """A model that has learned a cover has no residual on it; then the flat picture shows it."""
     fitter, faults = Fitter(lesson.model), Faults(lesson.model)
     start, kept = lesson.model.poses[0], np.zeros(len(lesson.model.sd))
     assert faults.flat(fitter.fit(recording.pictures[0], kept, start, max_iterations=1)) == ""

@@ -86,7 +86,7 @@ def test_a_face_that_mirror_images_contradict_is_refused_in_one_line(shares, tol
 
 
 class OneFaceClient:
-    """A client that sees one large face and, without a margin, a small one beside it."""
+    """A client that sees one large face and, without a margin, a small one next to it."""
 
     def ask(self, what, picture, **_):
         if what == "eye":

@@ -314,7 +314,7 @@ def test_frames_in_which_no_face_is_seen_are_told_from_frames_not_looked_at(
     assert UNSEEN in {row["reason"] for row in rows[40:56]}
     others = rows[:40] + rows[58:]
     assert UNSEEN not in {row["reason"] for row in others}
-    # With half of the looks the most closed frame of the blink may be lost, which is no matter of this test.
+    # With half of the looks the most closed frame of the blink may be lost; this test ignores that.
     assert sum(row["status"] == "tracked" for row in others) >= len(others) - 2
 
 

@@ -1,4 +1,4 @@
-"""Two real recordings, where they lie beside the checkout."""
+"""Two real recordings, if they are next to the checkout."""
 
 import numpy as np
 import pytest

@@ -143,7 +143,7 @@ def test_a_whole_file_is_the_same_whether_a_damaged_end_is_accepted(recording):
 
 
 def recorded(path, pictures, left_out=(), sound_s=0.0):
-    """A video of 100 frames/s, without some of its frames, beside a silent sound stream of its own length."""
+    """A video of 100 frames/s, without some of its frames, with a silent sound stream of another length."""
     with av.open(str(path), "w") as container:
         stream = container.add_stream("libx264", rate=100)
         stream.height, stream.width = pictures[0].shape

@@ -1,4 +1,4 @@
-"""A picture that stands still under noise or a codec is told; a person who hardly moves is not."""
+"""A picture that is still under noise or a codec is detected; a person who hardly moves is not."""
 
 import csv
 

@@ -41,7 +41,7 @@ def mesh():
 @settings(deadline=None, max_examples=40)
 @given(seed=st.integers(0, 10_000))
 def test_warp_there_and_back(mesh, seed):
-    """A picture that grows evenly is pulled back exactly: the value tells where each pixel was read."""
+    """A picture that grows evenly is pulled back exactly: the value shows where each pixel was read."""
     rng = np.random.default_rng(seed)
     shape = SHAPE + rng.normal(0, 1.5, SHAPE.shape)
     weights, corners = mesh.weights(), mesh.triangles[mesh.triangle_of]

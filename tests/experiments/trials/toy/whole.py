@@ -1,4 +1,4 @@
-"""Declare, plan, simulate over HTTP, store, export, analyse, read again: the toy in a process of its own.
+"""Declare, plan, simulate over HTTP, store, export, analyze, read again: the toy in a separate process.
 
 What follows the imports below is all that joins it: the line that a new kind has in the registry, and the
 places where files are found by a kind's name.

@@ -17,7 +17,7 @@ class WordChoice(TrialDeclaration):
     kind: Literal["word_choice"] = "word_choice"
     """Names this kind of trial."""
     question: Translated
-    """What is asked, in every language."""
+    """The question, in every language."""
     first: Translated
     """The first word."""
     second: Translated
