@@ -32,7 +32,7 @@ async function edit(body: Schemas["EditDefinition"]): Promise<Start> {
   return { toml, data, meeting: null };
 }
 
-/** Kept work put into a version that somebody else saved meanwhile. Text that is no TOML stays as it is. */
+/** Kept work put into a version that somebody else saved meanwhile. Text that is not valid TOML stays as it is. */
 async function broughtTogether({ toml, data, base }: Kept, present: string): Promise<Start> {
   const [mine, before, theirs] = await Promise.all([
     read({ toml, data }),
@@ -71,7 +71,7 @@ function Begun({ detail }: { detail: Schemas["StudyDetail"] }) {
     forgetDraft(draft.key);
     without(draft);
   };
-  const anew = () => {
+  const startOver = () => {
     forgetWork(name);
     setFrom({ toml: detail.toml, data: null });
   };
@@ -86,7 +86,7 @@ function Begun({ detail }: { detail: Schemas["StudyDetail"] }) {
           {note !== null && (
             <Group gap="xs" role="status">
               <span>{note}</span>
-              <Button size="compact-xs" variant="default" onClick={anew}>
+              <Button size="compact-xs" variant="default" onClick={startOver}>
                 Discard it
               </Button>
             </Group>

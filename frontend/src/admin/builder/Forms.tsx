@@ -12,7 +12,7 @@ import { markdown } from "../../ui/markdown";
 import { languageName } from "../ui/format";
 import { useField } from "./fields/scalars";
 
-// Questionnaires: from the bank, from a file, or made anew.
+// Questionnaires: from the bank, from a file, or new ones.
 
 export function Forms() {
   const builder = useBuilderHere();
@@ -190,7 +190,7 @@ function Shown({ text }: { text: string }) {
   const box = useRef<HTMLDivElement>(null);
   useEffect(() => {
     const parts = markdown(text === "" ? "*No text.*" : text);
-    // Inside this page they are no headings of it.
+    // Inside this page they are not its headings.
     for (const part of parts) if (/^H\d$/.test(part.tagName)) part.setAttribute("role", "presentation");
     box.current?.replaceChildren(...parts);
   }, [text]);

@@ -48,7 +48,7 @@ export function TrialPreview() {
   );
 }
 
-/** Every table with a question, wherever in the trial it stands. */
+/** Every table with a question, anywhere in the trial. */
 function scalesIn(value: unknown): Data[] {
   if (Array.isArray(value)) return (value as unknown[]).flatMap(scalesIn);
   if (!isTable(value)) return [];

@@ -92,7 +92,7 @@ interface Props {
 export function Workbench({ detail, start, meeting }: Props) {
   const { name } = detail.summary;
   const builder = useBuilder(detail, start);
-  const [beside, setBeside] = useState(false);
+  const [withToml, setWithToml] = useState(false);
   const { section: asked }: { section?: unknown } = useSearch({ strict: false });
   const section = SECTIONS.find(({ id }) => id === asked) ?? SECTIONS[0];
   useHotkeys(
@@ -107,9 +107,9 @@ export function Workbench({ detail, start, meeting }: Props) {
   const wrong = builder.problems.length > 0;
   return (
     <BuilderContext value={builder}>
-      <Bar detail={detail} builder={builder} beside={beside} onBeside={setBeside} />
+      <Bar detail={detail} builder={builder} withToml={withToml} onWithToml={setWithToml} />
       {meeting !== null && <Met meeting={meeting} version={detail.summary.version} />}
-      <div className={beside ? "builder with-toml" : "builder"}>
+      <div className={withToml ? "builder with-toml" : "builder"}>
         <Sections study={name} builder={builder} current={section.id} />
         <Stack gap="sm" className="builder-page">
           <div>
@@ -126,7 +126,7 @@ export function Workbench({ detail, start, meeting }: Props) {
             <Page key={section.id} section={section} rendered={detail.rendered} />
           )}
         </Stack>
-        {beside && <TomlText toml={builder.toml} onChange={builder.setToml} problems={builder.problems} rows={40} />}
+        {withToml && <TomlText toml={builder.toml} onChange={builder.setToml} problems={builder.problems} rows={40} />}
       </div>
       {wrong && <Wrong study={name} builder={builder} />}
       {builder.changed && !builder.writing && !wrong && <JudgedEdit detail={detail} toml={builder.toml} />}
@@ -244,11 +244,11 @@ function BeginSeries({ edit, detail, onClose, onConfirm }: BeginSeriesProps) {
 interface BarProps {
   detail: Schemas["StudyDetail"];
   builder: Builder;
-  beside: boolean;
-  onBeside: (beside: boolean) => void;
+  withToml: boolean;
+  onWithToml: (withToml: boolean) => void;
 }
 
-function Bar({ detail, builder, beside, onBeside }: BarProps) {
+function Bar({ detail, builder, withToml, onWithToml }: BarProps) {
   const { name, revision, status } = detail.summary;
   const [note, setNote] = useState("");
   const queries = useQueryClient();
@@ -319,7 +319,7 @@ function Bar({ detail, builder, beside, onBeside }: BarProps) {
         <Button variant="default" disabled={!builder.changed} onClick={builder.reset}>
           Discard changes
         </Button>
-        <Switch label="Show TOML" checked={beside} onChange={(event) => onBeside(event.currentTarget.checked)} mb={6} />
+        <Switch label="Show TOML" checked={withToml} onChange={(event) => onWithToml(event.currentTarget.checked)} mb={6} />
       </Group>
       <Text size="xs" c="dimmed" role="status" mt={4}>
         {builder.error !== null

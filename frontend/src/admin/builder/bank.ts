@@ -168,7 +168,7 @@ export const FORMS: readonly BankForm[] = [
   },
 ];
 
-/** `form` in the languages of the study; English stands in where the bank has none. */
+/** `form` in the languages of the study; in English where the bank lacks one. */
 export function inLanguages(form: unknown, languages: readonly string[]): unknown {
   if (Array.isArray(form)) return (form as unknown[]).map((inner) => inLanguages(inner, languages));
   if (typeof form !== "object" || form === null) return form;
@@ -193,7 +193,7 @@ Responsible: [name, institution, e-mail]. Ethics approval: [number].
 
 You are invited to a study on [topic]. You will watch short clips and rate them. It takes about [minutes] minutes.
 
-- Taking part is voluntary. If you would rather not, choose *I do not agree*. You can stop at any time with *Stop*; tell us the code of your run and we delete what it holds.
+- Taking part is voluntary. If you would rather not, choose *I do not agree*. You can stop at any time with *Stop*; send us the code of your run, and we will delete its data.
 - Answers are published in a public archive, without anything that names you. What is published cannot be taken back.
 - We store neither your name nor your internet address.
 

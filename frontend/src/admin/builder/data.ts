@@ -70,7 +70,7 @@ const UNITS: Record<string, string> = { ms: "ms", mm: "mm", px: "px", hours: "ho
 
 /** "failed_longest_gap_ms" reads "Failed longest gap (ms)". */
 export function labelOf(key: string): string {
-  // "break_seconds_min" is a least number of seconds: its unit stands before what it is the least of.
+  // "break_seconds_min" is a least number of seconds, but its unit comes before the "min".
   const parts = key.replace(/^(.*)_seconds_min$/, "shortest_$1_seconds").split("_");
   const last = parts.at(-1) ?? "";
   const unit = parts.length > 1 ? UNITS[last] : undefined;

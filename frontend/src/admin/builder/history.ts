@@ -29,7 +29,7 @@ export function edited(history: History, path: Path, value: unknown, at: number,
   return stepped(history, { data, toml: null, edited: pathName(path), at });
 }
 
-/** The whole text written anew; `data` is what it says. */
+/** The whole text replaced; `data` is its content. */
 export function rewritten(history: History, toml: string, data: Data, at: number): History {
   return stepped(history, { data, toml, edited: "toml", at });
 }
@@ -64,7 +64,7 @@ export function latestToml(history: History): string {
 
 // Edits of two people, or of two tabs, that began from the same version.
 
-/** A key of a table, or an element of a list by its name: a place that stays the same when elements come and go. */
+/** A key of a table, or an element of a list by name: a place that stays the same when elements come and go. */
 type Step = string | { named: string };
 
 export interface Change {
@@ -116,7 +116,7 @@ function isWithin(inner: readonly Step[], outer: readonly Step[]): boolean {
   return `${placeName(inner)}.`.startsWith(`${placeName(outer)}.`);
 }
 
-/** What differs, as few and as small changes as keys and names of elements tell. */
+/** The differences, as few and as small as keys and names of elements allow. */
 export function changesBetween(before: unknown, after: unknown, at: readonly Step[] = []): Change[] {
   if (isSame(before, after)) return [];
   if (isTable(before) && isTable(after)) {
@@ -131,7 +131,7 @@ export function changesBetween(before: unknown, after: unknown, at: readonly Ste
   );
 }
 
-/** The names of a list's elements; null where it is no list of which each element has one of its own. */
+/** The names of a list's elements; null for other values, and for lists whose elements lack unique names. */
 function namesOf(list: unknown): string[] | null {
   if (!Array.isArray(list)) return null;
   const names = (list as unknown[]).map(nameOf);

@@ -1,6 +1,6 @@
 /**
  * Unsaved work of the builder, kept in this browser: over a reload, a lost sign-in, a crash, a closed tab.
- * Each tab has a draft of its own, so that saving in one never touches what another has not saved. What a tab left
+ * Each tab has its own draft, so that saving in one never touches what another has not saved. What a tab left
  * behind can be opened from any other.
  */
 
@@ -38,7 +38,7 @@ function thisTab(): string {
     try {
       sessionStorage.setItem(TAB, name);
     } catch {
-      // The next page of this tab begins with a name of its own, and offers this draft.
+      // The next page of this tab begins with a new name, and offers this draft.
     }
   });
   window.addEventListener("pageshow", () => taken());

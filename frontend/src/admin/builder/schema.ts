@@ -33,7 +33,7 @@ type Effect = "wording" | "measured";
 const EFFECTS = declared.effects as Record<string, Effect>;
 const TRIAL_EFFECTS = declared.trial_effects as Record<string, Record<string, Effect>>;
 
-/** The schema that a reference stands for; what stands beside the reference (help, default) goes before. */
+/** The schema that a reference points to; keys next to the reference (help, default) take precedence. */
 export function resolved(schema: Schema): Schema {
   if (schema.$ref === undefined) return schema;
   const name = schema.$ref.replace("#/$defs/", "");
@@ -253,7 +253,7 @@ export const BASIC = new Set([
   "dataset.licence",
   "analysis.statistic",
 ]);
-/** Keys of every scale, wherever in a trial it stands. */
+/** Keys of every scale, anywhere in a trial. */
 const OF_SCALES = /^trial\.(?:.*\.)?scales?\.(?:minimum|maximum|question|low|high)$/;
 /** Under "More" even where they are set: what is derived from words that participants read, and fine points of a trial. */
 export const TUCKED = new Set([
@@ -277,7 +277,7 @@ export function isBasic(path: string, isRequired: boolean): boolean {
 const placed = new Set(NAMED.flatMap((section) => section.keys));
 const further = Object.keys(EXPERIMENT.properties ?? {}).filter((key) => !placed.has(key));
 
-/** Every key of the declaration stands on one of these pages; a key that none names is on the last. */
+/** Every key of the declaration is on one of these pages; a key that none names is on the last. */
 export const SECTIONS: readonly Section[] = [
   ...NAMED,
   ...(further.length > 0 ? [{ id: "further", label: "Further", about: "Other keys of the declaration.", keys: further }] : []),

@@ -17,7 +17,7 @@ export interface Builder {
   toml: string;
   /** The text does not say what the forms show yet: the server is writing it. */
   writing: boolean;
-  /** The text, edited by hand, is no TOML: forms show what it was before. */
+  /** The text, edited by hand, is not valid TOML: forms show the last valid one. */
   broken: boolean;
   problems: Problem[];
   design: Schemas["DesignOut"] | null;

@@ -70,10 +70,10 @@ function belowOf(labels: readonly string[]): number {
 /** Means of one factor, or of two: the second as colour. Bars are within-participant standard errors. */
 export function marginPlot(margin: Schemas["Margin"], { scale }: Results, factors: Factors): Plot.PlotOptions {
   const [first = "", second] = margin.factors;
-  const [across, beside] = [labelsOf(factors, first), labelsOf(factors, second ?? "")];
+  const [across, hues] = [labelsOf(factors, first), labelsOf(factors, second ?? "")];
   const rows = margin.means.map((mean) => ({
     x: across.of(mean.levels[first] ?? ""),
-    colour: second === undefined ? "" : beside.of(mean.levels[second] ?? ""),
+    colour: second === undefined ? "" : hues.of(mean.levels[second] ?? ""),
     mean: mean.mean,
     low: mean.mean - (mean.se_within ?? 0),
     high: mean.mean + (mean.se_within ?? 0),
@@ -88,7 +88,7 @@ export function marginPlot(margin: Schemas["Margin"], { scale }: Results, factor
       : "No bars: a standard error needs at least two participants with different answers.",
     x: { type: "point", padding: 0.6, label: null, domain: across.all.length > 0 ? across.all : rows.map((row) => row.x) },
     y: { domain: [scale.minimum, scale.maximum], grid: true, label: `mean ${scale.name}` },
-    color: { legend: crossed, scheme: "observable10", ...(crossed ? { domain: beside.all } : {}) },
+    color: { legend: crossed, scheme: "observable10", ...(crossed ? { domain: hues.all } : {}) },
     marks: [
       // Long labels break into lines.
       Plot.axisX({ lineWidth: belowEms(across.all), label: null }),
@@ -139,7 +139,7 @@ export function cellPlot({ cells, bins }: Results, factors: Factors): Plot.PlotO
         inset: 0.5,
         ...(every === 1 ? {} : { title: shareOf }),
       }),
-      // Columns of many bins are narrower than a share's words, which stand in their titles.
+      // Columns of many bins are narrower than a share's words, which are in their titles.
       Plot.text(every === 1 ? rows : [], { x: "response", y: "cell", text: shareOf, fill: "currentColor", fontSize: 11 }),
     ],
   };

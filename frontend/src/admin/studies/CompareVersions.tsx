@@ -101,7 +101,7 @@ export function sentenceOf({ path, pieces }: Pick<Schemas["KeyDifference"], "pat
   return `Changed ${what}${isShort ? ` from ${before} to ${after}` : ""}.`;
 }
 
-/** What stands at a path, the innermost first. */
+/** The values at a path, the innermost first. */
 function placeOf([part = "", name, ...rest]: string[]): string {
   if (part === "texts" && name !== undefined) return `the text “${labelOf(rest.join(" "))}” in ${languageName(name)}`;
   const noun = NOUNS[part];

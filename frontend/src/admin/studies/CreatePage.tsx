@@ -1,4 +1,4 @@
-/** A new study: from a shipped one, from a definition, or from clips of one's own. */
+/** A new study: from a shipped one, from a definition, or from the user's own clips. */
 
 import { useDebouncedValue } from "@mantine/hooks";
 import { useQuery } from "@tanstack/react-query";
@@ -64,16 +64,16 @@ const isTaken = (error: Error | null) => error instanceof Refused && error.code 
 const refusal = (error: Error | null): string | null => (error === null || isTaken(error) ? null : error.message);
 
 /**
- * Create a study and open it; `taken` is told where another study has the name.
- * @param told whether the page itself tells of every other refusal
+ * Create a study and open it; `taken` gets the message if another study has the name.
+ * @param isShown whether the page itself shows every other refusal
  */
-function useCreate(taken: (message: string) => void, created?: () => void, told = false) {
+function useCreate(taken: (message: string) => void, created?: () => void, isShown = false) {
   const navigate = useNavigate();
   return useChange((body: Schemas["NewStudy"]) => unwrap(api.POST("/api/admin/studies", { body })), {
     touches: [["studies"]],
     done: "Study created as a draft.",
     refused: (error) => {
-      if (!isTaken(error)) return told;
+      if (!isTaken(error)) return isShown;
       taken(error.message);
       return true;
     },

@@ -8,7 +8,7 @@ import { TurnedAway } from "./StatusBadge";
 
 const Preflight = onDemand(async () => (await import("./Preflight")).Preflight);
 
-/** A study that people can still be kept from: its checklist stands on its first page. */
+/** A study that people can still be kept from: its checklist is on its first page. */
 const isAhead = ({ status, archived_at }: Schemas["StudySummary"]) => (status === "draft" || status === "pilot") && archived_at === null;
 
 export function DesignTab() {

@@ -35,8 +35,8 @@ function Copy({ detail: { summary, versions } }: { detail: Schemas["StudyDetail"
   const [version, setVersion] = useState(String(summary.version));
   const own = useOwnWorkspaces();
   const [chosen, setWorkspace] = useState<string | null>(null);
-  const beside = own.find((one) => one.name === summary.workspace);
-  const workspace = chosen ?? beside?.name ?? null;
+  const present = own.find((one) => one.name === summary.workspace);
+  const workspace = chosen ?? present?.name ?? null;
   const copy = useChange(
     () =>
       unwrap(
@@ -60,7 +60,7 @@ function Copy({ detail: { summary, versions } }: { detail: Schemas["StudyDetail"
           onChange={(chosen) => setVersion(chosen ?? version)}
           w={140}
         />
-        {own.length > (beside === undefined ? 0 : 1) && (
+        {own.length > (present === undefined ? 0 : 1) && (
           <Select
             label="Into the workspace"
             data={own.map((one) => ({ value: one.name, label: one.title }))}

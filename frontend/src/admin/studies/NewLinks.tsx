@@ -1,4 +1,4 @@
-/** Make links: one for everybody, one a person, or to look at the study oneself. */
+/** Make links: one for everybody, one per person, or to look at the study oneself. */
 import { Button, Card, Group, NumberInput, SegmentedControl, Select, Stack, Text, Textarea, TextInput, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";

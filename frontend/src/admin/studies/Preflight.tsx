@@ -95,7 +95,7 @@ const PAGES = {
   rehearsal: { to: "/studies/$study/rehearsal", label: "Rehearsal", right: "view" },
 } as const;
 
-/** The way to where a finding is fixed; nothing where that is no page of the study, or not open to this account. */
+/** The way to where a finding is fixed; nothing where that is not a page of the study, or not open to this account. */
 function Where({ study, finding: { page, path } }: { study: string; finding: Finding }) {
   const rights = useQuery(studyQuery(study)).data?.summary.rights ?? [];
   if (page === "preview" || page === "server") return null;
@@ -115,7 +115,7 @@ interface ClipsTriedProps {
   check: { data: ClipCheck | undefined; error: Error | null; isFetching: boolean; refetch: () => unknown };
 }
 
-/** How the trial of the clips stands: begun by a button here, at once where the study is about to be opened. */
+/** The state of the clips' trial: begun by a button here, at once where the study is about to be opened. */
 function ClipsTried({ study, version, check }: ClipsTriedProps) {
   const progress = useQuery<ClipProgress>({
     queryKey: [...clipCheckQuery(study, version).queryKey, "progress"],

@@ -17,7 +17,7 @@ export function TurnedAway({ design }: { design: Schemas["DesignOut"] | undefine
   return design?.turned_away ? <Text size="sm">{design.turned_away}</Text> : null;
 }
 
-// Where a study stands between draft and live, and what comes next.
+// Where a study is between draft and live, and what comes next.
 
 const STEPS = [
   ["draft", "Draft"],

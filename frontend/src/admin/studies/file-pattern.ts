@@ -9,7 +9,7 @@ const EXEMPLAR = "exemplar";
 
 export interface FileLevels {
   file: string;
-  /** What stands in the place of each field; null where the name does not fit. */
+  /** The text in the place of each field; null where the name does not fit. */
   levels: string[] | null;
 }
 
@@ -59,7 +59,7 @@ interface Declared {
   levels: readonly { name: string }[];
 }
 
-/** The pattern by which these names are the study's own levels, where one is plain: for a clip alone nothing else tells. */
+/** The pattern by which these names are the study's own levels, where one is plain: a single clip gives no other hint. */
 export function declaredPattern(factors: readonly Declared[], files: readonly string[]): string {
   const known = factors.map(({ levels }) => new Set(levels.map(({ name }) => name)));
   const fits = (pattern: string) =>

@@ -66,7 +66,7 @@ function Translations(props: FieldProps) {
   );
 }
 
-/** Numbers in an order: one a line. What is no number stays out until it is one. */
+/** Numbers in an order, one per line. Text that is not a number stays out until it is one. */
 function Numbers(props: FieldProps) {
   const { value, label, help, problem, set } = useField(props);
   const [text, setText] = useState(() => (Array.isArray(value) ? value.map(String).join("\n") : ""));
@@ -123,7 +123,7 @@ function Dictionary(props: FieldProps) {
   );
 }
 
-// Names for elements that are added or copied, so that each has one of its own.
+// Names for elements that are added or copied, so that each name is unique.
 
 /** `element` with a name (or stored value) that none of `others` has. */
 export function named(element: unknown, others: readonly unknown[], what = "name"): unknown {
@@ -292,7 +292,7 @@ function Keys({ path, editor, but = [] }: { path: Path; editor: TableEditor; but
   );
 }
 
-/** Numbers, choices and switches stand side by side where there is room. */
+/** Numbers, choices and switches are side by side where there is room. */
 const isNarrow = (schema: Schema) => ["number", "choice", "flag", "text"].includes(editorOf(schema).kind);
 
 function isWrong(problems: readonly { path: string }[], path: Path): boolean {
@@ -350,7 +350,7 @@ function settingsOf(table: unknown): string {
   return [...shown, ...(Object.keys(table).length > shown.length ? ["…"] : [])].join("; ");
 }
 
-/** One of several kinds of table, told apart by a key. */
+/** One of several kinds of table; a key says which. */
 function Variants(props: FieldProps) {
   const { value, label, help, set, builder } = useField(props);
   const editor = editorOf(props.schema);
@@ -380,7 +380,7 @@ function Variants(props: FieldProps) {
   );
 }
 
-/** Tables in an order of their own: added, moved, removed. */
+/** Tables in an order that the user sets: added, moved, removed. */
 function Elements(props: FieldProps) {
   const { value, label, help } = useField(props);
   const editor = editorOf(props.schema);

@@ -157,7 +157,7 @@ export function Translated(props: FieldProps) {
   );
 }
 
-/** Lists of words: a list a line, words parted by commas. */
+/** Lists of words: one list per line, words separated by commas. */
 export function Lists(props: FieldProps) {
   const { value, label, help, problem, set } = useField(props);
   const lists = Array.isArray(value) ? (value as unknown[][]) : [];
@@ -187,7 +187,7 @@ export function Lists(props: FieldProps) {
   );
 }
 
-/** Any value, as JSON: for keys that have no editor of their own. */
+/** Any value, as JSON: for keys without a special editor. */
 export function Raw(props: FieldProps) {
   const { value, label, help, problem, set } = useField(props);
   const [text, setText] = useState(() => (value === undefined ? "" : JSON.stringify(value, null, 2)));
