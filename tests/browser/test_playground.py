@@ -27,7 +27,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_both_characters_blink_when_told_to(context: BrowserContext, pages: Path) -> None:
+def test_both_characters_blink_on_command(context: BrowserContext, pages: Path) -> None:
     opened = context.new_page()
     requests: list[str] = []
     errors: list[str] = []
@@ -84,7 +84,7 @@ def test_an_avatar_is_given_the_engines_lids(context: BrowserContext, pages: Pat
         assert (left, right) == pytest.approx((frame.left, frame.right), abs=1e-4)
 
 
-def test_a_file_that_is_no_avatar_is_refused_and_the_one_that_is_there_blinks_on(
+def test_a_file_that_is_not_an_avatar_is_refused_and_the_one_that_is_there_blinks_on(
     context: BrowserContext, pages: Path, tmp_path: Path
 ) -> None:
     wrong = tmp_path / "notes.vrm"

@@ -19,7 +19,7 @@ def python_report(*packages: object) -> str:
     return json.dumps({"dependencies": packages, "fixes": []})
 
 
-def test_a_known_weakness_is_named_with_the_version_that_mends_it() -> None:
+def test_a_known_weakness_is_named_with_the_version_that_fixes_it() -> None:
     outcome = python_outcome(python_report(FINE, WEAK, UNKNOWN))
     assert outcome.weak
     assert "pillow 9.0.0: PYSEC-2023-175, fixed in 10.0.1" in outcome.said
@@ -38,7 +38,7 @@ def test_a_database_that_knows_no_package_has_not_answered(answer: str) -> None:
     assert "skipped" in outcome.said
 
 
-def test_an_accepted_advisory_is_no_weakness(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_accepted_advisory_is_not_a_weakness(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tools.audit.ACCEPTED", {"CVE-2023-4863": "we read no WebP from strangers"})
     assert not python_outcome(python_report(WEAK)).weak
 

@@ -63,7 +63,7 @@ def said(source: str, doc: str) -> str:
         ("Returns\n-------\nint\n\nReturns\n-------\nint", "cannot read it: The section Returns"),
     ],
 )
-def test_a_docstring_that_is_no_numpydoc_is_refused(doc: str, fault: str) -> None:
+def test_a_docstring_that_is_not_numpydoc_is_refused(doc: str, fault: str) -> None:
     assert said(FUNCTION, doc).startswith("a.py:2: mean: ")
     assert fault in said(FUNCTION, doc)
 

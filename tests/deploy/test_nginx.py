@@ -134,7 +134,7 @@ def test_a_refused_request_leaves_no_address_in_a_log(program: str, tmp_path: Pa
     assert not [text for text in logs if "client:" in text]
 
 
-def test_an_emptied_cache_is_filled_anew(program: str, tmp_path: Path) -> None:
+def test_an_emptied_cache_is_filled_again(program: str, tmp_path: Path) -> None:
     with upstream() as (behind, asked), nginx(program, tmp_path, behind) as proxy:
         assert answer(proxy.port, ADDRESS) == (200, CLIP)
         kept = [path for path in tmp_path.rglob("*") if path.is_file() and CLIP in path.read_bytes()]

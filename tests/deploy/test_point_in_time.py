@@ -186,7 +186,7 @@ def test_the_database_goes_back_to_a_moment_and_stays_where_it_cannot(installati
 
 
 @pytest.mark.postgres
-def test_the_archive_stays_while_the_database_is_away_and_begins_anew_after_a_gap(
+def test_the_archive_stays_while_the_database_is_away_and_starts_over_after_a_gap(
     installation: Installation,
 ) -> None:
     bases = installation.archive / "base"
@@ -213,7 +213,7 @@ def test_the_archive_stays_while_the_database_is_away_and_begins_anew_after_a_ga
         ("2020-01-01T00:00:00Z", "the archive begins at no moment: it is empty"),
     ],
 )
-def test_what_is_no_moment_of_the_archive_is_one_line(tmp_path: Path, time_asked: str, said: str) -> None:
+def test_what_is_not_a_moment_of_the_archive_is_one_line(tmp_path: Path, time_asked: str, said: str) -> None:
     done = subprocess.run(
         ["sh", REPOSITORY / "deploy" / "archive.sh", "restore", time_asked, tmp_path / "new"],
         env={"PATH": os.environ["PATH"], "ARCHIVE": str(tmp_path)},

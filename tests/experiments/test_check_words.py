@@ -32,7 +32,7 @@ def test_what_nobody_has_read_says_so(language: str) -> None:
     assert "Unreviewed" in text.read_text(encoding="utf-8").partition("[")[0]
 
 
-def test_the_page_is_told_the_choices_in_the_order_of_their_answers() -> None:
+def test_the_page_gets_the_choices_in_the_order_of_their_answers() -> None:
     assert {name: len(kind.choices) for name, kind in CHECK_KINDS.items()} == CHOICES
     assert CHECK_KINDS["direction"].choices[2]["fr"] == WORDS["fr"]["direction"].choices[2] == "vers le haut"
     assert CHECK_KINDS["first_eye"].own_look

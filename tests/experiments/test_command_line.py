@@ -12,7 +12,7 @@ from experiments.command_line import run_command_line
 BIN = Path(sys.executable).parent
 
 
-def test_a_question_that_nobody_answers_is_no_traceback(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_question_that_nobody_answers_is_not_a_traceback(capsys: pytest.CaptureFixture[str]) -> None:
     def asks(**_options: object) -> None:
         raise typer.Abort
 

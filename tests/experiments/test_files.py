@@ -9,7 +9,7 @@ from experiments.files import whole_text
 
 
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="no folder here says it takes files and does not")
-def test_a_folder_that_takes_no_files_is_told() -> None:
+def test_a_folder_that_takes_no_files_is_reported() -> None:
     with (
         pytest.raises(InputError, match=r"x\.csv cannot be written .*; choose a different location"),
         whole_text(Path("/proc/x.csv")) as stream,

@@ -146,7 +146,7 @@ def test_a_screening_rule_changes_the_hash() -> None:
     assert definition_sha256(parse_experiment(screened())) != definition_sha256(load_experiment("exp1"))
 
 
-def test_a_file_that_is_not_text_is_told_in_one_line(tmp_path) -> None:
+def test_a_file_that_is_not_text_is_reported_in_one_line(tmp_path) -> None:
     file = tmp_path / "study.toml"
     file.write_bytes(b"\x91\x00\xff")
     with pytest.raises(InputError, match=r"study\.toml is not UTF-8 text .*; save it as UTF-8"):

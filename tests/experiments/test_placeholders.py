@@ -53,7 +53,7 @@ def test_marks_that_nobody_filled_in_are_found_in_every_language(mark: str, lang
         "As in [Smith et al., 2020], a device [e.g. a phone].",
     ],
 )
-def test_links_keys_and_quoted_marks_are_no_placeholders(text: str) -> None:
+def test_links_keys_and_quoted_marks_are_not_placeholders(text: str) -> None:
     assert unfilled_texts(parse_experiment(with_consent(text))) == []
 
 

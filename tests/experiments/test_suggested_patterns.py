@@ -64,7 +64,7 @@ def test_no_suggested_name_is_one_of_a_column() -> None:
         assert f"{{{name}}}" not in pattern
 
 
-def test_an_ending_is_no_part_of_a_level_as_the_page_shows_it() -> None:
+def test_an_ending_is_not_a_part_of_a_level_as_the_page_shows_it() -> None:
     placed = levels_from_names("{speed}_{style}", ["fast_round.mp4", "slow_flat.webm"])
     assert [levels for levels, _ in placed.values()] == [
         {"speed": "fast", "style": "round"},

@@ -36,7 +36,7 @@ SOON_S = 5.0
         "x = '\\' # '\ny" + ".a" * 400 + " = 1",
     ],
 )
-def test_a_key_without_end_is_seen_wherever_it_stands(text: str) -> None:
+def test_a_key_without_end_is_seen_wherever_it_is(text: str) -> None:
     assert has_endless_key(text)
     with pytest.raises(DefinitionError, match="nested too deeply"):
         toml_data(text)
@@ -52,7 +52,7 @@ def test_no_text_keeps_the_search_or_the_reader_busy(beginning: str, unit: str) 
 
 
 @pytest.mark.parametrize("quotes", ['"', "'", '"""', "'''"])
-def test_a_title_of_many_sentences_is_no_key(quotes: str) -> None:
+def test_a_title_of_many_sentences_is_not_a_key(quotes: str) -> None:
     for title in ("Yes. " * 501, "1.2." * 4001, "a.b." * 4001):
         text = f"title = {quotes}{title}{quotes} # {title}"
         assert toml_data(text) == {"title": title}
@@ -82,7 +82,7 @@ words = st.text(alphabet="a.\"'\\#\n ={}", max_size=12)
 
 
 @given(st.lists(words, min_size=1, max_size=4), st.integers(0, MAX_DEPTH + 3))
-def test_whatever_stands_in_texts_the_keys_after_them_are_counted(texts: list[str], dots: int) -> None:
+def test_whatever_is_in_texts_the_keys_after_them_are_counted(texts: list[str], dots: int) -> None:
     lines = []
     for number, text in enumerate(texts):
         escaped = text.replace("\\", "\\\\").replace('"', '\\"')

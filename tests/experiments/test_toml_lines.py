@@ -60,7 +60,7 @@ words = st.text(alphabet="ab\"'[]{}=#\\ \n", max_size=30)
 
 
 @given(st.lists(words, min_size=1, max_size=4))
-def test_whatever_stands_in_texts_the_keys_after_them_are_found(texts: list[str]) -> None:
+def test_whatever_is_in_texts_the_keys_after_them_are_found(texts: list[str]) -> None:
     lines: list[str] = []
     expected = {}
     for number, text in enumerate(texts):
@@ -72,14 +72,14 @@ def test_whatever_stands_in_texts_the_keys_after_them_are_found(texts: list[str]
     assert {key: line_of(document, (key,)) for key in expected} == expected
 
 
-def test_spaced_and_quoted_parts_of_a_header_are_told_apart() -> None:
+def test_spaced_and_quoted_parts_of_a_header_are_distinguished() -> None:
     text = '[ a . "b.c" . \'d.e\' ]\nf = 1\n[[ "g.h" ]]\ni . j = 1\n'
     tomllib.loads(text)
     assert line_of(text, ("a", "b.c", "d.e", "f")) == 2
     assert line_of(text, ("g.h", 0)) == 3
 
 
-def test_a_header_that_is_all_spaces_is_told_at_once() -> None:
+def test_a_header_that_is_all_spaces_is_reported_at_once() -> None:
     text, began = f'["a{" " * 100_000}b"]\nc = 1\n', time.process_time()
     assert line_of(text, ("c",)) is None
     assert line_of(text, (f"a{' ' * 100_000}b", "c")) == 2

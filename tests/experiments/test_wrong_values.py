@@ -114,7 +114,7 @@ def test_what_was_expected_and_what_came(old: str, new: str, words: str) -> None
     assert new in text.splitlines()[(said.line or 0) - 1]
 
 
-def test_one_table_for_several_is_told_how_they_are_written() -> None:
+def test_one_table_for_several_gets_a_message_how_they_are_written() -> None:
     with pytest.raises(DefinitionError, match=r"line 1: factors: expected a list, .* \[\[factors\]\]"):
         parse_experiment('[factors]\nname = "speed"\n')
 

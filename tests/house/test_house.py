@@ -75,7 +75,7 @@ def test_a_kind_is_compared_outside_its_own_folders_only(tree: Path) -> None:
     ]
 
 
-def test_marks_for_tools_and_docstrings_are_no_comments(tree: Path) -> None:
+def test_marks_for_tools_and_docstrings_are_not_comments(tree: Path) -> None:
     assert values(tree)["comments per 100 lines"] == f"{100 / 7:.1f}"
 
 

@@ -354,7 +354,7 @@ def test_the_first_account_can_be_invited_before_the_server_ever_ran(
     assert (called.returncode, "/admin/invitation#" in called.stdout) == (0, True), called.stderr
 
 
-def test_clips_without_a_size_are_told_of_where_the_screen_is_measured(
+def test_clips_without_a_size_are_reported_where_the_screen_is_measured(
     settings: Settings, services: Services, sources: Path
 ) -> None:
     manifest = sources / "clips" / "manifest.json"

@@ -47,7 +47,7 @@ def test_every_line_of_help_is_the_one_of_the_command_itself(module: str) -> Non
     assert lines == {name: line for name, (home, line) in COMMANDS.items() if home == module}
 
 
-def test_a_command_that_is_not_there_is_told_with_the_nearest_one() -> None:
+def test_a_command_that_is_not_there_is_reported_with_the_nearest_one() -> None:
     ended = subprocess.run(
         [sys.executable, "-m", "server", "studi", "list"], capture_output=True, text=True, check=False
     )

@@ -71,7 +71,7 @@ def soon_busy(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
 @pytest.mark.usefixtures("soon_busy")
-def test_a_locked_database_is_told_apart_and_nobody_waits_in_a_queue(
+def test_a_locked_database_is_distinguished_and_nobody_waits_in_a_queue(
     services: Services, participant: Participant
 ) -> None:
     participant.agree()
@@ -87,7 +87,7 @@ def test_a_locked_database_is_told_apart_and_nobody_waits_in_a_queue(
     assert [participant.rate(trial).status_code for trial in trials] == [201] * 4
 
 
-def test_a_pool_that_is_used_up_is_no_other_program() -> None:
+def test_a_pool_that_is_used_up_is_not_another_program() -> None:
     said = refusal(PoolTimeout("QueuePool limit of size 1 overflow 1 reached")) or ""
     assert ("PALPEBRA_DATABASE_POOL" in said, "another program" in said) == (True, False)
 

@@ -113,7 +113,7 @@ def test_locks_are_regained_without_being_asked(
     assert not other.is_held("one")
 
 
-def test_a_lock_that_another_took_meanwhile_is_told_of(
+def test_a_lock_that_another_took_meanwhile_is_reported(
     services: Services,
     locks: DatabaseLocks,
     monkeypatch: pytest.MonkeyPatch,

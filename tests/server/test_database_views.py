@@ -66,7 +66,7 @@ def written(database: Database) -> Iterator[list[str]]:
 @pytest.mark.parametrize(
     "changed", [("DROP VIEW ratings", OLDER), ("DROP VIEW ratings",)], ids=["old", "gone"]
 )
-def test_views_of_another_program_are_made_anew_without_a_new_revision(
+def test_views_of_another_program_are_made_again_without_a_new_revision(
     database: Database, changed: tuple[str, ...]
 ) -> None:
     assert is_up_to_date(database)
@@ -263,7 +263,7 @@ def test_a_view_that_others_are_made_of_is_refused_in_one_line_and_nothing_is_ch
 
 
 @on_postgres
-def test_a_user_who_does_not_own_the_views_is_told_so_in_one_line(database: Database) -> None:
+def test_a_user_who_does_not_own_the_views_is_reported_in_one_line(database: Database) -> None:
     with roles(database, "app") as (app,):
         run(
             database,

@@ -38,7 +38,7 @@ def test_bodies_that_are_not_what_was_asked_for(client: TestClient, study: Any, 
 @pytest.mark.parametrize(
     "kind", ["text/plain", "application/x-www-form-urlencoded", "multipart/form-data", None]
 )
-def test_a_body_that_is_not_said_to_be_json_is_told_what_was_expected(
+def test_a_body_that_is_not_said_to_be_json_is_refused_with_what_was_expected(
     client: TestClient, study: Any, kind: str | None
 ) -> None:
     headers = {} if kind is None else {"content-type": kind}
@@ -48,7 +48,7 @@ def test_a_body_that_is_not_said_to_be_json_is_told_what_was_expected(
     assert "application/json" in answer.json()["error"]["message"]
 
 
-def test_strangers_are_not_told_the_version(client: TestClient) -> None:
+def test_strangers_do_not_see_the_version(client: TestClient) -> None:
     said = client.get("/api/openapi.json").text
     assert version("palpebra") not in said
 
@@ -64,7 +64,7 @@ def renamed(services: Services, old: str, new: str) -> None:
         connection.exec_driver_sql(f"ALTER TABLE links RENAME COLUMN {old} TO {new}")
 
 
-def test_a_failure_of_the_server_tells_nothing_of_its_inside(client: TestClient, services: Services) -> None:
+def test_a_failure_of_the_server_says_nothing_of_its_inside(client: TestClient, services: Services) -> None:
     renamed(services, "token_hash", "gone")
     try:
         answer = client.get("/api/links/x")

@@ -64,7 +64,7 @@ def test_the_databases_own_first_line_is_kept() -> None:
         ("Invalid HTTP request received.", True),
     ],
 )
-def test_uvicorn_tells_no_failure_twice_and_nothing_of_websockets(line: str, kept: bool) -> None:
+def test_uvicorn_reports_no_failure_twice_and_nothing_of_websockets(line: str, kept: bool) -> None:
     record = logging.LogRecord("uvicorn.error", logging.WARNING, "", 1, line, (), None)
     assert UvicornFilter().filter(record) is kept
 

@@ -74,7 +74,7 @@ def test_pages_that_are_not_built_say_so(client: TestClient) -> None:
     assert (answer.status_code, answer.json()["error"]["code"]) == (503, "pages_not_built")
 
 
-def test_security_headers_stand_on_every_answer(client: TestClient, pages: Path) -> None:
+def test_security_headers_are_on_every_answer(client: TestClient, pages: Path) -> None:
     for path in ("/run/x", "/api/links/x", "/healthz", "/nothing"):
         headers = client.get(path).headers
         policy = headers["content-security-policy"]
@@ -93,7 +93,7 @@ def test_behind_https_browsers_are_told_to_stay_there(settings: Settings) -> Non
         assert "max-age=" in client.get("/healthz").headers["strict-transport-security"]
 
 
-def test_readiness_tells_of_missing_tables(client: TestClient, settings: Settings, tmp_path: Path) -> None:
+def test_readiness_reports_missing_tables(client: TestClient, settings: Settings, tmp_path: Path) -> None:
     assert client.get("/readyz").json()["status"] == "ready"
     empty = settings.model_copy(update={"database_url": f"sqlite:///{tmp_path / 'empty.sqlite'}"})
     with TestClient(create_app(empty)) as other:
@@ -102,7 +102,7 @@ def test_readiness_tells_of_missing_tables(client: TestClient, settings: Setting
     assert "server database upgrade" in answer.json()["error"]["message"]
 
 
-def test_readiness_tells_of_clips_that_cannot_be_read(
+def test_readiness_reports_clips_that_cannot_be_read(
     client: TestClient, services: Services, study: StudyInDatabase
 ) -> None:
     assert client.get("/readyz").status_code == 200
@@ -118,7 +118,7 @@ def test_a_link_answers_who_asks_for_its_head(client: TestClient, study: StudyIn
     assert asked.status_code == got.status_code
 
 
-def test_security_txt_names_who_to_tell_until_when(settings: Settings) -> None:
+def test_security_txt_names_who_to_contact_until_when(settings: Settings) -> None:
     named = settings.model_copy(update={"security_contact": "mailto:safe@lab.example"})
     with TestClient(create_app(named)) as client:
         answer = client.get("/.well-known/security.txt")

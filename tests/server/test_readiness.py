@@ -62,7 +62,7 @@ def test_the_limit_is_a_setting(settings: Settings) -> None:
         assert_told_to_monitors(client, {"/healthz": 200, "/readyz": 503})
 
 
-def test_monitors_that_ask_by_head_are_told_the_same(client: TestClient) -> None:
+def test_monitors_that_ask_by_head_get_the_same(client: TestClient) -> None:
     assert_told_to_monitors(client, {"/healthz": 200, "/readyz": 200})
 
 
@@ -71,7 +71,7 @@ def assert_told_to_monitors(client: TestClient, statuses: dict[str, int]) -> Non
 
 
 @pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
-def test_a_locked_database_is_told_apart(
+def test_a_locked_database_is_distinguished(
     client: TestClient, settings: Settings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(web, "LOCKED_AFTER_S", 0.2)

@@ -77,7 +77,7 @@ def test_a_provider_of_sign_in_is_declared_key_by_key(
         ("SECRET", "in the environment", "Extra inputs"),
     ],
 )
-def test_a_provider_that_is_declared_wrongly_is_told_in_one_line(
+def test_a_provider_that_is_declared_wrongly_is_reported_in_one_line(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], key: str, value: str, said: str
 ) -> None:
     known = {"LABEL": "Uni", "ISSUER": "https://login.uni.example", "CLIENT_ID": "palpebra", key: value}

@@ -95,7 +95,7 @@ def owner(services: Services, hosts: tuple[Host, Host]) -> list[httpx.Client]:
     return [first, other]
 
 
-def test_a_stream_on_one_host_tells_what_the_other_wrote(
+def test_a_stream_on_one_host_shows_what_the_other_wrote(
     study: StudyInDatabase, hosts: tuple[Host, Host], owner: list[httpx.Client]
 ) -> None:
     with owner[0].stream("GET", f"{ADMIN}/studies/short/monitor/stream") as stream:

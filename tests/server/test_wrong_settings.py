@@ -33,7 +33,9 @@ def test_a_mistyped_address_of_the_database_is_told_in_one_line(
 
 
 @pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
-def test_a_mistyped_number_is_told_in_one_line(settings: Settings, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_mistyped_number_is_reported_in_one_line(
+    settings: Settings, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("PALPEBRA_SESSION_HOURS", "twelve")
     called = run_server_command(settings, "study", "list")
     assert called.returncode == 2

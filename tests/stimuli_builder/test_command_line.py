@@ -41,7 +41,7 @@ def test_every_line_of_help_is_the_one_of_the_command_itself(module):
     assert lines == {name: line for name, (home, line) in COMMANDS.items() if home == module}
 
 
-def test_an_unknown_command_is_told_with_the_nearest_one(monkeypatch, capsys):
+def test_an_unknown_command_is_reported_with_the_nearest_one(monkeypatch, capsys):
     from stimuli_builder.cli import main
 
     monkeypatch.setattr(sys, "argv", ["stimuli", "blink"])

@@ -51,7 +51,7 @@ def run(tmp_path, monkeypatch):
         sys.modules.pop(name, None)
 
 
-def test_a_kernel_is_compiled_anew_where_one_that_it_calls_was_edited(run):
+def test_a_kernel_is_compiled_again_where_one_that_it_calls_was_edited(run):
     assert run(1) == (4.0, 0)
     assert run(100) == (202.0, 0)
 
@@ -102,7 +102,7 @@ def test_every_kernel_is_over_the_files_whose_kernels_and_numbers_it_holds():
     assert {path.name: found for path in files if (found := list(uncovered(path.read_text())))} == {}
 
 
-def test_a_number_of_another_file_under_a_kernel_of_a_kernel_is_told():
+def test_a_number_of_another_file_under_a_kernel_of_a_kernel_is_reported():
     source = "from stimuli_builder.a import B\n@compiled\ndef f(x):\n    return B\n"
     caller = "@compiled\ndef g(x):\n    return f(x)\n"
     assert list(uncovered(source + caller)) == [("f", "B"), ("g", "B")]

@@ -64,7 +64,7 @@ def test_files_of_which_the_native_reader_died_end_in_one_line(tmp_path, name, s
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a shell script replaces Python")
 @pytest.mark.parametrize("death", ["kill -SEGV $$", "exit 3", "echo '{'"])
-def test_a_reader_that_dies_is_no_end_of_the_analysis(tmp_path, monkeypatch, death) -> None:
+def test_a_reader_that_dies_is_not_an_end_of_the_analysis(tmp_path, monkeypatch, death) -> None:
     path = written(tmp_path / "a.sav")
     stand_in = tmp_path / "python"
     stand_in.write_text(f"#!/bin/sh\n{death}\n", encoding="utf-8")
@@ -84,7 +84,7 @@ def test_a_reader_that_goes_in_circles_is_ended(tmp_path, monkeypatch) -> None:
     assert "it is damaged" in said_of(path)
 
 
-def test_a_folder_with_modules_of_the_users_own_is_no_library(tmp_path, monkeypatch) -> None:
+def test_a_folder_with_modules_of_the_users_own_is_not_a_library(tmp_path, monkeypatch) -> None:
     for name in ("analysis", "json", "numpy"):
         (tmp_path / f"{name}.py").write_text("raise SystemExit(7)\n", encoding="utf-8")
     monkeypatch.chdir(tmp_path)

@@ -47,7 +47,7 @@ def test_a_frame_map_ascends_from_the_first_frame_and_lasts_as_long(
         assert middle < later
 
 
-def test_a_frame_that_stands_longer_is_repeated() -> None:
+def test_a_frame_that_is_shown_longer_is_repeated() -> None:
     assert frame_map([0.0, 0.04, 0.16], 0.20, Fraction(25)) == (0, 1, 1, 1, 2)
 
 

@@ -62,7 +62,7 @@ describe("a page that has not begun", () => {
       expect(page).toContain('The connection failed</h1><p><a href="">Reload the page');
       expect(reports).toEqual([]);
     }
-    expect(lose(storage).reloads, "by hand the count begins anew").toBe(1);
+    expect(lose(storage).reloads, "a reload by hand resets the count").toBe(1);
   });
   it("is not loaded again by itself where nothing can be counted", () => {
     const { page, reloads } = lose();

@@ -67,7 +67,7 @@ function* editors(schema: Schema, path: string, seen = new Set<string>()): Gener
 }
 
 describe("the declaration's schema", () => {
-  it("has an editor of its own for every key", () => {
+  it("has an editor for every key", () => {
     const all = [...editors(EXPERIMENT, "")];
     expect(all.length).toBeGreaterThan(120);
     expect(all.filter(([, editor]) => editor.kind === "raw").map(([path]) => path)).toEqual([]);
@@ -87,7 +87,7 @@ describe("the declaration's schema", () => {
     expect(keys.filter(([, key]) => !key.description).map(([name]) => name)).toEqual([]);
   });
 
-  it("stands on the pages of the builder, each key once", () => {
+  it("is on the pages of the builder, each key once", () => {
     const shown = SECTIONS.flatMap(({ keys }) => keys).filter((key) => key in (EXPERIMENT.properties ?? {}));
     expect(shown.toSorted()).toEqual(Object.keys(EXPERIMENT.properties ?? {}).toSorted());
   });

@@ -25,7 +25,7 @@ describe.each(Object.entries(ZEROS))("digits: %s", (_name, zero) => {
   it("are a key", () => expect(keyOf({ key: digitsOf(zero)[7] ?? "", code: "", shiftKey: false })).toBe("7"));
 });
 
-describe("what is no digit", () => {
+describe("what is not a digit", () => {
   it.each(["", "a", "12", "²", "½", "Ⅷ", "四", "Enter"])("has no value: %s", (text) => expect(digitValue(text)).toBe(null));
   it("leaves a number that is none as it is", () => expect(Number(plainNumber("3o"))).toBeNaN());
   it("keeps signs and points", () => expect(plainNumber("\u200f−٣٫٥")).toBe("-3.5"));

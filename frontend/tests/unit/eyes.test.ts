@@ -98,7 +98,7 @@ describe("eyes of a video", () => {
     expect(Math.hypot(x - 100 - dx, y - 60 - dy)).toBeLessThan(0.25 * 110);
     expect(seen.one?.blinks).toEqual(expect.arrayContaining([20, 75, 110]));
   });
-  it("tell how far the search is, never backwards", () => {
+  it("report the progress of the search, never backwards", () => {
     const shares: number[] = [];
     seeEyes(recording([[100, 60]], 110, BLINKS).slice(0, 30), SECONDS, (share) => shares.push(share));
     expect(shares.length).toBeGreaterThan(30);

@@ -24,7 +24,7 @@ describe("the monitor's runs", () => {
   const snapshot = (...runs: [string, number][]) =>
     ({ runs: runs.map(([run, answered]) => ({ run, answered })) }) as unknown as Parameters<typeof merge>[1];
 
-  it("are those told of last, the others kept as they are", () => {
+  it("are those reported last; the others stay as they are", () => {
     const before = snapshot(["a", 1], ["b", 1]);
     const after = merge(before, snapshot(["b", 2], ["c", 0]));
     expect(after.runs.map(({ run, answered }) => [run, answered])).toEqual([

@@ -167,7 +167,7 @@ describe("the work on a video", () => {
     expect([[...(saved?.frames.keys() ?? [])], saved?.rest["proposed"]]).toEqual([[5, 12, 20], {}]);
     expect([...(labelFileOf(loaded)?.frames.keys() ?? [])]).toEqual([12, 20]);
   });
-  it("begins anew with another number of eyes, the frames to label kept", () => {
+  it("starts over with another number of eyes and keeps the frames to label", () => {
     const one = withEyes({ ...withAccepted(opened, shape), selected: 12 }, 1);
     expect(one).toMatchObject({ eyes: 1, selected: null, chosen: [0, 10, 20], markers: { midLower: [[7]] } });
     expect(one.history.now.size).toBe(0);

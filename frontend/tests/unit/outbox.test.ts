@@ -68,7 +68,7 @@ describe("outbox", () => {
     expect(await store.all()).toHaveLength(0);
   });
 
-  it("tells of what is refused for good, of this run only", async () => {
+  it("reports what is refused for good, for this run only", async () => {
     const factory = new IDBFactory();
     const other = await opened(factory, ["silence", "silence"], { pause: () => new Promise<void>(() => {}) });
     await other.outbox.put("PUT", "/other", {});
@@ -84,7 +84,7 @@ describe("outbox", () => {
     expect(onRefused.mock.calls[0]?.[0]).toMatchObject({ status: 409 });
   });
 
-  it("tells of a write that was accepted before it is forgotten", async () => {
+  it("reports an accepted write before it forgets it", async () => {
     const factory = new IDBFactory();
     const seen: [string, unknown, number][] = [];
     const store = await IndexedDbStore.open(factory);
@@ -108,7 +108,7 @@ describe("outbox", () => {
     expect((got.at(-1)?.body as { events: object[] }).events).toContainEqual({ id: "e2" });
   });
 
-  it("goes on in memory, and says so, when the disk fails", async () => {
+  it("goes on in memory, and reports it, when the disk fails", async () => {
     const { outbox, store, got } = await opened(new IDBFactory());
     expect(outbox.durable).toBe(true);
     vi.spyOn(console, "warn").mockImplementation(() => {});

@@ -57,7 +57,7 @@ describe("levels by the names of files", () => {
     expect(unnamedFactors("{factor1}_{speed}_{exemplar}.mp4", FILES)).toEqual([{ field: "factor1", levels: ["rosie", "hal"] }]);
   });
 
-  it("take names as somebody types them, and leave what is no name or taken", () => {
+  it("take names as somebody types them, and skip taken names and what is not a name", () => {
     const pattern = "{factor1}_{factor2}_{exemplar}.mp4";
     expect(withNames(pattern, { factor1: "Robot type", factor2: "Größe" })).toBe("{Robot_type}_{Grosse}_{exemplar}.mp4");
     expect(withNames(pattern, { factor1: "speed", factor2: "speed" })).toBe("{speed}_{factor2}_{exemplar}.mp4");
@@ -79,7 +79,7 @@ describe("sizes of clips", () => {
     expect(sizeRemark([wide("a.mp4"), small("b.mp4"), wide("c.mp4"), small("d.mp4")])).toContain("others are 640 x 360");
   });
 
-  it("are no matter where all are one, or not known", () => {
+  it("do not matter where all are the same, or not known", () => {
     expect(sizeRemark([wide("a.mp4"), wide("b.mp4"), { name: "c.mp4", width_px: null, height_px: null }])).toBeNull();
     expect(sizeRemark([])).toBeNull();
   });
@@ -95,7 +95,7 @@ describe("what the frames of a clip show", () => {
     expect(kinds(plain(10), striped(90), striped(120))).toEqual(["begins_blank"]);
   });
 
-  it("is no motion where all frames are the same but for the noise of a codec, or where there is one", () => {
+  it("is not motion where all frames are the same but for the noise of a codec, or where there is one", () => {
     expect(kinds(striped(90), striped(92), striped(89))).toEqual(["still"]);
     expect(kinds(striped(90))).toEqual(["still"]);
     expect(kinds(striped(90), striped(91), striped(130))).toEqual([]);

@@ -19,7 +19,7 @@ const PIXELS = { width: 960, height: 360 };
 const SHOWN = { width: 480, height: 180 };
 
 describe("layout of a pair", () => {
-  it("puts two clips beside one another at their own size, the gap in millimetres", () => {
+  it("puts two clips side by side at their own size, with the gap in millimeters", () => {
     const layout = layoutOf(SIDE_BY_SIDE, PIXELS, SHOWN, { width: 1440, height: 900 }, 4);
     expect(layout?.canvas).toEqual({ width: 2 * 960 + 80, height: 360 });
     expect(layout?.shown).toEqual({ width: 1000, height: 180 });

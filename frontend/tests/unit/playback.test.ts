@@ -125,7 +125,7 @@ describe("playback record", () => {
     expect(record.frames_late).toBe(29);
   });
 
-  it("tells the rate of the screen that it was seen on, where that is faster than was measured", () => {
+  it("reports the rate of the screen that showed it, if that is faster than was measured", () => {
     const drawn = all(3).map((index): [number, number] => [index, 1_010 + index * 33.3]);
     const rateOf = (...seen_ms: (number | null)[]): number | null =>
       playbackRecord(

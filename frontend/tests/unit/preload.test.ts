@@ -61,7 +61,7 @@ describe("the clips of a block", () => {
     expect(seen.at(-1)).toBe(12);
   });
 
-  it("are told where they could not be had, and the others are here", async () => {
+  it("are reported where they could not be loaded, and the others are here", async () => {
     const cache = new ClipCache(({ clip_sha256 }) =>
       clip_sha256 === "3" ? Promise.reject(new ClipUnavailable("3", "missing")) : Promise.resolve(bytes),
     );

@@ -202,7 +202,7 @@ describe("the marks on a time line", () => {
 describe("the slider over a time line", () => {
   const trial = { kind: "continuous_rating", minimum: -1, maximum: 1 } as Schemas["Replay"]["trial"];
   const answer = { kind: "continuous_rating", values: [-1, 0, null, 1], step_frames: 1 };
-  it("stands where the sampled frame stood, or the next one that was drawn", () => {
+  it("is at the sampled frame, or at the next one that was drawn", () => {
     const play = aPlay({ answer });
     expect(traceOf(play, playedBack(play, [CLIP]), trial)).toEqual([
       [20, 0],

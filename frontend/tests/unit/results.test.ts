@@ -11,7 +11,7 @@ const factor = (name: string, ...levels: [string, string][]) => ({
 });
 const FACTORS = [factor("character", ["a", "Anna"], ["b", "Bert"]), factor("speed", ["100", "100 ms"], ["20", "20 ms"])];
 
-it("a figure of means tells of bars only where there are some", () => {
+it("a figure of means mentions bars only where there are some", () => {
   const caption = (se_within: number | null): unknown => {
     const means = [{ levels: { speed: "20" }, mean: 2, se_within, participants: 1 }];
     return marginPlot({ factors: ["speed"], means }, { scale: { name: "rating", minimum: 1, maximum: 7 } } as never, FACTORS).caption;
@@ -53,7 +53,7 @@ describe("counts", () => {
 });
 
 describe("labels of cells", () => {
-  it("stand in declared order, of the factors in which the cells differ", () => {
+  it("are in declared order, with the factors in which the cells differ", () => {
     expect([...cellLabels(["b/20", "a/20", "b/100", "a/100"], FACTORS)]).toEqual([
       ["a/100", "Anna, 100 ms"],
       ["a/20", "Anna, 20 ms"],

@@ -44,7 +44,7 @@ describe("actual size", () => {
     ["a tablet turned", { screen_width_px: 1_080, screen_height_px: 1_920 }, "none"],
     ["another monitor", { screen_width_px: 2_560, screen_height_px: 1_440 }, "screen"],
     ["a finer monitor", { device_pixel_ratio: 2, screen_width_px: 1_512, screen_height_px: 982 }, "screen"],
-  ])("tells %s", (_what, change, kind) => {
+  ])("recognizes %s", (_what, change, kind) => {
     expect(screenChange(before, { ...before, ...change })).toBe(kind);
   });
   it("keeps the size in millimetres under zoom", () => {

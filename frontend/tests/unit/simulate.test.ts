@@ -31,7 +31,7 @@ async function sent(reference: ShownClipRating["reference"]): Promise<RatingIn[]
   return bodies;
 }
 
-it("a simulated rating tells the declared gap after a reference, and none without one", async () => {
+it("a simulated rating reports the declared gap after a reference, and none without one", async () => {
   const answers = { rating: { response: expect.any(Number) as number } };
   const [after] = await sent({ label: { en: "Reference" }, gap_ms: 2_000 });
   expect(after?.answer).toEqual({ kind: "clip_rating", answers, reference_gap_ms: 2_000 });

@@ -30,7 +30,7 @@ describe("the figure of a cell", () => {
     });
   });
 
-  it("has a tick a blink in a row a clip, all below the scale", () => {
+  it("has one tick per blink and one row per clip, all below the scale", () => {
     const ticks = ticksOf(CELL, DATA);
     expect(ticks.map(({ time_s }) => time_s)).toEqual([0.05, 0.15, 0.1]);
     expect(ticks.every(({ from, to }) => from < to && to < DATA.minimum)).toBe(true);

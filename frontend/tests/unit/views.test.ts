@@ -195,7 +195,7 @@ describe("disturbances", () => {
     vi.unstubAllGlobals();
   });
 
-  it("tells another refresh rate from a hiccup", () => {
+  it("distinguishes another refresh rate from a hiccup", () => {
     expect(refreshDropped(33.3, 16.7)).toBe(true);
     expect(refreshDropped(17.5, 16.7)).toBe(false);
     expect(refreshDropped(null, 16.7)).toBe(false);

@@ -44,7 +44,7 @@ describe("what the page waits for from its worker", () => {
     vi.unstubAllGlobals();
   });
 
-  it("gives a clip that is prepared anew the whole limit, whatever became of the first time", async () => {
+  it("gives a clip that is prepared again the whole limit, whatever became of the first time", async () => {
     const worker = new SilentWorker();
     const player = playerOf(worker);
     const first = player.prepare(CLIP, new ArrayBuffer(8), 30);
@@ -64,7 +64,7 @@ describe("what the page waits for from its worker", () => {
     await isPreparedLate(player, worker);
   });
 
-  it("takes no late answer to a clip given up for one to the clip prepared anew", async () => {
+  it("takes no late answer to a clip given up for one to the clip prepared again", async () => {
     const worker = new SilentWorker();
     const player = playerOf(worker);
     const given_up = expect(player.prepare(CLIP, new ArrayBuffer(8), 30)).rejects.toThrow("not a video");

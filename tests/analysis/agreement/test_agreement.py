@@ -81,7 +81,7 @@ def test_krippendorffs_own_example(tmp_path, level, alpha) -> None:
     assert any("1 items were rated by only one person" in decision for decision in result.decisions)
 
 
-def test_who_rated_what_nobody_else_did_is_no_rater(tmp_path) -> None:
+def test_who_rated_what_nobody_else_did_is_not_a_rater(tmp_path) -> None:
     lines = [f"{who},c{clip},{1 + (clip + k) % 5}" for k, who in enumerate("ab") for clip in range(6)]
     result = agreement(read_votes(votes_file(tmp_path, [*lines, "z,own,3"]), "clip", "id", "score"))
     assert (result.n_people, result.n_items, result.n_complete_items) == (2, 6, 6)
@@ -95,7 +95,7 @@ def test_who_rated_what_nobody_else_did_is_no_rater(tmp_path) -> None:
         (["a,c1,3", "b,c1,3", "a,c2,3", "b,c2,3"], "every rating is 3"),
     ],
 )
-def test_what_tells_nothing_of_agreement_is_refused(tmp_path, lines, said) -> None:
+def test_what_says_nothing_of_agreement_is_refused(tmp_path, lines, said) -> None:
     with pytest.raises(InputError, match=said):
         agreement(read_votes(votes_file(tmp_path, lines), "clip", "id", "score"))
 
@@ -110,7 +110,7 @@ def test_what_tells_nothing_of_agreement_is_refused(tmp_path, lines, said) -> No
         (["calm", "happy"], [], None, "no column 'happy'"),
     ],
 )
-def test_items_that_are_no_scale_are_refused(items, reverse, scale, said) -> None:
+def test_items_that_are_not_a_scale_are_refused(items, reverse, scale, said) -> None:
     with pytest.raises(InputError, match=said):
         read_items(FOLDER / "items.csv", items, reverse, scale)
 

@@ -136,7 +136,7 @@ def test_a_covariate_that_the_groups_determine_is_refused(tmp_path) -> None:
     )
 
 
-def test_follow_up_tests_stand_in_the_json(tmp_path) -> None:
+def test_follow_up_tests_are_in_the_json(tmp_path) -> None:
     out = tmp_path / "o.json"
     arguments = (
         "--within",
@@ -181,7 +181,7 @@ def test_a_group_of_one_participant_is_named(tmp_path) -> None:
     assert "group g has one" not in said
 
 
-def test_slopes_that_a_group_of_one_does_not_tell_are_named(tmp_path) -> None:
+def test_slopes_that_a_group_of_one_does_not_determine_are_named(tmp_path) -> None:
     """The intercept cannot be distinguished from that group's slope either, and it has no name."""
     file = tmp_path / "t.csv"
     file.write_text(

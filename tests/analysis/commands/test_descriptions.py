@@ -17,6 +17,6 @@ ALONE = "from analysis import cli; cli.run_command_line = lambda app: None; cli.
 @pytest.mark.parametrize(
     ("before", "said"), [("", Experiment.model_fields["name"].description), (ALONE, None)]
 )
-def test_descriptions_are_read_where_they_are_told(before: str, said: str | None) -> None:
+def test_descriptions_are_read_where_they_are_given(before: str, said: str | None) -> None:
     done = subprocess.run([sys.executable, "-c", before + TOLD], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == str(said)

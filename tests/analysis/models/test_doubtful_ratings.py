@@ -76,7 +76,7 @@ def test_an_item_of_one_condition_each_is_refused() -> None:
         fitted(SLEEP.assign(clip="c" + SLEEP["drug"]), item="clip")
 
 
-def test_one_person_with_two_ratings_tells_no_variance_of_people() -> None:
+def test_one_person_with_two_ratings_shows_no_variance_of_people() -> None:
     # lme4 answers F(1, 9) = 28.4, p = .0005
     with pytest.raises(InputError, match=r"determine the variance of who intercept"):
         fitted(SLEEP.iloc[:11])

@@ -30,7 +30,7 @@ def _run(tmp_path: Path, command: str, file: Path, *options: str) -> dict[str, A
 
 
 @pytest.mark.parametrize("known", GOLDEN["mixed"], ids=lambda known: known["formula"])
-def test_models_that_are_no_full_factorials_agree_with_lmer(tmp_path: Path, known: dict[str, Any]) -> None:
+def test_models_that_are_not_full_factorials_agree_with_lmer(tmp_path: Path, known: dict[str, Any]) -> None:
     result = _run(tmp_path, "mixed", CROSSED, "--formula", known["formula"])
     # the same model, fitted at least as well as BOBYQA does, which stops where the criterion is nearly flat
     assert known["reml"] - 1e-5 < result["reml_criterion"] < known["reml"] + 1e-6

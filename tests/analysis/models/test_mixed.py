@@ -125,7 +125,7 @@ def test_one_rating_a_cell_drops_the_slope_of_the_highest_interaction():
     assert all(c.term != "A:B" for c in result.components)
 
 
-def test_items_named_by_two_columns_are_told_apart():
+def test_items_named_by_two_columns_are_distinguished():
     rows = small_data(2).assign(exemplar=lambda d: d["clip"].str[1:])
     joined = fit_mixed(rows, "who", "y", ["A", "B"], ["A", "exemplar"], "main")
     single = fit_mixed(rows, "who", "y", ["A", "B"], "clip", "main")

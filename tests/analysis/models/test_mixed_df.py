@@ -112,7 +112,7 @@ def test_a_variance_that_may_be_zero_begins_at_zero() -> None:
     assert 0 < high < 1.5
 
 
-def test_every_interval_is_told_before_it_is_computed() -> None:
+def test_every_interval_is_reported_before_it_is_computed() -> None:
     told: list[str] = []
     fit_mixed(few(8), "who", "y", ["A"], slopes="none", intervals=True, progress=told.append)
     assert told == [
@@ -122,7 +122,7 @@ def test_every_interval_is_told_before_it_is_computed() -> None:
     ]
 
 
-def test_an_end_in_another_minimum_is_fitted_anew(monkeypatch) -> None:
+def test_an_end_in_another_minimum_is_fitted_again(monkeypatch) -> None:
     """Fits that go on from one another may follow a minimum that is not the least."""
     rows = few()
     right = fit_mixed(rows, "who", "y", ["A"], slopes="none", intervals=True)

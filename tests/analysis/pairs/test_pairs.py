@@ -119,7 +119,7 @@ def test_groups_never_compared_are_refused(tmp_path: Path) -> None:
         fitted(table(tmp_path, rows))
 
 
-def test_davidson_tells_the_most_ties_there_can_be(tmp_path: Path) -> None:
+def test_davidson_shows_the_most_ties_there_can_be(tmp_path: Path) -> None:
     rows = [("a", "b", "left")] * 10 + [("a", "b", "right")] * 10 + [("a", "b", "tie")] * 10
     result = fitted(table(tmp_path, rows), method="davidson")
     assert result.items[1].ability == pytest.approx(0.0, abs=1e-9)

@@ -83,7 +83,7 @@ def test_df_and_p_are_recomputed(test, checks) -> None:
     assert {f.check for f in check_study(study(test=(test,)))} == checks
 
 
-def test_univariate_df_are_told_and_mixing_is_doubted() -> None:
+def test_univariate_df_are_reported_and_mixing_is_doubted() -> None:
     tests = ({"effect": "A", "f": "3", "df": (2, 38)}, {"effect": "A:B", "f": "3", "df": (4, 16)})
     both = {"factors": {"A": ("x", "y", "z"), "B": ("k", "l", "m")}, "test": tests}
     kinds = [f.kind for f in check_study(study(**both))]

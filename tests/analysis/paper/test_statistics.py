@@ -69,7 +69,7 @@ def test_what_fits_is_consistent(text) -> None:
         ("t(20) = 2.60, p = .001, Bonferroni-corrected", "inconsistent", "gives p = .017 to 1.000"),
     ],
 )
-def test_what_does_not_fit_is_told(text, verdict, why) -> None:
+def test_what_does_not_fit_is_reported(text, verdict, why) -> None:
     statistic = only(text)
     assert statistic.verdict == verdict
     assert why in statistic.problems[0]
@@ -84,7 +84,7 @@ def test_each_statistic_has_its_own_p_and_what_is_unread_is_said() -> None:
 
 
 @pytest.mark.parametrize("text", ["F(1; 20) = 4,35; p = 0,003", "t(19) = 2,10; p = 0,049", "z = 2,33"])
-def test_numbers_with_a_decimal_comma_are_told_as_unread(text) -> None:
+def test_numbers_with_a_decimal_comma_are_reported_as_unread(text) -> None:
     result = check_text(plain(text))
     assert result.statistics == ()
     assert bool(result.unread) == ("p = " in text)
@@ -241,11 +241,11 @@ def test_a_damaged_word_file_ends_in_one_line(tmp_path) -> None:
 
 
 @pytest.mark.parametrize("text", ["p\np < .05\npartial η²", "* p < .05, ** p < .01", "†p < .001"])
-def test_a_level_over_a_column_or_in_a_legend_is_no_statistic(text) -> None:
+def test_a_level_over_a_column_or_in_a_legend_is_not_a_statistic(text) -> None:
     assert check_text(plain(text)).unread == ()
 
 
-def test_a_level_in_a_sentence_is_told_as_unread() -> None:
+def test_a_level_in_a_sentence_is_reported_as_unread() -> None:
     assert check_text("All of them differed, p < .05.").unread == ("p < .05.",)
 
 
@@ -326,7 +326,7 @@ def test_a_line_may_end_within_a_statistic(tmp_path: Path, suffix: str, at: str)
         "t(20) = -1.80, p = .957, one-sided",
     ],
 )
-def test_corrected_and_one_sided_tests_are_no_errors(text: str) -> None:
+def test_corrected_and_one_sided_tests_are_not_errors(text: str) -> None:
     (found,) = check_text(text).statistics
     assert found.verdict == "consistent", found.problems
 

@@ -181,14 +181,14 @@ def test_a_version_is_the_answers_given_under_it_alone(tmp_path, rows) -> None:
         (Pool(Origin.PILOT, version=3), "has no ratings of origin 'pilot' under version 3 yet"),
     ],
 )  # fmt: skip
-def test_an_unknown_version_or_series_is_told_those_there_are(tmp_path, rows, pool, words) -> None:
+def test_an_unknown_version_or_series_is_refused_with_those_there_are(tmp_path, rows, pool, words) -> None:
     with pytest.raises(InputError, match=re.escape(words)) as refused:
         report(tmp_path, in_three_versions(rows), pool=pool)
     if pool.version == 4:
         assert str(refused.value).endswith("data series 2 (versions 2, 3)")
 
 
-def test_rows_without_versions_are_told_so(tmp_path, rows) -> None:
+def test_rows_without_versions_are_reported(tmp_path, rows) -> None:
     bare = [{key: value for key, value in row.items() if key != "study_version"} for row in rows]
     with pytest.raises(InputError, match="does not record the study version of its rows; do not choose"):
         report(tmp_path, bare, pool=Pool(version=1))

@@ -99,7 +99,7 @@ def arguments(rows: pd.DataFrame, between: tuple[str, ...] = ()) -> dict[str, An
 
 
 @pytest.mark.parametrize(("effect", "group"), [("A:B", False), ("G:A", True)])
-def test_an_interaction_that_differs_between_faces_is_no_effect(effect: str, group: bool) -> None:
+def test_an_interaction_that_differs_between_faces_is_not_an_effect(effect: str, group: bool) -> None:
     """Of 16 sets without an effect one or so is below .05; with slopes of main effects six are."""
     below = 0
     for seed in range(16):
@@ -130,7 +130,7 @@ def test_what_is_not_fitted_holds_for_the_faces_shown() -> None:
     assert holds_for("A", ["face"], "none") == "the face shown"
 
 
-def test_one_clip_a_cell_is_no_grouping_beside_the_slopes() -> None:
+def test_one_clip_per_cell_is_not_a_grouping_with_the_slopes() -> None:
     fitted, slopes = fit_with_random(arguments(trials(1, per_cell=1)), ["face"], every=True)
     assert slopes == "all"
     assert fitted.n_items == 0

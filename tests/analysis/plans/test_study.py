@@ -178,7 +178,7 @@ def test_repeated_rows_count_once_and_contradictions_are_refused(tmp_path, rows)
         )
 
 
-def test_other_studies_and_experiments_are_told_apart(tmp_path, rows) -> None:
+def test_other_studies_and_experiments_are_distinguished(tmp_path, rows) -> None:
     two = rows + change(rows, lambda row: True, study="t", run="z")
     path = write_export(tmp_path / "two.csv", EXP3, two)
     with pytest.raises(InputError, match="holds 2 studies; choose one with --study: s, t"):
@@ -191,7 +191,7 @@ def test_other_studies_and_experiments_are_told_apart(tmp_path, rows) -> None:
         load_csv(other, EXP3, READING)
 
 
-def test_nothing_to_analyse_is_told_from_bad_input(tmp_path, rows) -> None:
+def test_nothing_to_analyse_is_distinguished_from_bad_input(tmp_path, rows) -> None:
     with pytest.raises(NoRatingsError, match="no ratings yet"):
         load_csv(write_export(tmp_path / "e.csv", EXP3, []), EXP3, READING)
     with pytest.raises(NoRatingsError, match="no ratings of origin 'participant'"):
@@ -215,7 +215,7 @@ def test_an_unusable_database_address_is_refused(url) -> None:
         load_database(url, EXP3, READING)
 
 
-def test_a_file_that_is_no_database_is_refused(tmp_path) -> None:
+def test_a_file_that_is_not_a_database_is_refused(tmp_path) -> None:
     (tmp_path / "f.sqlite").write_text("not a database, but a rather long text that SQLite cannot read")
     with pytest.raises(InputError, match=r"cannot read f\.sqlite"):
         load_database(f"sqlite:///{tmp_path}/f.sqlite", EXP3, READING)

@@ -52,7 +52,7 @@ def test_a_covariate_has_the_power_of_the_noncentral_f() -> None:
     assert "a covariate correlates 0.7" in design.population
 
 
-def test_groups_alone_are_told_no_correlation() -> None:
+def test_groups_alone_have_no_correlation() -> None:
     design = FactorialDesign({}, {"group": 2}, {"group": 0.3}, 0.5)
     assert "correlate" not in design.population
     assert "each participant gives one mean" in design.population
@@ -195,7 +195,7 @@ def test_two_items_have_the_power_of_the_binomial_test() -> None:
 
 
 @pytest.mark.parametrize("abilities", [(0.0, 0.0), (0.0, 0.0, 0.0)])
-def test_items_that_do_not_differ_are_told_apart_at_the_rate_of_alpha(abilities) -> None:
+def test_items_that_do_not_differ_are_distinguished_at_the_rate_of_alpha(abilities) -> None:
     """Raters' own preferences, compared five times each, are not evidence about the population."""
     design = PairsDesign(abilities, repeats=5, rater_sd=1.0)
     result = simulate_design(design, "x", [10, 25], 800, seed=3)

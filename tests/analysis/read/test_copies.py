@@ -74,14 +74,14 @@ def test_copies_of_a_part_and_of_sorted_rows_are_named(tmp_path: Path) -> None:
     assert "every row is in the table twice" in said("mixed", sorted_rows, tmp_path)
 
 
-def test_rows_that_differ_in_any_column_are_no_copies(tmp_path: Path) -> None:
+def test_rows_that_differ_in_any_column_are_not_copies(tmp_path: Path) -> None:
     rows = ratings()
     twice = pd.concat([rows.assign(session=1), rows.assign(session=2)])
     assert "pasted twice" not in said("mixed", twice, tmp_path)
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_ratings_that_agree_by_chance_are_no_copies(seed: int) -> None:
+def test_ratings_that_agree_by_chance_are_not_copies(seed: int) -> None:
     """Fixed orders of conditions, few levels, no trial numbers: what repeats there is no copied file."""
     rng = np.random.default_rng(seed)
     levels = int(rng.integers(2, 8))

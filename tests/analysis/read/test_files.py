@@ -97,7 +97,7 @@ def test_a_survey_of_one_question_is_its_number(tmp_path, ending) -> None:
     assert "jsPsych numbers their choices from 0" in data.decisions[1]
 
 
-def test_a_survey_of_several_questions_is_no_number(tmp_path) -> None:
+def test_a_survey_of_several_questions_is_not_a_number(tmp_path) -> None:
     path = tmp_path / "two.json"
     beside = {"trial_type": "survey-likert", "trial_index": 1, "time_elapsed": 9, "id": "a", "face": "calm"}
     path.write_text(json.dumps([beside | {"response": {"Q0": 1, "Q1": 2}}]), encoding="utf-8")
@@ -105,7 +105,7 @@ def test_a_survey_of_several_questions_is_no_number(tmp_path) -> None:
         read_long_table(path, "id", "response", ["face"])
 
 
-def test_the_last_line_of_gorilla_is_no_trial(tmp_path) -> None:
+def test_the_last_line_of_gorilla_is_not_a_trial(tmp_path) -> None:
     path = tmp_path / "gorilla.csv"
     lines = ["Event Index,Participant Private ID,Zone Type,face,Response"]
     lines += [f"{i},{p},response_slider,{f},{s}" for i, (p, f, s) in enumerate(ROWS)]
@@ -115,7 +115,7 @@ def test_the_last_line_of_gorilla_is_no_trial(tmp_path) -> None:
     assert "read as data of Gorilla: 1 rows" in data.decisions[0]
 
 
-def test_routines_of_psychopy_without_a_rating_are_no_trials(tmp_path) -> None:
+def test_routines_of_psychopy_without_a_rating_are_not_trials(tmp_path) -> None:
     path = tmp_path / "psychopy.csv"
     with path.open("w", encoding="utf-8", newline="") as file:
         out = csv.writer(file)
@@ -146,7 +146,7 @@ def test_two_sheets_are_refused_until_one_is_named(tmp_path) -> None:
         (True, "'score' should be a number, got 'True' in line 3"),
     ],
 )
-def test_cells_that_are_no_ratings_are_refused(tmp_path, score, said) -> None:
+def test_cells_that_are_not_ratings_are_refused(tmp_path, score, said) -> None:
     rows = [*ROWS]
     rows[1] = (*rows[1][:2], score)
     with pytest.raises(InputError, match=said):

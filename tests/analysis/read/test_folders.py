@@ -36,7 +36,7 @@ def test_a_folder_with_a_file_a_person_is_one_table(tmp_path, psychopy) -> None:
     assert data.decisions[0] == "read 3 data files of the folder f"
 
 
-def test_a_column_that_a_folder_lacks_is_told_with_the_folder(tmp_path, monkeypatch) -> None:
+def test_a_column_that_a_folder_lacks_is_reported_with_the_folder(tmp_path, monkeypatch) -> None:
     folder = folder_of(tmp_path / "f")
     told = r"^the folder f \(all its \.csv files as one table\) has no column 'rating'"
     with pytest.raises(InputError, match=told):
@@ -123,7 +123,7 @@ def test_rows_of_few_kinds_that_are_those_of_others_are_said_and_count(tmp_path)
     )
 
 
-def test_generated_rows_are_told_though_only_some_files_say_so(tmp_path) -> None:
+def test_generated_rows_are_reported_though_only_some_files_say_so(tmp_path) -> None:
     folder = folder_of(tmp_path / "f")
     (folder / "p9.csv").write_text("face,score,synthetic,age\ncalm,1,1,30\nwild,2,1,30\n", encoding="utf-8")
     data = read_long_table(folder, "file", "score", ["face"])
@@ -148,7 +148,7 @@ def test_hidden_files_and_folders_with_the_name_of_a_table_are_none(tmp_path) ->
     ["face,score\n".encode("utf-16"), b'face,"sc\nore"\n', b"\xef\xbb\xbfface,score\n", b"face,score\n,\n"],
     ids=["UTF-16", "two lines", "mark", "blank cells"],
 )
-def test_a_header_alone_is_no_row_however_it_is_written(tmp_path, text) -> None:
+def test_a_header_alone_is_not_a_row_however_it_is_written(tmp_path, text) -> None:
     folder = folder_of(tmp_path / "f")
     (folder / "p9.csv").write_bytes(text)
     data = read_long_table(folder, "file", "score", ["face"])
@@ -171,7 +171,7 @@ def test_psych_ds_files_of_a_header_alone_are_left_out(tmp_path) -> None:
     assert set(data.rows["id"].astype(str)) == set(PEOPLE)
 
 
-def test_messages_name_the_file_beside_the_line(tmp_path) -> None:
+def test_messages_name_the_file_next_to_the_line(tmp_path) -> None:
     folder = folder_of(tmp_path / "f")
     with (folder / "p2.csv").open("a", encoding="utf-8") as file:
         file.write("calm,\n")
@@ -182,7 +182,7 @@ def test_messages_name_the_file_beside_the_line(tmp_path) -> None:
         read_long_table(folder, "file", "score", ["face"])
 
 
-def test_answers_of_few_kinds_that_are_alike_by_chance_are_no_joined_file(tmp_path) -> None:
+def test_answers_of_few_kinds_that_are_alike_by_chance_are_not_a_joined_file(tmp_path) -> None:
     (tmp_path / "f").mkdir()
     for number in range(5):
         rows = ["calm,1", "wild,2"] * (4 if number == 2 else 3)

@@ -52,7 +52,7 @@ def test_a_rating_far_from_the_others_is_named(tmp_path) -> None:
     assert "'y' has 77 (line 62), far from the others (1 to 7)" in said
 
 
-def test_numbers_that_are_no_scale_are_left_alone(tmp_path) -> None:
+def test_numbers_that_are_not_a_scale_are_left_alone(tmp_path) -> None:
     reaction_times = [str(300 + 17 * (i % 23)) for i in range(60)]
     assert not read(file_of(tmp_path, [*reaction_times, "2900"])).decisions
 
@@ -65,7 +65,7 @@ def test_numbers_that_are_no_scale_are_left_alone(tmp_path) -> None:
         (["y"], "two roles"),
     ],
 )
-def test_the_participant_is_no_item(tmp_path, item, message) -> None:
+def test_the_participant_is_not_an_item(tmp_path, item, message) -> None:
     path = tmp_path / "t.csv"
     rows = [f"{i // 4},x{i // 4},{'ab'[i % 2]},{i % 5}" for i in range(24)]
     path.write_text("\n".join(["id,person,a,y", *rows]))
@@ -115,7 +115,7 @@ def test_empty_rows_below_a_table_are_left_out(tmp_path) -> None:
 
 
 @pytest.mark.parametrize("first", ["sep=|", "id|a|y"])
-def test_a_first_line_that_is_no_header_is_shown_with_what_to_do(tmp_path, first) -> None:
+def test_a_first_line_that_is_not_a_header_is_shown_with_what_to_do(tmp_path, first) -> None:
     path = file_of(tmp_path, ["1", "2"])
     path.write_text(f"{first}\n{path.read_text()}")
     with pytest.raises(InputError, match=r"its first line is .*; it should have the column names"):
@@ -129,7 +129,7 @@ def with_another(tmp_path: Path, other: list[str], ratings: list[str]) -> Path:
     return path
 
 
-def test_points_beside_another_columns_decimal_comma_are_refused_with_both_readings(tmp_path) -> None:
+def test_points_next_to_another_columns_decimal_comma_are_refused_with_both_readings(tmp_path) -> None:
     path = with_another(tmp_path, ["2,5", "NA", "3"], ["1.003", "2.500", ""])
     with pytest.raises(InputError) as caught:
         read(path)
@@ -144,5 +144,5 @@ def test_points_are_decimal_where_no_other_column_has_a_decimal_comma(tmp_path, 
     assert read(with_another(tmp_path, other, ["1.003", "2.500"])).rows["y"].tolist() == [1.003, 2.5]
 
 
-def test_a_shown_decimal_point_is_one_beside_another_columns_comma(tmp_path) -> None:
+def test_a_shown_decimal_point_is_one_next_to_another_columns_comma(tmp_path) -> None:
     assert read(with_another(tmp_path, ["2,5", "3"], ["1.003", "2.5"])).rows["y"].tolist() == [1.003, 2.5]

@@ -20,7 +20,7 @@ def wide_file(folder: Path, text: str = WIDE) -> Path:
     return path
 
 
-def test_every_cell_becomes_a_row_and_the_rest_stays_beside(tmp_path) -> None:
+def test_every_cell_becomes_a_row_and_the_rest_stays_next_to_it(tmp_path) -> None:
     table = lengthen(wide_file(tmp_path), "{face}_{blur}", "score")
     assert table.factors == ("face", "blur")
     assert table.beside == ("id", "age")
@@ -50,7 +50,7 @@ def test_a_long_command_on_a_wide_table_says_the_way_out(tmp_path) -> None:
         (["a_id", "face", "rating_1"], None),
     ],
 )
-def test_wide_headers_are_told_from_long_ones(header, pattern) -> None:
+def test_wide_headers_are_distinguished_from_long_ones(header, pattern) -> None:
     hint = wide_hint(header)
     assert (f"--columns '{pattern}'" in hint) if pattern else hint == ""
 
@@ -76,7 +76,7 @@ def test_a_name_that_fits_in_two_ways_is_refused(tmp_path) -> None:
         lengthen(path, "{face}_{blur}", "score")
 
 
-def test_columns_that_are_asked_for_are_no_cells_of_a_wide_table(tmp_path) -> None:
+def test_columns_that_are_asked_for_are_not_cells_of_a_wide_table(tmp_path) -> None:
     path = tmp_path / "a.csv"
     path.write_text("case,q1,q2,q3\na,1,2,3\nb,2,3,4\n", encoding="utf-8")
     with pytest.raises(InputError, match=r"no column 'id'; its columns are case, q1, q2, q3$"):

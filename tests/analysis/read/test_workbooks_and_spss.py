@@ -52,7 +52,7 @@ def test_merged_cells_are_named(tmp_path, rows, merged, said) -> None:
     assert said in str(caught.value)
 
 
-def test_merged_cells_beside_what_is_read_are_nothing(tmp_path) -> None:
+def test_merged_cells_next_to_what_is_read_are_nothing(tmp_path) -> None:
     rows = [(*HEAD, "note"), *[(*row, "x") for row in ROWS]]
     assert len(read(workbook(tmp_path / "a.xlsx", rows, ["D2:D4"])).rows) == len(ROWS)
 
@@ -94,7 +94,7 @@ def test_codes_of_one_word_are_kept_apart(tmp_path) -> None:
     assert sorted(spss(tmp_path / "b.sav", {1: "2", 3: "x"}).rows["cond"].unique()) == ["2 (1)", "2 (2)", "x"]
 
 
-def test_values_declared_missing_are_no_ratings(tmp_path) -> None:
+def test_values_declared_missing_are_not_ratings(tmp_path) -> None:
     ranges = {"score": [{"lo": 6, "hi": 7}, 1]}
     data = spss(tmp_path / "a.sav", {1: "a"}, missing_ranges=ranges)
     left = [score for *_, score in ROWS if score not in (1, 6, 7)]
@@ -104,7 +104,7 @@ def test_values_declared_missing_are_no_ratings(tmp_path) -> None:
 WORDS = {1: "low", 2: "middle", 3: "high"}
 
 
-def test_levels_stand_in_the_order_of_their_codes(tmp_path) -> None:
+def test_levels_are_in_the_order_of_their_codes(tmp_path) -> None:
     data = spss(tmp_path / "a.sav", WORDS)
     table = cell_table(data.rows, "id", "score", ["cond"])
     assert table.levels == (("low", "middle", "high"),)
@@ -156,7 +156,7 @@ def test_thresholds_opinion_and_pairs_take_the_order_of_the_codes(tmp_path) -> N
     )
 
 
-def test_fits_of_thresholds_stand_in_the_order_of_the_codes(tmp_path) -> None:
+def test_fits_of_thresholds_are_in_the_order_of_the_codes(tmp_path) -> None:
     read = read_answers(answers(tmp_path / "t.sav", WORDS), "x", "yes", None, "cond")
     fits = fit_thresholds(read, "logistic", 0.0, 0.02)
     assert list(fits.pooled) == ["low", "middle", "high"]

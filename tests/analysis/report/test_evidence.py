@@ -46,7 +46,7 @@ def runs(tmp_path):
     return read_runs(path)
 
 
-def test_counts_and_signals_stand_in_page_and_numbers(answers, runs, tmp_path) -> None:
+def test_counts_and_signals_are_in_page_and_numbers(answers, runs, tmp_path) -> None:
     contents = study_contents(RULE, answers, runs=runs)
     assert contents.numbers["evidence"]["verdicts"] == {
         "likely": 4,
@@ -88,7 +88,7 @@ def test_data_from_before_there_were_verdicts_say_so(answers) -> None:
     )
 
 
-def test_a_file_that_is_no_runs_csv_is_refused(tmp_path) -> None:
+def test_a_file_that_is_not_a_runs_csv_is_refused(tmp_path) -> None:
     path = tmp_path / "other.csv"
     path.write_text("run,rt\nr1,5\n", encoding="utf-8")
     with pytest.raises(InputError, match="evidence_verdict"):

@@ -58,7 +58,7 @@ def test_levels_called_as_a_symbol_are_not_in_italics() -> None:
     assert italic("Gender: M", "Gender: F", "p") == ["p"]
 
 
-def test_minus_stands_before_numbers_alone() -> None:
+def test_minus_is_before_numbers_alone() -> None:
     assert (
         with_minus("t(11) = -6.28, [-.05, 0.30], 7-9, P-1 and x - y")
         == "t(11) = −6.28, [−.05, 0.30], 7-9, P-1 and x - y"

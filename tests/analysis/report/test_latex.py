@@ -170,7 +170,7 @@ def test_tex_sets_every_letter_and_sign(tmp_path) -> None:
 
 
 @pytest.mark.skipif(shutil.which("luatex") is None, reason="no luatex (texlive-binaries)")
-def test_a_letter_that_the_font_of_luatex_lacks_stands_as_its_number(tmp_path) -> None:
+def test_a_letter_that_the_font_of_luatex_lacks_is_shown_as_its_number(tmp_path) -> None:
     """XeTeX and LuaTeX leave such a letter out, so that two levels would have one name."""
     text = document(odd_contents(), tmp_path)
     declared = re.findall(r"^\\catcode.*\\fi\}$", text, re.MULTILINE)

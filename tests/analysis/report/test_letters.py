@@ -47,7 +47,7 @@ def test_a_dollar_and_a_backslash_are_letters() -> None:
 
 
 @pytest.mark.usefixtures("no_further_fonts")
-def test_letters_without_a_font_are_told_apart_by_their_numbers() -> None:
+def test_letters_without_a_font_are_distinguished_by_their_numbers() -> None:
     figure = figure_of((CHINESE, "مرحبا"), ("한", "b"))
     with warnings.catch_warnings():
         warnings.simplefilter("error")

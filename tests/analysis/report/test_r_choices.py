@@ -73,7 +73,7 @@ def test_r_finds_a_changed_number(tmp_path, made, table) -> None:
         list(verify_with_r([script]))
 
 
-def test_no_name_of_a_person_or_cell_stands_in_code(tmp_path) -> None:
+def test_no_name_of_a_person_or_cell_is_in_code(tmp_path) -> None:
     for contents in (of_pairs(tmp_path), of_thresholds(tmp_path)):
         text = written(contents, tmp_path).read_text(encoding="utf-8")
         code = "\n".join(line for line in text.splitlines() if not line.startswith("#"))

@@ -42,7 +42,7 @@ def written(section: Section, folder: Path, key: str = "") -> list[Path]:
     return [folder / name for name in files]
 
 
-def test_levels_stand_in_the_order_of_the_model(tmp_path) -> None:
+def test_levels_are_in_the_order_of_the_model(tmp_path) -> None:
     experiment = first_levels(2)
     factor = experiment.factors[0]
     export = write_export(
@@ -120,7 +120,7 @@ def test_r_finds_a_changed_f_and_a_changed_coefficient(of_r) -> None:
     assert re.search(r"^ordinal coefficient .*DIFFER$", of_r["changed ordinal"], re.MULTILINE)
 
 
-def test_no_name_stands_in_code(tmp_path) -> None:
+def test_no_name_is_in_code(tmp_path) -> None:
     mixed, ordinal = sections(tmp_path, first_levels(2))
     for path in written(mixed, tmp_path, "a") + written(ordinal, tmp_path, "a"):
         assert path.name.startswith("a-")

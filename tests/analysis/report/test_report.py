@@ -69,7 +69,7 @@ def test_one_sentence_an_effect_with_its_numbers(analysis) -> None:
 STATISTIC = re.compile(r"F\(([\d.]+), ([\d.]+)\) = ([\d.]+), p [=<] [^()]*?partial η² = (\.\d\d)")
 
 
-def test_every_f_of_a_sentence_stands_beside_its_own_effect_size(analysis) -> None:
+def test_every_f_of_a_sentence_is_next_to_its_own_effect_size(analysis) -> None:
     found = [STATISTIC.findall(text) for text in sentences(analysis)]
     assert all(found)
     for df1, df2, f, eta in (match for matches in found for match in matches):
@@ -85,7 +85,7 @@ def test_the_report_finds_no_fault_with_its_own_sentences(analysis) -> None:
     assert "more cannot" not in said
 
 
-def test_what_stands_alone_is_told_apart_from_what_was_recomputed() -> None:
+def test_what_stood_alone_is_distinguished_from_what_was_recomputed() -> None:
     assert self_check(("r(20) = .50, p = .018.", "It is more (p = .001).")).endswith(
         "0 inconsistent; 1 more cannot be recomputed from the sentence."
     )
@@ -173,7 +173,7 @@ def test_undefined_tests_are_dashes_with_a_reason(tmp_path) -> None:
     assert "univariate, df and p with the Greenhouse-Geisser correction" in text
 
 
-def test_bayes_factors_stand_beside_the_planned_pairs(tmp_path) -> None:
+def test_bayes_factors_are_next_to_the_planned_pairs(tmp_path) -> None:
     section = bayes_factors(analysis_of("exp3", tmp_path, 12))
     (table,) = section.tables
     assert len(table.rows) == 6

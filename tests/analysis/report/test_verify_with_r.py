@@ -15,7 +15,7 @@ def written(folder: Path, name: str, line: str) -> Path:
     return path
 
 
-def test_scripts_of_models_come_last_and_each_is_told_before_the_next_begins(tmp_path) -> None:
+def test_scripts_of_models_come_last_and_each_is_reported_before_the_next_begins(tmp_path) -> None:
     needed()
     models = [
         written(tmp_path, f"{kind}-verify.R", f'cat("{kind}"); invisible(file.create("{kind}"))\n')

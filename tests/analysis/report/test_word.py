@@ -123,7 +123,7 @@ def test_captions_are_numbered_by_word_and_each_figure_and_table_has_alternative
         assert f"{len(table.rows) - 1} rows" in said.get(qn("w:val"))
 
 
-def test_notes_begin_as_such_and_stand_under_what_they_are_of(report) -> None:
+def test_notes_begin_as_such_and_are_under_what_they_are_of(report) -> None:
     said, folder = report
     document = docx.Document(str(folder / "report.docx"))
     notes = [paragraph for paragraph in document.paragraphs if paragraph.style.name == "Body Text 3"]

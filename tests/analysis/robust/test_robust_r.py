@@ -52,7 +52,7 @@ def test_all_sign_flips(expected: dict[str, Any], rows: pd.DataFrame) -> None:
         assert test.p_value == pytest.approx(theirs["p_value"], abs=1e-12)
 
 
-def test_all_orders_beside_a_covariate(expected: dict[str, Any], rows: pd.DataFrame) -> None:
+def test_all_orders_with_a_covariate(expected: dict[str, Any], rows: pd.DataFrame) -> None:
     means = rows[rows["id"] <= "p07"].groupby(["id", "g"], as_index=False)["y"].mean()
     x = np.array(expected["lane"]["x"], dtype=float)
     codes = (means["g"] == "g2").to_numpy().astype(np.int64)[:, None]

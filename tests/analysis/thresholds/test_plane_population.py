@@ -123,13 +123,13 @@ def test_a_falling_function_is_the_rising_one_of_the_other_answers(
     assert fit.tilt_ci.high == pytest.approx(rising.tilt_ci.high, rel=5e-3)
 
 
-def test_two_people_are_no_population() -> None:
+def test_two_people_are_not_a_population() -> None:
     every = people(2, 10, 10)
     with pytest.raises(InputError, match="3 people or more, got 2"):
         fit_plane_population(every, together(every))
 
 
-def test_answers_that_place_no_threshold_of_their_own_count_and_are_told() -> None:
+def test_answers_that_place_no_threshold_of_their_own_count_and_are_reported() -> None:
     """One person whose answers switch without overlap has no fit, and is one of the population."""
     every = [*people(3, 8, 20), Points(X, Z, np.full(X.size, 3.0), np.where(X > 260, 3.0, 0.0))]
     rows = [

@@ -137,7 +137,7 @@ def test_bad_input_is_one_line(tmp_path: Path, text: str, options: list[str], to
     assert told in str(done.exception)
 
 
-def test_people_without_a_threshold_of_their_own_are_counted_beside_the_mean(tmp_path: Path) -> None:
+def test_people_without_a_threshold_of_their_own_are_counted_next_to_the_mean(tmp_path: Path) -> None:
     path = tmp_path / "trials.csv"
     rows = [f"p{p},{x},{int(k < (x - p) / 4)}" for p in range(4) for x in (10, 20, 30, 40) for k in range(10)]
     rows += [f"q,{x},1" for x in (10, 20, 30, 40) for _ in range(10)]

@@ -59,7 +59,7 @@ def test_an_end_of_a_profile_is_where_the_refitted_likelihood_has_fallen() -> No
     assert loss(low + 3) < -0.02  # before the end the likelihood has not fallen as far
 
 
-def test_an_end_between_the_last_step_and_the_bound_is_no_open_end() -> None:
+def test_an_end_between_the_last_step_and_the_bound_is_not_an_open_end() -> None:
     """R 4.2.2, nlminb from six starts and uniroot over the same likelihood: 8.46284 (2026-11-24)."""
     right = np.array([8.0, 6, 10, 10, 10, 12, 11, 11])
     fit = fit_threshold(Trials(np.arange(10.0, 81, 10), np.full(8, 12.0), right), "weibull", 0.5, None)

@@ -56,7 +56,7 @@ def test_a_clip_chosen_by_mistake_is_left_out_and_what_was_typed_stays(
     expect(page.get_by_text("4 clips", exact=True)).to_be_visible()
 
 
-def test_a_file_that_is_no_clip_keeps_no_other_from_coming(dashboard: Dashboard, tmp_path: Path) -> None:
+def test_a_file_that_is_not_a_clip_keeps_no_other_from_coming(dashboard: Dashboard, tmp_path: Path) -> None:
     """A picture among clips stopped the upload for good: those behind it never came."""
     page = dashboard.open("/studies/new")
     page.get_by_label("Short name").fill("unfinished")

@@ -221,7 +221,7 @@ def test_the_canvas_shows_the_frame_that_the_log_says(dashboard: Dashboard, runs
     assert dashboard.complaints == []
 
 
-def test_faults_answers_and_events_are_told(dashboard: Dashboard, runs: Runs) -> None:
+def test_faults_answers_and_events_are_reported(dashboard: Dashboard, runs: Runs) -> None:
     page = open_replay(dashboard, runs, "rating")
     row = page.get_by_role("region", name="Views").get_by_role("row").nth(1)
     expect(row).to_contain_text("8 to 10", timeout=SLOW_MS)

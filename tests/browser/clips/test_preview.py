@@ -81,7 +81,7 @@ def opened(chromium: Browser, sheet: tuple[Manifest, Path]) -> Iterator[tuple[Pa
     context.close()
 
 
-def test_every_clip_stands_beside_its_curves(
+def test_every_clip_is_next_to_its_curves(
     opened: tuple[Page, list[str], list[str]], sheet: tuple[Manifest, Path]
 ) -> None:
     page, _, wrong = opened

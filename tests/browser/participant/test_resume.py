@@ -71,7 +71,7 @@ def test_the_server_dies_while_the_page_is_reloaded(
     assert [row["response"] for row in server.rows(RATED)] == [4, 2, 4, 4, 4, 4]
 
 
-def test_a_second_tab_is_told_and_may_take_over(
+def test_a_second_tab_gets_a_message_and_may_take_over(
     server: ServerProcess, tmp_path: Path, context: BrowserContext, page: Page
 ) -> None:
     _, link = started(server, tmp_path / "clips", page)

@@ -72,7 +72,7 @@ def press_while_it_is_held_up(page: Page, address: str) -> None:
     held[0].continue_()
 
 
-def test_a_fault_goes_when_mended_and_stop_stands_on_every_trial_screen(
+def test_a_fault_goes_when_fixed_and_stop_is_on_every_trial_screen(
     server: ServerProcess, tmp_path: Path, page: Page
 ) -> None:
     text = 'participant_title = { en = "A study of blinks" }\nlanguages'

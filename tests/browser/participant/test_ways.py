@@ -72,7 +72,7 @@ def test_repeats_that_differ_are_followed_by_one_more_and_all_is_stored(served: 
     assert (row["distance_method"], row["distance_typed_mm"]) == ("typed", 600)
 
 
-def test_another_person_begins_anew_where_somebody_has_begun(
+def test_another_person_starts_over_where_somebody_has_begun(
     served: Served, page: Page, context: BrowserContext
 ) -> None:
     server, studies = served

@@ -34,7 +34,7 @@ def test_a_new_key_is_covered_by_no_entry() -> None:
     assert effect_of("trial.brand_new") is None
 
 
-def test_nothing_changed_is_no_difference() -> None:
+def test_nothing_changed_is_not_a_difference() -> None:
     assert edited() == []
     assert edited(("participants = ", "# a comment\nparticipants = ")) == []
 

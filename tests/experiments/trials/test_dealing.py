@@ -85,7 +85,7 @@ def test_a_pair_that_is_dealt_again_has_its_sides_exchanged() -> None:
         ('dealing = { by = "actve" }', ANY, "no such by 'actve'"),
     ],
 )
-def test_dealing_that_does_not_fit_is_told_in_one_line(rest: str, pairs: str, told: str) -> None:
+def test_dealing_that_does_not_fit_is_reported_in_one_line(rest: str, pairs: str, told: str) -> None:
     with pytest.raises(DefinitionError, match=told) as raised:
         declared(pairs, rest=rest)
     assert "\n" not in raised.value.problems[0].message

@@ -138,7 +138,7 @@ def test_its_trials_are_as_many_as_its_blocks_say(kind: Kind) -> None:
     assert trials_per_participant(experiment) == len(main)
 
 
-def test_the_page_is_told_a_part_of_it(kind: Kind) -> None:
+def test_the_page_gets_a_part_of_it(kind: Kind) -> None:
     told = kind.shown(declared(kind))
     assert isinstance(told, kind.page)
     assert told.model_dump()["kind"] == kind.name

@@ -174,7 +174,7 @@ def test_a_block_a_level_holds_the_series_of_that_level() -> None:
             assert trial.block_label == {"s1": "SL", "s2": "AL"}[trial.series]
 
 
-def test_the_plan_tells_series_stimuli_and_length() -> None:
+def test_the_plan_shows_series_stimuli_and_length() -> None:
     told = "\n".join(THRESHOLD.plan(declared()))
     assert "2 adaptive series, interleaved: s1 (SL), s2 (AL)" in told
     assert "4 stimuli from 100 to 400" in told

@@ -58,7 +58,7 @@ def test_the_cookie_is_out_of_reach_of_scripts_and_other_sites(
     assert "samesite=strict" in cookie
 
 
-def test_an_unknown_name_and_a_wrong_password_are_told_alike(
+def test_an_unknown_name_and_a_wrong_password_get_the_same_answer(
     client: TestClient, settings: Settings, owner: Admin
 ) -> None:
     browser = fresh_browser(client, settings)

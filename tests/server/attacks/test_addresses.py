@@ -46,7 +46,7 @@ def test_a_name_that_nothing_has_is_refused(
 
 
 @pytest.mark.parametrize("asked", [f"bytes={DIGITS}-", f"bytes=-{DIGITS}", f"bytes=0-{DIGITS}"])
-def test_a_part_of_a_clip_that_is_no_number_is_the_whole_clip(
+def test_a_part_of_a_clip_that_is_not_a_number_is_the_whole_clip(
     client: TestClient, study: StudyInDatabase, asked: str
 ) -> None:
     with study.services.database.read() as session:
@@ -59,7 +59,7 @@ def test_a_part_of_a_clip_that_is_no_number_is_the_whole_clip(
 @pytest.mark.parametrize(
     "origin", ["http://[", "null", "http://evil.example", "http://localhost@evil.example"]
 )
-def test_an_origin_that_is_no_address_is_another_site(experimenter: Admin, origin: str) -> None:
+def test_an_origin_that_is_not_an_address_is_another_site(experimenter: Admin, origin: str) -> None:
     answer = experimenter.client.post(
         "/api/admin/tokens",
         json={"name": "x", "scopes": ["read"], "days": 1},

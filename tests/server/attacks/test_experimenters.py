@@ -45,7 +45,7 @@ def test_a_definition_that_no_program_reads_is_refused_in_words(
     assert time.process_time() - began < SOON_S
 
 
-def test_of_a_hundred_thousand_unknown_keys_the_first_are_told_at_once(
+def test_of_a_hundred_thousand_unknown_keys_the_first_are_reported_at_once(
     experimenter: Admin, study: StudyInDatabase
 ) -> None:
     toml, began = "".join(f"[a{number}]\n" for number in range(30_000)), time.process_time()
@@ -55,7 +55,7 @@ def test_of_a_hundred_thousand_unknown_keys_the_first_are_told_at_once(
     assert time.process_time() - began < SOON_S
 
 
-def test_a_long_text_of_words_and_dots_is_no_key(experimenter: Admin, study: StudyInDatabase) -> None:
+def test_a_long_text_of_words_and_dots_is_not_a_key(experimenter: Admin, study: StudyInDatabase) -> None:
     text = SHORT.replace("\n", f"\n# {'Look at a. ' * 3000}{'.' * 3000}\n", 1)
     answer = experimenter.send("POST", "/studies/short/versions/check", {"toml": text})
     assert answer.status_code == 200, answer.text

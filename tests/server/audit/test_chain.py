@@ -203,7 +203,7 @@ def test_syslog_gets_each_entry_after_its_commit_without_details(services: Servi
         ("[fe80::1%eth0]:514", ("fe80::1%eth0", 514)),
     ],
 )
-def test_an_ipv6_address_of_syslog_stands_in_brackets(written: str, read: tuple[str, int]) -> None:
+def test_an_ipv6_address_of_syslog_is_in_brackets(written: str, read: tuple[str, int]) -> None:
     assert syslog_address(written) == ("udp", *read)
     for scheme in ("", "tcp://", "tls://"):
         assert Settings(audit_syslog=scheme + written).audit_syslog == scheme + written
@@ -213,7 +213,7 @@ def test_an_ipv6_address_of_syslog_stands_in_brackets(written: str, read: tuple[
     "wrong",
     ["::1", "::1:514", "[logs]:514", "[::1", "[]", "a:b", "tcp://", "udp://a:1", "a:65536", "a:0", "ftp://a"],
 )
-def test_what_is_no_address_of_syslog_is_refused_at_the_start(wrong: str) -> None:
+def test_what_is_not_an_address_of_syslog_is_refused_at_the_start(wrong: str) -> None:
     with pytest.raises(ValidationError, match="expected /dev/log, host:port"):
         Settings(audit_syslog=wrong)
 

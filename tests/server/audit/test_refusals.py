@@ -88,7 +88,7 @@ def test_a_stranger_uses_up_no_room_of_those_who_are_known(
 
 
 @pytest.mark.parametrize("end", ["revoked", "expired"])
-def test_a_token_that_has_ended_is_no_stranger(
+def test_a_token_that_has_ended_is_not_a_stranger(
     services: Services, client: TestClient, settings: Settings, owner: Admin, end: str
 ) -> None:
     made = owner.send("POST", "/tokens", {"name": "night", "scopes": ["read"]}).json()

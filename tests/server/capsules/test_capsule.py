@@ -189,7 +189,7 @@ def test_a_foreign_file_is_named(unpacked: Path, capsule: Path, tmp_path: Path) 
 
 
 @pytest.mark.parametrize("content", [b"", b"PK\x03\x04 and no more", b"no zip at all" * 99])
-def test_what_is_no_capsule_gets_one_line(tmp_path: Path, content: bytes) -> None:
+def test_what_is_not_a_capsule_gets_one_line(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "c.zip").write_bytes(content)
     code, said = verify(tmp_path / "c.zip")
     assert code == 2
@@ -221,7 +221,7 @@ def test_a_report_made_of_files_outside_is_refused(unpacked: Path, path: str) ->
     assert f"the report was made from '{path}', which the list does not contain" in " ".join(said.split())
 
 
-def test_a_list_that_is_no_object_gets_one_line(unpacked: Path) -> None:
+def test_a_list_that_is_not_an_object_gets_one_line(unpacked: Path) -> None:
     (unpacked / CAPSULE_FILE).write_text("[1, 2]", encoding="utf-8")
     code, said = verify(unpacked)
     assert code == 2

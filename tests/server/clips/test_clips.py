@@ -31,7 +31,7 @@ class TestServing:
         assert answer.headers["content-type"] == "video/mp4"
         assert answer.headers["accept-ranges"] == "bytes"
 
-    def test_head_tells_the_length_without_the_bytes(self, client: TestClient) -> None:
+    def test_head_shows_the_length_without_the_bytes(self, client: TestClient) -> None:
         answer = client.head(URL)
         assert (answer.status_code, answer.content) == (200, b"")
         assert answer.headers["content-length"] == str(len(CONTENT))
@@ -75,7 +75,7 @@ class TestServing:
         assert (answer.status_code, answer.json()["error"]["code"]) == (404, "clip_unknown")
 
     @pytest.mark.parametrize("name", ["..%2f..%2fetc%2fpasswd", "ABC", SHA256.upper()])
-    def test_a_name_that_is_no_hash(self, client: TestClient, name: str) -> None:
+    def test_a_name_that_is_not_a_hash(self, client: TestClient, name: str) -> None:
         assert client.get(f"/clips/{name}.mp4").status_code in (404, 422)
 
 

@@ -121,7 +121,7 @@ def test_readiness_before_the_first_study_needs_the_bucket_alone(
         assert client.get("/readyz").status_code == 503
 
 
-def test_a_store_that_does_not_answer_is_told_by_503(s3_settings: Settings) -> None:
+def test_a_store_that_does_not_answer_is_reported_by_503(s3_settings: Settings) -> None:
     away = s3_settings.model_copy(update={"s3_endpoint": "http://127.0.0.1:1"})
     with TestClient(create_app(away)) as client:
         answer = client.get(f"/clips/{SHA256}.mp4")

@@ -96,7 +96,7 @@ def test_the_migration_fills_the_sums_from_the_evidence(watcher: Watcher, servic
     assert before.first_issued_at != before.newest_issued_at
 
 
-def test_doctor_tells_of_wrong_sums(watcher: Watcher, services: Services) -> None:
+def test_doctor_reports_wrong_sums(watcher: Watcher, services: Services) -> None:
     answered(watcher)
     assert next(doctor.counts(services)).verdict == "ok"
     with services.database.write() as session:
@@ -121,7 +121,7 @@ def test_tickets_between_the_first_and_the_newest_are_summed_up(watcher: Watcher
     assert refused.json()["error"]["code"] == "clips_outlast_tickets"
 
 
-def test_a_run_whose_evidence_was_deleted_is_told_by_doctor(watcher: Watcher, services: Services) -> None:
+def test_a_run_whose_evidence_was_deleted_is_reported_by_doctor(watcher: Watcher, services: Services) -> None:
     answered(watcher)
     with services.database.write() as session:
         session.execute(delete(AnswerEvidence))

@@ -117,7 +117,7 @@ def test_an_hour_offline_is_late_and_nothing_else(watcher: Watcher, services: Se
 
 
 @pytest.mark.parametrize("years", [-30, 30])
-def test_a_client_s_clock_years_off_is_no_reason_to_refuse(watcher: Watcher, years: int) -> None:
+def test_a_client_s_clock_years_off_is_not_a_reason_to_refuse(watcher: Watcher, years: int) -> None:
     trial = with_clips(watcher.state())[0]
     watcher.wait(SHOWN_S)
     moment = watcher.moment + timedelta(days=365 * years)
@@ -125,7 +125,7 @@ def test_a_client_s_clock_years_off_is_no_reason_to_refuse(watcher: Watcher, yea
     assert answer.status_code == 201
 
 
-def test_the_server_s_clock_set_back_is_no_reason_to_refuse(watcher: Watcher) -> None:
+def test_the_server_s_clock_set_back_is_not_a_reason_to_refuse(watcher: Watcher) -> None:
     trial = with_clips(watcher.state())[0]
     watcher.wait(-7200)
     assert watcher.answer(trial).status_code == 201
@@ -201,7 +201,7 @@ def test_an_answer_after_a_reload_needs_no_second_view(watcher: Watcher) -> None
     assert code(watcher.answer(second)) == "409 clips_outlast_tickets"
 
 
-def test_views_told_of_at_once_are_no_time_to_watch_them(watcher: Watcher) -> None:
+def test_views_reported_at_once_leave_no_time_to_watch_them(watcher: Watcher) -> None:
     trials = with_clips(watcher.state())
     views = [begun(watcher, trial) for trial in trials]
     assert watcher.request("POST", "/views", {"views": views}).status_code == 200

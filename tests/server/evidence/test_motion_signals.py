@@ -95,7 +95,7 @@ def test_checks_whose_play_failed_are_neither_right_nor_wrong() -> None:
         (1, {"response": None}, "likely"),
     ],
 )
-def test_failed_plays_are_no_way_around_the_checks(number: int, changes: Any, verdict: str) -> None:
+def test_failed_plays_are_not_a_way_around_the_checks(number: int, changes: Any, verdict: str) -> None:
     """Two of ten may fail, as they do on honest people's machines; more leave the run unclear."""
     checked = with_checks(gamma_person(3), random.Random(1), 1.0)
     assert judge(checked).verdict == "likely"

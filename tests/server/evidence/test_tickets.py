@@ -19,7 +19,7 @@ KEY = evidence_key(b"secret")
 MOMENT = datetime(2026, 11, 21, 12, tzinfo=UTC)
 
 
-def test_each_ticket_opens_its_own_play_and_tells_when_it_was_issued() -> None:
+def test_each_ticket_opens_its_own_play_and_shows_when_it_was_issued() -> None:
     batch = issue(KEY, "run1", MOMENT)
     issued = tickets(KEY, batch, [2, 1])
     assert [len(plays) for plays in issued] == [2, 1]

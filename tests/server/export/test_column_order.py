@@ -28,7 +28,7 @@ def table(text: str) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO(text.lstrip("\ufeff"), newline="")))
 
 
-def test_what_belongs_together_stands_together() -> None:
+def test_what_belongs_together_is_together() -> None:
     for columns in (RUN_COLUMNS, *(view.columns for view in views())):
         names = [column.name for column in columns]
         neighbours = set(pairwise(names))

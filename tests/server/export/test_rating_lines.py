@@ -99,7 +99,7 @@ def test_lines_that_are_missing_break_the_export_off(
         list(ratings_csv(session, session.query(Study).one(), EVERYTHING))
 
 
-def test_what_a_column_names_tells_what_it_is_of() -> None:
+def test_what_a_column_names_shows_what_it_is_of() -> None:
     columns = (
         Column("of_answer", "text", "Of the answer.", source="t.payload", member="choice"),
         Column("of_run", "text", "Of the run.", source="s.name || v.number"),

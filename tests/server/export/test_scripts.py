@@ -72,7 +72,7 @@ def impure(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Experiment]:
     return write_export(tmp_path_factory.mktemp("rules") / "rules.csv", study, rows), study
 
 
-def test_the_python_script_leaves_out_what_its_rows_tell(impure: tuple[Path, Experiment]) -> None:
+def test_the_python_script_leaves_out_what_its_rows_show(impure: tuple[Path, Experiment]) -> None:
     path, study = impure
     target = path.with_suffix(".py")
     target.write_text(script(study, "py", path.name), encoding="utf-8")
@@ -82,7 +82,7 @@ def test_the_python_script_leaves_out_what_its_rows_tell(impure: tuple[Path, Exp
     assert float(line.split()[4]) == pytest.approx(own_f(path, study), abs=5e-4)
 
 
-def test_the_r_script_leaves_out_what_its_rows_tell(impure: tuple[Path, Experiment]) -> None:
+def test_the_r_script_leaves_out_what_its_rows_show(impure: tuple[Path, Experiment]) -> None:
     needed("afex", "emmeans", "lme4")
     path, study = impure
     target = path.with_suffix(".R")

@@ -170,7 +170,7 @@ def test_a_key_is_gone_from_the_file_of_the_database(
 
 
 @on_sqlite
-def test_a_changed_secret_key_is_told_in_a_line_and_mended(
+def test_a_changed_secret_key_is_reported_in_a_line_and_fixed(
     services: Services, owner: Admin, people: list[Participant], tmp_path: Path
 ) -> None:
     old = tmp_path / "old_key"
@@ -199,7 +199,7 @@ def test_a_changed_secret_key_is_told_in_a_line_and_mended(
     ("content", "said"),
     [("{}", "expected a key file"), ("no JSON", "expected a key file"), ("newer", "format 2")],
 )
-def test_what_is_no_key_file(
+def test_what_is_not_a_key_file(
     services: Services, people: list[Participant], content: str, said: str, tmp_path: Path
 ) -> None:
     backup = tmp_path / "b.tar"

@@ -35,7 +35,7 @@ def taken_part(client: TestClient, study: StudyInDatabase) -> None:
     gone.request("POST", "/withdraw")
 
 
-def test_erased_visits_are_no_withdrawals_and_other_origins_are_named(
+def test_erased_visits_are_not_withdrawals_and_other_origins_are_named(
     client: TestClient, study: StudyInDatabase, viewer: Admin, services: Services
 ) -> None:
     taken_part(client, study)
@@ -142,7 +142,7 @@ def test_latex_has_no_sign_that_means_something(words: str) -> None:
     assert not set(bare) & set("&%$#_{}~\\")
 
 
-def test_motion_checks_are_told_with_how_many_were_right(
+def test_motion_checks_are_reported_with_how_many_were_right(
     client: TestClient, services: Services, tmp_path: Path, viewer: Admin
 ) -> None:
     study = add_study(services, tmp_path / "clips", checked(SHORT))

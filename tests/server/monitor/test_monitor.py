@@ -100,7 +100,7 @@ def test_a_finished_run_is_done_in_the_table_as_in_the_funnel(
     )
 
 
-def test_the_monitor_is_of_one_origin_and_tells_how_many_others_there_are(
+def test_the_monitor_is_of_one_origin_and_shows_how_many_others_there_are(
     viewer: Admin, study: StudyInDatabase, client: TestClient
 ) -> None:
     Participant(client, study.link_token).agree()

@@ -82,7 +82,7 @@ def test_a_database_that_cannot_be_opened_is_one_finding_each(tmp_path: Path) ->
     assert len(found) >= len(CHECKS)
 
 
-def test_a_ledger_left_in_the_data_folder_is_told_until_it_was_moved(
+def test_a_ledger_left_in_the_data_folder_is_reported_until_it_was_moved(
     services: Services, settings: Settings, tmp_path: Path
 ) -> None:
     note_erased(settings, ["run-a", "run-b"])

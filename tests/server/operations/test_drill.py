@@ -184,7 +184,7 @@ def test_a_stop_in_mid_drill_leaves_no_copy(watched: Settings) -> None:
     assert not list(watched.data_folder.glob(".drill-*"))
 
 
-def test_doctor_and_metrics_tell_age_and_outcome(watched: Settings, services: Services) -> None:
+def test_doctor_and_metrics_show_age_and_outcome(watched: Settings, services: Services) -> None:
     told = Services(**{**vars(services), "settings": watched})
     os.utime(backup_of(watched), (time.time() - 3 * 86400,) * 2)
     old, none = list(backups(told))
@@ -232,7 +232,7 @@ def test_the_server_makes_the_drill_by_itself(
     assert client.get("/healthz").status_code == 200
 
 
-def test_a_missing_file_is_told(watched: Settings, tmp_path: Path) -> None:
+def test_a_missing_file_is_reported(watched: Settings, tmp_path: Path) -> None:
     result = drill(watched, tmp_path / "no.tar")
     assert not result.passed
     assert "cannot be read" in result.said

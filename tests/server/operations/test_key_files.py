@@ -121,7 +121,7 @@ def test_a_key_file_older_than_the_backup_fails_drill_and_restore(
 
 
 @pytest.mark.parametrize("kind", ["here", "off the host"])
-def test_the_keys_stand_there_before_the_backup(
+def test_the_keys_are_there_before_the_backup(
     services: Services, first: Participant, safe: tuple[str, Path], kind: str, tmp_path: Path
 ) -> None:
     """Whenever it is killed: no backup without its keys."""

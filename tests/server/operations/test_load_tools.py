@@ -66,7 +66,7 @@ def test_the_raters_of_load_rate_and_everything_is_stored(server: LoadServer) ->
     assert stored(server, tally) == (0, 0)
 
 
-def test_a_rating_that_was_acknowledged_and_is_not_there_is_told(server: LoadServer) -> None:
+def test_a_rating_that_was_acknowledged_and_is_not_there_is_reported(server: LoadServer) -> None:
     assert stored(server, Tally(acknowledged={"00000000-0000-4000-8000-000000000000": 4})) == (1, 0)
 
 
@@ -141,7 +141,7 @@ class _Answers(threading.Thread):
         (b"HTTP/1.1 200 OK\r\ncontent-length: 9\r\n\r\nabc", "ended within a clip"),
     ],
 )
-def test_what_is_no_whole_clip_is_not_counted(answer: bytes, said: str) -> None:
+def test_what_is_not_a_whole_clip_is_not_counted(answer: bytes, said: str) -> None:
     answering = _Answers(answer)
     answering.start()
     with socket.create_connection(answering.listener.getsockname()) as connection:

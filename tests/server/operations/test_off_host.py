@@ -350,7 +350,7 @@ class TestInOneLine:
             assert said in done.stderr
 
 
-def test_the_admin_page_tells_how_backups_are(
+def test_the_admin_page_shows_how_backups_are(
     rated: Services, owner: Admin, experimenter: Admin, keys: tuple[str, Path], tmp_path: Path
 ) -> None:
     assert experimenter.get("/backups").status_code == 403

@@ -50,7 +50,7 @@ def pooled(settings: Settings, request: pytest.FixtureRequest) -> Iterator[Setti
 @pytest.mark.parametrize(
     ("pooled", "verdict"), [("transaction", "failed"), ("session", "ok")], indirect=["pooled"]
 )
-def test_a_pool_in_transaction_mode_is_told(pooled: Settings, verdict: str) -> None:
+def test_a_pool_in_transaction_mode_is_reported(pooled: Settings, verdict: str) -> None:
     deadline = time.monotonic() + 20
     while True:
         services = open_services(pooled)

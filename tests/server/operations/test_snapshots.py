@@ -133,7 +133,7 @@ class TestTaking:
         assert len(done.stderr.strip().splitlines()) == 1, done.stderr
         assert snapshots_of(services.settings) == []
 
-    def test_postgresql_is_told_where_to_look(self, services: Services) -> None:
+    def test_postgresql_is_given_where_to_look(self, services: Services) -> None:
         settings = Settings(
             database_url="postgresql://me@localhost/lab", data_folder=services.settings.data_folder
         )

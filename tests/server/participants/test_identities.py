@@ -139,7 +139,7 @@ def test_a_finished_visits_code_is_not_shown_for_a_recruiters_id(
         assert paid not in answer.text
 
 
-def test_who_has_lost_the_code_begins_anew_and_leaves_the_other_visit_alone(
+def test_who_has_lost_the_code_starts_over_and_leaves_the_other_visit_alone(
     client: TestClient, link: str, victim: Participant, services: Services
 ) -> None:
     second = Participant(client, link)
@@ -280,7 +280,7 @@ def test_no_page_or_export_shows_a_raw_id(
         assert SONA_CODE.encode() not in answer.content, path
 
 
-def test_a_personal_links_label_is_no_participant_of_exports(
+def test_a_personal_links_label_is_not_a_participant_of_exports(
     client: TestClient, study: StudyInDatabase, experimenter: Admin
 ) -> None:
     Participant(client, study.link("personal", label="Miriam K")).agree().answer_all()

@@ -25,7 +25,7 @@ def age_runs(services: Services, **ages: timedelta) -> None:
                 setattr(run, column, now() - age)
 
 
-def test_an_open_link_tells_what_the_visitor_may_know(client: TestClient, study: StudyInDatabase) -> None:
+def test_an_open_link_shows_what_the_visitor_may_know(client: TestClient, study: StudyInDatabase) -> None:
     link = client.get(f"/api/links/{study.link_token}").json()
     assert (link["status"], link["kind"], link["resumable"]) == ("open", "general", False)
     assert link["study"]["title"] == "A short study"

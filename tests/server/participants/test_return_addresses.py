@@ -74,7 +74,7 @@ def test_what_an_earlier_release_took_ends_no_visit(
 
 
 @pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
-def test_a_study_with_an_address_of_before_is_paused_and_told_by_the_doctor(
+def test_a_study_with_an_address_of_before_is_paused_and_reported_by_the_doctor(
     services: Services, experimenter: Admin, study: StudyInDatabase
 ) -> None:
     """Its page sends all settings, the address too; another that is refused is not saved with it."""

@@ -52,7 +52,7 @@ def test_a_quota_holds_when_all_start_at_once(
         assert session.query(StudyRun).count() == 5
 
 
-def test_who_cannot_begin_anew_keeps_the_visit_there_was(
+def test_who_cannot_start_over_keeps_the_visit_there_was(
     client: TestClient, services: Services, quick_folder: Path
 ) -> None:
     text_of_study = SHORT.replace("[session]", '[session]\nresume = "restart"')

@@ -44,7 +44,7 @@ def test_the_page_gets_everything_but_the_cells(participant: Participant) -> Non
     assert not {"slow", "fast", "cell", "levels", "expected_response"} & set(str(state["trials"]).split("'"))
 
 
-def test_clips_are_where_the_page_is_told(client: TestClient, participant: Participant) -> None:
+def test_clips_are_where_the_page_expects_them(client: TestClient, participant: Participant) -> None:
     trial = participant.agree().state()["trials"][0]
     content = client.get(clip_url(trial)).content
     assert hashlib.sha256(content).hexdigest() == trial["clip_sha256"]

@@ -50,7 +50,7 @@ def rows_of(services: Services, run: str) -> dict[str, int]:
     return {name: count for name, count in counts.items() if count}
 
 
-def test_everything_that_is_stored_is_told(
+def test_everything_that_is_stored_is_reported(
     services: Services, owner: Admin, person: Participant, client: TestClient, link: str
 ) -> None:
     other = Participant(client, link)
@@ -138,7 +138,7 @@ def test_the_command_erases_by_the_recruiters_id(services: Services, person: Par
         (("--run", "4"), "There is no run '4'"),
     ],
 )
-def test_who_is_not_known_is_told_in_a_line(
+def test_who_is_not_known_is_reported_in_a_line(
     services: Services, person: Participant, arguments: tuple[str, ...], said: str, tmp_path: Path
 ) -> None:
     file = tmp_path / "x.json"

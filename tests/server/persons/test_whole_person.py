@@ -76,7 +76,7 @@ def run_of(session: Session, public_id: str) -> StudyRun:
     return session.scalars(select(StudyRun).where(StudyRun.public_id == public_id)).one()
 
 
-def test_everything_that_leads_to_a_run_is_told_and_erased(
+def test_everything_that_leads_to_a_run_is_reported_and_erased(
     client: TestClient, services: Services, owner: Admin, study: StudyInDatabase
 ) -> None:
     person = with_events(client, services, study.link("personal", label="Ada"))
@@ -111,7 +111,7 @@ def test_events_of_a_link_of_many_are_nobodys(
 
 @on_sqlite
 @pytest.mark.parametrize("kind", ["general", "personal"])
-def test_what_pays_is_not_told(
+def test_what_pays_is_not_reported(
     client: TestClient, services: Services, owner: Admin, study: StudyInDatabase, kind: str
 ) -> None:
     person = Participant(client, study.link(kind, label="Label of it")).agree()

@@ -100,7 +100,7 @@ def test_a_new_password_ends_a_login_under_way(
     assert logins(services) == 0
 
 
-def test_a_letter_tells_of_a_login_that_was_added(ada: Admin, services: Services) -> None:
+def test_a_letter_reports_a_login_that_was_added(ada: Admin, services: Services) -> None:
     with services.database.write() as session:
         session.query(Account).one().email = ADDRESS
     with smtp_server() as (box, port):

@@ -115,7 +115,7 @@ def test_thresholds_are_planned_with_the_trials_of_a_series() -> None:
         ("threshold-demo", (ASYMMETRIC, ""), "there is only one series"),
     ],
 )
-def test_a_power_that_no_plan_reckons_is_not_shown(name: str, change: tuple[str, str], problem: str) -> None:
+def test_a_power_that_no_plan_computes_is_not_shown(name: str, change: tuple[str, str], problem: str) -> None:
     text = locate(name).read_text(encoding="utf-8")
     experiment = parse_experiment(text.replace(*change))
     with pytest.raises(InputError, match=problem):

@@ -69,7 +69,7 @@ def test_the_list_says_what_can_be_played(viewer: Admin, person: Participant) ->
     assert clip["cell"]
 
 
-def test_events_of_the_trial_and_no_others_are_told(viewer: Admin, person: Participant) -> None:
+def test_events_of_the_trial_and_no_others_are_reported(viewer: Admin, person: Participant) -> None:
     trial = person.state()["trials"][0]
     person.request("POST", "/views", {"views": [view_of(trial)]})
     person.rate(trial, 4, answered_at_client="2026-11-21T10:00:03+00:00")

@@ -63,7 +63,7 @@ def raising(error: Exception) -> Callable[[], None]:
 @pytest.mark.parametrize(
     ("error", "told"), [(OSError("disk full"), "disk full"), (KeyError("series"), jobs.UNFORESEEN)]
 )
-def test_any_error_ends_a_job_and_is_told_or_logged(
+def test_any_error_ends_a_job_and_is_reported_or_logged(
     services: Services, job: str, caplog: pytest.LogCaptureFixture, error: Exception, told: str
 ) -> None:
     with caplog.at_level(logging.ERROR):

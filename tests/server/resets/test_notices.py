@@ -89,7 +89,9 @@ def test_a_letter_says_what_changed(
     assert PASSWORD not in told[0].get_content() + FRESH
 
 
-def test_nobody_is_told_of_what_did_not_happen(ada: Admin, stranger: TestClient, box: Letterbox) -> None:
+def test_nobody_gets_a_notice_of_what_did_not_happen(
+    ada: Admin, stranger: TestClient, box: Letterbox
+) -> None:
     ada.send("PUT", "/password", {"password": "wrong", "new_password": FRESH})
     ada.send("DELETE", "/second-factor", {"password": "wrong"})
     ada.send("DELETE", "/logins/99")
@@ -97,7 +99,7 @@ def test_nobody_is_told_of_what_did_not_happen(ada: Admin, stranger: TestClient,
     assert box.letters == []
 
 
-def test_the_command_line_tells_too(
+def test_the_command_line_shows_it_too(
     ada: Admin, settings: Settings, box: Letterbox, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name, value in {

@@ -197,7 +197,7 @@ def test_an_address_is_confirmed_before_it_counts(ada: Admin, stranger: TestClie
         "a" * 65 + "@c.example",
     ],
 )
-def test_what_is_no_single_address_is_refused(ada: Admin, address: str) -> None:
+def test_what_is_not_a_single_address_is_refused(ada: Admin, address: str) -> None:
     assert ada.send("PUT", "/mail", {"address": address, "password": PASSWORD}).status_code == 422
 
 
@@ -337,7 +337,7 @@ def test_no_link_is_kept_for_a_session_that_has_just_ended(ada: Admin, services:
         resets.ask_to_confirm(services.database, services.settings, asking, "eve@evil.example")
 
 
-def test_the_address_before_is_told_of_a_change(ada: Admin, stranger: TestClient, box: Letterbox) -> None:
+def test_the_old_address_gets_a_notice_of_a_change(ada: Admin, stranger: TestClient, box: Letterbox) -> None:
     token = _asks_for_eves_address(ada, box)
     assert stranger.post("/api/admin/session/mail", json={"token": token}).status_code == 204
     assert (box.letters[-1]["To"], "confirmed another" in box.letters[-1].get_content()) == (ADDRESS, True)

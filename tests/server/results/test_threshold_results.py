@@ -104,7 +104,7 @@ SECOND = 'second = { factor = "character", values = { photorealistic = 0, cartoo
 PLANE = YES_NO.replace('{ factor = "duration" }', f'{{ factor = "duration", {SECOND} }}')
 
 
-def test_over_two_factors_answers_are_told_by_both_numbers(
+def test_over_two_factors_answers_are_reported_by_both_numbers(
     client: TestClient, services: Services, viewer: Admin, tmp_path: Path
 ) -> None:
     study = add_study(services, tmp_path / "clips", text_with(SHORT, PLANE))

@@ -17,7 +17,7 @@ from tests.helpers.motion_checks import checked
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study
 
 
-def test_levels_told_apart_by_something_else_are_named_before_going_live(
+def test_levels_distinguished_by_something_else_are_named_before_going_live(
     owner: Admin, services: Services, tmp_path: Path
 ) -> None:
     add_study(services, tmp_path / "clips", status="draft")

@@ -96,7 +96,7 @@ def test_one_name_twice_is_refused_also_without_a_zip(experimenter: Admin) -> No
     assert (answer.status_code, "more than once" in answer.json()["error"]["message"]) == (422, True)
 
 
-def test_levels_that_are_numbers_stand_in_their_order(experimenter: Admin) -> None:
+def test_levels_that_are_numbers_are_in_their_order(experimenter: Admin) -> None:
     names = [f"{speed}_{n}.mp4" for speed in ("10", "2", "n1.5") for n in (1, 2)]
     table = "file,speed\n" + "\n".join(f"{name},{name.split('_')[0].replace('n', '-')}" for name in names)
     found = upload(experimenter, ("clips.zip", zipped(video_files(*names)))).json()
@@ -245,7 +245,7 @@ def test_unsafe_uploads_are_refused_whole(
     assert list(services.settings.upload_folder.iterdir()) == []
 
 
-def test_a_file_that_is_no_film_is_named(experimenter: Admin) -> None:
+def test_a_file_that_is_not_a_film_is_named(experimenter: Admin) -> None:
     found = upload(
         experimenter, ("clips.zip", zipped({"a_1.mp4": b"these are words", "b_1.mp4": encoded_video(4, 30)}))
     ).json()
@@ -299,7 +299,7 @@ def test_a_definition_is_checked_with_lines(experimenter: Admin) -> None:
     )
 
 
-def test_text_that_is_no_toml_has_no_data_and_takes_none(experimenter: Admin) -> None:
+def test_text_that_is_not_toml_has_no_data_and_takes_none(experimenter: Admin) -> None:
     read = experimenter.send("POST", "/definitions/edit", {"toml": "name = = 1\n"}).json()
     assert (read["data"], read["problems"][0]["line"]) == (None, 1)
     answer = experimenter.send("POST", "/definitions/edit", {"toml": "name = ", "data": {"name": "a"}})
@@ -324,7 +324,7 @@ def test_edited_texts_become_a_version_and_runs_keep_theirs(
     assert experimenter.get("/studies/short/versions/1").text.strip() == SHORT.strip()
 
 
-def test_two_people_editing_at_once_are_told(experimenter: Admin, study: StudyInDatabase) -> None:
+def test_two_people_editing_at_once_get_a_message(experimenter: Admin, study: StudyInDatabase) -> None:
     revision = experimenter.get("/studies/short").json()["summary"]["revision"]
     settings = {"paused": True, "quota": 20, "recruiter": None}
     assert (

@@ -94,7 +94,7 @@ def _comments(text: str) -> set[str]:
     return set(re.findall(r"#[^\n]*", text))
 
 
-def test_comments_go_with_the_element_that_they_stand_above() -> None:
+def test_comments_go_with_the_element_that_they_are_above() -> None:
     data = tomllib.loads(COMMENTED)
     data["factors"].reverse()
     text = with_data(COMMENTED, data)
@@ -128,7 +128,7 @@ def test_tables_out_of_order_are_written_whole() -> None:
     assert tomllib.loads(with_data(text, data)) == data
 
 
-def test_text_that_is_no_toml_is_refused() -> None:
+def test_text_that_is_not_toml_is_refused() -> None:
     with pytest.raises(InputError, match="not valid TOML"):
         with_data("name = ", {"name": "a"})
 

@@ -82,7 +82,7 @@ def test_what_comes_at_once_never_holds_more_together(tmp_path: Path) -> None:
     assert sum(kept) == len(list(tmp_path.glob("*/clips.csv")))
 
 
-def test_files_that_go_while_they_are_counted_are_no_error(
+def test_files_that_go_while_they_are_counted_are_not_an_error(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The worker's own files, and uploads that become studies, go at any moment."""

@@ -117,7 +117,7 @@ def test_the_same_again_is_stored_once_and_another_answer_refused(judge: Partici
         ({"answer": {"kind": "clip_rating", "answers": {"x": {"response": 3}}}}, "answer_of_other_kind"),
     ],
 )
-def test_what_is_no_answer_to_a_pair_is_refused_in_one_line(
+def test_what_is_not_an_answer_to_a_pair_is_refused_in_one_line(
     judge: Participant, services: Services, changes: dict[str, Any], code: str
 ) -> None:
     answer = compare(judge, mains(judge)[0], "left", **changes)

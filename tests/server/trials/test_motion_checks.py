@@ -67,7 +67,7 @@ def rows(services: Services, name: str) -> list[dict[str, str]]:
     return list(csv.DictReader(text.splitlines()))
 
 
-def test_checks_stand_in_every_block_but_never_first_and_none_twice(participant: Participant) -> None:
+def test_checks_are_in_every_block_but_never_first_and_none_twice(participant: Participant) -> None:
     state = participant.state()
     blocks: dict[int, list[str]] = {}
     for trial in state["trials"]:
@@ -79,7 +79,7 @@ def test_checks_stand_in_every_block_but_never_first_and_none_twice(participant:
     assert len(set(clips)) == 4
 
 
-def test_the_page_is_told_the_same_whatever_the_right_answers_are(
+def test_the_page_gets_the_same_whatever_the_right_answers_are(
     services: Services, client: TestClient, study: StudyInDatabase, participant: Participant
 ) -> None:
     """The same clips with other answers: nothing that is sent differs, but who and where."""
@@ -106,7 +106,7 @@ def test_the_page_is_told_the_same_whatever_the_right_answers_are(
     assert all(word not in json.dumps(list(told.values())) for word in ('"answer"', '"seed"', '"levels"'))
 
 
-def test_answers_are_kept_apart_and_exported_beside_the_right_ones(
+def test_answers_are_kept_apart_and_exported_next_to_the_right_ones(
     services: Services, study: StudyInDatabase, participant: Participant
 ) -> None:
     right = right_answers(services, study.name)
@@ -129,7 +129,9 @@ def test_answers_are_kept_apart_and_exported_beside_the_right_ones(
         assert not list(Recount(services.versions).differing(session))
 
 
-def test_what_is_no_answer_to_a_check_is_refused(study: StudyInDatabase, participant: Participant) -> None:
+def test_what_is_not_an_answer_to_a_check_is_refused(
+    study: StudyInDatabase, participant: Participant
+) -> None:
     state = participant.state()
     directions = [one for one in of_kind(state, "check") if one["check"] == "direction"]
     digits = [one for one in of_kind(state, "check") if one["check"] == "digit"]
@@ -196,7 +198,7 @@ def test_a_view_of_a_check_lasts_as_long_as_its_own_clip(
     assert lasted[trial["trial_index"]] == pytest.approx(2 * of_trial_ms + 100), "both intervals and the gap"
 
 
-def test_the_command_simulates_observers_beside_checks(services: Services, tmp_path: Path) -> None:
+def test_the_command_simulates_observers_with_checks(services: Services, tmp_path: Path) -> None:
     """Clips of checks are not stimuli of the psychometric function."""
     study = add_study(services, tmp_path / "clips", checked(text_with(SHORT, YES_NO)))
     called = run_server_command(services.settings, "simulate", study.name, "--participants", "1")
@@ -239,7 +241,7 @@ def distracted(trial: Any, clip: dict[str, Any]) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("way", [escaping, distracted])
-def test_no_run_is_likely_a_person_s_whose_checks_all_tell_nothing(
+def test_no_run_is_likely_a_person_s_whose_checks_all_say_nothing(
     services: Services, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, way: Any
 ) -> None:
     eight = CHECKS.replace("per_block = 2", "per_block = 4")

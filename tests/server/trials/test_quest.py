@@ -55,7 +55,7 @@ def test_the_estimates_of_many_observers_have_no_bias_and_the_error_they_state()
     assert max(map(abs, errors)) < 4 * stated
 
 
-def test_equal_answers_give_equal_choices_whatever_was_reckoned_before() -> None:
+def test_equal_answers_give_equal_choices_whatever_was_computed_before() -> None:
     assumed = model("weibull")
     said = answered(assumed, 200.0, 6, seed=1)
     before = (quest.choices(assumed, said, 3), quest.estimate(assumed, said))

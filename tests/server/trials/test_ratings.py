@@ -75,7 +75,7 @@ def test_a_rating_off_the_scale(participant: Participant, response: float) -> No
 
 
 @pytest.mark.parametrize("response", ["4", True, [4]])
-def test_a_rating_that_is_no_number(participant: Participant, response: Any) -> None:
+def test_a_rating_that_is_not_a_number(participant: Participant, response: Any) -> None:
     assert error_code(participant.rate(first_main(participant.agree()), response)) == (422, "invalid")
 
 

@@ -71,7 +71,7 @@ def mains(participant: Participant) -> list[Any]:
     return [trial for trial in participant.state()["trials"] if trial["kind"] == "main"]
 
 
-def test_each_scale_is_a_row_and_what_does_not_apply_is_no_number(
+def test_each_scale_is_a_row_and_what_does_not_apply_is_not_a_number(
     rater: Participant, services: Services
 ) -> None:
     first, second, *_ = mains(rater)
@@ -116,7 +116,7 @@ def test_each_scale_is_a_row_and_what_does_not_apply_is_no_number(
         ({}, "invalid", "answers"),
     ],
 )
-def test_what_is_no_answer_is_refused_in_one_line(
+def test_what_is_not_an_answer_is_refused_in_one_line(
     rater: Participant, answers: dict[str, Any], code: str, said: str
 ) -> None:
     refused = answer(rater, mains(rater)[0], answers)

@@ -225,7 +225,7 @@ def test_a_clip_that_was_not_offered_fails(observer: Participant, services: Serv
         ({"kind": "threshold", "chosen": "yes", "known": -1}, "invalid"),
     ],
 )
-def test_what_is_no_answer_is_refused_in_one_line(
+def test_what_is_not_an_answer_is_refused_in_one_line(
     observer: Participant, services: Services, given: dict[str, Any], code: str
 ) -> None:
     refused = answer(observer, of_series(observer.state(), 0)[0], None, answer=given)

@@ -89,7 +89,7 @@ def test_a_disturbance_does_what_is_declared(name: str, consequence: str | None,
     ("declared", "ruling"),
     [({}, "failed"), ({"focus_lost": "flag"}, "flagged"), ({"focus_lost": "ignore"}, "good")],
 )
-def test_lost_focus_does_what_is_declared_beside_the_others(declared: dict[str, str], ruling: str) -> None:
+def test_lost_focus_does_what_is_declared_like_the_others(declared: dict[str, str], ruling: str) -> None:
     rules = PlaybackRules.model_validate({"disturbances": declared})
     for changed in ({"focus_lost": True}, {"focus_lost": True, "disturbances": {"focus_lost": 2}}):
         assert judge(rules, replace(GOOD, **changed), CLIP, 45, FPS, rated=True)[0] == ruling

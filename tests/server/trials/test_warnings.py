@@ -118,7 +118,7 @@ def test_nobody_is_ended_by_answers_from_before_a_warning_was_read(warned: Warne
     assert receipts[-1]["status"] == "active"
 
 
-def test_who_mends_their_ways_hears_no_more(warned: Warned) -> None:
+def test_who_improves_hears_no_more(warned: Warned) -> None:
     participant = warned()
     trials = main_trials(participant)
     rate(participant, trials[:5])

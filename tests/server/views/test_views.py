@@ -148,7 +148,7 @@ def test_a_view_broken_off_fails_its_play_and_both_are_exported(
     ]
 
 
-def test_what_happened_stands_in_the_order_of_the_views(participant: Participant, services: Services) -> None:
+def test_what_happened_is_in_the_order_of_the_views(participant: Participant, services: Services) -> None:
     participant.agree()
     trial = main_trial(participant)
     begun = [a_view(trial, number, play=1) for number in (1, 2, 3)]

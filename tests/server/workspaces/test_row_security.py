@@ -135,7 +135,7 @@ def seen(connection: Connection, account: int, query: str = "SELECT name FROM st
 
 
 @on_postgres
-def test_every_table_stands_behind_the_wall_or_is_named_as_hanging_on_no_study(services: Services) -> None:
+def test_every_table_is_behind_the_wall_or_is_named_as_hanging_on_no_study(services: Services) -> None:
     with services.database.engine.connect() as connection:
         query = "SELECT relname FROM pg_class WHERE relrowsecurity AND relkind = 'r'"
         assert set(connection.scalars(text(query))) == set(row_policies.tables_apart())
@@ -241,7 +241,9 @@ def policies(database: Database) -> int:
 
 
 @empty_postgres
-def test_a_database_user_who_may_make_no_role_goes_without_and_is_told(empty_database_url: str) -> None:
+def test_a_database_user_who_may_make_no_role_goes_without_and_gets_a_message(
+    empty_database_url: str,
+) -> None:
     owner = Database(empty_database_url)
     with owner.engine.begin() as connection:
         connection.exec_driver_sql("CREATE ROLE plain_user LOGIN PASSWORD 'plain'")

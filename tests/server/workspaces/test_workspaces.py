@@ -107,7 +107,7 @@ def test_who_manages_the_server_needs_the_second_factor_of_a_workspace_too(
     assert owner.send("PUT", "/workspaces/locked", wanted).status_code == 204
 
 
-def test_a_copy_lands_beside_its_source_or_where_the_copier_says(
+def test_a_copy_lands_next_to_its_source_or_where_the_copier_says(
     client: TestClient, services: Services, owner: Admin, study: StudyInDatabase
 ) -> None:
     owner.send("POST", "/workspaces", {"name": "new-lab", "title": "New"})

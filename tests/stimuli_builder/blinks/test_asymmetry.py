@@ -41,7 +41,7 @@ def blinks(one: RecognisedEvents) -> list[float]:
 
 @pytest.mark.parametrize(("seed", "fps"), [(1, 30.0), (2, 60.0), (3, 120.0), (4, 240.0)])
 @pytest.mark.parametrize("noise", [0.004, 0.03])
-def test_the_eye_that_moves_is_told_as_if_it_were_alone(seed: int, fps: float, noise: float) -> None:
+def test_the_eye_that_moves_is_reported_as_if_it_were_alone(seed: int, fps: float, noise: float) -> None:
     motions, (moving, still) = face(seed, fps, 0.0, noise)
     (alone,) = recognised([moving], fps)
     assert len(blinks(alone)) >= 0.7 * sum(motion.kind == "blink" for motion in motions)
@@ -64,7 +64,7 @@ def test_a_column_of_one_value_hides_no_blink(value: float) -> None:
 
 
 @pytest.mark.parametrize(("seed", "share"), [(6, 0.15), (7, 0.2), (8, 0.3)])
-def test_an_eye_that_moves_a_little_is_told_with_its_share(seed: int, share: float) -> None:
+def test_an_eye_that_moves_a_little_is_reported_with_its_share(seed: int, share: float) -> None:
     _, eyes = face(seed, 120.0, share, 0.006)
     strong, weak = recognised(eyes, 120.0)
     assert strong.events == recognised(eyes[:1], 120.0)[0].events
@@ -87,7 +87,7 @@ def test_eyes_that_both_move_are_judged_together(share: float) -> None:
     assert right.asymmetry.share == pytest.approx(share, abs=0.15)
 
 
-def test_an_eye_not_seen_at_the_others_blinks_is_no_still_one() -> None:
+def test_an_eye_not_seen_at_the_others_blinks_is_not_a_still_one() -> None:
     _, (left, right) = face(10, 60.0, 1.0)
     right[120:] = np.nan  # seen for the first two seconds alone
     told = recognised([left, right], 60.0)

@@ -28,7 +28,7 @@ def test_blinks_of_both_eyes_are_written_with_their_profiles(stimuli, series_fil
     assert b"<svg" in (tmp_path / "a.svg").read_bytes()[:1000]
 
 
-def test_the_summary_tells_rate_spread_and_histograms(stimuli, series_file, tmp_path):
+def test_the_summary_shows_rate_spread_and_histograms(stimuli, series_file, tmp_path):
     arguments = (
         "--column",
         "gap_l",
@@ -50,7 +50,7 @@ def test_the_summary_tells_rate_spread_and_histograms(stimuli, series_file, tmp_
     assert max(summary["mean_blink"]["closure"]) > 0.8
 
 
-def test_few_blinks_do_not_tell_how_far_lids_close(stimuli, series_file, tmp_path):
+def test_few_blinks_do_not_show_how_far_lids_close(stimuli, series_file, tmp_path):
     pd.read_csv(series_file).head(1000).to_csv(tmp_path / "short.csv", index=False)
     command = (
         "blinks",
@@ -93,7 +93,7 @@ def test_a_rejected_blink_is_kept_with_the_reason_and_left_out_of_the_profiles(
     assert decisions[["decision", "reason"]].to_numpy().tolist() == [["accept", "only a smile"]]
 
 
-def test_a_decision_about_a_blink_that_is_gone_is_told_and_kept(stimuli, series_file, tmp_path):
+def test_a_decision_about_a_blink_that_is_gone_is_reported_and_kept(stimuli, series_file, tmp_path):
     review = tmp_path / "review.csv"
     review.write_text("column,minimum_frame,decision,reason\ngap_l,77,reject,old\n", encoding="utf-8")
     common = ("--column", "gap_l", "--fps", 300, "--out", tmp_path / "b.csv", "--review", review)
@@ -308,7 +308,9 @@ def test_moved_ends_that_cannot_be(stimuli, series_file, tmp_path, row, words):
     assert words in ended.err
 
 
-def test_a_blink_that_a_gap_cuts_is_told_by_its_frame_and_not_as_too_shallow(stimuli, series_file, tmp_path):
+def test_a_blink_that_a_gap_cuts_is_reported_by_its_frame_and_not_as_too_shallow(
+    stimuli, series_file, tmp_path
+):
     table = pd.read_csv(series_file)
     lowest = int(table["gap_l"].iloc[: len(table) // 4].idxmin())
     table.loc[lowest + 8 :, "gap_l"] = None

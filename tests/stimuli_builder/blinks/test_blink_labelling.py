@@ -128,7 +128,7 @@ def test_labels_follow_a_head_that_comes_nearer(make_known):
     assert len(label_blinks(known.distance * growth, known.fps)) == 6
 
 
-def test_a_shallow_dip_is_no_blink(make_known):
+def test_a_shallow_dip_is_not_a_blink(make_known):
     known = make_known(depths=(1.0, 0.15, 1.0))
     minima = [blink.minimum for blink in label_blinks(known.distance, 300)]
     assert minima == pytest.approx([known.minima[0], known.minima[2]], abs=3)

@@ -110,7 +110,7 @@ def test_a_one_eyed_profile_does_not_fit_a_model_of_both():
 
 
 @pytest.mark.parametrize("content", ["{}", "no json", '{"format": "other"}', "[1]"])
-def test_a_file_that_is_no_model_is_refused(tmp_path, content):
+def test_a_file_that_is_not_a_model_is_refused(tmp_path, content):
     (tmp_path / "m.json").write_text(content, encoding="utf-8")
     with pytest.raises(InputError, match=r"m\.json"):
         BlinkModel.load(tmp_path / "m.json")

@@ -77,7 +77,7 @@ def test_a_scale_by_the_irises_makes_mm_of_px(stimuli, close_up, tmp_path):
     assert "0.2500 mm per pixel: an iris is 11.7 mm wide, 46.8 px here (median of 50 in i.csv)" in page
 
 
-def test_irises_that_are_not_of_one_face_are_no_scale(stimuli, close_up, tmp_path):
+def test_irises_that_are_not_of_one_face_are_not_a_scale(stimuli, close_up, tmp_path):
     table = pd.DataFrame({"left_iris_diameter_px": [46.8] * 9, "right_iris_diameter_px": [4.0] * 9})
     table.to_csv(tmp_path / "i.csv", index=False)
     files = ("--out", tmp_path / "b.csv", "--lids", tmp_path / "l.csv")
@@ -116,7 +116,7 @@ def test_the_table_of_irises_is_not_written_over(stimuli, close_up, tmp_path):
         (None, "expected a table as CSV, Excel (.xlsx), SPSS (.sav) or JSON"),
     ],
 )
-def test_a_table_without_irises_is_no_scale(stimuli, close_up, tmp_path, content, message):
+def test_a_table_without_irises_is_not_a_scale(stimuli, close_up, tmp_path, content, message):
     if content is not None:
         (tmp_path / "i.csv").write_text(content, encoding="utf-8")
     files = ("--out", tmp_path / "b.csv", "--lids", tmp_path / "l.csv")

@@ -122,7 +122,7 @@ def test_a_series_that_cannot_be_used_is_refused_in_one_line(tmp_path, header, c
 
 
 @pytest.mark.parametrize("content", ["", "\x00\x01", "a,b\n"])
-def test_a_file_that_is_no_table_is_refused(tmp_path, content):
+def test_a_file_that_is_not_a_table_is_refused(tmp_path, content):
     path = tmp_path / "bad.csv"
     path.write_text(content, encoding="utf-8")
     with pytest.raises(InputError, match=r"bad\.csv"):

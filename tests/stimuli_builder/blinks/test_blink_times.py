@@ -19,7 +19,7 @@ def written(path: Path, times: Array, values: Array) -> Path:
 
 
 @pytest.mark.parametrize("fps", [30.0, 60.0, 240.0])
-def test_a_pause_in_the_times_is_no_recording(stimuli, make_known, tmp_path: Path, fps: float) -> None:
+def test_a_pause_in_the_times_is_not_a_recording(stimuli, make_known, tmp_path: Path, fps: float) -> None:
     known = make_known(fps=fps, noise=0.05)
     times = np.arange(known.distance.size) / fps
     times[known.minima[1] + round(fps) :] += 60  # between two blinks
@@ -58,7 +58,7 @@ def test_a_few_dropped_frames_are_bridged(tmp_path: Path, fps: float, dropped: i
     assert len(series.notes) == holes
 
 
-def test_an_empty_value_is_still_refused_beside_a_hole(tmp_path: Path) -> None:
+def test_an_empty_value_is_still_refused_next_to_a_hole(tmp_path: Path) -> None:
     times = np.arange(400) / 60
     times[200:] += 5
     values = np.full(400, 20.0)
@@ -75,7 +75,7 @@ def test_times_that_jump_by_years_are_refused(tmp_path: Path) -> None:
         read_series(written(tmp_path / "s.csv", times, np.full(400, 20.0)), resample=True)
 
 
-def test_a_rate_too_low_is_told_in_few_digits(tmp_path: Path) -> None:
+def test_a_rate_too_low_is_reported_in_few_digits(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"at 0\.03 frames per second blinks cannot"):
         read_series(written(tmp_path / "s.csv", np.arange(400) / 0.03, np.full(400, 20.0)))
 
@@ -133,7 +133,7 @@ def test_a_rate_that_was_given_needs_no_column_of_times(tmp_path: Path, stamps, 
         read_series(tmp_path / "s.csv", ["gap"])
 
 
-def test_a_gap_of_a_resampled_series_is_told_by_its_time(tmp_path: Path) -> None:
+def test_a_gap_of_a_resampled_series_is_reported_by_its_time(tmp_path: Path) -> None:
     values = np.full(400, 20.0)
     values[120:180] = np.nan
     with pytest.raises(InputError, match=r"from 1\.98\d s on|from 2\.00\d s on"):

@@ -113,7 +113,7 @@ def test_a_validity_of_other_columns_is_not_heeded(make_known, tmp_path: Path) -
 
 
 @pytest.mark.parametrize("name", ["valid_points", "points_valid", "invalid"])
-def test_a_number_of_valid_points_is_no_validity(make_known, tmp_path: Path, name: str) -> None:
+def test_a_number_of_valid_points_is_not_validity(make_known, tmp_path: Path, name: str) -> None:
     spoilt(make_known, name, 68, 0).to_csv(tmp_path / "s.csv", index=False)
     assert read_series(tmp_path / "s.csv", ["gap_l"], FPS)[0].missing_frames == 0
 

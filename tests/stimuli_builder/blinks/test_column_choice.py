@@ -44,7 +44,9 @@ def test_one_left_and_one_right_eye_are_taken_without_being_named(tmp_path: Path
 
 
 @pytest.mark.parametrize("names", [("EAR_l", "EAR_r", "EAR_mean"), ("a", "b"), ("EAR_l", "gap_l")])
-def test_columns_that_are_no_one_pair_of_eyes_are_to_be_named(tmp_path: Path, names: tuple[str, ...]) -> None:
+def test_columns_that_are_not_a_one_pair_of_eyes_are_to_be_named(
+    tmp_path: Path, names: tuple[str, ...]
+) -> None:
     table = pd.DataFrame({name: np.linspace(1.5, 2.5, 50) + n for n, name in enumerate(names)})
     with pytest.raises(InputError, match="select the series with --column"):
         choose_columns(table, (), tmp_path / "s.csv")
@@ -84,7 +86,7 @@ def test_blinks_of_two_of_three_columns_are_paired(stimuli, series_file: Path, t
     assert "4 blinks in both eyes; 0 only in gap_l, 0 only in gap_r" in page
 
 
-def test_columns_of_which_no_two_are_eyes_are_told(stimuli, series_file: Path, tmp_path: Path) -> None:
+def test_columns_of_which_no_two_are_eyes_are_reported(stimuli, series_file: Path, tmp_path: Path) -> None:
     table = pd.read_csv(series_file).rename(columns={"gap_r": "b"})
     table["c"] = table["gap_l"] * 0.9
     table.to_csv(tmp_path / "s.csv", index=False)
@@ -97,7 +99,7 @@ def test_columns_of_which_no_two_are_eyes_are_told(stimuli, series_file: Path, t
     )
 
 
-def test_a_presence_is_no_second_eye(make_known, tmp_path: Path) -> None:
+def test_a_presence_is_not_a_second_eye(make_known, tmp_path: Path) -> None:
     closure = 3 * (1 - make_known(fps=FPS, noise=0.3).distance.clip(0, 34) / 34)
     path = write(tmp_path, AU45_r=closure, AU45_c=(closure > 1).astype(float))
     for named in ((), ("AU45_r", "AU45_c")):
@@ -107,7 +109,7 @@ def test_a_presence_is_no_second_eye(make_known, tmp_path: Path) -> None:
     assert [one.column for one in read_series(path, ["AU45_c"], FPS)] == ["AU45_c"]
 
 
-def test_columns_that_are_the_same_are_no_two_eyes(make_known, tmp_path: Path) -> None:
+def test_columns_that_are_the_same_are_not_two_eyes(make_known, tmp_path: Path) -> None:
     distance = make_known(fps=FPS, noise=0.3).distance
     path = write(tmp_path, EAR_l=distance, EAR_r=distance)
     (series,) = read_series(path, ["EAR_l", "EAR_r"], FPS)
@@ -117,7 +119,7 @@ def test_columns_that_are_the_same_are_no_two_eyes(make_known, tmp_path: Path) -
     )
 
 
-def test_columns_of_whole_numbers_are_told_and_taken_by_name(make_known, tmp_path: Path) -> None:
+def test_columns_of_whole_numbers_are_reported_and_taken_by_name(make_known, tmp_path: Path) -> None:
     gap = np.round(make_known(fps=FPS, noise=0.3).distance * 10).astype(int)
     path = write(tmp_path, frame=range(gap.size), gap=gap, label="x", seen=(gap > 50).astype(int))
     with pytest.raises(InputError) as error:
@@ -130,7 +132,7 @@ def test_columns_of_whole_numbers_are_told_and_taken_by_name(make_known, tmp_pat
 
 
 @pytest.mark.parametrize(("fps", "told"), [(12.0, True), (15.0, False), (1000.0, False), (1200.0, True)])
-def test_a_rate_beyond_those_tested_is_told(
+def test_a_rate_beyond_those_tested_is_reported(
     stimuli, make_known, tmp_path: Path, fps: float, told: bool
 ) -> None:
     path = write(tmp_path, gap_l=make_known(fps=fps, noise=0.05).distance)

@@ -43,7 +43,7 @@ from stimuli_builder.blinks.series import read_series
         ),
     ],
 )
-def test_the_eye_is_told_from_the_words_of_a_name(name: str, eye: str | None) -> None:
+def test_the_eye_is_read_from_the_words_of_a_name(name: str, eye: str | None) -> None:
     assert eye_of(name) == eye
 
 
@@ -58,7 +58,7 @@ def test_the_eye_is_told_from_the_words_of_a_name(name: str, eye: str | None) ->
         *((name, False) for name in ("blink_distance", "left_blink_EAR", "eye_closed_distance", "closed_px")),
     ],
 )
-def test_a_closure_is_told_from_its_name(name: str, shut: bool) -> None:
+def test_a_closure_is_read_from_its_name(name: str, shut: bool) -> None:
     assert is_high_when_shut(name) is shut
 
 
@@ -107,7 +107,7 @@ def test_an_opening_that_is_named_as_a_closure_waits_for_a_word(make_known, tmp_
         read_series(tmp_path / "s.csv", ["eyeBlinkLeft"], 300)
 
 
-def test_a_glitch_is_no_level_of_a_shut_lid(make_known, tmp_path: Path) -> None:
+def test_a_glitch_is_not_a_level_of_a_shut_lid(make_known, tmp_path: Path) -> None:
     closure = 1 - make_known(noise=0.05).distance / 34.2
     closure[700:702] = 40.0
     pd.DataFrame({"closure": closure}).to_csv(tmp_path / "s.csv", index=False)

@@ -56,14 +56,14 @@ def test_decimal_commas_among_commas_are_refused(tmp_path, text):
         read_table(path)
 
 
-def test_thousands_are_no_decimals(tmp_path):
+def test_thousands_are_not_decimals(tmp_path):
     path = tmp_path / "t.csv"
     path.write_text('frame,a\n0,"1,234"\n1,999\n', encoding="utf-8")
     with pytest.raises(InputError, match="must have numbers"):
         read_series(path, ["a"], 240)
 
 
-def test_words_beside_decimal_commas_stay_words(tmp_path):
+def test_words_next_to_decimal_commas_stay_words(tmp_path):
     path = tmp_path / "t.csv"
     path.write_text("frame;a\n0;0,5\n1;lost\n", encoding="utf-8")
     with pytest.raises(InputError, match="must have numbers"):
@@ -79,7 +79,7 @@ def test_words_beside_decimal_commas_stay_words(tmp_path):
         (b"\n \n", r"rub\.csv is empty; expected"),
     ],
 )
-def test_what_is_no_text_is_refused_by_what_it_is(tmp_path, content, message):
+def test_what_is_not_text_is_refused_by_what_it_is(tmp_path, content, message):
     path = tmp_path / "rub.csv"
     path.write_bytes(content)
     with pytest.raises(InputError, match=message):

@@ -54,7 +54,7 @@ def test_nested_blinks_are_both_kept_and_part():
 
 
 @pytest.mark.parametrize("kind", ["closed_eye", "squint", "gaze_shift"])
-def test_one_motion_told_twice_is_the_longer_event(kind):
+def test_one_motion_reported_twice_is_the_longer_event(kind):
     events = [event(kind, 1.0, 4.0), event(kind, 2.0, 3.2)]
     assert times(separate_events(events, depth_open_at(), 0, FPS)) == [(kind, 1.0, 4.0)]
 
@@ -107,11 +107,11 @@ def test_a_blink_that_a_squint_explains_is_listed_as_that():
     assert listed(event("blink", 0.9, 1.1), doubtful, squints=(doubtful,)) == ["blink", "squint"]
 
 
-def test_a_ripple_of_a_closed_eye_is_no_squint():
+def test_a_ripple_of_a_closed_eye_is_not_a_squint():
     ripple = event("blink", 2.9, 3.1)
     assert "squint" not in listed(event("closed_eye", 2.3, 3.9), ripple, squints=(ripple,))
 
 
-def test_of_two_blinks_too_close_the_one_that_is_no_squint_stays():
+def test_of_two_blinks_too_close_the_one_that_is_not_a_squint_stays():
     doubtful, sure = replace(event("blink", 2.9, 3.1), probability=0.95), event("blink", 3.0, 3.2)
     assert listed(doubtful, sure, squints=(doubtful,)) == ["blink"]

@@ -70,7 +70,7 @@ def reopening_in_steps(fps, rng):
 
 
 @pytest.mark.parametrize("fps", [30.0, 60.0])
-def test_a_step_in_the_reopening_is_no_second_blink(fps):
+def test_a_step_in_the_reopening_is_not_a_second_blink(fps):
     told = [
         kinds_of(reopening_in_steps(fps, np.random.default_rng(seed)), fps).count("blink")
         for seed in range(8)
@@ -141,7 +141,7 @@ def test_half_a_second_closed_parts_a_blink_from_a_closed_eye(hold, kind):
 
 @pytest.mark.parametrize(("gaze", "depth"), [(0.3, 0.7), (0.4, 1.0), (0.6, 1.0)])
 @pytest.mark.parametrize("fps", [120.0, 240.0])
-def test_a_blink_while_looking_down_is_no_closed_eye(fps, gaze, depth):
+def test_a_blink_while_looking_down_is_not_a_closed_eye(fps, gaze, depth):
     motions = [Motion("gaze_shift", 8, 0.08, 3.0, 0.1, gaze), Motion("blink", 8.8, 0.1, 0.04, 0.24, depth)]
     (seen,) = recognise([eye(lids([*blinks_at(3, 5.5, 14, 17), *motions], fps), fps)])
     assert "closed_eye" not in [event.kind for event in seen.events]
@@ -163,7 +163,7 @@ def test_lids_shut_for_half_a_second_while_looking_down_are_a_closed_eye(gaze, h
     ("depth", "down", "hold", "up"),
     [(0.4, 0.14, 0.1, 0.4), (0.4, 0.18, 0.03, 0.35), (0.55, 0.22, 0.03, 0.35)],
 )
-def test_a_brief_slow_squint_is_no_blink(fps, depth, down, hold, up):
+def test_a_brief_slow_squint_is_not_a_blink(fps, depth, down, hold, up):
     squint = Motion("squint", 9, down, hold, up, depth)
     (seen,) = recognise([eye(lids([*blinks_at(3, 6, 14, 17), squint], fps), fps)])
     assert [event.kind for event in seen.events] == ["blink", "blink", "squint", "blink", "blink"]
@@ -242,7 +242,7 @@ def test_durations_of_a_real_recording_do_not_change_with_the_rate(shared_data):
     assert max(lengths.values()) < 1.07 * min(lengths.values()), lengths
 
 
-def test_a_blink_cut_by_a_gap_is_told_and_the_others_are_measured():
+def test_a_blink_cut_by_a_gap_is_reported_and_the_others_are_measured():
     distance = lids(blinks_at(2, 5, 9, 13, 16), 60.0)
     distance[round(5.1 * 60) : round(6.5 * 60)] = np.nan
     series = eye(distance, 60.0)
@@ -251,7 +251,7 @@ def test_a_blink_cut_by_a_gap_is_told_and_the_others_are_measured():
     assert any("gap" in refused.reason for refused in seen.refused)
 
 
-def test_gaps_beside_every_blink_are_measured_without_an_error(make_known):
+def test_gaps_next_to_every_blink_are_measured_without_an_error(make_known):
     known = make_known(noise=0.1)
     distance = known.distance.copy()
     for end in known.ends:
@@ -304,7 +304,7 @@ def test_uneven_times_are_resampled_on_request(stimuli, tmp_path):
 
 @pytest.mark.parametrize("seconds", [0.7, 3.0, 9.0, 12.0, 30.0])
 @pytest.mark.parametrize("fps", [30.0, 120.0])
-def test_eyes_that_stay_shut_are_told_however_long(fps, seconds):
+def test_eyes_that_stay_shut_are_reported_however_long(fps, seconds):
     shut = Motion("closed_eye", 11, 0.2, seconds, 0.4, 0.95)
     later = [11 + seconds + 3 * n for n in (1, 2, 3)]
     (seen,) = recognise([eye(lids([*blinks_at(2, 5, 8), shut, *blinks_at(*later)], fps, seconds + 24), fps)])

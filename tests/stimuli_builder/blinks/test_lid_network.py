@@ -49,5 +49,5 @@ def test_the_networks_that_ship_know_the_features_and_are_small(
     assert weights.stat().st_size < max_bytes
 
 
-def test_both_looks_tell_the_same_kinds() -> None:
+def test_both_looks_find_the_same_kinds() -> None:
     assert stored_network(FIRST_LOOK).kinds == stored_network(SECOND_LOOK).kinds == CLASSES

@@ -19,7 +19,7 @@ def read(path: Path, values: Array, fps: float, name: str = "gap_l") -> BlinkSer
 
 
 @pytest.mark.parametrize("fps", [15.0, 30.0, 120.0, 300.0])
-def test_a_value_that_is_repeated_for_seconds_is_told_and_not_seen(
+def test_a_value_that_is_repeated_for_seconds_is_reported_and_not_seen(
     make_known, tmp_path: Path, fps: float
 ) -> None:
     distance = make_known(fps=fps, noise=0.3).distance.copy()
@@ -33,7 +33,7 @@ def test_a_value_that_is_repeated_for_seconds_is_told_and_not_seen(
     assert np.isnan(series.distance[frozen.start + 1 : frozen.stop]).all()
 
 
-def test_seconds_frozen_are_no_time_of_the_rate(stimuli, make_known, tmp_path: Path) -> None:
+def test_seconds_frozen_are_not_a_time_of_the_rate(stimuli, make_known, tmp_path: Path) -> None:
     known = make_known(fps=120.0, noise=0.3)
     left, right = known.distance.copy(), known.distance * 0.9
     left[300:400], left[840:1000] = left[300], left[840]
@@ -81,7 +81,7 @@ def test_a_closure_cut_at_its_open_end_is_not_repeated(make_known, tmp_path: Pat
     assert read(tmp_path, np.maximum(rest, shut), 120.0, "AU45_r").missing_frames == 0
 
 
-def test_zeros_of_a_lost_face_are_told_and_no_blink(stimuli, make_known, tmp_path: Path) -> None:
+def test_zeros_of_a_lost_face_are_reported_and_no_blink(stimuli, make_known, tmp_path: Path) -> None:
     known = make_known(fps=60.0, noise=0.3, depths=(0.6, 0.5, 0.7, 0.6))
     distance = known.distance.copy()
     for start, length in ((200, 9), (300, 12), (400, 1)):
@@ -116,7 +116,7 @@ def test_zeros_at_both_ends_are_not_seen(make_known, tmp_path: Path) -> None:
     assert series.missing_frames == 40
 
 
-def test_zeros_beside_frames_without_a_value_are_not_seen(make_known, tmp_path: Path) -> None:
+def test_zeros_next_to_frames_without_a_value_are_not_seen(make_known, tmp_path: Path) -> None:
     distance = make_known(fps=60.0, noise=0.3, depths=(0.6, 0.5)).distance.copy()
     distance[170:175], distance[175:190] = np.nan, 0.0
     distance[300:310], distance[310] = 0.0, np.nan
@@ -149,7 +149,7 @@ def test_zeros_that_may_be_the_only_closures_are_left(make_known, tmp_path: Path
     assert (series.distance == 0).sum() == closed.sum() - 1
 
 
-def test_zeros_beside_a_partial_blink_are_not_the_only_closures(make_known, tmp_path: Path) -> None:
+def test_zeros_next_to_a_partial_blink_are_not_the_only_closures(make_known, tmp_path: Path) -> None:
     distance = make_known(fps=60.0, noise=0.3, depths=(0.0, 0.5, 0.0)).distance.copy()
     distance[100:112] = distance[340:352] = 0.0
     series = read(tmp_path, distance, 60.0)

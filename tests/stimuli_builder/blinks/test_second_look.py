@@ -38,7 +38,7 @@ def value(row: Array, name: str) -> float:
     return float(row[CONTEXT.index(name)])
 
 
-def test_the_dips_about_are_told_with_how_far_away_they_are() -> None:
+def test_the_dips_about_are_reported_with_how_far_away_they_are() -> None:
     times, rows = told([series()])
     assert times == pytest.approx([2.12, 3.62, 8.12], abs=0.05)
     assert value(rows[1], "dip -1: log seconds away") == pytest.approx(np.log(1.5), abs=0.02)
@@ -110,7 +110,7 @@ def test_an_eye_that_was_followed_for_less_is_not_seen_after_that(frames: int) -
 
 
 @pytest.mark.parametrize("other", [np.full(1440, 30.0), np.full(1440, np.nan)], ids=["still", "unseen"])
-def test_an_eye_without_dips_tells_nothing(other: Array) -> None:
+def test_an_eye_without_dips_says_nothing(other: Array) -> None:
     _, rows = told([series(), BlinkSeries(distance=other, fps=FPS, column="d", is_px=True)])
     assert np.isfinite(rows).all()
     assert [value(row, "other eye has dips") for row in rows] == [0, 0, 0]
@@ -120,7 +120,7 @@ def test_an_eye_without_dips_tells_nothing(other: Array) -> None:
 
 
 @pytest.mark.parametrize(("look", "features"), [("first", FEATURES), ("second", CONTEXT)])
-def test_each_look_learns_from_what_it_is_told(look: str, features: tuple[str, ...]) -> None:
+def test_each_look_learns_from_its_input(look: str, features: tuple[str, ...]) -> None:
     rows, kinds = labelled_features(look, generate(np.random.default_rng(1), 30, 60.0))
     assert rows.shape == (len(kinds), len(features))
     assert {"blink", "nothing"} <= set(kinds) <= set(CLASSES)

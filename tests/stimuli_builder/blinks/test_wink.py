@@ -41,7 +41,7 @@ def blinks(one: RecognisedEvents) -> list[float]:
 
 @pytest.mark.parametrize("fps", [30.0, 60.0, 120.0, 240.0])
 @pytest.mark.parametrize("noise", [0.003, 0.015])
-def test_a_wink_is_told_of_its_eye_alone(make_known, fps: float, noise: float) -> None:
+def test_a_wink_is_reported_for_its_eye_alone(make_known, fps: float, noise: float) -> None:
     left, right = told(face(make_known, fps, noise), fps)
     times = [2.0 * n + 2 for n in range(len(DEPTHS))]
     assert blinks(left) == pytest.approx(times, abs=0.06)
@@ -49,7 +49,7 @@ def test_a_wink_is_told_of_its_eye_alone(make_known, fps: float, noise: float) -
 
 
 @pytest.mark.parametrize("fps", [30.0, 120.0])
-def test_a_small_dip_of_one_eye_is_no_wink(make_known, fps: float) -> None:
+def test_a_small_dip_of_one_eye_is_not_a_wink(make_known, fps: float) -> None:
     left, right = told(face(make_known, fps, 0.015, wink=0.3), fps)
     for eye in (left, right):
         assert not any(abs(time - WINK_S) < 0.3 for time in blinks(eye))

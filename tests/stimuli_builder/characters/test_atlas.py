@@ -145,6 +145,6 @@ def test_an_atlas_of_another_format_is_one_clear_line(tmp_path: Path, content: b
     assert "\n" not in str(caught.value)
 
 
-def test_folder_without_declaration_is_no_character(tmp_path: Path) -> None:
+def test_folder_without_declaration_is_not_a_character(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="is not a character"):
         load_atlas(tmp_path)

@@ -123,7 +123,7 @@ def test_a_damaged_video_is_said_in_one_line(in_video: Path) -> None:
         load_atlas(in_video).check_files()
 
 
-def test_bytes_that_are_no_video_are_said_in_one_line() -> None:
+def test_bytes_that_are_not_video_are_said_in_one_line() -> None:
     with pytest.raises(
         InputError, match=r"levels is damaged: cannot decode x.mkv; restore the complete file"
     ):

@@ -116,7 +116,7 @@ def test_what_cannot_be_had_is_one_line(repository: Path, tmp_path: Path, name: 
     assert "\n" not in str(raised.value)
 
 
-def test_a_study_that_asks_for_one_is_told_the_command() -> None:
+def test_a_study_that_asks_for_one_gets_the_command() -> None:
     for name in load_retired():
         if not (ROOT / "stimuli_builder" / "characters" / "data" / name).exists():
             with pytest.raises(InputError, match=f"`stimuli character fetch {name}`"):

@@ -44,7 +44,7 @@ def in_pixels(one: CheckJob) -> NDArray[np.bool_]:
 
 @pytest.mark.parametrize("what", ALONE)
 @pytest.mark.parametrize("look", solvers.LOOKS)
-def test_no_look_at_a_picture_or_at_the_mean_tells_what_is_inside(
+def test_no_look_at_a_picture_or_at_the_mean_shows_what_is_inside(
     delivered: list[tuple[CheckJob, NDArray[np.float64]]], what: str, look: str
 ) -> None:
     """Against the masks of other clips of the same kind, so that the edge of the picture says nothing."""
@@ -61,7 +61,7 @@ def test_no_look_at_a_picture_or_at_the_mean_tells_what_is_inside(
     assert CHANCE + float(np.mean(differences)) == pytest.approx(CHANCE, abs=LIMIT)
 
 
-def test_motion_tells_what_is_inside(delivered: list[tuple[CheckJob, NDArray[np.float64]]]) -> None:
+def test_motion_shows_what_is_inside(delivered: list[tuple[CheckJob, NDArray[np.float64]]]) -> None:
     areas = []
     for one, clip in delivered:
         fields = solvers.flow_fields(clip)

@@ -65,7 +65,7 @@ def answers(manifest: Manifest) -> list[tuple[str, int]]:
     return [(clip.check, clip.answer) for clip in manifest.checks]
 
 
-def test_checks_stand_beside_the_clips_under_names_that_say_nothing(built: Path) -> None:
+def test_checks_are_next_to_the_clips_under_names_that_say_nothing(built: Path) -> None:
     manifest = read_manifest(built)
     check_files(manifest, built)
     assert len(manifest.clips) == 2
@@ -93,7 +93,7 @@ def test_a_further_build_keeps_the_checks_and_renders_nothing(copied: Path) -> N
     assert (copied / MANIFEST_NAME).read_bytes() == before
 
 
-def test_checks_made_anew_are_others_and_the_old_ones_go(copied: Path) -> None:
+def test_checks_made_again_are_others_and_the_old_ones_go(copied: Path) -> None:
     before = read_manifest(copied)
     report = checks.build_checks(EXPERIMENT, copied, Options(), silent, anew=True)
     after = read_manifest(copied)

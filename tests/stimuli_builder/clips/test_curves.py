@@ -97,7 +97,7 @@ def test_a_lower_lid_within_reach_is_shown_as_it_is() -> None:
     assert within_reach(curve, None) == (curve, {})
 
 
-def test_a_lower_lid_that_wavers_about_rest_is_held_there_and_the_manifest_told() -> None:
+def test_a_lower_lid_that_wavers_about_rest_is_held_there_and_the_manifest_says_so() -> None:
     shown, said = within_reach(moved([0.0, 1.05, -0.2], [0.0, 2.0, 0.0]), REACH)
     np.testing.assert_array_equal(shown.lower_vertical_mm, [0.0, 1.0, 0.0])
     assert said == {"lower_vertical_held_mm": "0.2000"}

@@ -66,7 +66,7 @@ def test_clips_are_held_against_the_declaration(
     assert message in capsys.readouterr().err
 
 
-def test_a_declared_factor_that_no_name_has_is_told(
+def test_a_declared_factor_that_no_name_has_is_reported(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     study = tmp_path / "shapes.toml"

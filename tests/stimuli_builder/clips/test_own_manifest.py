@@ -120,7 +120,7 @@ def empty_videos(folder: Path, *names: str) -> Path:
     return folder
 
 
-def test_a_stray_level_is_named_beside_what_was_understood(
+def test_a_stray_level_is_named_next_to_what_was_understood(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     names = [f"{speed}_{number}.mp4" for speed in ("slow", "fast") for number in (1, 2, 3, 4)]

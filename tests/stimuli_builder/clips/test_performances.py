@@ -103,7 +103,7 @@ def test_full_closes_every_blink_and_none_keeps_the_eyes_open() -> None:
     assert still.blinks_s == ()
 
 
-def test_speech_beside_the_toml_is_answered(tmp_path: Path) -> None:
+def test_speech_next_to_the_toml_is_answered(tmp_path: Path) -> None:
     (tmp_path / "talk.vtt").write_text(
         "WEBVTT\n\n00:00.500 --> 00:04.000\nOne.\n\n00:06.500 --> 00:12.000\nTwo.\n"
     )

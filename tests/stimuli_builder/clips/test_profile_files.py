@@ -27,7 +27,7 @@ def test_numbers_alone_are_closure(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_closure_file(file)[0].closure, [0, 0.5, 1, 0.4, 0])
 
 
-def test_blank_lines_at_the_end_are_no_samples(tmp_path: Path) -> None:
+def test_blank_lines_at_the_end_are_not_samples(tmp_path: Path) -> None:
     file = tmp_path / "blink.csv"
     file.write_text("closure\n0\n0.5\n1\n0.4\n0\n\n\n")
     np.testing.assert_array_equal(read_closure_file(file)[0].closure, [0, 0.5, 1, 0.4, 0])

@@ -34,7 +34,7 @@ def test_a_worker_helps_another_with_the_character_it_has_read() -> None:
     assert taken[1] == [6, 7, 8]
 
 
-def test_a_few_jobs_of_another_character_are_left_to_whoever_has_read_it() -> None:
+def test_a_few_jobs_of_another_character_are_left_to_the_process_that_has_read_it() -> None:
     few = ["alder"] * 4 + ["cartoon"] * 4
     queues = JobQueues(range(8), few, 2)
     assert [queues.take(0) for _ in range(5)] == [0, 1, 2, 3, None]

@@ -61,7 +61,7 @@ def test_wrong_numbers_are_found(small: Small, copied: Path, change: dict[str, o
     assert problem in str(finding)
 
 
-def test_a_declared_amount_that_is_no_number_is_a_finding(small: Small, copied: Path) -> None:
+def test_a_declared_amount_that_is_not_a_number_is_a_finding(small: Small, copied: Path) -> None:
     clip = json.loads((copied / MANIFEST_NAME).read_text())["clips"][0]
     rewrite(copied, {"inputs": clip["inputs"] | {f"{PREFIX}{PARTS[0]}_mm": "a lot"}})
     verdict = verify(copied, small.folder)
@@ -144,7 +144,7 @@ def test_curves_that_are_not_those_shown_are_found(
     assert problem in finding.problem
 
 
-def test_a_file_that_is_no_video_is_found(small: Small, copied: Path) -> None:
+def test_a_file_that_is_not_a_video_is_found(small: Small, copied: Path) -> None:
     first = json.loads((copied / MANIFEST_NAME).read_text())["clips"][0]["file"]
     (copied / first).write_bytes(b"not a video at all")
     rewrite(copied, {})

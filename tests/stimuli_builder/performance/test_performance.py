@@ -130,7 +130,7 @@ def test_subtitles_out_of_order_and_by_voice(tmp_path: Path) -> None:
         speech_in_subtitles(path, "Ana")
 
 
-def test_what_the_engine_is_told() -> None:
+def test_what_the_engine_receives() -> None:
     stretches = join_speech([Speech(3.0, 4.0), Speech(1.0, 2.0), Speech(2.05, 2.4), Speech(7.0, 8.0)])
     assert stretches == [Speech(1.0, 2.4), Speech(3.0, 4.0), Speech(7.0, 8.0)]
     assert [(event.kind, event.time_s) for event in speech_events(stretches)] == [

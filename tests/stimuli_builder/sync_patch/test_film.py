@@ -51,7 +51,7 @@ def test_a_picture_half_way_between_two_frames_is_neither(number: int, share: fl
     assert patch_code.read_numbers(mixed[None]).tolist() == [patch_code.UNREADABLE]
 
 
-def test_no_frame_is_told_from_every_frame() -> None:
+def test_no_frame_is_distinguished_from_every_frame() -> None:
     assert patch_code.read_numbers(np.ones((1, 9))).tolist() == [patch_code.NO_FRAME]
     assert not any(patch_code.fields_of_number(number).all() for number in range(patch_code.NUMBERS))
 

@@ -305,7 +305,7 @@ def test_a_name_of_another_kind_of_file_is_refused_before_work(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_track_too_short_for_a_plot_is_written_and_the_plot_is_told(stimuli, recording, tmp_path):
+def test_a_track_too_short_for_a_plot_is_written_and_the_plot_is_reported(stimuli, recording, tmp_path):
     write_frames(tmp_path / "short.mp4", recording.pictures[:30], fps=200)
     model, out, plot = tmp_path / "m.npz", tmp_path / "t.csv", tmp_path / "p.png"
     fast = ("--no-refine", "--folds", 2, "--base-pixels", 1000)

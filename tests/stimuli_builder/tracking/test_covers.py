@@ -135,30 +135,30 @@ def test_eyes_that_stay_are_not_covered_in_a_sharp_picture_or_a_poor_one(spread)
         ([(0, range(5, 32)), (1, range(5, 32))], 2, "both eyes covered, closed tightly or turned away: "),
     ],
 )
-def test_covers_are_told_however_brief_or_long_and_on_all_eyes_at_once(covers, eyes, words):
+def test_covers_are_detected_however_brief_or_long_and_on_all_eyes_at_once(covers, eyes, words):
     told = covered_frames(VIDEO, looks(0.025, covers, eyes=eyes), 6)
     assert sorted(told) == list(covers[0][1])
     assert all(why.startswith(words) for why in told.values())
 
 
-def test_a_look_that_a_cover_nearly_hides_from_is_told_by_those_beside_it():
+def test_a_look_that_a_cover_nearly_hides_from_is_detected_by_those_next_to_it():
     seen = looks(0.025, [(0, [5, 6, 8])], eyes=1)
     assert sorted(covered_frames(VIDEO, seen | {7: [0.05], 20: [0.05]}, 6)) == [5, 6, 7, 8]
 
 
-def test_looks_apart_in_time_are_not_beside_one_another():
+def test_looks_apart_in_time_are_not_next_to_one_another():
     seen = looks(0.025, [(0, [5, 6, 8])], eyes=1) | {7: [0.05]}
     apart = {n + 100 * (n > 6) + 100 * (n > 7): spreads for n, spreads in seen.items()}
     assert sorted(covered_frames(VIDEO, apart, 6)) == [5, 6, 208]
 
 
-def test_blinks_that_are_read_less_steadily_are_no_covers():
+def test_blinks_that_are_read_less_steadily_are_not_covers():
     seen = looks(0.02, [], eyes=1)
     assert covered_frames(VIDEO, seen | {n: [0.05] for n in (5, 6, 20, 21, 22, 35)}, 6) == {}
 
 
 @pytest.mark.parametrize("covers", [range(5, 37), range(40)])
-def test_covers_for_most_of_a_recording_or_all_of_it_are_told(covers):
+def test_covers_for_most_of_a_recording_or_all_of_it_are_detected(covers):
     seen = looks(0.025, [(0, covers)])
     with pytest.raises(InputError, match=f"an eye is covered in {len(covers)} of 40 frames that show one"):
         covered_frames(VIDEO, seen, fewest=20)
@@ -345,7 +345,7 @@ def test_no_look_at_a_real_close_up_is_called_covered(detector, shared_data):
 
 
 @pytest.mark.parametrize("eye", [0, 1])
-def test_an_eye_whose_picture_is_flat_is_no_eye(eye, lesson, recording):
+def test_an_eye_whose_picture_is_flat_is_not_an_eye(eye, lesson, recording):
     """A model that has learned a cover has no residual on it; then the flat picture shows it."""
     fitter, faults = Fitter(lesson.model), Faults(lesson.model)
     start, kept = lesson.model.poses[0], np.zeros(len(lesson.model.sd))

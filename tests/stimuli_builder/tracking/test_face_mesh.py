@@ -48,7 +48,7 @@ def test_a_mirrored_face_has_its_image_left_eye_first_from_the_outer_canthus():
     assert turned[:, 1] == pytest.approx(face().points[:, 1])
 
 
-def test_a_face_in_both_images_is_the_mean_and_tells_how_far_they_differ():
+def test_a_face_in_both_images_is_the_mean_and_shows_how_far_they_differ():
     both = in_both(face(), [face(80), face(2)])
     assert both.points == pytest.approx(face(1).points)
     assert both.mirror_shares == pytest.approx([2 / widths(face().points)] * 2)
@@ -107,7 +107,7 @@ class OneFaceClient:
         return {"box": [left, 40, left + side, 40 + side], "eyes": eyes}
 
 
-def test_a_small_face_beside_one_that_fills_the_picture_is_kept():
+def test_a_small_face_next_to_one_that_fills_the_picture_is_kept():
     seen = FaceMesh(OneFaceClient()).detect(np.zeros((480, WIDTH_PX, 3), np.uint8))
     assert [round(float(one.box[2] - one.box[0])) for one in seen] == [400, 60]
 

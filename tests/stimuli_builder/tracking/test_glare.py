@@ -95,7 +95,7 @@ def test_shut_lids_under_a_reflection_show_it_about_them_or_no_iris_between(skin
     assert opening == pytest.approx(seen, rel=0.15)
 
 
-def test_skin_at_the_end_of_the_grey_levels_is_no_highlight():
+def test_skin_at_the_end_of_the_grey_levels_is_not_a_highlight():
     picture = np.full((300, 300), 255, np.uint8)
     assert highlights(picture, eye_at(0.2))[:3] == (0.0, 0.0, 0.0)
 

@@ -65,7 +65,7 @@ def track(stimuli, recording, lesson, tmp_path):
     return out
 
 
-def test_the_command_tells_the_scale(stimuli, recording, course, track, tmp_path):
+def test_the_command_shows_the_scale(stimuli, recording, course, track, tmp_path):
     out = tmp_path / "iris.csv"
     code, said, error = stimuli("iris", recording.video, track, "--out", out)
     assert (code, error) == (0, "")

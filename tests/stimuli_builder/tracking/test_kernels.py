@@ -52,7 +52,7 @@ def test_no_sample_is_taken_outside_the_picture_whatever_the_shape(mesh, bad):
     assert set(np.unique(warp_picture(mesh, picture, shape))) <= {7.0}
 
 
-def test_a_fit_that_wanders_across_the_picture_equals_one_begun_anew_at_each_step(lesson, recording):
+def test_a_fit_that_wanders_across_the_picture_equals_one_started_again_at_each_step(lesson, recording):
     """Cells are packed once around the mesh; a mesh that leaves them has them packed again."""
     picture, model = recording.pictures[0], lesson.model
     c, pose = model.examples[0], model.poses[0] + [0, 0, 9.0, 0]
@@ -82,7 +82,7 @@ def test_residuals_are_weighted_root_mean_squares_of_each_eye(lesson, recording)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e7])
-def test_a_movement_that_is_no_number_is_infinite(bad):
+def test_a_movement_that_is_not_a_number_is_infinite(bad):
     before, after = np.zeros((3, 2), np.float32), np.zeros((3, 2), np.float32)
     after[1, 1] = 0.25
     assert kernels.moved_by(after, before) == 0.25

@@ -291,7 +291,7 @@ def test_a_loss_has_the_detectors_word_of_it_as_long_as_that_holds(lesson, recor
     assert (again.status, again.reason) == ("reinitialised", f"found again after {reasons[0]}")
 
 
-def test_frames_in_which_no_face_is_seen_are_told_from_frames_not_looked_at(
+def test_frames_in_which_no_face_is_seen_are_distinguished_from_frames_not_looked_at(
     detector, shared_data, tmp_path, monkeypatch
 ):
     monkeypatch.setattr("stimuli_builder.tracking.survey.LOOKED_AT", 36)

@@ -102,7 +102,7 @@ def test_labels_of_another_size_or_a_longer_video_are_refused(document, tmp_path
 
 
 @pytest.mark.parametrize("raw", ["", "[]", "{", "\x00", '{"frames": 3, "image_size_px": [1, 1]}'])
-def test_what_is_no_label_file_is_refused(tmp_path, raw):
+def test_what_is_not_a_label_file_is_refused(tmp_path, raw):
     with pytest.raises(InputError):
         load_labels(saved(tmp_path, None, raw=raw))
 

@@ -70,7 +70,7 @@ def test_eyes_lost_in_a_light_followed_wrongly_are_found_in_that_of_the_labels(l
 
 
 @pytest.mark.parametrize(("gain", "offset"), [(0.6, 0.0), (1.4, -20.0), (0.8, 30.0)])
-def test_gain_and_offset_are_found_beside_what_no_model_explains(gain, offset):
+def test_gain_and_offset_are_found_despite_what_no_model_explains(gain, offset):
     rng = np.random.default_rng(2)
     look = rng.uniform(40, 200, 6500).astype(np.float32)
     seen = ((look - offset) / gain + rng.normal(0, 20, 6500)).astype(np.float32)
@@ -79,7 +79,7 @@ def test_gain_and_offset_are_found_beside_what_no_model_explains(gain, offset):
     assert told[0] == pytest.approx(gain, rel=0.02)
 
 
-def test_a_fit_that_broke_down_tells_no_light(lesson, recording):
+def test_a_fit_that_broke_down_shows_no_light(lesson, recording):
     fitter, model = Fitter(lesson.model), lesson.model
     dim = in_light(recording.pictures[0], 0.6, 0.0)
     seen = fitter.fit(dim, np.zeros(len(model.sd)), model.poses[0], 1)
@@ -88,14 +88,14 @@ def test_a_fit_that_broke_down_tells_no_light(lesson, recording):
     assert (broken.iterations, broken.light) == (0, (1.0, 0.0))
 
 
-def test_nothing_in_common_tells_no_light():
+def test_nothing_in_common_shows_no_light():
     look = np.linspace(40, 200, 500, dtype=np.float32)
     gain, offset = light_between(look, look[::-1].copy(), np.ones(500, np.float32))
     assert not Light(gain, offset).believable
     assert Light().following(gain, offset) == Light()
 
 
-def test_light_goes_back_where_nothing_is_told():
+def test_light_goes_back_where_nothing_is_reported():
     light = Light(1.3, -20.0)
     for _ in range(400):
         light = light.following(1.0, 0.0)

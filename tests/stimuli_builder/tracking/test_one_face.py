@@ -121,7 +121,7 @@ class Mesh:
 
 @pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize(("side", "more"), [(70, 1), (20, 0)])
-def test_a_face_too_small_beside_the_whole_picture_is_seen_in_a_part_of_it(turned, side, more):
+def test_a_face_too_small_next_to_the_whole_picture_is_seen_in_a_part_of_it(turned, side, more):
     picture = np.zeros((400, 1000, 3), np.uint8)
     picture[100:300, 100:300] = 200
     picture[200 : 200 + side, 800 : 800 + side] = 100

@@ -63,7 +63,7 @@ def test_a_second_run_on_proposals_that_nobody_touched_is_the_first_again(track,
     assert error == ""
 
 
-def test_moved_and_accepted_frames_count_and_the_others_are_proposed_anew(track, tmp_path, recording, seen):
+def test_moved_and_accepted_frames_count_and_the_others_are_proposed_again(track, tmp_path, recording, seen):
     track()
     worst = tmp_path / "worst.json"
     first, second, *_ = json.loads(worst.read_text())["frames"]
@@ -94,7 +94,7 @@ def test_what_the_page_saves_of_proposals_is_by_hand_to_the_last_frame(proposals
     assert unmarked_note(labels) == ""
 
 
-def test_a_file_of_before_without_proposals_counts_whole_and_is_told(proposals):
+def test_a_file_of_before_without_proposals_counts_whole_and_is_reported(proposals):
     changed(proposals, lambda document: document.pop("proposed"))
     labels = load_labels(proposals)
     assert by_hand(labels).frames.keys() == labels.frames.keys()
@@ -122,7 +122,7 @@ def test_proposals_that_are_none_are_refused(document, tmp_path, stimuli, record
 
 
 @pytest.mark.parametrize("command", ["track", "train"])
-def test_labels_that_nobody_reviewed_are_told(command, stimuli, recording, tmp_path, seen):
+def test_labels_that_nobody_reviewed_are_reported(command, stimuli, recording, tmp_path, seen):
     labels, out = tmp_path / "l.json", tmp_path / ("t.csv" if command == "track" else "m.npz")
     proposed_labels(scan_video(recording.video), seen, labels, 12)
     assert len(as_proposed(load_labels(labels))) == 12

@@ -166,14 +166,14 @@ def recorded(path, pictures, left_out=(), sound_s=0.0):
 
 
 @pytest.mark.parametrize("suffix", ["mp4", "mkv"])
-def test_a_dropped_frame_near_the_end_is_no_damage(recording, tmp_path, suffix):
+def test_a_dropped_frame_near_the_end_is_not_damage(recording, tmp_path, suffix):
     path = recorded(tmp_path / f"gap.{suffix}", recording.pictures[:101], left_out={95})
     taken = scan_before_damage(path)
     assert (taken.frame_count, taken.damaged) == (100, False)
 
 
 @pytest.mark.parametrize("sound_s", [0.8, 1.2])
-def test_sound_of_another_length_is_no_damage(recording, lesson, stimuli, tmp_path, sound_s):
+def test_sound_of_another_length_is_not_damage(recording, lesson, stimuli, tmp_path, sound_s):
     path = recorded(tmp_path / "sound.mkv", recording.pictures[:100], sound_s=sound_s)
     model, out = tmp_path / "m.npz", tmp_path / "t.csv"
     save_model(lesson.model, model)
@@ -183,7 +183,7 @@ def test_sound_of_another_length_is_no_damage(recording, lesson, stimuli, tmp_pa
     assert "declared" not in said
 
 
-def test_only_the_video_s_own_length_tells_how_many_frames_are_missing(recording, tmp_path):
+def test_only_the_video_s_own_length_shows_how_many_frames_are_missing(recording, tmp_path):
     whole = recorded(tmp_path / "whole.mkv", recording.pictures[:100], sound_s=1.4)
     path = tmp_path / "cut.mkv"
     path.write_bytes(whole.read_bytes()[: whole.stat().st_size // 2])
@@ -238,7 +238,7 @@ def test_bytes_spoilt_in_the_middle_are_refused_and_the_refusal_says_where(whole
 
 
 @pytest.mark.parametrize("groups", ["open-gop=1:keyint=20:bframes=3", "intra-refresh=1:keyint=20"])
-def test_frames_that_lean_on_others_across_groups_are_no_damage(recording, tmp_path, groups):
+def test_frames_that_lean_on_others_across_groups_are_not_damage(recording, tmp_path, groups):
     path = tmp_path / "groups.mp4"
     with av.open(str(path), "w") as container:
         stream = container.add_stream("libx264", rate=100, options={"x264-params": groups})

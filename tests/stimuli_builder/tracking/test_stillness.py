@@ -81,7 +81,7 @@ def test_a_person_who_holds_still_for_a_second_is_not_called_a_still_picture(les
 
 
 @pytest.mark.parametrize(("every", "times"), [(1, 2), (1, 3), (4, 2)])
-def test_frames_that_a_change_of_rate_repeats_are_told_once_and_keep_their_status(
+def test_frames_that_a_change_of_rate_repeats_are_reported_once_and_keep_their_status(
     lesson, recording, tmp_path, every, times
 ):
     """30 to 60 frames/s, 20 to 60, and 4 frames made 5."""
@@ -179,7 +179,7 @@ def test_lids_that_are_alike_in_a_few_frames_are_not_called_still(fps):
     assert all(told[10:])
 
 
-def test_two_seconds_begin_anew_after_a_frame_without_eyes():
+def test_two_seconds_start_over_after_a_frame_without_eyes():
     lids, eye = Stillness(FPS), np.arange(18.0).reshape(9, 2)
     assert [lids.after(eye) for _ in range(130)][119:] == [True] * 11
     lids.forget()
