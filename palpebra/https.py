@@ -61,7 +61,7 @@ def serve(
         palpebra serve --domain lab.example.org --certificate lab.pem --key lab.key
     """
     program = _caddy()
-    _check_name(domain, is_public=not (acme or certificate))
+    check_name(domain, is_public=not (acme or certificate))
     tls = tls_lines(certificate, key, acme, acme_root)
     place, chosen = data_folder(folder), free_port(port)
     os.environ["PALPEBRA_PUBLIC_URL"] = f"https://{domain}"
@@ -141,11 +141,12 @@ def running_proxy(program: str, rules: str, place: Path) -> Iterator[None]:
         )
     # After its own shutdown, uvicorn raises the signal again: by default it would end Python on the spot.
     signal.signal(signal.SIGTERM, lambda number, _frame: sys.exit(128 + number))
+    stopping = threading.Event()
     try:
         try:
             process.wait(SECONDS_TO_FAIL)
         except subprocess.TimeoutExpired:
-            threading.Thread(target=_watch, args=(process, log), daemon=True).start()
+            threading.Thread(target=_watch, args=(process, log, stopping), daemon=True).start()
             yield
             return
         raise InputError(
@@ -153,6 +154,7 @@ def running_proxy(program: str, rules: str, place: Path) -> Iterator[None]:
             "(on Linux: sudo setcap cap_net_bind_service=+ep $(command -v caddy))"
         )
     finally:
+        stopping.set()
         process.terminate()
         process.wait()
 
@@ -163,13 +165,13 @@ def last_error(log: Path) -> str:
     for line in log.read_text(encoding="utf-8", errors="replace").splitlines():
         if line.startswith(("Error: ", "run: ")):
             reason = line.partition(": ")[2]
-        elif line.startswith("{") and '"level":"error"' in line:
-            entry = json.loads(line)
+        elif line.startswith("{") and line.endswith("}") and '"level":"error"' in line:
+            entry = json.loads(line)  # the last line may be half-written
             reason = str(entry.get("error") or entry.get("msg") or "")
     return " ".join(reason.split())[:300]
 
 
-def _watch(process: subprocess.Popen[bytes], log: Path) -> None:
+def _watch(process: subprocess.Popen[bytes], log: Path, stopping: threading.Event) -> None:
     """Print once that there is a certificate, or why there is none yet; stop the server if Caddy ends."""
     printed = ""
     while process.poll() is None:
@@ -184,7 +186,8 @@ def _watch(process: subprocess.Popen[bytes], log: Path) -> None:
             printed = news
         if news.startswith("Caddy got"):
             process.wait()
-    if process.returncode > 0:
+    # 0: by Ctrl-C, which Caddy got too. Below 0: by a signal, as where memory ran out.
+    if process.returncode != 0 and not stopping.is_set():
         typer.echo(f"Caddy ended: {last_error(log)}; the server stops (log: {log})", err=True)
         _thread.interrupt_main()
 
@@ -207,11 +210,19 @@ def _caddy() -> str:
     return program
 
 
-def _check_name(domain: str, *, is_public: bool) -> None:
+def check_name(domain: str, *, is_public: bool) -> None:
+    """Refuse what is not a host name.
+
+    Raises
+    ------
+    InputError
+        It is none, or a public one has no dot.
+    """
     is_address = domain.replace(".", "").isdigit()
     if not NAME.fullmatch(domain) or is_address or (is_public and "." not in domain):
         raise InputError(f"--domain: expected a host name such as lab.example.org, got '{domain}'")
 
 
 def _quoted(path: Path | None) -> str:
-    return json.dumps(str(path and path.resolve()))
+    # Caddy knows no escapes but that of the quote: letters and slashes stay as they are.
+    return json.dumps(path.resolve().as_posix() if path else "", ensure_ascii=False)

@@ -9,6 +9,7 @@ import typer
 
 from experiments.errors import InputError
 from palpebra.folders import PORT, Folder, data_folder
+from palpebra.https import check_name
 
 UNIT = """\
 # Written by `palpebra service install`. The server under systemd, with access to its data folder only.
@@ -68,6 +69,10 @@ def install(
 
         palpebra service install --domain lab.example.org
     """
+    if domain:
+        check_name(domain, is_public=not own_proxy)
+    elif own_proxy:
+        raise InputError("--own-proxy is for a domain: expected --domain NAME with it")
     program = shutil.which("palpebra") or f"{sys.executable} -m palpebra"
     place = data_folder(folder)
     if " " in str(place):

@@ -1,11 +1,14 @@
 """`palpebra serve`: a certificate from a real authority on this machine, and what can go wrong before."""
 
+import json
 import os
 import shutil
+import signal
 import socket
 import ssl
 import subprocess
 import sys
+import time
 import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from experiments.errors import InputError
-from palpebra.https import proxy_rules, tls_lines
+from palpebra.https import SECONDS_TO_FAIL, last_error, proxy_rules, tls_lines
 from tests.helpers.ports import free_port
 from tests.helpers.waiting import until
 
@@ -128,6 +131,23 @@ def test_certificate_is_fetched_and_pages_are_served(
     until(lambda: not is_answered(443))  # Caddy ended with the server
 
 
+def test_server_ends_if_caddy_is_killed(tmp_path: Path, domain: str) -> None:
+    certificate, key = own_certificate(tmp_path, domain)
+    options = ["--domain", domain, "--certificate", certificate, "--key", key, "--port", str(free_port())]
+    command = [sys.executable, "-m", "palpebra", "serve", "--folder", tmp_path / "data", *options]
+    with subprocess.Popen(command, env={**os.environ, "HOME": str(tmp_path)}) as process:
+        try:
+            until(lambda: process.poll() is not None or is_answered(443))
+            time.sleep(SECONDS_TO_FAIL + 1)  # from then on Caddy is watched
+            children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+            caddy = [int(pid) for pid in children if Path(f"/proc/{pid}/comm").read_text() == "caddy\n"]
+            assert len(caddy) == 1
+            os.kill(caddy[0], signal.SIGKILL)
+            process.wait(60)
+        finally:
+            process.kill()
+
+
 def page(url: str, trusted: ssl.SSLContext) -> int:
     try:
         with urllib.request.urlopen(url, timeout=10, context=trusted) as answer:
@@ -151,9 +171,10 @@ def test_port_in_use_is_one_line(tmp_path: Path, domain: str) -> None:
     assert done.stderr.count("\n") == 1
 
 
-def own_certificate(folder: Path) -> tuple[Path, Path]:
+def own_certificate(folder: Path, domain: str = "lab") -> tuple[Path, Path]:
     certificate, key = folder / "own.pem", folder / "own.key"
     command = ["openssl", "req", "-x509", "-newkey", "ed25519", "-nodes", "-subj", "/CN=lab", "-days", "2"]
+    command += ["-addext", f"subjectAltName=DNS:{domain}"]
     subprocess.run([*command, "-out", certificate, "-keyout", key], check=True, capture_output=True)
     return certificate, key
 
@@ -187,14 +208,22 @@ def test_half_a_certificate_is_refused(tmp_path: Path) -> None:
         tls_lines(None, None, "", there)
 
 
+def test_reason_is_that_of_the_last_whole_line(tmp_path: Path) -> None:
+    log = tmp_path / "caddy.log"
+    log.write_text('{"level":"error","error":"no route"}\n{"level":"error","er', encoding="utf-8")
+    assert last_error(log) == "no route"
+
+
 @pytest.mark.skipif(CADDY is None, reason="no caddy on this machine")
 def test_rules_are_valid_for_caddy(tmp_path: Path) -> None:
     assert CADDY is not None
-    rules = proxy_rules("lab.example.org", 8123, [], store=tmp_path / "with blank", email="me@example.org")
+    store = tmp_path / "with blank and ü"
+    rules = proxy_rules("lab.example.org", 8123, [], store=store, email="me@example.org")
     file = tmp_path / "Caddyfile"
     file.write_text(rules, encoding="utf-8")
     command = [CADDY, "adapt", "--config", file, "--adapter", "caddyfile"]
     adapted = subprocess.run(command, check=True, capture_output=True, text=True)
     assert '"dial":"127.0.0.1:8123"' in adapted.stdout
     assert "lab.example.org" in adapted.stdout
+    assert json.loads(adapted.stdout)["storage"]["root"] == str(store)
     assert "me@example.org" in adapted.stdout

@@ -146,6 +146,21 @@ def test_service_writes_a_unit(tmp_path: Path, options: list[str], line: str) ->
     assert ("CAP_NET_BIND_SERVICE" in text) == ("serve" in line)
 
 
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--domain", "https://lab.example.org"], "--domain: expected a host name"),
+        (["--own-proxy"], "--own-proxy is for a domain: expected --domain NAME with it"),
+    ],
+)
+def test_a_unit_that_cannot_work_is_not_written(tmp_path: Path, options: list[str], said: str) -> None:
+    out = tmp_path / "palpebra.service"
+    done = palpebra("service", "install", "--out", str(out), *options, folder=tmp_path)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert not out.exists()
+
+
 def test_server_starts_without_extras_and_without_what_only_unix_has(tmp_path: Path) -> None:
     port = unused_port()
     program = Path(__file__).with_name("without_unix.py")
