@@ -12,6 +12,7 @@ import tempfile
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from decimal import Decimal, InvalidOperation
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -277,7 +278,7 @@ def _compared(
 ) -> Iterator[Comparison]:
     """Run the command on the table, and put each printed number next to ours."""
     with tempfile.TemporaryDirectory() as scratch:
-        table, out = Path(scratch) / (analysis.table or "made.csv"), Path(scratch) / "out.json"
+        table, out = Path(scratch) / Path(analysis.table or "made.csv").name, Path(scratch) / "out.json"
         if analysis.made_by:
             _run_command(run, analysis, [*analysis.made_by, "--out", str(table)])
         elif analysis.table:
@@ -353,7 +354,12 @@ def _evaluated(rows: pd.DataFrame, text: str) -> Any:
 
 
 def _filled(text: str, row: Mapping[Any, Any]) -> str:
-    return text.format_map({str(key): value for key, value in row.items()})
+    try:
+        return text.format_map({str(key): value for key, value in row.items()})
+    except (KeyError, AttributeError, IndexError, ValueError) as error:
+        raise InputError(
+            f"'{text}' in {DECLARATION}: expected {{columns}} of the table, got {error}"
+        ) from None
 
 
 def _sentence(analysis: StudyAnalysis) -> Iterator[Figure]:
@@ -390,6 +396,8 @@ def _printed_numbers(
     rows = pd.read_csv(io.StringIO(text), dtype=str)
     if file.where is not None:
         rows = rows[_evaluated(rows, file.where).astype(bool)]
+    if unknown := {*file.label, *file.columns} - {*rows.columns}:
+        raise InputError(f"{file.file} has no column '{min(unknown)}'; it has {', '.join(rows.columns)}")
     for record in rows.to_dict("records"):
         row = {str(key): value for key, value in record.items()}
         label = " ".join(str(row[key]) for key in file.label or row.keys() - file.columns.keys())
@@ -445,14 +453,20 @@ def _value_at(one: Any, path: str) -> Any:
 def _comparison(analysis: str, figure: str, printed: str, numbers: Any, column: PrintedColumn) -> Comparison:
     ours = number_at(numbers, column.at)
     text = printed.replace("−", "-").replace(" ", "")
-    if text[0] in "<>":
-        bound = float(text[1:])
-        return Comparison(analysis, figure, printed, ours, ours < bound if text[0] == "<" else ours > bound)
-    decimals = len(text.partition(".")[2]) if column.decimals is None else column.decimals
+    sign = text[:1] if text[:1] in ("<", ">") else ""
+    try:
+        number = Decimal(text.removeprefix(sign))
+        last_digit = int(number.as_tuple().exponent)  # that of 6e-04 is -4
+    except (InvalidOperation, ValueError):
+        raise InputError(f"{analysis}: {figure}: expected a printed number, got '{printed}'") from None
+    if sign:
+        bound = float(number)
+        return Comparison(analysis, figure, printed, ours, ours < bound if sign == "<" else ours > bound)
+    decimals = -last_digit if column.decimals is None else column.decimals
     allowed = 0.5 * 10.0**-decimals * (1 + 1e-9)
     if column.within is not None:
         allowed = column.within * (1.0 if column.of is None else abs(number_at(numbers, column.of)))
-    return Comparison(analysis, figure, printed, ours, abs(ours - float(text)) <= allowed)
+    return Comparison(analysis, figure, printed, ours, abs(ours - float(number)) <= allowed)
 
 
 # The comparison as tables.

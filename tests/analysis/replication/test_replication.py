@@ -121,6 +121,7 @@ def test_a_new_study_is_one_folder(tmp_path: Path) -> None:
         ("t-test", "t-tests", "There is no command 't-tests'"),
         ('title = "A study"', "titel = 1", "study.toml: title: Field required"),
         ('"doubled", "--against"', '"tripled", "--against"', "ratings.csv has no column 'tripled'"),
+        ("{{group}}-{{id}}", "{{group}}-{{ids}}", "expected {columns} of the table, got 'ids'"),
         ("{sha}", "{sha:.63}0", "the file again from the source"),
     ],
 )
@@ -132,6 +133,20 @@ def test_wrong_declarations_are_one_line(tmp_path: Path, before: str, after: str
         replicate_study(run, str(folder))
     assert said in str(error.value)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(("printed", "n_equal"), [("5e-02", 4), ("4.9e-02", 4), ("6e-02", 3), ("4e-01", 3)])
+def test_a_power_of_ten_has_its_own_last_digit(tmp_path: Path, printed: str, n_equal: int) -> None:
+    folder = _folder(tmp_path / "ours", printed=PRINTED.replace(".049", printed))
+    (folder / "ratings.csv").write_text(CSV, encoding="utf-8")
+    assert replicate_study(run, str(folder)).n_equal == n_equal
+
+
+def test_files_may_be_in_a_folder_of_the_study(tmp_path: Path) -> None:
+    folder = _folder(tmp_path / "ours", STUDY.replace("ratings.csv", "raw/ratings.csv"))
+    (folder / "raw").mkdir()
+    (folder / "raw" / "ratings.csv").write_text(CSV, encoding="utf-8")
+    assert replicate_study(run, str(folder)).n_equal == 4
 
 
 def test_addresses_reach_numbers() -> None:
