@@ -1,6 +1,7 @@
 """`analysis ranks` and `analysis t-test`: tests of one factor, or of one sample."""
 
 from dataclasses import asdict, dataclass, replace
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -28,9 +29,20 @@ RatingOption = Annotated[str, typer.Option(help="Column with the rating.")]
 WithinOption = Annotated[str | None, typer.Option(help="Column of a factor within participants.")]
 BetweenOption = Annotated[str | None, typer.Option(help="Column of a factor between participants.")]
 ScaleOption = Annotated[str | None, typer.Option(help="Ends of the scale, e.g. 1:7.")]
+
+
+def _finite(value: float | None) -> float | None:
+    if value is None or isfinite(value):
+        return value
+    raise InputError(f"--against should be a number such as 4, got {value}")
+
+
 AgainstOption = Annotated[
     float | None,
-    typer.Option(help="Test against this value: all participants, or those of each level of a factor."),
+    typer.Option(
+        callback=_finite,
+        help="Test against this value: all participants, or those of each level of a factor.",
+    ),
 ]
 EquivalenceOption = Annotated[
     str | None,

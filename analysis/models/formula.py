@@ -150,8 +150,9 @@ def _effects_of(text: str, whole: str) -> tuple[Effect, ...]:
                 f"'{term}' in '{whole}' is not understood; expected names joined by +, * or :, as in "
                 f"{EXAMPLE}"
             )
+        factors = list(dict.fromkeys(factors))  # a:a is a
         sizes = range(1, len(factors) + 1) if "*" in term else [len(factors)]
-        for effect in chain.from_iterable(combinations(dict.fromkeys(factors), size) for size in sizes):
+        for effect in chain.from_iterable(combinations(factors, size) for size in sizes):
             effects.setdefault(frozenset(effect), effect)
     if without_intercept:
         raise InputError(f"'{whole}' has a term without an intercept (0 +), which is not supported")

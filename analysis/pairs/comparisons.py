@@ -67,6 +67,8 @@ class Comparisons:
         if self.content is None:
             return {"all": self}
         parts = {name: self._subset(self.content == name, name) for name in map(str, np.unique(self.content))}
+        if "all" in parts:
+            raise InputError(f"{self.source}: a content is called all, as all contents together; rename it")
         shared = len(_components(self, strong=False)) == 1
         return {**({"all": self} if shared and len(parts) > 1 else {}), **parts}
 

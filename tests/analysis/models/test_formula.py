@@ -70,6 +70,7 @@ def test_formulas_are_read_as_r_reads_them() -> None:
     parsed = parse_formula("y ~ a*b*age + (1 + a | person) + (1 | lab/room) + (1 | clip)")
     names = [":".join(effect) for effect in parsed.effects]
     assert names == ["a", "b", "age", "a:b", "a:age", "b:age", "a:b:age"]
+    assert parse_formula("y ~ a:a + (1 | person)").effects == (("a",),)
     header = ("y", "a", "b", "age", "person", "lab", "room", "clip")
     options = model_options(parsed, header, {"y", "age", "b"})
     assert options.factors == ("a",)

@@ -51,6 +51,12 @@ def test_without_prior_jod_are_thurstones_abilities(tmp_path: Path) -> None:
         assert [item.wins for item in scale.items] == [item.wins for item in expected.items]
 
 
+def test_a_content_is_not_called_as_all_together(tmp_path: Path) -> None:
+    rows = [row.replace(",x,", ",all,") for row in _rows()]
+    with pytest.raises(InputError, match="a content is called all, as all contents together; rename it"):
+        _read(_file(tmp_path / "pairs.csv", *rows)).by_content()
+
+
 def test_order_of_rows_and_sides_changes_nothing(tmp_path: Path) -> None:
     rows = _rows()
     turned = [

@@ -38,6 +38,16 @@ def test_welch_anova_and_pairs_agree_with_r() -> None:
         assert test.p_equivalence == pytest.approx(expected["tost"], rel=1e-8)
 
 
+@pytest.mark.parametrize("command", ["t-test", "ranks"])
+@pytest.mark.parametrize("value", ["nan", "inf"])
+def test_a_value_to_test_against_is_a_number(tmp_path: Path, command: str, value: str) -> None:
+    file = tmp_path / "table.csv"
+    file.write_text("id,score\na,1\nb,2\nc,4\n", encoding="utf-8")
+    options = ["--participant", "id", "--rating", "score", "--against", value]
+    with pytest.raises(InputError, match=f"--against should be a number such as 4, got {value}"):
+        app([command, str(file), *options], standalone_mode=False)
+
+
 def test_one_sample_tests_agree_with_r() -> None:
     values = [np.array(KNOWN["groups_tied"]["values"])]
     test = compare_with_value(None, ["all"], values, 3.5, BOUNDS).tests[0]
