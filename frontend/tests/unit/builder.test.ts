@@ -319,8 +319,10 @@ describe("edits of two people that meet", () => {
     expect(meeting.mine.map(({ at }) => placeName(at))).toEqual(["forms.about.fields.age.minimum"]);
     // Their order stays, and my change is in the question that has its name.
     expect(valueAt(meetingOf(base, mine, theirs).merged, ["forms", 0, "fields", 1])).toEqual(question("age", 16));
-    // A question that they removed, and I edited: mine for now.
-    expect(meetingOf(base, mine, removed).both.map(({ path }) => path)).toEqual(["forms.about.fields.age.minimum"]);
+    // A question that they removed, and I edited: mine for now, with all that it had.
+    const back = meetingOf(base, mine, removed);
+    expect(back.both.map(({ path }) => path)).toEqual(["forms.about.fields.age"]);
+    expect(valueAt(back.merged, ["forms", 0, "fields", 1])).toEqual(question("age", 16));
   });
 
   it("are shown field by field where both changed the same, and can be taken from either", () => {
@@ -330,6 +332,19 @@ describe("edits of two people that meet", () => {
     expect(meeting.merged["title"]).toBe("mine");
     if (edit !== undefined) expect(withChange(meeting.merged, edit.theirs.at, edit.theirs.after)["title"]).toBe("theirs");
     expect(meetingOf(base, changed(["title"], "same"), changed(["title"], "same")).both).toEqual([]);
+  });
+
+  it("are one choice where one removed what the other changed in several fields", () => {
+    const without = changed(["forms", 0, "fields", 0], undefined);
+    const other = changed(["forms", 0, "fields", 0], { ...question("age", 21), label: { en: "Age" } });
+    const { both, theirs, merged } = meetingOf(base, without, other);
+    expect(both.map(({ path }) => path)).toEqual(["forms.about.fields.age"]);
+    expect(theirs).toEqual([]);
+    expect(merged).toEqual(without);
+    const [edit] = both;
+    if (edit === undefined) throw new Error("expected an edit");
+    const taken = withChange(merged, edit.theirs.at, edit.theirs.after);
+    expect(valueAt(taken, ["forms", 0, "fields", 1])).toEqual(valueAt(other, ["forms", 0, "fields", 0]));
   });
 
   it("bring back what one removed, and remove what one took out", () => {

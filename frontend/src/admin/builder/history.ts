@@ -94,17 +94,35 @@ export interface Meeting {
 /** Edits that began from `base`, brought together. */
 export function meetingOf(base: unknown, mine: Data, theirs: Data): Meeting {
   const [my, other] = [changesBetween(base, mine), changesBetween(base, theirs)];
-  const both = my.flatMap((change) => {
-    const met = other.find((one) => isWithin(one.at, change.at) || isWithin(change.at, one.at));
-    return met === undefined || isSame(met.after, change.after) ? [] : [{ path: placeName(change.at), mine: change, theirs: met }];
-  });
-  const met = new Set<Change>(both.flatMap((edit) => [edit.mine, edit.theirs]));
+  const places = new Map<string, readonly Step[]>();
+  const met = new Set<Change>();
+  for (const change of my) {
+    const overlapping = other.filter((one) => isWithin(one.at, change.at) || isWithin(change.at, one.at));
+    const around = overlapping.find((one) => isWithin(change.at, one.at));
+    // Where they took out what my change is in, it is all of that which both changed.
+    const isGone = around !== undefined && contentAt(theirs, change.at.slice(0, -1)) === undefined;
+    const at = isGone ? around.at : change.at;
+    if (overlapping.length === 0 || isSame(contentAt(mine, at), contentAt(theirs, at))) continue;
+    places.set(placeName(at), at);
+    for (const one of [change, ...overlapping]) met.add(one);
+  }
+  const changeTo = (data: Data, at: readonly Step[]) => ({ at, before: contentAt(base, at), after: contentAt(data, at) });
+  const both = [...places].map(([path, at]) => ({ path, mine: changeTo(mine, at), theirs: changeTo(theirs, at) }));
+  const alone = my.filter((change) => !met.has(change));
+  const kept = [...alone, ...both.map((edit) => edit.mine)];
   return {
-    merged: my.reduce((data, change) => withChange(data, change.at, change.after), theirs),
+    merged: kept.reduce((data, change) => withChange(data, change.at, change.after), theirs),
     theirs: other.filter((change) => !met.has(change)),
-    mine: my.filter((change) => !met.has(change)),
+    mine: alone,
     both,
   };
+}
+
+/** What is at a place; undefined where there is none. */
+function contentAt(data: unknown, at: readonly Step[]): unknown {
+  let here = data;
+  for (const step of at) here = typeof step !== "string" ? elementOf(here, step.named) : isTable(here) ? here[step] : undefined;
+  return here;
 }
 
 /** "forms.about.fields.age.minimum" */
