@@ -274,7 +274,8 @@ class FileLocks:
             with suppress(ImportError):  # a system without such locks: the job's age alone tells
                 held.enter_context(file_lock(path))
             yield
-            path.unlink(missing_ok=True)
+            with suppress(PermissionError):  # Windows keeps a file that is open
+                path.unlink(missing_ok=True)
 
     def job_is_left(self, job: Job) -> bool:
         """Whether the process of a job that is not over has ended; by its age if there is no file."""

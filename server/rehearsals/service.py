@@ -2,6 +2,7 @@
 
 import atexit
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -307,7 +308,7 @@ def _server(settings: Settings, of_server: Sequence[Finding]) -> Iterator[Launch
     for finding in of_server:
         kind = _OF_SERVER.get(finding.subject)
         if kind is not None and finding.verdict != "ok":
-            yield _of_finding(kind, finding)
+            yield of_finding(kind, finding)
     if settings.is_local:
         yield LaunchCheck(
             kind="address",
@@ -326,9 +327,12 @@ def _server(settings: Settings, of_server: Sequence[Finding]) -> Iterator[Launch
         )
 
 
-def _of_finding(kind: str, finding: Finding) -> LaunchCheck:
+def of_finding(kind: str, finding: Finding) -> LaunchCheck:
+    """A finding of `server doctor` as a line of the checklist."""
     # Folders of the server are nothing for people of a study: the doctor names them to its operator.
-    state = finding.state.rpartition(", ")[2] if kind == "disk" else finding.state
+    state = re.split(r", |: ", finding.state)[-1] if kind == "disk" else finding.state
+    if kind == "backups" and finding.verdict == "failed":
+        state = "they cannot be read"
     text = f"{finding.subject.capitalize()}: {state}. {finding.advice[:1].upper()}{finding.advice[1:]}."
     return LaunchCheck(kind=kind, blocks=False, text=text, page="server")
 

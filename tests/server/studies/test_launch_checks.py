@@ -11,6 +11,8 @@ from experiments.manifest import Manifest
 from server.context import Services
 from server.core.settings import Settings
 from server.models import Job, Study, StudyVersion
+from server.operations.doctor import Finding
+from server.rehearsals.service import of_finding
 from tests.helpers.admins import Admin
 from tests.helpers.databases import run_server_command
 from tests.helpers.motion_checks import checked
@@ -275,3 +277,15 @@ def test_a_full_disk_is_named(
     (disk,) = advice(owner, "disk")
     assert "GB free" in disk
     assert "free disk space" in disk.lower()
+
+
+def test_folders_of_the_server_are_not_shown() -> None:
+    disk = Finding(
+        "data folder", "failed", "/srv/secret, data: Permission denied", "set PALPEBRA_DATA_FOLDER"
+    )
+    backups = Finding("backups", "failed", "/srv/backups cannot be read: No such file", "look at the store")
+    for kind, finding, said in (
+        ("disk", disk, "Data folder: Permission denied. Set PALPEBRA_DATA_FOLDER."),
+        ("backups", backups, "Backups: they cannot be read. Look at the store."),
+    ):
+        assert of_finding(kind, finding).text == said
