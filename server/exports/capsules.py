@@ -9,11 +9,8 @@ from dataclasses import dataclass
 from datetime import timedelta
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from rocrate.model.contextentity import ContextEntity
-from rocrate.model.person import Person
-from rocrate.rocrate import ROCrate
 from sqlalchemy.orm import Session
 
 from experiments.capsule import (
@@ -54,6 +51,9 @@ from server.results.methods import MethodsFigures, methods_figures, paragraph_of
 from server.studies.lookup import definition_of, find_study
 from server.studies.series import version_of_series
 
+if TYPE_CHECKING:
+    from rocrate.rocrate import ROCrate
+
 # The RO-Crate of a capsule (https://w3id.org/ro/crate/1.2): what each file is, who made it, and how.
 
 CRATE_FILE = "ro-crate-metadata.json"
@@ -78,6 +78,9 @@ def crate_metadata(
     made: str,
 ) -> str:
     """`ro-crate-metadata.json` of a capsule of these files."""
+    from rocrate.model.person import Person  # a quarter of the server's start, for a rare download
+    from rocrate.rocrate import ROCrate
+
     crate = ROCrate(version=CRATE_VERSION)
     about = experiment.dataset
     crate.name = f"{experiment.title} (study {study})"
@@ -120,17 +123,21 @@ def _person(name: str, affiliation: str) -> dict[str, Any]:
     return {"name": name, **({"affiliation": affiliation} if affiliation else {})}
 
 
-def _licence(crate: ROCrate, page: str | None) -> Any:
+def _licence(crate: "ROCrate", page: str | None) -> Any:
     properties = {
         "@type": "CreativeWork",
         "name": page or "No licence",
         "description": f"The license at {page}." if page else _NO_LICENCE,
     }
+    from rocrate.model.contextentity import ContextEntity
+
     return crate.add(ContextEntity(crate, page or "#no-licence", properties=properties))
 
 
-def _add_action(crate: ROCrate, by_path: dict[str, Any], report: ReportSource, software: Software) -> None:
+def _add_action(crate: "ROCrate", by_path: dict[str, Any], report: ReportSource, software: Software) -> None:
     """How the report came about: the program, what it read, what it gave."""
+    from rocrate.model.contextentity import ContextEntity
+
     program = ContextEntity(
         crate,
         f"#{PROGRAM}",
