@@ -1,6 +1,7 @@
 """`palpebra` and `palpebra demo`: the server with the embedded default, and the browser on the first page."""
 
 import os
+import shlex
 import threading
 import time
 import urllib.error
@@ -15,7 +16,7 @@ from urllib.parse import quote, urlencode
 import typer
 
 from experiments.errors import InputError
-from palpebra.folders import PORT, Folder, data_folder, free_port, use_folder
+from palpebra.folders import DATA_VARIABLE, PORT, Folder, data_folder, default_folder, free_port, use_folder
 
 if TYPE_CHECKING:  # the server is only imported when it starts, so that `palpebra --help` is quick
     from server.cli_run import Welcome
@@ -148,6 +149,8 @@ def serve_folder(
         address = local + page(welcome, place)
         print_links(welcome, public_url)
         typer.echo(f"Data folder: {place}")
+        if place != default_folder():
+            typer.echo(f"For commands on these data: export {DATA_VARIABLE}={shlex.quote(str(place))}")
         typer.echo(f"Open {address}")
         typer.echo("Stop with Ctrl-C.")
         with around():

@@ -74,8 +74,8 @@ def stored_services(settings: Settings | None = None) -> Iterator[Services]:
 
 def _no_database(address: str, what: str) -> InputError:
     return InputError(
-        f"there is {what} {address}; run this in the folder of the server, or set PALPEBRA_DATA_FOLDER or "
-        f"DATABASE_URL"
+        f"there is {what} {address}; run this in the folder of the server, or set PALPEBRA_DATA_FOLDER "
+        f"to the data folder that the server printed, or DATABASE_URL"
     )
 
 

@@ -73,7 +73,7 @@ def check_strength(password: str, name: str) -> None:
         said = judged["feedback"]["warning"] or (
             "use a few uncommon words in a row, which are easy to remember"
         )
-        raise WeakPassword(f"This password is too easy to guess: {said.rstrip('.')}.")
+        raise WeakPassword(f"This password is too easy to guess: {said[:1].lower()}{said[1:].rstrip('.')}.")
 
 
 def hash_password(password: str, name: str) -> str:

@@ -103,7 +103,8 @@ def simulate(
                 raise InputError(f"the server refused a simulated participant: {error}") from error
             advance()
     out.print(
-        f"study {study}: {counted(participants, 'simulated participant')}, {counted(ratings, 'rating')}"
+        f"study {study}: {counted(participants, 'simulated participant')}, {counted(ratings, 'rating')}, "
+        "practice and repeated plays included"
     )
 
 

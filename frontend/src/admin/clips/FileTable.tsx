@@ -113,7 +113,7 @@ function OneFile({ file, onReplace, onLeaveOut }: RowProps & { file: Schemas["Up
           {state === "refused" && (
             <label>
               {" "}
-              Replace by:{" "}
+              Replace with:{" "}
               <input
                 type="file"
                 accept="video/*,.mkv,.mxf,.y4m"

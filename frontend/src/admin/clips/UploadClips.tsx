@@ -4,6 +4,7 @@ import type { Schemas } from "../api";
 import { Alert, Button, FileInput, Group, Progress, Select, Stack, Text } from "@mantine/core";
 import { useState, type ReactNode } from "react";
 import { onDemand } from "../ui/Answer";
+import { counted } from "../ui/format";
 import { LeftOut, type Upload } from "./useUpload";
 
 type Sized = Pick<Schemas["UploadedFile"], "name" | "width_px" | "height_px">;
@@ -160,7 +161,7 @@ function Received({ upload, received }: { upload: Upload; received: Schemas["Upl
         </Button>
       </Group>
       {refused > 0 && (
-        <Alert color="red" variant="light" title={`${count(refused)} files cannot be used`}>
+        <Alert color="red" variant="light" title={`${counted(refused, "file")} cannot be used`}>
           <Text size="sm">Correct them as described in the table, then choose the corrected files there. The other files stay.</Text>
         </Alert>
       )}

@@ -226,8 +226,8 @@ const FILES: [file: string, title: string, words: string][] = [
   ["ratings.sav", "Answers for SPSS", "One row per presentation, with labels of variables and levels."],
   ["wide.sav", "Wide table for SPSS", "One row per participant, with labels of variables and form answers."],
   ["ratings.parquet", "Answers as Parquet", "One row per presentation, with types and levels, for pandas, Polars, Arrow and DuckDB."],
-  ["analysis.R", "Script for R", "Analyses the answers with afex, emmeans and lme4. Save it next to the answers."],
-  ["analysis.py", "Script for Python", "Analyses the answers with pandas and statsmodels. Save it next to the answers."],
+  ["analysis.R", "Script for R", "Analyzes the answers with afex, emmeans and lme4. Save it next to the answers."],
+  ["analysis.py", "Script for Python", "Analyzes the answers with pandas and statsmodels. Save it next to the answers."],
   [
     "psych-ds.zip",
     "Psych-DS dataset",
@@ -319,11 +319,11 @@ export function DataTab() {
         ))}
       </SimpleGrid>
       <Text size="sm">
-        The same on the command line, and the analysis; the{" "}
+        These commands download the same files and run the analysis. First save the{" "}
         <Anchor underline="always" href={`/api/admin/studies/${study}/versions/${version}`} download={`${study}.toml`}>
           definition
         </Anchor>{" "}
-        saved as {study}.toml:
+        as {study}.toml.
       </Text>
       <Code
         block

@@ -88,7 +88,7 @@ export function DesignLine({ design }: { design: Schemas["DesignOut"] }) {
     <div>
       <Text size="sm" role="status" aria-label="Size of the design">
         {counted(cells, "cell")} with {counted(exemplars, "clip")} each, {counted(unique_clips, "clip")} in all;{" "}
-        {counted(trials_per_participant, "trial")} per participant, about {expected_minutes.toFixed(0)} minutes
+        {counted(trials_per_participant, "trial")} per participant, about {counted(Math.max(1, Math.round(expected_minutes)), "minute")}
       </Text>
       {notes.map((note) => (
         <Text key={note} size="sm">
