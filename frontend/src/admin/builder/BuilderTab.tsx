@@ -75,17 +75,23 @@ function Begun({ detail }: { detail: Schemas["StudyDetail"] }) {
     forgetWork(name);
     setFrom({ toml: detail.toml, data: null });
   };
-  const note =
-    kept === null || from.toml !== kept.toml
-      ? null
-      : `Unsaved work from ${when(kept.at)} was restored.${kept.revision === revision ? "" : " The study has changed since then; your changes were put into its present version. The changes that saving would make are listed below."}`;
+  // What came of the kept work: put into what others saved, or still what saving would replace theirs by.
+  const noteOf = (meeting: Meeting | null) => {
+    if (kept === null || from.toml !== kept.toml) return null;
+    const restored = `Unsaved work from ${when(kept.at)} was restored.`;
+    if (kept.revision === revision) return restored;
+    const isReplacing = isMet && meeting === null;
+    return isReplacing
+      ? `${restored} The study has changed since then. Your text is not valid TOML, so saving it would replace those changes.`
+      : `${restored} The study has changed since then; ${isMet ? "your changes were put into its present version. The" : "the"} changes that saving would make are listed below.`;
+  };
   return (
     <Answer of={start}>
       {(begun) => (
         <Stack key={begun.toml} gap="sm">
-          {note !== null && (
+          {noteOf(begun.meeting) !== null && (
             <Group gap="xs" role="status">
-              <span>{note}</span>
+              <span>{noteOf(begun.meeting)}</span>
               <Button size="compact-xs" variant="default" onClick={startOver}>
                 Discard it
               </Button>
