@@ -2,6 +2,7 @@
 
 from dataclasses import asdict
 from enum import StrEnum
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -149,8 +150,8 @@ def pairs(
         show_text(jod_text(scaled, file.stem, comparisons.synthetic))
         show_tables(*jod_tables(scaled, file.stem, comparisons.synthetic))
         return
-    if reference or screen:
-        raise InputError("--reference and --screen are for --method jod")
+    if reference or screen or prior is PriorChoice.NONE:
+        raise InputError("--reference, --screen and --prior are for --method jod")
     usual: Method = "davidson" if comparisons.ties else "bradley-terry"
     chosen: Method = usual if method is None else method.value  # type: ignore[assignment]
     with progress_spinner("fitting"):
@@ -173,9 +174,12 @@ def _anchor(reference: str | None) -> tuple[str | None, float]:
     """The reference item and its score; `ITEM=10` gives the score."""
     item, _, score = (reference or "").rpartition("=")
     try:
-        return (item, float(score)) if item else (reference, 0.0)
+        at = float(score) if item else 0.0
     except ValueError:
         return reference, 0.0
+    if not isfinite(at):
+        raise InputError(f"--reference should be ITEM or ITEM=10, got '{reference}'")
+    return item or reference, at
 
 
 # `analysis thresholds`.

@@ -166,7 +166,9 @@ def test_commands_scale_contents(tmp_path: Path) -> None:
         ),
         (["--method", "jod", "--screen"], "--screen compares observers; add --participant COLUMN"),
         (["--method", "jod", "--firth"], "--method jod takes no --factors, --order-effect or --firth"),
-        (["--screen"], "--reference and --screen are for --method jod"),
+        (["--screen"], "--reference, --screen and --prior are for --method jod"),
+        (["--prior", "none"], "--reference, --screen and --prior are for --method jod"),
+        (["--method", "jod", "--reference", "a=nan"], "--reference should be ITEM or ITEM=10, got 'a=nan'"),
         (["--method", "jod", "--winner", "tied", "--tie", "same"], "are ties, which jod does not support"),
     ],
 )
