@@ -482,8 +482,9 @@ class Settings(BaseSettings):
     @classmethod
     def _address_of_the_server(cls, values: dict[str, Any]) -> dict[str, Any]:
         """Commands print links for the port and the domain with which the server was last started."""
-        if "public_url" in values:
+        if values.get("public_url"):
             return values
+        values = {key: value for key, value in values.items() if key != "public_url"}
         folder = Path(values.get("data_folder") or cls.model_fields["data_folder"].default)
         try:
             noted = (folder / ADDRESS_FILE).read_text(encoding="utf-8").strip()

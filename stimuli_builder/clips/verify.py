@@ -341,6 +341,8 @@ def _steadier(
     windows = list(frame_windows(len(life), clip.fps, clip.inputs.get("motion_blur") != "false"))
 
     def steady(luma: NDArray[np.uint8], number: int) -> NDArray[np.uint8]:
+        if number >= len(windows):  # a clip longer than its curve, which is reported by its length
+            return luma
         moved = regions.moved_from(life, *windows[number])
         still = regions.warped(luma.astype(np.float32), moved, sign=-1)
         return np.asarray(np.clip(np.rint(still), 0, 255), np.uint8)

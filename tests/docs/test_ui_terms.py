@@ -27,12 +27,17 @@ NOT_OURS = {
 }
 """Names in other programs, and titles."""
 STRING = re.compile(r"\"([^\"\n]+)\"|'([^'\n]+)'|`([^`]+)`|>\s*([A-Z][^<>{}]*?)\s*[<{]", re.DOTALL)
+ATTRIBUTE = re.compile(r"=\"([^\"\n]+)\"")
 ITALIC = re.compile(r"(?<![\w*\\])\*([A-Z][^*\n]*)\*(?![\w*])")
 EMPHASIS = re.compile(r"`[^`\n]*`|\*\*[^*]+\*\*")
 
 
 def texts_of(source: str) -> Iterator[str]:
-    """Every string and every text between tags."""
+    """Every string, every text between tags, and every attribute by itself.
+
+    A backtick inside a template makes the first expression take code for a string.
+    """
+    yield from ATTRIBUTE.findall(source)
     for match in STRING.finditer(source):
         yield " ".join(next(part for part in match.groups() if part is not None).split())
 

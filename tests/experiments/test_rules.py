@@ -6,7 +6,7 @@ from tests.conftest import REPOSITORY
 
 def test_warnings_have_words_in_every_language_of_the_page() -> None:
     pages = REPOSITORY / "frontend" / "src" / "i18n" / "languages"
-    languages = {path.stem for path in pages.glob("*.ts")}
+    languages = {path.stem for path in pages.glob("*.json")}
     assert len(languages) >= 11
     for rule in (WarnFast, WarnPattern, WarnSameAnswer):
         words = rule().text

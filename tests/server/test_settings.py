@@ -89,3 +89,20 @@ def test_a_provider_that_is_declared_wrongly_is_reported_in_one_line(
     [line] = capsys.readouterr().err.splitlines()
     assert line.startswith(f"error: PALPEBRA_OIDC__UNI__{key}")
     assert said in line
+
+
+@pytest.mark.parametrize("noted", [None, "http://localhost:8123\n"])
+def test_address_is_that_of_the_last_start_unless_it_is_set(
+    noted: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if noted is not None:
+        (tmp_path / "address").write_text(noted, encoding="utf-8")
+    expected = (noted or "http://localhost:8000").strip()
+    for unset in (None, ""):
+        if unset is None:
+            monkeypatch.delenv("PALPEBRA_PUBLIC_URL", raising=False)
+        else:
+            monkeypatch.setenv("PALPEBRA_PUBLIC_URL", unset)
+        assert Settings(data_folder=tmp_path).public_url == expected
+    monkeypatch.setenv("PALPEBRA_PUBLIC_URL", "https://lab.example.org")
+    assert Settings(data_folder=tmp_path).public_url == "https://lab.example.org"

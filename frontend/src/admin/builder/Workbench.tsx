@@ -1,4 +1,4 @@
-/** What is edited: pages of forms, the Show TOML them, and the bar that saves. */
+/** What is edited: pages of forms, the TOML next to them, and the bar that saves. */
 
 import { Alert, List, Button, Group, Modal, NavLink, SegmentedControl, Select, Stack, Switch, Text, TextInput, Title } from "@mantine/core";
 import { useDebouncedValue, useHotkeys } from "@mantine/hooks";
