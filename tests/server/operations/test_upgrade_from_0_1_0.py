@@ -12,6 +12,7 @@ from sqlalchemy.exc import DBAPIError
 
 from server.accounts.identity import OPERATOR
 from server.context import Services, open_services
+from server.core import migrate
 from server.core.migrate import current_revision, downgrade, newest_revision, upgrade
 from server.core.settings import Settings
 from server.exports.formats import FORMATS
@@ -127,3 +128,30 @@ def test_down_to_the_older_revision_and_up_again_keeps_every_row(migrated: Servi
         assert session.scalar(query) == 5
     upgrade(migrated.database)
     assert exported(migrated, "short") == before
+
+
+@both
+def test_upgrade_that_ends_half_way_leaves_the_older_database(
+    empty_database_url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    older = load_older_database(empty_database_url)
+    tables = ("studies", "study_versions", "ratings")
+
+    def rows() -> list[int]:
+        with older.engine.connect() as connection:
+            return [connection.execute(text(f"SELECT count(*) FROM {name}")).scalar_one() for name in tables]
+
+    before = rows()
+
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(migrate, "make_views", stop)  # the last step: all migrations have run by then
+        with pytest.raises(KeyboardInterrupt):
+            upgrade(older)
+    assert current_revision(older) == "0001"
+    assert rows() == before
+    upgrade(older)
+    assert current_revision(older) == newest_revision()
+    older.close()
