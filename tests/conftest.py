@@ -2,8 +2,9 @@
 
 import os
 import tomllib
-from collections.abc import Collection, Generator
+from collections.abc import Collection, Generator, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -11,6 +12,9 @@ from xdist.remote import Producer
 from xdist.scheduler import LoadFileScheduling
 
 from tests.tiers import SHORT_RUN, entry_of, is_long
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
 
 # Most tests answer at once and without clips; those of evidence ask for refusals by their settings.
 os.environ.setdefault("PALPEBRA_EVIDENCE", "record")
@@ -135,6 +139,25 @@ def name_of_item(item: pytest.Item) -> str:
 def fixtures_of(item: pytest.Item) -> Collection[str]:
     """The names of the fixtures that a test asks for, by itself or through others."""
     return tuple(getattr(item, "fixturenames", ()))
+
+
+@pytest.fixture(scope="session")
+def chromium() -> "Iterator[Browser]":
+    """A headless Chromium: the system's, or the one Playwright has installed.
+
+    One for all folders of tests: Playwright runs once in a process.
+    """
+    from playwright.sync_api import sync_playwright
+
+    from tests.browser.conftest import CHROMIUM_FLAGS, system_chromium
+
+    found = system_chromium()
+    with sync_playwright() as playwright:
+        if found is None and not Path(playwright.chromium.executable_path).exists():
+            pytest.skip("no Chromium here: sudo apt-get install chromium, or `playwright install chromium`")
+        browser = playwright.chromium.launch(executable_path=found, args=CHROMIUM_FLAGS)
+        yield browser
+        browser.close()
 
 
 @pytest.fixture(scope="session")

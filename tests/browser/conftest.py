@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page, expect
 
 from tests.browser.forked_server import ForkedServer
 from tests.browser.server_process import ServerProcess
@@ -41,18 +41,6 @@ def built_page() -> Path:
 def system_chromium() -> str | None:
     """The path of the system's Chromium; None where Playwright's own is to be used."""
     return next((path for name in CHROMIUM_NAMES if (path := shutil.which(name))), None)
-
-
-@pytest.fixture(scope="session")
-def chromium() -> Iterator[Browser]:
-    """A headless Chromium: the system's, or the one Playwright has installed."""
-    found = system_chromium()
-    with sync_playwright() as playwright:
-        if found is None and not Path(playwright.chromium.executable_path).exists():
-            pytest.skip("no Chromium here: sudo apt-get install chromium, or `playwright install chromium`")
-        browser = playwright.chromium.launch(executable_path=found, args=CHROMIUM_FLAGS)
-        yield browser
-        browser.close()
 
 
 @pytest.fixture

@@ -16,7 +16,6 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, expect
 
-from tests.browser.conftest import chromium  # noqa: F401 - a fixture
 from tests.conftest import REPOSITORY
 from tools.build_wheel import build_demo
 
@@ -107,7 +106,7 @@ def test_wheel_holds_pages_docs_declarations_and_migrations(wheel: Path) -> None
     assert not {name for name in names if name.startswith(("tests/", "tools/", "bench/"))}
 
 
-def test_first_page_leads_to_the_demo_and_a_rating(started: str, chromium: Browser) -> None:  # noqa: F811
+def test_first_page_leads_to_the_demo_and_a_rating(started: str, chromium: Browser) -> None:
     page = chromium.new_page(viewport={"width": 1280, "height": 800}, locale="en-US")
     complaints: list[str] = []
     page.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
@@ -127,7 +126,7 @@ def test_first_page_leads_to_the_demo_and_a_rating(started: str, chromium: Brows
     page.close()
 
 
-def test_first_account_is_created_and_a_study_can_be_made(started: str, chromium: Browser) -> None:  # noqa: F811
+def test_first_account_is_created_and_a_study_can_be_made(started: str, chromium: Browser) -> None:
     page = chromium.new_page(viewport={"width": 1280, "height": 800}, locale="en-US")
     page.goto(started)
     page.get_by_role("link", name="Create account").click()
