@@ -82,6 +82,7 @@ def main() -> None:
     DATA.mkdir(parents=True, exist_ok=True)
     port = os.environ.get("PORT", "8000")
     os.environ["PALPEBRA_DATA_FOLDER"] = str(DATA)
+    os.environ.setdefault("PALPEBRA_PUBLIC_URL", f"http://localhost:{port}")  # links name it before the start
     call("server", "database", "upgrade")
     stamp_text, made = sources(), studies_made()
     for study in STUDIES:
