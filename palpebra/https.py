@@ -176,16 +176,12 @@ def _watch(process: subprocess.Popen[bytes], log: Path, stopping: threading.Even
     printed = ""
     while process.poll() is None:
         time.sleep(1)
-        said = log.read_text(encoding="utf-8", errors="replace")
-        error = last_error(log)
-        news = "Caddy got the certificate." if OBTAINED in said else ""
-        if not news and error:
-            news = f"No certificate yet: {error} (log: {log})"
-        if news and news != printed:
-            typer.echo(news)
-            printed = news
-        if news.startswith("Caddy got"):
+        if OBTAINED in log.read_text(encoding="utf-8", errors="replace"):
+            typer.echo("Caddy got the certificate.")
             process.wait()
+        elif (error := last_error(log)) and error != printed:
+            typer.echo(f"No certificate yet: {error} (log: {log})")
+            printed = error
     # 0: by Ctrl-C, which Caddy got too. Below 0: by a signal, as where memory ran out.
     if process.returncode != 0 and not stopping.is_set():
         typer.echo(f"Caddy ended: {last_error(log)}; the server stops (log: {log})", err=True)

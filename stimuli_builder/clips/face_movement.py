@@ -347,7 +347,7 @@ ROOMY_WIDTH_PX = 1200
 @lru_cache(maxsize=2)
 def kept_levels(
     character: str,
-    fingerprint: str,  # noqa: ARG001 - part of the key: a character baked anew is read anew
+    fingerprint: str,  # noqa: ARG001 - part of the key: a character baked again is read again
     size_px: tuple[int, int],
     beside: Path | None,
     movement: Movement = AS_BAKED,
