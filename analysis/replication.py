@@ -18,7 +18,7 @@ from typing import Annotated, Any, Literal
 
 import pandas as pd
 import typer
-from pydantic import Field, ValidationError
+from pydantic import Field, ValidationError, ValidationInfo, field_validator
 
 from analysis.report.formats import Table
 from analysis.report.numbers import DASH
@@ -26,6 +26,13 @@ from experiments.declaration.base import Declaration
 from experiments.errors import InputError
 
 SHIPPED = Path(__file__).parent / "published"
+# A study may come from a stranger: its commands read the table they are given, and write no other file.
+TABLE_COMMANDS = (
+    *("anova", "ranks", "t-test", "mixed", "ordinal"),
+    *("pairs", "thresholds", "opinion", "reliability", "agreement"),
+)
+TABLE_MAKERS = ("synthesise",)
+FILE_OPTIONS = ("--json", "--out", "--scores", "--factors")
 DECLARATION = "study.toml"
 CommandLine = Callable[[list[str]], object]
 """Runs a command line, and raises its errors."""
@@ -109,6 +116,19 @@ class StudyAnalysis(Declaration):
     file: tuple[PrintedFile, ...] = ()
     cases: tuple[dict[str, str | int], ...] = ()
     slow: bool = False
+
+    @field_validator("run", "made_by")
+    @classmethod
+    def _reads_one_table(cls, words: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
+        allowed = TABLE_COMMANDS if info.field_name == "run" else TABLE_MAKERS
+        if words and words[0] not in allowed:
+            raise ValueError(f"expected one of {', '.join(allowed)}, got '{words[0]}'")
+        for word in words:
+            if word.split("=")[0] in FILE_OPTIONS:
+                raise ValueError(
+                    f"a study may not choose files: expected no {', '.join(FILE_OPTIONS)}, got '{word}'"
+                )
+        return words
 
 
 class NotReproduced(Declaration):

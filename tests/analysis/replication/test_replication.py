@@ -5,10 +5,20 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+import typer
 from typer.testing import CliRunner
 
 from analysis.cli import app
-from analysis.replication import SHIPPED, load_study, number_at, replicate_study, shipped_studies
+from analysis.replication import (
+    FILE_OPTIONS,
+    SHIPPED,
+    TABLE_COMMANDS,
+    TABLE_MAKERS,
+    load_study,
+    number_at,
+    replicate_study,
+    shipped_studies,
+)
 from experiments.errors import InputError
 
 run = partial(app, standalone_mode=False)
@@ -118,7 +128,14 @@ def test_a_new_study_is_one_folder(tmp_path: Path) -> None:
         ("score * 2", "scores * 2", "name 'scores' is not defined"),
         ("tests[0].t}", "tests[3].t}", "the analysis has no number at 'tests[3].t'; look at its --json"),
         ("M = {{groups", "mean {{groups", "does not have the form"),
-        ("t-test", "t-tests", "There is no command 't-tests'"),
+        ("t-test", "t-tests", "reliability, agreement, got 't-tests'"),
+        ('"t-test"', '"run"', "expected one of anova, ranks, t-test"),
+        ('"--against", "1"', '"--against", "1", "--json=/tmp/x"', "a study may not choose files"),
+        (
+            'table = "ratings.csv"',
+            'made_by = ["convert", "a.csv"]',
+            "expected one of synthesise, got 'convert'",
+        ),
         ('title = "A study"', "titel = 1", "study.toml: title: Field required"),
         ('"doubled", "--against"', '"tripled", "--against"', "ratings.csv has no column 'tripled'"),
         ("{{group}}-{{id}}", "{{group}}-{{ids}}", "expected {columns} of the table, got 'ids'"),
@@ -147,6 +164,17 @@ def test_files_may_be_in_a_folder_of_the_study(tmp_path: Path) -> None:
     (folder / "raw").mkdir()
     (folder / "raw" / "ratings.csv").write_text(CSV, encoding="utf-8")
     assert replicate_study(run, str(folder)).n_equal == 4
+
+
+def test_no_option_of_an_allowed_command_names_another_file() -> None:
+    commands = typer.main.get_group(app).commands
+    assert set(commands) >= {*TABLE_COMMANDS, *TABLE_MAKERS}
+    for name in (*TABLE_COMMANDS, *TABLE_MAKERS):
+        for parameter in commands[name].params:
+            # A private attribute of typer's: without it, this test fails and needs another instrument.
+            kind = parameter.type_descriptor.annotation  # type: ignore[attr-defined]
+            if kind is Path and parameter.param_type_name == "option":
+                assert {*parameter.opts} <= {*FILE_OPTIONS}, (name, parameter.opts)
 
 
 def test_addresses_reach_numbers() -> None:
