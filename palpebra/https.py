@@ -12,6 +12,7 @@ import threading
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
 
@@ -63,6 +64,8 @@ def serve(
     program = _caddy()
     check_name(domain, is_public=not (acme or certificate))
     tls = tls_lines(certificate, key, acme, acme_root)
+    if certificate is not None and key is not None:
+        check_certificate(certificate, key, domain)
     place, chosen = data_folder(folder), free_port(port)
     os.environ["PALPEBRA_PUBLIC_URL"] = f"https://{domain}"
     os.environ.setdefault("FORWARDED_ALLOW_IPS", "127.0.0.1")
@@ -94,6 +97,42 @@ def tls_lines(certificate: Path | None, key: Path | None, acme: str, acme_root: 
         return []
     trusted = [f"trusted_roots {_quoted(acme_root)}"] if acme_root else []
     return ["tls {", "issuer acme {", f"dir {acme}", *trusted, "}", "}"]
+
+
+def check_certificate(certificate: Path, key: Path, domain: str) -> None:
+    """Refuse a certificate that browsers would not accept; Caddy would silently ask for another.
+
+    Raises
+    ------
+    InputError
+        It is not readable, names other hosts, is out of date, or the key belongs to another certificate.
+    """
+    from cryptography import x509
+    from cryptography.hazmat.primitives.serialization import load_pem_private_key
+
+    try:
+        first = x509.load_pem_x509_certificates(certificate.read_bytes())[0]
+        names = first.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+        hosts = [name.lower() for name in names.get_values_for_type(x509.DNSName)]
+    except (OSError, ValueError, x509.ExtensionNotFound) as error:
+        raise InputError(
+            f"{certificate}: expected a PEM certificate with host names, got: {error}"
+        ) from error
+    # A wildcard stands for exactly one label (RFC 6125, section 6.4.3).
+    if not {domain.lower(), f"*.{domain.lower().partition('.')[2]}"} & {*hosts}:
+        raise InputError(f"{certificate} is for {', '.join(hosts) or 'no host'}; expected one for {domain}")
+    today = datetime.now(UTC)
+    if not first.not_valid_before_utc <= today <= first.not_valid_after_utc:
+        ends, begins = first.not_valid_after_utc, first.not_valid_before_utc
+        raise InputError(
+            f"{certificate} is valid from {begins:%Y-%m-%d} to {ends:%Y-%m-%d}, which is not today"
+        )
+    try:
+        own = load_pem_private_key(key.read_bytes(), password=None).public_key()
+    except (OSError, ValueError, TypeError) as error:
+        raise InputError(f"{key}: expected a PEM private key without a password, got: {error}") from error
+    if own != first.public_key():
+        raise InputError(f"{key} is not the key of {certificate}; expected the key that belongs to it")
 
 
 def proxy_rules(domain: str, port: int, tls: Sequence[str], *, store: Path, email: str = "") -> str:
@@ -141,13 +180,15 @@ def running_proxy(program: str, rules: str, place: Path) -> Iterator[None]:
         )
     # After its own shutdown, uvicorn raises the signal again: by default it would end Python on the spot.
     signal.signal(signal.SIGTERM, lambda number, _frame: sys.exit(128 + number))
-    stopping = threading.Event()
+    stopping, lost = threading.Event(), threading.Event()
     try:
         try:
             process.wait(SECONDS_TO_FAIL)
         except subprocess.TimeoutExpired:
-            threading.Thread(target=_watch, args=(process, log, stopping), daemon=True).start()
+            threading.Thread(target=_watch, args=(process, log, stopping, lost), daemon=True).start()
             yield
+            if lost.is_set():
+                raise InputError(f"Caddy ended: {last_error(log)}; the server stopped (log: {log})") from None
             return
         raise InputError(
             f"Caddy did not start: {last_error(log)}; ports 80 and 443 must be free and allowed for you "
@@ -171,7 +212,9 @@ def last_error(log: Path) -> str:
     return " ".join(reason.split())[:300]
 
 
-def _watch(process: subprocess.Popen[bytes], log: Path, stopping: threading.Event) -> None:
+def _watch(
+    process: subprocess.Popen[bytes], log: Path, stopping: threading.Event, lost: threading.Event
+) -> None:
     """Print once that there is a certificate, or why there is none yet; stop the server if Caddy ends."""
     printed = ""
     while process.poll() is None:
@@ -184,7 +227,7 @@ def _watch(process: subprocess.Popen[bytes], log: Path, stopping: threading.Even
             printed = error
     # 0: by Ctrl-C, which Caddy got too. Below 0: by a signal, as where memory ran out.
     if process.returncode != 0 and not stopping.is_set():
-        typer.echo(f"Caddy ended: {last_error(log)}; the server stops (log: {log})", err=True)
+        lost.set()
         _thread.interrupt_main()
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from experiments.errors import InputError
-from palpebra.https import SECONDS_TO_FAIL, last_error, proxy_rules, tls_lines
+from palpebra.https import SECONDS_TO_FAIL, check_certificate, last_error, proxy_rules, tls_lines
 from tests.helpers.ports import free_port
 from tests.helpers.waiting import until
 
@@ -135,7 +135,9 @@ def test_server_ends_if_caddy_is_killed(tmp_path: Path, domain: str) -> None:
     certificate, key = own_certificate(tmp_path, domain)
     options = ["--domain", domain, "--certificate", certificate, "--key", key, "--port", str(free_port())]
     command = [sys.executable, "-m", "palpebra", "serve", "--folder", tmp_path / "data", *options]
-    with subprocess.Popen(command, env={**os.environ, "HOME": str(tmp_path)}) as process:
+    with subprocess.Popen(
+        command, env={**os.environ, "HOME": str(tmp_path)}, stderr=subprocess.PIPE, text=True
+    ) as process:
         try:
             until(lambda: process.poll() is not None or is_answered(443))
             time.sleep(SECONDS_TO_FAIL + 1)  # from then on Caddy is watched
@@ -143,7 +145,10 @@ def test_server_ends_if_caddy_is_killed(tmp_path: Path, domain: str) -> None:
             caddy = [int(pid) for pid in children if Path(f"/proc/{pid}/comm").read_text() == "caddy\n"]
             assert len(caddy) == 1
             os.kill(caddy[0], signal.SIGKILL)
-            process.wait(60)
+            errors = process.communicate(timeout=60)[1]
+            assert process.returncode == 2
+            assert "error: Caddy ended: " in errors
+            assert "the server stopped" in errors
         finally:
             process.kill()
 
@@ -163,7 +168,7 @@ def test_port_in_use_is_one_line(tmp_path: Path, domain: str) -> None:
         taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         taken.bind(("0.0.0.0", 443))
         taken.listen()
-        certificate, key = own_certificate(tmp_path)
+        certificate, key = own_certificate(tmp_path, domain)
         done = serve("--domain", domain, "--certificate", certificate, "--key", key, folder=tmp_path)
     assert done.returncode == 2
     assert done.stderr.startswith("error: Caddy did not start: ")
@@ -206,6 +211,47 @@ def test_half_a_certificate_is_refused(tmp_path: Path) -> None:
         tls_lines(there, tmp_path / "absent.pem", "", None)
     with pytest.raises(InputError, match="expected --acme URL"):
         tls_lines(None, None, "", there)
+
+
+def test_certificate_must_be_one_that_browsers_accept(tmp_path: Path) -> None:
+    certificate, key = own_certificate(tmp_path, "lab.example.org")
+    check_certificate(certificate, key, "Lab.example.org")
+    with pytest.raises(InputError, match=r"is for lab\.example\.org; expected one for other\.example\.org"):
+        check_certificate(certificate, key, "other.example.org")
+    (tmp_path / "second").mkdir()
+    wild, wild_key = own_certificate(tmp_path / "second", "*.example.org")
+    check_certificate(wild, wild_key, "lab.example.org")
+    with pytest.raises(InputError, match=r"is for \*\.example\.org; expected one for a\.lab\.example\.org"):
+        check_certificate(wild, wild_key, "a.lab.example.org")
+    with pytest.raises(InputError, match="is not the key of"):
+        check_certificate(certificate, wild_key, "lab.example.org")
+    with pytest.raises(InputError, match="expected a PEM certificate"):
+        check_certificate(key, key, "lab.example.org")
+    with pytest.raises(InputError, match="expected a PEM private key"):
+        check_certificate(certificate, certificate, "lab.example.org")
+
+
+def test_certificate_out_of_date_is_refused(tmp_path: Path) -> None:
+    command = [
+        "openssl",
+        "x509",
+        "-req",
+        "-days",
+        "0",
+        "-in",
+        tmp_path / "request",
+        "-out",
+        tmp_path / "old.pem",
+    ]
+    (tmp_path / "names").write_text("subjectAltName=DNS:lab.example.org\n", encoding="utf-8")
+    _, key = own_certificate(tmp_path, "lab.example.org")
+    asked = ["openssl", "req", "-new", "-key", key, "-subj", "/CN=lab", "-out", tmp_path / "request"]
+    subprocess.run(asked, check=True, capture_output=True)
+    command += ["-extfile", tmp_path / "names", "-signkey", key]
+    subprocess.run(command, check=True, capture_output=True)
+    time.sleep(1.1)  # it is valid for the second in which it was made
+    with pytest.raises(InputError, match="which is not today"):
+        check_certificate(tmp_path / "old.pem", key, "lab.example.org")
 
 
 def test_reason_is_that_of_the_last_whole_line(tmp_path: Path) -> None:
