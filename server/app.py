@@ -151,7 +151,7 @@ def create_app(settings: Settings | None = None, *, rehearses: bool = False) -> 
     app.add_middleware(ChangeNotifier, changes=services.changes)
     app.add_middleware(ConcurrencyLimit)  # inside the limits: a body that comes slowly holds no place
     app.add_middleware(RequestLimits, settings=services.settings)
-    app.add_middleware(RowSecurity)  # outside the limits, which recognise accounts too
+    app.add_middleware(RowSecurity)  # outside the limits, which recognize accounts too
     app.add_middleware(SecurityHeaders, settings=services.settings, clips_from=services.clips.origin())
     app.add_middleware(Observer, settings=services.settings)
     app.add_middleware(ProxyWatch, settings=services.settings)

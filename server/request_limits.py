@@ -18,7 +18,7 @@ from server.core.errors import ApiError, refusal_response
 from server.core.settings import Settings
 from server.core.values import body_problem
 
-# What comes in is bounded before anybody is recognised: size, time and text of every request's body.
+# What comes in is bounded before anybody is recognized: size, time and text of every request's body.
 #
 # Written as plain ASGI because Starlette's BaseHTTPMiddleware costs as much as a whole rating.
 

@@ -49,7 +49,7 @@ def _read(path: Path, names: list[str]) -> dict[str, Any]:
         report = {"refused": _DIED}
     if "refused" in report:
         raise InputError(
-            f"{path.name} is not an SPSS file that can be read ({report['refused']}); open it in SPSS or "
+            f"{path.name} is not an SPSS file that can be read ({report['refused']}). Open it in SPSS or "
             "PSPP and save it again, or export it as CSV"
         )
     if not report["names"]:

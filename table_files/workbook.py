@@ -193,7 +193,7 @@ def _header(path: Path, page: Page) -> list[str]:
         if low <= page.first <= high and right > left:
             raise InputError(
                 f"{path.name}: the first row has merged cells ({text}); expected one row that names every "
-                "column: unmerge them, give each column its own name (blur_calm), and delete rows above"
+                "column. Unmerge them, give each column its own name (blur_calm), and delete rows above"
             )
     names = ["" if value is None else str(value).strip() for value in page.rows[0]] if page.rows else []
     while names and not names[-1]:
@@ -320,5 +320,5 @@ def _refuse_uncalculated(path: Path, title: str, columns: list[str], body: Rows,
         if isinstance(held, str) and held.startswith("="):
             raise InputError(
                 f"{path.name}: row {page.first + 1 + i} of '{columns[p]}' holds the formula {held} "
-                "without its value; open the file in a spreadsheet program and save it, or save it as CSV"
+                "without its value. Open the file in a spreadsheet program and save it, or save it as CSV"
             )

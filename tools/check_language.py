@@ -1,6 +1,7 @@
-"""Plain English: banned words with the better one, and how hard pages are to read.
+"""Plain English: banned words with the better one, long sentences, and how hard pages are to read.
 
-    python -m tools.check_language              every finding in docs, texts and code; fails if any
+    python -m tools.check_language              every finding in docs, texts and code; fails if any: banned
+                                                words, errors with long sentences, British comments
     python -m tools.check_language --pages      the site's pages, README, CONTRIBUTING and CHANGELOG:
                                                 words, American spelling, reading grades and links
                                                 (`make check-docs`)
@@ -21,6 +22,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
+WORDS_IN_ERROR = 25
+"""Words in a sentence of an error, at most; a value put in counts as one."""
 MEDIAN_GRADE, HIGHEST_GRADE = 10.0, 14.0
 """Reading grades of pages with text: the median, and the hardest page."""
 REFERENCE = ("docs/reference/columns.md", "docs/reference/settings.md", "docs/reference/experiment.md")
@@ -146,6 +149,28 @@ def source_texts(file: Path) -> Iterator[tuple[int, str]]:
             yield number, line
 
 
+def raised_text(node: ast.expr) -> str:
+    """A text as raised, with `X` for each value; empty for anything else."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        return node.value
+    if isinstance(node, ast.JoinedStr):
+        return "".join(raised_text(part) if isinstance(part, ast.Constant) else "X" for part in node.values)
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
+        return raised_text(node.left) + raised_text(node.right)
+    return ""
+
+
+def long_sentences_in(source: str) -> Iterator[tuple[int, str]]:
+    """Line and sentence of each error whose sentence has too many words."""
+    for node in ast.walk(ast.parse(source)):
+        if not (isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call)):
+            continue
+        for text in map(raised_text, node.exc.args):
+            for sentence in re.split(r"[.?!]\s", text):
+                if len(sentence.split()) > WORDS_IN_ERROR:
+                    yield node.lineno, sentence
+
+
 def anchors_of(page: Path) -> set[str]:
     """The names by which links reach the headings of a page."""
     headings = re.findall(r"^#+ (.+)$", without_code_blocks(page.read_text(encoding="utf-8")), re.MULTILINE)
@@ -186,12 +211,18 @@ def findings_in_code() -> Iterator[Finding]:
         file = ROOT / name
         if not file.is_file() or name.startswith(UNCHANGED):
             continue
-        # Quotes of TypeScript hold texts that people read: they are checked like comments.
-        text = file.read_text(encoding="utf-8")
-        texts = source_texts(file) if name.endswith(".py") else [(1, text.replace('"', "'"))]
+        source = file.read_text(encoding="utf-8")
+        # Quotes and templates of TypeScript hold texts that people read: they are checked like comments.
+        texts = source_texts(file) if name.endswith(".py") else [(1, re.sub('["`]', "'", source))]
         for first, text in texts:
-            for line, word, better in banned_words_in(text):
+            words = BANNED_WORDS + BRITISH_WORDS if text.lstrip().startswith("# ") else BANNED_WORDS
+            for line, word, better in banned_words_in(text, words):
                 yield Finding(name, first + line - 1, word, better)
+        if name.endswith(".py") and not name.startswith("tests/"):
+            for line, sentence in long_sentences_in(source):
+                yield Finding(
+                    name, line, sentence, f"at most {WORDS_IN_ERROR} words in a sentence of an error"
+                )
 
 
 def grades() -> list[tuple[float, str]]:

@@ -203,7 +203,7 @@ def examine(path: Path) -> VideoFile:
     Raises
     ------
     NotAClip
-        It is not a video, damaged, interlaced, in HDR or wide-gamut colours, or beyond a limit. What the
+        It is not a video, damaged, interlaced, in HDR or wide-gamut colors, or beyond a limit. What the
         container says of rate, frames and pixels is checked before the first frame is decoded.
     """
     stored = _stored_packets(path, with_edits=False)

@@ -538,7 +538,7 @@ def _refuse_too_few(data: ModelData, effects: Sequence[str]) -> None:
     if own * people >= ratings:
         raise InputError(
             f"expected more than {own * people} ratings for {own} correlated coefficients of each of "
-            f"{people} participants, got {ratings}; with one rating per cell use --slopes none or all"
+            f"{people} participants, got {ratings}. With one rating per cell, use --slopes none or all"
         )
 
 

@@ -94,7 +94,7 @@ def fit_mixed(
         One row per trial.
     item : str or sequence of str, optional
         The column (or columns, together) that names what was rated; None for a model of participants alone,
-        which generalises to no other clips.
+        which generalizes to no other clips.
     slopes : {"none", "main", "all", "correlated"}, optional
         By-participant slopes. `all`: one variance for every effect within participants, so that each test has
         its own error term; `main`: main effects only; `correlated`: intercept and main-effect slopes with all

@@ -213,7 +213,7 @@ def refuse_separation(data: ModelData) -> None:
                 low = ", ".join(levels[k] for k in sorted(order[:cut]))
                 raise InputError(
                     f"no rating at {name}={low} is above any other rating of {name}: they are separated, and "
-                    "an ordinal model has no finite estimate; use analysis mixed, or remove the factor"
+                    "an ordinal model has no finite estimate. Use analysis mixed, or remove the factor"
                 )
 
 

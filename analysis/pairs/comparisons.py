@@ -237,8 +237,8 @@ def _refuse_tie(table: TextTable, tie: str, items: set[str]) -> None:
     other = "an item" if tie in items else "a side" if tie.casefold() in ("left", "right") else ""
     if other:
         raise InputError(
-            f"{table.source}: --tie {tie} is also {other}; expected a word for ties that does not name a "
-            "winner: use another word in the rows that are ties"
+            f"{table.source}: --tie {tie} is also {other}; expected a word that names no winner. Use another "
+            "word in the rows that are ties"
         )
 
 

@@ -253,7 +253,7 @@ def _resampled(wins: Array, prior: Prior, start: Array, number: int) -> Array:
             draws.append(_maximum(total, prior, start)[0])
     raise InputError(
         f"in most samples of the {len(wins)} raters an item wins or loses every comparison, so there is no "
-        "interval without a prior; use --prior gaussian, or --bootstrap 0"
+        "interval without a prior. Use --prior gaussian, or --bootstrap 0"
     )
 
 

@@ -108,7 +108,7 @@ class MixedDesign:
                 )
             if not self.faces and clips == cell:
                 raise InputError(
-                    f"{clips} clips are one per condition, so clip and condition are confounded; use "
+                    f"{clips} clips are one per condition, so clip and condition are confounded. Use "
                     f"{2 * cell} clips or more, or add --crossed if each clip is shown in every condition"
                 )
         if self.faces and min(self.faces) < 2:

@@ -123,7 +123,7 @@ def _refuse_participants_as_items(table: TextTable, participant: str, item: Sequ
     if len(pairs) > 1 and len(pairs) == people.nunique() == what.nunique():
         raise InputError(
             f"every item of '{'/'.join(item)}' belongs to one participant and every participant has one, so "
-            "items and participants are the same; name the column of clips, or omit --item"
+            "items and participants are the same. Name the column of clips, or omit --item"
         )
 
 

@@ -53,7 +53,7 @@ def _refuse_out_of_bounds(table: TextTable, name: str, values: NDArray[np.float6
         row = int(np.argmax((table.columns[name] == text).to_numpy()))
         raise InputError(
             f"{table.source}: '{name}' is {text} in line {table.line(row)}: sums of squares of such numbers "
-            "cannot be computed; correct it, or use a larger unit for the column"
+            "cannot be computed. Correct it, or use a larger unit for the column"
         )
     if sizes.max() < SIZE_MIN:
         raise InputError(

@@ -122,7 +122,7 @@ def _binary(table: TextTable, response: str) -> Array:
         row = int(np.argmax(unknown))
         raise InputError(
             f"{table.source}: '{response}' is '{table.columns[response].iloc[row]}' in line "
-            f"{table.line(row)}; expected 1 or 0 (yes or no, correct or wrong), or an empty cell (or NA) if "
+            f"{table.line(row)}. Expected 1 or 0 (yes or no, correct or wrong), or an empty cell (or NA) if "
             "it is missing"
         )
     return values

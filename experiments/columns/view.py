@@ -148,7 +148,7 @@ _ORDER = ("trial_index", "play", "scale")
 
 @dataclass(frozen=True)
 class Stretch:
-    """Neighbouring columns that change together.
+    """Neighboring columns that change together.
 
     Attributes
     ----------

@@ -205,7 +205,7 @@ class Deal:
 
 
 def item_of(experiment: Experiment, clip: ClipSpec) -> str:
-    """What a clip stands for when pairs are analysed.
+    """What a clip stands for when pairs are analyzed.
 
     Its cell; its level where pairs lie within one factor; itself where any exemplars are compared.
     """
@@ -236,7 +236,7 @@ def check_connected(experiment: Experiment, pairs: Sequence[Pair]) -> None:
     if len(apart) > 1:
         raise InputError(
             f"'{experiment.name}': expected pairs that connect all items, got {len(apart)} groups never "
-            f"compared with one another: {_named(apart)}; declare a pair between them, or more participants "
+            f"compared with one another: {_named(apart)}. Declare a pair between them, or more participants "
             "or pairs_per_person"
         )
     compared = {clip for pair in pairs for clip in pair}

@@ -88,7 +88,7 @@ def begin_attempt(
     asking : Identity, optional
         The account that asks for a login.
     invitation_hash : str, optional
-        Of the invitation by which a new account is to be made of whom the provider recognises.
+        Of the invitation by which a new account is to be made of whom the provider recognizes.
     """
     state, browser = new_token(), new_token()
     with database.write() as session:

@@ -117,14 +117,14 @@ def begin_session(
     second_factor: bool | None = None,
     provider: str | None = None,
 ) -> str:
-    """Sign an account in that has just been recognised; return the session's token.
+    """Sign an account in that has just been recognized; return the session's token.
 
     Parameters
     ----------
     second_factor : bool, optional
         Whether one was given; where not said, what the account has was asked for.
     provider : str, optional
-        Who recognised her; None for a password.
+        Who recognized her; None for a password.
     """
     token = new_token()
     session.add(

@@ -271,7 +271,7 @@ def move(session: Session, study: Study, workspace: Workspace, identity: Identit
     record(session, identity, "study moved", "study", study.name, workspace=workspace.name)
 
 
-# Who may send clips: recognised before the body of an upload is read.
+# Who may send clips: recognized before the body of an upload is read.
 
 
 def _must_make_studies(database: Database, identity: Identity) -> Identity:

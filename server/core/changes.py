@@ -195,7 +195,7 @@ async def background_task(watch: Callable[[Stopped], Coroutine[Any, Any, None]])
     Parameters
     ----------
     watch : callable
-        Gets the event that the server stops; cancelled then.
+        Gets the event that the server stops; canceled then.
     """
     stopped = threading.Event()
     watching = asyncio.create_task(watch(stopped.is_set))

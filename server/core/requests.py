@@ -1,7 +1,7 @@
 """What nearly every endpoint needs of the running server: its database and its settings, as dependencies.
 
 Those that need more take `server.context.ServicesDep`. This module knows nothing of the other parts, so that
-what recognises accounts rests on the database and the settings alone.
+what recognizes accounts rests on the database and the settings alone.
 """
 
 from typing import Annotated

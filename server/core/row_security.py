@@ -17,7 +17,7 @@ from server.models.base import Base
 
 # The second wall between laboratories: on PostgreSQL a member's transactions see her own studies' rows.
 #
-# Every transaction of a request that an account was recognised for runs in a role that owns no table, and the
+# Every transaction of a request that an account was recognized for runs in a role that owns no table, and the
 # tables' policies (`server.core.row_security`) let that role at rows of her workspaces' and grants'
 # studies. Who calls whom does not matter: an endpoint that forgets to ask whose a study is finds nothing.
 # Participants, the command line and the server's own work are nobody's requests and run as the owner of the
@@ -37,7 +37,7 @@ class ActingAccount:
     Attributes
     ----------
     account_id : int or None
-        None before an account was recognised.
+        None before an account was recognized.
     """
 
     account_id: int | None = None

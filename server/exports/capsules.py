@@ -207,7 +207,7 @@ def build_capsule(
     Raises
     ------
     InputError
-        There is nothing to analyse, or a clip is missing from the store.
+        There is nothing to analyze, or a clip is missing from the store.
     NotFound
         There is no such data series.
     """

@@ -73,7 +73,7 @@ def _shifted_moment(moment: Any, shift: timedelta) -> Any:
     return iso(datetime.fromisoformat(moment) + shift) if moment else moment
 
 
-# Scripts that analyse an export with usual packages: R (afex, emmeans, lme4), Python (pandas, statsmodels).
+# Scripts that analyze an export with usual packages: R (afex, emmeans, lme4), Python (pandas, statsmodels).
 #
 # They are written for each study, from its declaration, and read the long table of answers.
 

@@ -225,7 +225,7 @@ PURPOSES: tuple[Purpose, ...] = get_args(Purpose)
 
 
 class AccountLogin(Base):
-    """A subject of an issuer, and the account that it signs in to; nothing else recognises anybody.
+    """A subject of an issuer, and the account that it signs in to; nothing else recognizes anybody.
 
     Attributes
     ----------
@@ -257,7 +257,7 @@ class LoginAttempt(Base):
         Of the request's state and of the browser's cookie. Nonce and PKCE's verifier are derived from that
         cookie with the server's key, so that neither lies here.
     purpose : {"sign in", "link", "code"}
-        `code`: the provider has recognised the account, whose second factor is asked for still.
+        `code`: the provider has recognized the account, whose second factor is asked for still.
     session_id : int or None
         The session that asked to link; it must be open still when the browser comes back.
     invitation_hash : str or None

@@ -126,7 +126,7 @@ def check_replaceable(path: Path, secret: bytes) -> None:
     """Refuse to write over the keys of another installation."""
     if path.exists() and key_file(path).installation != installation(secret):
         raise InputError(
-            f"{path} contains the keys of another installation or secret key; back up to another folder, "
+            f"{path} contains the keys of another installation or secret key. Back up to another folder, "
             f"choose another file with --keys, or move it to the backups of the previous secret key"
         )
 
@@ -148,13 +148,13 @@ def check_fits(keys: KeyFile, secret: bytes, backed_up_at: str, name: str, *, st
     """
     if keys.installation != installation(secret):
         raise InputError(
-            f"{name} belongs to another installation or secret key than the backup; specify the key file "
+            f"{name} belongs to another installation or secret key than the backup. Specify the key file "
             f"of the backup with --keys, or move the file away to restore without recruiters' IDs"
         )
     if keys.written_at < backed_up_at and not stale:
         raise InputError(
             f"{name} of {keys.written_at} is older than the backup of {backed_up_at}: IDs of later visits "
-            f"would be lost; make a new backup, specify a newer file with --keys, or restore with "
+            f"would be lost. Make a new backup, specify a newer file with --keys, or restore with "
             f"--stale-keys"
         )
 

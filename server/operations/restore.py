@@ -279,7 +279,7 @@ def _check_key(settings: Settings, key: bytes) -> None:
     if there and there != key:
         raise InputError(
             "this installation has a different secret key than the backup, so existing links could not be "
-            f"shown again; if the key here is not in use, remove {path} (or unset PALPEBRA_SECRET_KEY)"
+            f"shown again. If the key here is not in use, remove {path} (or unset PALPEBRA_SECRET_KEY)"
         )
 
 

@@ -25,7 +25,7 @@ from server.participation.evidence_repository import WaitingClip
 from server.participation.intake import Intake
 from server.studies.lookup import definition_of
 
-# The judgement on a stored run.
+# The judgment on a stored run.
 
 
 def judge_run(session: Session, run: StudyRun) -> Judgement:

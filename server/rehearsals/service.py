@@ -165,7 +165,7 @@ def _run(database: Database, settings: Settings, name: str, public_id: str, orde
     try:
         _write_inputs(database, name, folder, order)
         with _turn(settings, folder) as mine:
-            # One that was cancelled and replaced before it had a folder has lost its mark with the folder.
+            # One that was canceled and replaced before it had a folder has lost its mark with the folder.
             if not mine or _status(database, public_id) != "queued":
                 return
             note(database, public_id, status="running", message="beginning", started_at=now())

@@ -48,7 +48,7 @@ from server.studies.uploads import upload_folder
 from server.transcoding.records import videos_of
 from video_conversion.prepared import QUICKTIME, major_brand
 
-# A definition that may be stored: one that can be read, and whose design can be analysed.
+# A definition that may be stored: one that can be read, and whose design can be analyzed.
 
 
 def planned_experiment(text: str, source: str = "definition") -> Experiment:

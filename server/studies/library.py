@@ -14,7 +14,7 @@ from server.core.errors import ERROR_RESPONSES, NotFound
 from server.core.requests import SettingsDep
 from table_files.delimited import delimited_table
 
-# The shipped blinks, recorded and modelled, read from the files that come with `stimuli`.
+# The shipped blinks, recorded and modeled, read from the files that come with `stimuli`.
 
 blink_router = APIRouter(prefix="/api/admin/blinks", tags=["blinks"], responses=ERROR_RESPONSES)
 

@@ -72,7 +72,7 @@ class BlinkModel:
         """Fit the model to recorded profiles; two-eyed when every profile has both eyes.
 
         The scaling-factor columns get the weight that gives them together the same variance as all
-        closure samples together: the energy normalisation the paper uses to couple shape and
+        closure samples together: the energy normalization the paper uses to couple shape and
         appearance (equation 5), so that neither timing nor form rules the components.
         """
         if len(profiles) < 3:

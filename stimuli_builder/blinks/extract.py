@@ -150,7 +150,7 @@ def blinks_of(
     ----------
     edges : mapping of int to (int, int), optional
         By minimum frame, an (onset, end) of a person's that takes the place of the labeled one.
-    recognised : Recognised, optional
+    recognised : Recognized, optional
         Result of `recognise` for this series; None labels by the paper's rule with `options`.
     """
     if recognised is None:

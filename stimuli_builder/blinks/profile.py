@@ -147,7 +147,7 @@ def to_full_closure(profile: BlinkProfile) -> BlinkProfile:
 def to_natural_closure(profile: BlinkProfile) -> BlinkProfile:
     """Return the profile as measured (condition NC): a blink that stayed partly open stays so.
 
-    See `to_full_closure` for why this is not the range normalisation the paper's text names.
+    See `to_full_closure` for why this is not the range normalization the paper's text names.
     """
     return profile
 

@@ -248,7 +248,7 @@ def resampled(
     if count > MAX_FRAMES:
         raise InputError(
             f"{path.name}: time_s runs over {times[-1] - times[0]:,.0f} s, {count:,} frames at {fps:.4g} fps "
-            f"but at most {MAX_FRAMES:,} are allowed: cut the recording at the pause, or fix time_s"
+            f"but at most {MAX_FRAMES:,} are allowed. Cut the recording at the pause, or fix time_s"
         )
     even = np.minimum(times[0] + np.arange(count) / fps, times[-1])
     left = np.clip(np.searchsorted(times, even, side="right") - 1, 0, steps.size - 1)

@@ -126,7 +126,7 @@ def _by_irises(path: Path) -> Scale:
     if max(middles) > MAX_IRIS_RATIO * min(middles):
         raise InputError(
             f"--scale {IRIS_FILE}{path.name}: the irises of both eyes are {min(middles):.3g} and "
-            f"{max(middles):.3g} px wide (medians), which is implausible for one face: check the recording "
+            f"{max(middles):.3g} px wide (medians), which is implausible for one face. Check the recording "
             "with stimuli track --preview, or give mm per pixel"
         )
     middle = float(np.median(seen))

@@ -273,7 +273,7 @@ def _held(curve: ClipCurve, signal: Array, limits: tuple[float, float], way: str
     if beyond > HELD_MM:
         raise InputError(
             f"profile {curve.profile_id} moves the lower lid {signal.min():.2f} to {signal.max():.2f} mm "
-            f"{way}, but its character is baked for {limits[0]:g} to {limits[1]:g} mm; bake a larger range "
+            f"{way}, but its character is baked for {limits[0]:g} to {limits[1]:g} mm. Bake a larger range "
             "(docs/explanation/characters.md) or omit this signal with lower_lid"
         )
     return held, beyond

@@ -222,7 +222,7 @@ def check_levels(experiment: Experiment) -> None:
                 if other.render == level.render:
                     raise InputError(
                         f"factor '{factor.name}': '{other.name}' and '{level.name}' do not change the "
-                        "rendering, so their clips would be the same; add `render` to them, or write the "
+                        "rendering, so their clips would be the same. Add `render` to them, or write the "
                         "manifest of your own clips with `stimuli manifest`"
                     )
 

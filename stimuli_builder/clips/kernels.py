@@ -89,7 +89,7 @@ def to_yuv(
             # Limited range, 16 to 235, with half a level for rounding: players stretch it, and treat full
             # range each in their own way.
             luma[y, x] = np.uint8(np.float32(16.5) + np.float32(219.0) * grey)
-            # 2 (1 - 0.0722) = 1.8556 is the span of b - grey, 2 (1 - 0.2126) = 1.5748 that of r - grey.
+            # 2 (1 - 0.0722) = 1.8556 is the span of b - gray, 2 (1 - 0.2126) = 1.5748 that of r - gray.
             row_blue[side, x] = (b - grey) * np.float32(224.0 / 1.8556)
             row_red[side, x] = (r - grey) * np.float32(224.0 / 1.5748)
         if side == 1:

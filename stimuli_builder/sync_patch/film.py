@@ -177,7 +177,7 @@ def read_film(path: Path, camera_fps: float | None = None, say: Said = lambda _:
     corners, numbers = _best(_brightness(path, quads))
     if corners is None or numbers is None:
         raise InputError(
-            f"{path}: no sync patch was found; film the whole patch, in focus and at least 40 pixels wide, "
+            f"{path}: no sync patch was found. Film the whole patch, in focus and at least 40 pixels wide, "
             "with a still camera, from before the start key until after the clip"
         )
     return Film(times_ms[: len(numbers)], numbers, rate, corners)

@@ -370,7 +370,7 @@ def _require_upright(info: VideoInfo, eyes_seen: dict[int, Points], upright: dic
     quarter = int(np.median([round(turn_deg(points) / 90) % 4 for points in turned]))
     raise InputError(
         f"{info.path}: the face is turned by {90 * quarter} degrees clockwise on {len(turned)} of "
-        f"{len(eyes_seen)} frames that show one: the file's rotation is wrong; turn the video upright first"
+        f"{len(eyes_seen)} frames that show one: the file's rotation is wrong. Turn the video upright first"
     )
 
 

@@ -10,6 +10,7 @@ from tools.check_language import (
     banned_words_in,
     broken_links,
     faults_of_grades,
+    long_sentences_in,
 )
 
 
@@ -67,3 +68,10 @@ def test_a_link_to_a_missing_file_or_heading_is_found(tmp_path: Path) -> None:
         "other.md#what-you-pay",
         "#nowhere",
     ]
+
+
+def test_a_long_sentence_of_an_error_is_found_whatever_it_is_made_of() -> None:
+    words = " ".join(["word"] * 24)
+    long = f"raise InputError(f'{{file}}: {words} ' + 'end. Short.')"
+    assert [line for line, _ in long_sentences_in(long)] == [1]
+    assert list(long_sentences_in(long.replace("word word", "word. Word", 1))) == []

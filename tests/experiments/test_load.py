@@ -187,7 +187,7 @@ def test_a_text_without_the_first_language_is_refused() -> None:
         "mine.toml: line 85: trial.scale.question: expected a text in en, the first of languages, got only "
         "de, and languages does not list de; add en to the text, or correct languages"
     )
-    # What was collected by it is analysed, and what a database holds is read.
+    # What was collected by it is analyzed, and what a database holds is read.
     experiment = parse_experiment(text, has_data=True)
     assert load_stored(json.loads(experiment.model_dump_json()), FORMAT) == experiment
 

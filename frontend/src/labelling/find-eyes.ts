@@ -77,7 +77,7 @@ interface Spot {
   /** Its middle, in squares. */
   readonly x: number;
   readonly y: number;
-  /** Mean change in it above that of the ring around it, in grey levels. */
+  /** Mean change in it above that of the ring around it, in gray levels. */
   readonly strength: number;
 }
 
@@ -158,7 +158,7 @@ const DISTANCES = [1.5, 3.6] as const;
 const MAX_TILT = 0.35;
 /** The weaker spot of two has at least this share of the stronger one's change. */
 const LEAST_BALANCE = 0.35;
-/** Grey levels by the share of all change nearby; noise of sensors stays below. */
+/** Gray levels by the share of all change nearby; noise of sensors stays below. */
 const LEAST_SCORE = 0.6;
 /** Gray levels by which the eyes change more than twice the region around them. */
 const LEAST_STILLED = 1;

@@ -1,7 +1,7 @@
-/** Grey pictures, and patches of them that are compared. */
+/** Gray pictures, and patches of them that are compared. */
 import type { Point } from "./points";
 
-// Grey pictures: what choosing frames and proposing points look at.
+// Gray pictures: what choosing frames and proposing points look at.
 
 export interface Grey {
   readonly width: number;
@@ -20,7 +20,7 @@ function greyOf(pixels: { width: number; height: number; data: Uint8ClampedArray
   return { width: pixels.width, height: pixels.height, values };
 }
 
-/** Grey values of a whole canvas. */
+/** Gray values of a whole canvas. */
 export function greyOfCanvas(canvas: HTMLCanvasElement | OffscreenCanvas): Grey {
   const context: CanvasRenderingContext2D | OffscreenCanvasRenderingContext2D | null = canvas.getContext("2d", {
     willReadFrequently: true,
@@ -60,7 +60,7 @@ export function thumbnailOf(picture: Grey): Grey {
   return { width: across, height: down, values: Uint8ClampedArray.from(values) };
 }
 
-/** Normalised cross-correlation of two samples of equal length: 1 alike up to light and contrast, 0 unrelated. */
+/** Normalized cross-correlation of two samples of equal length: 1 alike up to light and contrast, 0 unrelated. */
 function correlation(a: Float64Array, b: Float64Array): number {
   let [sumA, sumB, aa, bb, ab] = [0, 0, 0, 0, 0];
   for (let pixel = 0; pixel < a.length; pixel += 1) {

@@ -1,4 +1,4 @@
-/** The frames that are labelled: opened from a file, chosen, and kept with their labels. */
+/** The frames that are labeled: opened from a file, chosen, and kept with their labels. */
 import { blockMeans, type Grey, thumbnailOf } from "./grey";
 import { type EyesOfVideo, eyesFor, NO_EYES } from "./eyes";
 import { checkShape, type LabelFile, LabelProblem } from "./label-file";
@@ -69,7 +69,7 @@ function difference(a: Grey, b: Grey): number {
 /**
  * Places of the pictures to take by farthest-point selection: each next one is the least like all taken before.
  *
- * `taken` are places already labelled; without any it begins at the first picture. Pictures equal to a taken one
+ * `taken` are places already labeled; without any it begins at the first picture. Pictures equal to a taken one
  * are never taken, so fewer than `count` may come back. In ascending order, `taken` included.
  */
 export function farthestPictures(pictures: readonly Grey[], count: number, taken: readonly number[] = []): number[] {
@@ -93,7 +93,7 @@ export function farthestPictures(pictures: readonly Grey[], count: number, taken
   return chosen.sort((a, b) => a - b);
 }
 
-// Labelled frames of one video: which to label, and whether labels fit the video.
+// Labeled frames of one video: which to label, and whether labels fit the video.
 
 export interface LabelledFrame {
   readonly shape: Shape;
@@ -125,7 +125,7 @@ function briefPlaces({ pictures, eyes }: Looked, count: 1 | 2): number[] {
   return [...blinks, ...others].slice(0, BRIEF_CHANGES);
 }
 
-/** About 20 frames: those labelled, blinks and other brief changes, and ones as unlike these as there are. */
+/** About 20 frames: those labeled, blinks and other brief changes, and ones as unlike these as there are. */
 export function chooseFrames(looked: Looked, labelled: readonly number[], eyes: 1 | 2): number[] {
   const { candidates, pictures } = looked;
   const taken = labelled.map((number) =>
@@ -164,7 +164,7 @@ export function problemOf(number: number, shape: Shape, video: OpenedVideo): str
   }
 }
 
-// A video opened for labelling, with the frames looked at to find unlike ones.
+// A video opened for labeling, with the frames looked at to find unlike ones.
 
 /** Open a video and look at frames of it; `report` receives how far that is. */
 export async function openForLabelling(file: File, report: (progress: string) => void): Promise<{ video: OpenedVideo; looked: Looked }> {
@@ -186,7 +186,7 @@ export async function openForLabelling(file: File, report: (progress: string) =>
   }
 }
 
-/** Eyes that blink, looked for in a worker. Without one, labelling goes on from a fixed place. */
+/** Eyes that blink, looked for in a worker. Without one, labeling goes on from a fixed place. */
 function eyesOf(task: ToEyes, report: (percent: number) => void): Promise<EyesOfVideo> {
   if (task.pictures.length < 3 || !(task.seconds > 0)) return Promise.resolve(NO_EYES);
   const worker = new Worker(new URL("./eyes-worker.ts", import.meta.url), { type: "module" });

@@ -1,4 +1,4 @@
-/** The start shape of a new frame, found from frames labelled before by correlating patches of the pictures. */
+/** The start shape of a new frame, found from frames labeled before by correlating patches of the pictures. */
 import { type Grey, cut, type Directions, PLANE, searchFinely, greyOfCanvas } from "./grey";
 import { at, eyeCount, eyeOf, eyeWidth, type Point, type Shape, inside, type Size, templateShape } from "./points";
 import { eyesFor, placesOn, shapeOn } from "./eyes";
@@ -25,11 +25,11 @@ function centreOf(eye: Shape): Point {
 }
 
 /**
- * Propose the shape of a frame from labelled ones.
+ * Propose the shape of a frame from labeled ones.
  *
- * Each eye by itself: the labelled eye whose picture is found again best, within a third of an eye's width, is laid
- * where it was found; then each point follows its own small patch, held by its neighbours on the lid.
- * Throws RangeError without a labelled frame.
+ * Each eye by itself: the labeled eye whose picture is found again best, within a third of an eye's width, is laid
+ * where it was found; then each point follows its own small patch, held by its neighbors on the lid.
+ * Throws RangeError without a labeled frame.
  */
 export function proposeShape(picture: Grey, labelled: readonly Labelled[]): Shape {
   const first = labelled[0];
@@ -82,7 +82,7 @@ function middle(values: readonly number[]): number {
   return [...values].sort((a, b) => a - b)[Math.floor(values.length / 2)] ?? 0;
 }
 
-// The shape a new frame begins with: the template, the nearest labelled frame's, or a proposal from all of them.
+// The shape a new frame begins with: the template, the nearest labeled frame's, or a proposal from all of them.
 
 const MAX_SOURCES = 24;
 
@@ -112,7 +112,7 @@ export async function startShape(
   return { number, shape: proposeShape(greyOfCanvas(canvas), sources), from: "proposal" };
 }
 
-/** Without a labelled frame: laid on the eyes found, as closed as they are there, or at a fixed place. */
+/** Without a labeled frame: laid on the eyes found, as closed as they are there, or at a fixed place. */
 function firstShape(number: number, { candidates, eyes: known }: Looked, eyes: 1 | 2, size: Size): Start {
   const blinking = eyesFor(known, eyes);
   if (blinking === null) return { number, shape: templateShape(eyes, size), from: "template" };

@@ -1,4 +1,4 @@
-/** A second look at labelled blinks: the trace as it is drawn, and what was decided on each blink. */
+/** A second look at labeled blinks: the trace as it is drawn, and what was decided on each blink. */
 import { requiredColumn, csvField, parseTable, type Table, TableProblem, wholeAt } from "./csv";
 
 // Blinks as `stimuli blinks` writes them, and the review file that `stimuli blinks --review` reads.
@@ -15,7 +15,7 @@ export interface Blink {
   readonly closure: number;
 }
 
-/** A decision about a blink; `onset` and `end` are null where they stay as labelled. */
+/** A decision about a blink; `onset` and `end` are null where they stay as labeled. */
 export interface Decision {
   readonly decision: "accept" | "reject";
   readonly reason: string;
@@ -35,7 +35,7 @@ export interface BlinkTable {
   readonly decisions: Decisions;
 }
 
-/** Decisions by `blinkKey`; a blink that is not in it is as the labelling left it. */
+/** Decisions by `blinkKey`; a blink that is not in it is as the labeling left it. */
 export type Decisions = ReadonlyMap<string, Decision>;
 
 export function blinkKey({ column, minimum }: Pick<Blink, "column" | "minimum">): string {
@@ -143,7 +143,7 @@ export function edgesOf(blink: Blink, decisions: Decisions): { onset: number; en
 
 export type Edge = "onset" | "end";
 
-/** The frames a start or end may move to: not past the minimum, nor into the neighbouring blink. */
+/** The frames a start or end may move to: not past the minimum, nor into the neighboring blink. */
 export function edgeLimits(
   blink: Blink,
   edge: Edge,
@@ -177,7 +177,7 @@ export function withEdge(
   return withDecision(decisions, blink, { ...before, [edge]: edgeFrame === blink[edge] ? null : edgeFrame });
 }
 
-/** Decisions with one in place; a blink left as labelled without a word is no longer in them. */
+/** Decisions with one in place; a blink left as labeled without a word is no longer in them. */
 export function withDecision(decisions: Decisions, blink: Blink, decision: Decision): Decisions {
   const next = new Map(decisions);
   const plain = decision.decision === "accept" && decision.reason === "";

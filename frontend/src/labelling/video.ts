@@ -20,7 +20,7 @@ export interface OpenedVideo {
   /** From the first frame to the last. */
   readonly seconds: number;
   frame(number: number): Promise<HTMLCanvasElement>;
-  /** Small grey pictures of some frames, numbers ascending. */
+  /** Small gray pictures of some frames, numbers ascending. */
   smallPictures(numbers: readonly number[], done: (count: number) => void): Promise<Grey[]>;
   close(): void;
 }

@@ -1,4 +1,4 @@
-/** The labels of one video as they grow: every step of the labelling page, from one state to the next. */
+/** The labels of one video as they grow: every step of the labeling page, from one state to the next. */
 import { defaultMarkers, type LabelFile } from "./label-file";
 import {
   acceptedOf,

@@ -6,7 +6,7 @@ export interface Decision {
   frames: number;
   width: number;
   height: number;
-  /** Mean grey of each frame, 0 to 255; empty for a clip that is decoded while it is shown. */
+  /** Mean gray of each frame, 0 to 255; empty for a clip that is decoded while it is shown. */
   greys: number[];
 }
 

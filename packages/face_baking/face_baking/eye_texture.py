@@ -16,7 +16,7 @@ GLOBE_CM = 1.5
 WHITE = (0.61, 0.56, 0.52)
 VEINS = 60
 DRIFT, DRIFT_CM = 0.006, 0.07
-"""How far fibres wander on their way outwards: standard deviation at the rim, turns, and its scale, cm.
+"""How far fibers wander on their way outwards: standard deviation at the rim, turns, and its scale, cm.
 
 Straight spokes look drawn.
 """
@@ -101,11 +101,11 @@ def _iris_colour(plane: _Plane, iris: Iris, noises: tuple[Array, Array, Array], 
     pupil = iris.pupil_mm / 20
     outer, middle, inner = (np.array(c) for c in (iris.outer, iris.middle, iris.inner))
     zone = np.exp(-(((q - 0.45) / 0.35) ** 2))[..., None]
-    # Uneven zones follow broad noise: where they follow the fibres' bundles they look like petals.
+    # Uneven zones follow broad noise: where they follow the fibers' bundles they look like petals.
     core = np.clip(np.exp(-(((q - 0.08) / (0.24 + 0.02 * broad + 0.008 * bundles)) ** 2)) * 0.85, 0, 1)[
         ..., None
     ]
-    # Here fibres lie bare, there a haze covers them: of one strength all round they were a wheel's spokes.
+    # Here fibers lie bare, there a haze covers them: of one strength all round they were a wheel's spokes.
     bare = np.clip(0.75 + 0.45 * plane.noise(0.11), 0.15, 1.5)
     stroma = 0.66 + 0.19 * fibres * bare * (0.5 + 0.5 * q) + 0.10 * bundles + 0.13 * broad
     out = (outer * (1 - zone) + middle * zone) * (1 - core) + inner * core

@@ -41,7 +41,7 @@ def eyeball(path: BlinkPath, posed: Array, side: int, stroke: float) -> Mesh:
         return np.where(angle < limbus, plane, radius - 0.035 * np.exp(-((angle - limbus) / 0.05)))
 
     mesh, angle = _dome(path, side, stroke, profile, 1.45, (150, 96))
-    # One texture, half a turn further on the other side: two irises whose fibres agreed looked copied.
+    # One texture, half a turn further on the other side: two irises whose fibers agreed looked copied.
     uv = mesh.uv if side > 0 or mesh.uv is None else 1 - mesh.uv
     sclera = smooth(limbus - 0.01, limbus + 0.05, angle)
     # Between lids that meet, shadows that are rendered leave little: this one would make the slit black.

@@ -91,7 +91,7 @@ def test_variances_that_are_shared_freely_are_named_where_tests_hold() -> None:
 
 def test_correlated_slopes_of_one_rating_a_cell_are_refused() -> None:
     with pytest.raises(
-        InputError, match=r"more than 20 ratings for 2 correlated .* got 20; .* --slopes none"
+        InputError, match=r"more than 20 ratings for 2 correlated .* got 20\. .* --slopes none"
     ):
         fit_mixed(SLEEP, "who", "extra", ["drug"], None, "correlated")
 

@@ -236,7 +236,5 @@ def test_of_an_export_only_answers_that_count_are_compared(tmp_path: Path) -> No
 @pytest.mark.parametrize(("tie", "what"), [("a", "an item"), ("Left", "a side")])
 def test_a_word_for_ties_that_names_a_winner_is_refused(tmp_path: Path, tie: str, what: str) -> None:
     path = table(tmp_path, [("a", "b", "a"), ("b", "a", "Left"), ("a", "b", "b")])
-    with pytest.raises(
-        InputError, match=f"--tie {tie} is also {what}; expected a word for ties that does not name a"
-    ):
+    with pytest.raises(InputError, match=f"--tie {tie} is also {what}; expected a word that names no winner"):
         read_comparisons(path, "left", "right", "winner", tie)

@@ -121,7 +121,7 @@ def test_the_command_writes_pooled_people_and_means(tmp_path: Path) -> None:
     [
         ("x,response\n1,1\n1,0\n", [], "two levels of x or more, got 1"),
         ("x,response\n1,1\n2,1\n", [], "all 2 answers are the same"),
-        ("x,response\n1,maybe\n2,1\n", [], "'response' is 'maybe' in line 2; expected 1 or 0"),
+        ("x,response\n1,maybe\n2,1\n", [], "'response' is 'maybe' in line 2. Expected 1 or 0"),
         ("x,response\nlong,0\n2,1\n", [], "'x' should be a number, got 'long'"),
         ("x,response\n0,0\n2,1\n", ["--function", "weibull"], "Weibull function needs x above 0"),
         ("x,response\n1,0\n2,1\n", ["--guess", "1.5"], "expected --guess from 0"),

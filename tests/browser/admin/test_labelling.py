@@ -82,7 +82,7 @@ def test_points_are_labelled_undone_and_saved_as_stimuli_reads_them(
     page.keyboard.press("Control+z")
     page.keyboard.press("Control+z")
 
-    # In the view of the whole frame, where points overlap, a press on a centre takes that point.
+    # In the view of the whole frame, where points overlap, a press on a center takes that point.
     page.get_by_role("button", name="Whole frame").click()
     for number in range(18):
         point = page.locator(f'circle.point[data-point="{number}"]')

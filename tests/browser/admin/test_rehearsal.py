@@ -17,7 +17,7 @@ def look(dashboard: Dashboard, name: str) -> None:
     page = dashboard.page
     try:
         for scheme in ("light", "dark"):
-            # Without transitions: axe must not meet a colour on its way from one scheme to the other.
+            # Without transitions: axe must not meet a color on its way from one scheme to the other.
             page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
             for width, height in SIZES:
                 page.set_viewport_size({"width": width, "height": height})

@@ -13,7 +13,7 @@ def test_a_kind_in_folders_of_its_own_goes_from_declaration_to_report(tmp_path: 
     done = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, check=False, timeout=300)
     assert done.returncode == 0, done.stderr[-3000:]
     found = json.loads(done.stdout)
-    # 2 characters x 2 speeds x 2 exemplars are 8 clips: 7 pairs of neighbours each.
+    # 2 characters x 2 speeds x 2 exemplars are 8 clips: 7 pairs of neighbors each.
     assert found["rows"] == 3 * 7
     assert found["csv"] == found["database"]
     assert (found["csv"]["n"], found["csv"]["synthetic"]) == (21, True)

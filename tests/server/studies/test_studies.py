@@ -371,7 +371,7 @@ def test_a_design_whose_clips_are_never_compared_is_not_saved(
         assert answer.status_code == 422, answer.text
         assert answer.json()["error"]["message"].startswith(
             "definition: line 31: trial: expected pairs that connect all items, got 2 groups never compared "
-            "with one another: {a/fast, a/slow} and {b/fast, b/slow}; declare a pair between them"
+            "with one another: {a/fast, a/slow} and {b/fast, b/slow}. Declare a pair between them"
         )
     [summary] = experimenter.get("/studies").json()
     assert (summary["name"], summary["version"]) == ("short", 1)

@@ -19,7 +19,7 @@ def eye_window(side: int) -> tuple[int, int, int, int]:
 def visible_opening_mm(picture: np.ndarray) -> float:
     """Height of the highest column of eyeball in a picture (h, w, 3).
 
-    All colours of the eyeball have nearly as much green as red, or more; skin, lashes and rims have less.
+    All colors of the eyeball have nearly as much green as red, or more; skin, lashes and rims have less.
     """
     eyeball = picture[..., 1] > 0.84 * picture[..., 0]
     return float(np.max(eyeball.sum(0)) / PX_PER_MM)

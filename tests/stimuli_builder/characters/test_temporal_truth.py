@@ -65,7 +65,7 @@ def test_no_level_pops(face: Face) -> None:
     around = [np.median(np.r_[size[max(0, k - 3) : k], size[k + 1 : k + 4]]) for k in range(len(size))]
     # A level that is out of line doubles the steps to it and from it.
     assert (size / around).max() < 1.7
-    # No patch of 1 mm changes between neighbours by more than a lash does that passes it.
+    # No patch of 1 mm changes between neighbors by more than a lash does that passes it.
     patch = round(face.px(1.05))
     assert max(float(cv2.blur(step, (patch, patch)).max()) for step in steps) < 45
 

@@ -30,7 +30,7 @@ def test_products_are_summed_over_poses_and_mattes() -> None:
 @pytest.mark.parametrize(
     ("rgb", "yuv"),
     [
-        # ITU-R BT.709, limited range: the 100% colour bars of Rec. BT.709-6 table values.
+        # ITU-R BT.709, limited range: the 100% color bars of Rec. BT.709-6 table values.
         ((1, 1, 1), (235, 128, 128)),
         ((0, 0, 0), (16, 128, 128)),
         ((1, 0, 0), (63, 102, 240)),

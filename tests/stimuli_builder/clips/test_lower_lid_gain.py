@@ -60,5 +60,5 @@ def test_a_single_clip_has_the_gain_of_its_settings(tmp_path: Path) -> None:
 
 
 def test_motion_beyond_what_was_baked_is_refused_in_one_line() -> None:
-    with pytest.raises(InputError, match="its character is baked for 0 to 1 mm; bake a larger range"):
+    with pytest.raises(InputError, match=r"its character is baked for 0 to 1 mm\. Bake a larger range"):
         clip_of(3.0)

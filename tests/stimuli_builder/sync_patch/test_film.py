@@ -110,7 +110,7 @@ def test_a_slow_motion_file_needs_the_camera_s_rate(tmp_path: Path) -> None:
 
 def test_a_film_without_a_patch_is_one_line(tmp_path: Path) -> None:
     path = film(tmp_path / "film.mp4", Shown({}, 0.0), PHONE, 60)
-    with pytest.raises(InputError, match="no sync patch was found; film the whole patch"):
+    with pytest.raises(InputError, match=r"no sync patch was found\. Film the whole patch"):
         read_film(path)
 
 

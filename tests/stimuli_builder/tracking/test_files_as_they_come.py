@@ -19,9 +19,9 @@ FRAMES = 24
 
 
 def written(path, pictures, codec="libx264", pixels="yuv420p", rotation_deg=0, fps=240, options=None):
-    """A grey video; `rotation_deg` is what a phone would write into its head.
+    """A gray video; `rotation_deg` is what a phone would write into its head.
 
-    8 bits are written as they are, as the model's own recording was: its grey levels belong to the model.
+    8 bits are written as they are, as the model's own recording was: its gray levels belong to the model.
     """
     with av.open(str(path), "w", options=options or {}) as container:
         stream = container.add_stream(codec, rate=Fraction(fps))

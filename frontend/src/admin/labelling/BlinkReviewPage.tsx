@@ -1,4 +1,4 @@
-/** A second look at labelled blinks, for `stimuli blinks --review`. The files stay on this computer. */
+/** A second look at labeled blinks, for `stimuli blinks --review`. The files stay on this computer. */
 import { Button, Card, Group, Table, Text, TextInput, Alert, SegmentedControl, Stack, Title } from "@mantine/core";
 import { useState } from "react";
 import { type Blink, blinkKey, decisionOn, edgesOf, zoomedWindow } from "../../labelling/review";

@@ -1,4 +1,4 @@
-/** The work of the labelling page: a video, its labels with undo, and the start shape of each new frame. */
+/** The work of the labeling page: a video, its labels with undo, and the start shape of each new frame. */
 import { useEffect, useState, useEffectEvent, useCallback } from "react";
 import type { OpenedVideo } from "../../labelling/video";
 import type { Grey } from "../../labelling/grey";
@@ -61,7 +61,7 @@ interface Begun extends Start {
   readonly eyes: 1 | 2;
 }
 
-/** Null for a labelled frame, and until the start of another is known; a failure goes to `report`. */
+/** Null for a labeled frame, and until the start of another is known; a failure goes to `report`. */
 function useStart({ opened, eyes, history, current }: Work, picture: Picture | null, report: (problem: string) => void): Start | null {
   const [start, setStart] = useState<Begun | null>(null);
   const video = opened?.video ?? null;
@@ -84,7 +84,7 @@ function useStart({ opened, eyes, history, current }: Work, picture: Picture | n
   return fits && !labelled ? start : null;
 }
 
-/** Grey pictures of labelled frames, kept as long as their video is open. */
+/** Gray pictures of labeled frames, kept as long as their video is open. */
 const GREYS = new WeakMap<OpenedVideo, Map<number, Grey>>();
 
 function greysOf(video: OpenedVideo): Map<number, Grey> {

@@ -67,7 +67,7 @@ function belowOf(labels: readonly string[]): number {
   return 24 + 14 * (lines === 1 ? 1 : lines + 1);
 }
 
-/** Means of one factor, or of two: the second as colour. Bars are within-participant standard errors. */
+/** Means of one factor, or of two: the second as color. Bars are within-participant standard errors. */
 export function marginPlot(margin: Schemas["Margin"], { scale }: Results, factors: Factors): Plot.PlotOptions {
   const [first = "", second] = margin.factors;
   const [across, hues] = [labelsOf(factors, first), labelsOf(factors, second ?? "")];
@@ -106,7 +106,7 @@ const MAX_TICKS = 11;
 
 const shareOf = ({ share }: { share: number }) => (share >= 0.005 ? `${Math.round(100 * share)}%` : "");
 
-/** One row a cell, one column an answer: the share of answers as depth of colour, and as a number. */
+/** One row a cell, one column an answer: the share of answers as depth of color, and as a number. */
 export function cellPlot({ cells, bins }: Results, factors: Factors): Plot.PlotOptions {
   const labels = cellLabels(
     cells.map(({ cell }) => cell),

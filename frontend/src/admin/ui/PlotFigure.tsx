@@ -1,4 +1,4 @@
-/** Charts: an Observable Plot drawn into the page, in the page's colours and as wide as its place. */
+/** Charts: an Observable Plot drawn into the page, in the page's colors and as wide as its place. */
 
 import { Button, Group } from "@mantine/core";
 import { useElementSize } from "@mantine/hooks";
@@ -8,7 +8,7 @@ import { allowStyles } from "../nonce";
 import { downloadText } from "./useChange";
 import { csvText, type Row, svgText } from "./figure-files";
 
-// An Observable Plot drawn into the page, in the page's colours and as wide as its place.
+// An Observable Plot drawn into the page, in the page's colors and as wide as its place.
 
 const WIDEST_PX = 720;
 

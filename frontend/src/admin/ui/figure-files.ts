@@ -13,7 +13,7 @@ const LINE_PX = 20;
 const GLYPH_PX = 7;
 const INK = { background: "white", color: "black", fontFamily: "sans-serif", fontSize: "12px" };
 
-/** The picture, dark on white whatever the page's colours are; its legend and caption, which the page has as HTML, are drawn into it. */
+/** The picture, dark on white whatever the page's colors are; its legend and caption, which the page has as HTML, are drawn into it. */
 export function svgText(options: Plot.PlotOptions, label: string): string {
   const drawn = Plot.plot({ ...options, width: WIDTH_PX, style: INK });
   const parts = drawn instanceof SVGSVGElement ? [drawn] : [...drawn.querySelectorAll<SVGSVGElement>(":scope > svg")];
@@ -42,7 +42,7 @@ export function svgText(options: Plot.PlotOptions, label: string): string {
   return `<?xml version="1.0" encoding="UTF-8"?>\n${new XMLSerializer().serializeToString(whole)}\n`;
 }
 
-/** A legend of colours by name, in lines no longer than the figure. */
+/** A legend of colors by name, in lines no longer than the figure. */
 function swatches(drawn: ReturnType<typeof Plot.plot>): Element[] {
   const colours = drawn.querySelector(":scope > div") === null ? undefined : drawn.scale("color");
   const lines: Element[] = [];

@@ -60,7 +60,7 @@ export function plain(value: unknown): string {
   return typeof value === "string" ? value : JSON.stringify(value);
 }
 
-/** Colours of the badges of verdicts: white can be read on each. */
+/** Colors of the badges of verdicts: white can be read on each. */
 export const VERDICT_COLOURS: Record<string, string> = { good: "teal.9", uncertain: "blue.9", flagged: "#8a5a00", failed: "red.9" };
 
 // How a play of a clip was judged and shown, in words: the data have the names of rules and methods.

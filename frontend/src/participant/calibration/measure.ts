@@ -1,4 +1,4 @@
-/** How many pixels a millimetre has here: by card or ruler, more than once, checked, and large enough for the clip. */
+/** How many pixels a millimeter has here: by card or ruler, more than once, checked, and large enough for the clip. */
 import type { Translate } from "../../i18n";
 import { h, uniqueId, button, showPage, statusLine, alertLine } from "../../ui/element";
 import { randomStart, asTyped, measureDistance, mean, settled, spreadPercent, SPREAD_MAX_PERCENT } from "./distance";
@@ -10,7 +10,7 @@ import { choose, noDevice, saveShown, screenOut, stopButton } from "../screens/s
 import type { Session } from "../session";
 import "./calibration.css";
 
-// A bank card drawn on the screen, to be made as large as a real one: gives CSS pixels per millimetre.
+// A bank card drawn on the screen, to be made as large as a real one: gives CSS pixels per millimeter.
 
 /** ISO/IEC 7810 ID-1. */
 const CARD_WIDTH_MM = 85.6;
@@ -133,7 +133,7 @@ function handWithCard(label: string): SVGElement {
   return picture;
 }
 
-// A line of known pixels to be measured, or of known millimetres to be checked.
+// A line of known pixels to be measured, or of known millimeters to be checked.
 
 const MEASURED_LINE_PX = 378;
 const CHECK_LINE_MM = 100;

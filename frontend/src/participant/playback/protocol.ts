@@ -42,7 +42,7 @@ export interface ClipPlayer {
    * each in the same refresh. A shorter one holds its last frame. Rejects with ClipBroken.
    */
   compose(name: string, parts: readonly Part[], width: number, height: number): Promise<Prepared>;
-  /** Give the element this clip's own pixel size and the surround's colour. */
+  /** Give the element this clip's own pixel size and the surround's color. */
   blank(sha256: string): void;
   /** Show a prepared clip from the next screen refresh on; resolves after its last frame. */
   play(sha256: string, options: PlayOptions): Promise<ShownClip>;

@@ -37,7 +37,7 @@ export function screenChange(before: ScreenShape, now: ScreenShape): ScreenChang
   return sameSize || same(device(before), device(now)) ? "zoom" : "screen";
 }
 
-/** CSS pixels per millimetre after a zoom: the pixel has grown, so a millimetre holds fewer. */
+/** CSS pixels per millimeter after a zoom: the pixel has grown, so a millimeter holds fewer. */
 export function zoomed(px_per_mm: number, before: ScreenShape, now: ScreenShape): number {
   return (px_per_mm * before.device_pixel_ratio) / now.device_pixel_ratio;
 }
@@ -81,13 +81,13 @@ export function calibrationBody(measured: Measured, distance: Distance, occasion
   };
 }
 
-/** CSS pixels per millimetre that screens have: 48 to 254 an inch, from a large television to a telephone. */
+/** CSS pixels per millimeter that screens have: 48 to 254 an inch, from a large television to a telephone. */
 const PLAUSIBLE_PX_PER_MM = [1.9, 10] as const;
 
 /** Widest screen that somebody rates at, and the same where it is twice as wide as high or more. */
 const WIDEST_MM = [1_000, 1_300] as const;
 
-/** False where a card or ruler cannot have been held against the screen: it would be a metre wide, or as small as a stamp. */
+/** False where a card or ruler cannot have been held against the screen: it would be a meter wide, or as small as a stamp. */
 export function isPlausible(px_per_mm: number, { screen_width_px: width, screen_height_px: height } = screenShape()): boolean {
   const widest = WIDEST_MM[width >= 2 * height ? 1 : 0];
   return px_per_mm >= PLAUSIBLE_PX_PER_MM[0] && px_per_mm <= PLAUSIBLE_PX_PER_MM[1] && width / px_per_mm <= widest;

@@ -114,7 +114,7 @@ export function calibration(session: Session): PluginClass<CalibrationParameters
       occasion: STRING, // first, screen_changed or recheck
     },
     data: {
-      px_per_mm: FLOAT, // CSS pixels per millimetre, null where skipped
+      px_per_mm: FLOAT, // CSS pixels per millimeter, null where skipped
       method: STRING, // card or ruler
       checked: BOOL, // true where an earlier size was looked at once more and holds
     },

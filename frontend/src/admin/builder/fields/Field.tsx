@@ -172,7 +172,7 @@ function ElementButtons({ path, title, count, short = false }: ButtonsProps) {
 
 type TableEditor = Extract<Editor, { kind: "table" }>;
 
-/** Whether elements are named and labelled, and little else. */
+/** Whether elements are named and labeled, and little else. */
 function fitsRow({ keys }: TableEditor): boolean {
   const names = keys.map(([name]) => name);
   return keys.length <= 3 && names.includes("label") && (names.includes("name") || names.includes("value"));

@@ -27,7 +27,7 @@ export function stepFrames(fps: number, sample_hz: number): number {
 
 /**
  * The slider's place when frames 0, `step`, 2 `step` and so on were drawn. A frame that was not drawn lies between its
- * neighbours in time; after the last one that was, frames follow at the clip's rate.
+ * neighbors in time; after the last one that was, frames follow at the clip's rate.
  */
 export function traceOf(
   moves: readonly Move[],

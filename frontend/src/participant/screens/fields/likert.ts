@@ -1,4 +1,4 @@
-/** A rating with labelled ends. */
+/** A rating with labeled ends. */
 import { pick } from "../../../i18n";
 import { h } from "../../../ui/element";
 import type { TypeOfField } from "./field";

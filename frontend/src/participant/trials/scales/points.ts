@@ -1,4 +1,4 @@
-/** Points side by side: a press, a digit or the arrow keys; the two ends labelled, or every point. */
+/** Points side by side: a press, a digit or the arrow keys; the two ends labeled, or every point. */
 import { pick } from "../../../i18n";
 import { h } from "../../../ui/element";
 import { scaleDirection, keyFor, valueOf } from "../../../ui/keys";
