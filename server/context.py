@@ -22,6 +22,7 @@ from server.participation.intake import Intake
 from server.participation.versions import Versions
 from server.results.cache import ResultsCache
 from server.transcoding.preparing import UploadPreparation
+from server.transcoding.stored import StoredClips
 
 SIMULATED_TIME = "x-palpebra-simulated-time"
 REFUSALS_PER_MINUTE, REFUSALS_OF_A_KIND = 20, 3
@@ -38,6 +39,7 @@ class Services:
     settings: Settings
     database: Database
     clips: ClipStore
+    stored_clips: StoredClips
     run_starts: RateLimit
     unsupported: RateLimit
     versions: Versions
@@ -78,6 +80,7 @@ def open_services(settings: Settings, *, rehearses: bool = False) -> Services:
         settings=settings,
         database=database,
         clips=clips,
+        stored_clips=StoredClips(clips),
         run_starts=RateLimit(settings.run_starts_per_minute, name="run starts", shared=shared),
         unsupported=RateLimit(settings.unsupported_per_minute, name="unsupported", shared=shared),
         versions=Versions(),

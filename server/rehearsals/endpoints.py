@@ -1,5 +1,7 @@
 """Before a study goes live: the checklist, and the dress rehearsal with simulated people in a sandbox."""
 
+from functools import partial
+
 from fastapi import APIRouter
 from fastapi.responses import FileResponse
 
@@ -19,8 +21,14 @@ launch_router = APIRouter(prefix="/api/admin", tags=["studies"], responses=ERROR
 @launch_router.get("/studies/{study}/launch-checks")
 def list_launch_checks(services: ServicesDep, identity: Viewer, study: str) -> list[LaunchCheck]:
     """What to look at before the study goes live."""
-    findings = findings_for_studies(services)
-    return service.preflight(services.database, services.settings, findings, study, identity)
+    return service.preflight(
+        services.database,
+        services.settings,
+        services.stored_clips,
+        partial(findings_for_studies, services),
+        study,
+        identity,
+    )
 
 
 router = APIRouter(

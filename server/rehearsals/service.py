@@ -9,7 +9,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -42,9 +42,10 @@ from server.rehearsals.schemas import (
 )
 from server.results import repository
 from server.results.jobs import begin_job, in_background, is_under_way, job_state, note
-from server.studies.launch_checks import launch_checks
+from server.studies.launch_checks import clip_findings, clips_shown, launch_checks
 from server.studies.lookup import active_version, find_study
 from server.studies.schemas import LaunchCheck
+from server.transcoding.stored import StoredClips
 
 _KEPT_VARIABLES = ("PATH", "LANG", "LC_ALL", "HOME", "TMPDIR", "VIRTUAL_ENV", "PYTHONPATH")
 """What the sandbox gets of the environment: no address of a database, no key, no setting."""
@@ -249,17 +250,25 @@ def _kill(group: int) -> None:
 
 
 def preflight(
-    database: Database, settings: Settings, of_server: Sequence[Finding], name: str, identity: Identity
+    database: Database,
+    settings: Settings,
+    stored: StoredClips,
+    examine_server: Callable[[], Sequence[Finding]],
+    name: str,
+    identity: Identity,
 ) -> list[LaunchCheck]:
     """Everything that speaks against opening the active version of a study, blocking findings first.
 
-    `of_server` is what the doctor found (`server.operations.doctor.findings_for_studies`).
+    `examine_server` asks the doctor (`server.operations.doctor.findings_for_studies`), once the account has
+    turned out to be allowed to see the study. Of clips it says what is known by now.
     """
     with database.read() as session:
         findings = launch_checks(session, name, identity)
         study = find_study(session, name, identity, "view")
         findings += [*_plan(session, study), *_rehearsal(session, study)]
-    return sorted([*findings, *_server(settings, of_server)], key=lambda finding: not finding.blocks)
+        clips = clips_shown(session, study)
+    findings += clip_findings(stored.known_faults(clips))
+    return sorted([*findings, *_server(settings, examine_server())], key=lambda finding: not finding.blocks)
 
 
 def _plan(session: Session, study: Study) -> Iterator[LaunchCheck]:

@@ -1,5 +1,6 @@
 """`server study` and `server link`: take studies in, open and close them, make links."""
 
+from collections.abc import Sequence
 from datetime import timedelta
 from pathlib import Path
 from typing import Annotated
@@ -11,11 +12,12 @@ from sqlalchemy.orm import Session
 from experiments.command_groups import command_group
 from experiments.errors import InputError, did_you_mean
 from experiments.load import locate
-from experiments.manifest import Manifest, read_manifest
+from experiments.manifest import CheckClip, Clip, Manifest, read_manifest
 from experiments.schema.canonical import definition_sha256
 from server.accounts.audit import record
 from server.accounts.identity import OPERATOR
 from server.cli_common import migrated_services, out, stored_services
+from server.context import Services
 from server.core.settings import Settings
 from server.core.values import now
 from server.models import Link, Study, StudyVersion
@@ -29,7 +31,13 @@ from server.studies.creation import (
     planned_experiment,
     store_clips,
 )
-from server.studies.launch_checks import refuse_if_live, refuse_unready
+from server.studies.launch_checks import (
+    CLIPS_WITHIN_S,
+    clip_findings,
+    clips_shown,
+    refuse_if_live,
+    refuse_unready,
+)
 from server.studies.links import (
     LinkKind,
     LinkOptions,
@@ -42,6 +50,7 @@ from server.studies.links import (
 )
 from server.studies.lookup import active_version, find_study, must_not_be_archived
 from server.studies.repository import links_of
+from server.studies.schemas import LaunchCheck
 
 study_app = command_group("Studies on this server.")
 link_app = command_group("Links for participants.")
@@ -79,6 +88,7 @@ def add(
     check_against_design(declared, manifest)
     with migrated_services() as services:
         new = store_clips(services.clips, manifest, clips)
+        of_clips = _of_new_clips(services, name or declared.name, manifest, new=new, open_=open_)
         with services.database.write() as session:
             study = repository.study_called(session, name or declared.name)
             if study is not None:
@@ -88,16 +98,29 @@ def add(
             said = f"version {study.active_version}, nothing new"
             if version is None:
                 version = add_version(session, study, text, declared, manifest, None)
-                refuse_if_live(session, study)
+                refuse_if_live(session, study, of_clips)
                 said = f"version {version.number}, {len(manifest.clips)} clips ({new} new)"
             out.print(f"study {study.name}: {said}")
             for note in notes_of(declared, manifest, version):
                 out.print(f"note: {note}", markup=False)
             if open_:
-                _set_status(session, study, "live")
+                _set_status(session, study, "live", of_clips)
                 for group, url in _urls(services.settings, session, study):
                     to = f" of the group {group}" if group else ""
                     out.print(f"link for participants{to}, once the server runs: {url}", soft_wrap=True)
+
+
+def _of_new_clips(
+    services: Services, name: str, manifest: Manifest, *, new: int, open_: bool
+) -> list[LaunchCheck]:
+    """What is wrong with clips that participants are about to get; nothing where they have them already."""
+    with services.database.read() as session:
+        study = repository.study_called(session, name)
+        is_live = study is not None and study.status == "live"
+    if not (new if is_live else open_):
+        return []
+    shown: list[Clip | CheckClip] = [*manifest.clips, *manifest.checks]
+    return clip_findings(*services.stored_clips.find_faults(shown, CLIPS_WITHIN_S))
 
 
 def _same_version(session: Session, study: Study, sha256: str, manifest: Manifest) -> StudyVersion | None:
@@ -116,13 +139,17 @@ def _urls(settings: Settings, session: Session, study: Study) -> list[tuple[str,
     return [(link.group_name, link_url(settings.public_url, settings.key, link.public_id)) for link in links]
 
 
-def _set_status(session: Session, study: Study, status: str) -> None:
+def _set_status(
+    session: Session, study: Study, status: str, of_clips: Sequence[LaunchCheck] = (), *, anyway: bool = False
+) -> None:
     must_not_be_archived(study)
     if study.status == status:
         return
+    passed_over: dict[str, str] = {}
     if status == "live":
-        refuse_unready(session, study)
-    record(session, None, "status changed", "study", study.name, old=study.status, new=status)
+        kinds = refuse_unready(session, study, of_clips, anyway=anyway)
+        passed_over = {"anyway": ", ".join(kinds)} if anyway else {}
+    record(session, None, "status changed", "study", study.name, old=study.status, new=status, **passed_over)
     study.status, study.revision = status, study.revision + 1
     if status in ("pilot", "live"):
         study.opened_at, study.closed_at = study.opened_at or now(), None
@@ -134,17 +161,29 @@ def _set_status(session: Session, study: Study, status: str) -> None:
 def set_status(
     study: Annotated[str, typer.Argument(help="Name of the study.")],
     status: Annotated[str, typer.Argument(help="draft, pilot, live or closed.")],
+    anyway: Annotated[
+        bool,
+        typer.Option(help="Set it live although clips are missing or do not decode; the audit notes it."),
+    ] = False,
 ) -> None:
-    """Open or close a study.
+    """Open or close a study. Before it is live, each of its clips is decoded.
 
     Example: server study status exp3 pilot
     """
     if status not in STATUSES:
         raise InputError(f"no status '{status}'{did_you_mean(status, STATUSES)}")
-    with stored_services() as services, services.database.write() as session:
-        known = find_study(session, study, OPERATOR, "view")
-        _set_status(session, known, status)
-        out.print(f"study {known.name}: {known.status}")
+    with stored_services() as services:
+        of_clips: list[LaunchCheck] = []
+        if status == "live":
+            with services.database.read() as session:
+                clips = clips_shown(session, find_study(session, study, OPERATOR, "view"))
+            of_clips = clip_findings(*services.stored_clips.find_faults(clips, CLIPS_WITHIN_S))
+        with services.database.write() as session:
+            known = find_study(session, study, OPERATOR, "view")
+            _set_status(session, known, status, of_clips, anyway=anyway)
+            out.print(f"study {known.name}: {known.status}")
+        for finding in of_clips:
+            out.print(f"note: {finding.text}", markup=False)
 
 
 @study_app.command("list")

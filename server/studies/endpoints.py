@@ -43,6 +43,7 @@ from server.studies.schemas import (
     EditedDefinition,
     JudgedEdit,
     Label,
+    LaunchCheck,
     LinkOut,
     LinkPage,
     ListedStudy,
@@ -128,10 +129,13 @@ def get_version(database: DatabaseDep, identity: Viewer, study: str, number: Num
 
 
 @router.put("/studies/{study}/status")
-def change_status(database: DatabaseDep, identity: Writer, study: str, body: ChangeStatus) -> StudyDetail:
-    """draft -> pilot -> live -> closed."""
+def change_status(services: ServicesDep, identity: Writer, study: str, body: ChangeStatus) -> StudyDetail:
+    """draft -> pilot -> live -> closed. Before a study is live, the server decodes each of its clips."""
+    database, of_clips = services.database, list[LaunchCheck]()
+    if body.status == "live":
+        of_clips = service.find_clip_faults(database, services.stored_clips, study, identity)
     with database.write() as session:
-        service.change_status(session, study, body.revision, body.status, identity)
+        service.change_status(session, study, body, identity, of_clips)
     return get_study(database, identity, study)
 
 

@@ -3,7 +3,7 @@
 The same checks hold for whatever reaches participants later: a new version of a live study, and its settings.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 from sqlalchemy.orm import Session
@@ -12,7 +12,7 @@ from experiments.declaration.experiment import Experiment
 from experiments.errors import counted
 from experiments.kinds import expected_minutes
 from experiments.level_leaks import reported_leaks
-from experiments.manifest import Manifest
+from experiments.manifest import CheckClip, Clip, Manifest
 from experiments.wording import (
     LEAST_HOURLY_PAY,
     MINUTES_TOLERANCE,
@@ -33,8 +33,11 @@ from server.participation.recruiter import Recruiter, stored_recruiter
 from server.studies import repository
 from server.studies.lookup import active_version, definition_of, find_study, version_numbered
 from server.studies.schemas import LaunchCheck, LaunchPage
+from server.transcoding.stored import ClipFault
 
 MAX_TEXTS_NAMED = 3
+CLIPS_WITHIN_S = 60.0
+"""How long opening a study waits until its clips are examined."""
 
 
 class NotReady(Conflict, code="not_ready"):
@@ -69,13 +72,34 @@ def launch_checks(session: Session, name: str, identity: Identity) -> list[Launc
     return [finding for check in (*_BLOCKING, *_ADVISING) for finding in check(launch)]
 
 
-def refuse_unready(session: Session, study: Study) -> None:
-    """NotReady, with the sentences of every blocking check, where the study must not be live as it is."""
-    if sentences := _blocking_sentences(_to_launch(session, study, active_version(session, study))):
+def refuse_unready(
+    session: Session, study: Study, of_clips: Sequence[LaunchCheck] = (), *, anyway: bool = False
+) -> list[str]:
+    """NotReady, with the sentences of every blocking check, where the study must not be live as it is.
+
+    Parameters
+    ----------
+    session : Session
+    study : Study
+    of_clips : sequence of LaunchCheck, optional
+        What `clip_findings` gave, found before the transaction.
+    anyway : bool, optional
+        Open it in spite of what blocks in `of_clips`; other checks are not passed over.
+
+    Returns
+    -------
+    passed_over : list of str
+        Kinds of the findings that were passed over.
+    """
+    launch = _to_launch(session, study, active_version(session, study))
+    blocking = [finding for finding in of_clips if finding.blocks]
+    sentences = _blocking_sentences(launch) + [finding.text for finding in blocking if not anyway]
+    if sentences:
         raise NotReady(" ".join(sentences))
+    return [finding.kind for finding in blocking]
 
 
-def refuse_if_live(session: Session, study: Study) -> None:
+def refuse_if_live(session: Session, study: Study, of_clips: Sequence[LaunchCheck] = ()) -> None:
     """As `refuse_unready`, of a new version of a study that is live; what was live before stays possible."""
     if study.status != "live":
         return
@@ -85,6 +109,7 @@ def refuse_if_live(session: Session, study: Study) -> None:
         before = version_numbered(session, study, version.number - 1)
         found_before = _blocking_sentences(_to_launch(session, study, before))
     sentences = _blocking_sentences(_to_launch(session, study, version))
+    sentences += [finding.text for finding in of_clips if finding.blocks]
     if new := [sentence for sentence in sentences if sentence not in found_before]:
         raise NotReady(" ".join(new))
 
@@ -336,6 +361,53 @@ def _tried(launch: LaunchState) -> Iterator[LaunchCheck]:
             "Go through it once as a participant."
         )
         yield LaunchCheck(kind="not_tried", blocks=False, text=text, page="preview")
+
+
+# Clips as the store holds them. They are examined outside of the transaction: decoding takes time.
+
+
+def clips_shown(session: Session, study: Study) -> list[Clip | CheckClip]:
+    """Every clip that participants of the active version may see, each file once."""
+    manifest = Manifest.model_validate(active_version(session, study).manifest)
+    shown: list[Clip | CheckClip] = [*manifest.clips, *manifest.checks]
+    return list({clip.sha256: clip for clip in shown}.values())
+
+
+_CLIP_WORDS = {
+    "missing": ("is missing on the server", "are missing on the server", "Upload it again."),
+    "undecodable": (
+        "does not play in the participant page",
+        "do not play in the participant page",
+        "Export it again as H.264 in MP4.",
+    ),
+    "different": ("is not as stored", "are not as stored", "Upload it again."),
+    "other_rate": (
+        "plays at another rate than recorded",
+        "play at another rate than recorded",
+        "Is this intended?",
+    ),
+    "codec": ("does not play in every browser", "do not play in every browser", "Export it as H.264."),
+}
+_BLOCKING_FAULTS = ("missing", "undecodable", "different")
+
+
+def clip_findings(faults: Sequence[ClipFault], left: int = 0) -> list[LaunchCheck]:
+    """One line of the checklist per kind of fault; one more for clips that there was no time to examine."""
+    findings = []
+    for kind, (one, several, todo) in _CLIP_WORDS.items():
+        hits = [f"{fault.file} ({fault.detail})" for fault in faults if fault.kind == kind]
+        if hits:
+            what = one if len(hits) == 1 else several
+            text = f"{counted(len(hits), 'clip')} {what}: {', '.join(hits)}. {todo}"
+            findings.append(_of_clips(f"clip_{kind}", text, blocks=kind in _BLOCKING_FAULTS))
+    if left:
+        text = f"The server has not yet examined {counted(left, 'clip')}. Try again in a minute."
+        findings.append(_of_clips("clips_not_examined", text, blocks=True))
+    return findings
+
+
+def _of_clips(kind: str, text: str, *, blocks: bool) -> LaunchCheck:
+    return LaunchCheck(kind=kind, blocks=blocks, text=text, page="clips")
 
 
 _BLOCKING: tuple[Check, ...] = (_placeholders, _completion_codes)

@@ -268,6 +268,10 @@ class ChangeStatus(RequestBody):
 
     revision: Revision
     status: Literal["draft", "pilot", "live", "closed"]
+    anyway: bool = Field(
+        default=False,
+        description="Set live although clips are missing or do not decode; the audit log notes it.",
+    )
 
 
 class ChangeSettings(RequestBody):

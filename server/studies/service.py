@@ -1,6 +1,7 @@
 """Studies on the dashboard: checked, listed, shown, opened and closed, deleted."""
 
 from collections import Counter
+from collections.abc import Sequence
 from datetime import UTC, datetime, time, timedelta
 from typing import Any
 
@@ -18,6 +19,7 @@ from server.accounts.audit import record
 from server.accounts.identity import Identity
 from server.accounts.workspace_repository import studies_opened_to
 from server.accounts.workspaces import Standing, place_of_copy, standing_of, standing_on
+from server.core.db import Database
 from server.core.errors import Conflict, Invalid
 from server.core.storage import clip_address
 from server.core.values import now
@@ -25,7 +27,13 @@ from server.models import Study, StudyVersion, VersionClip
 from server.participation.recruiter import Recruiter, without_refused
 from server.studies import repository
 from server.studies.creation import add_version, create_study, for_edit, planned_experiment, size_notes
-from server.studies.launch_checks import refuse_recruiter, refuse_unready
+from server.studies.launch_checks import (
+    CLIPS_WITHIN_S,
+    clip_findings,
+    clips_shown,
+    refuse_recruiter,
+    refuse_unready,
+)
 from server.studies.lookup import (
     active_version,
     definition_of,
@@ -38,6 +46,7 @@ from server.studies.schemas import (
     ArchiveStudy,
     BlockOut,
     ChangeSettings,
+    ChangeStatus,
     ClipOut,
     CloneStudy,
     DefinitionCheck,
@@ -46,6 +55,7 @@ from server.studies.schemas import (
     EditedDefinition,
     FactorOut,
     JudgedEdit,
+    LaunchCheck,
     LevelOut,
     ListedStudy,
     ProblemOut,
@@ -55,6 +65,7 @@ from server.studies.schemas import (
 )
 from server.studies.series import effects_of_edit, series_of
 from server.studies.toml_edit import with_data
+from server.transcoding.stored import StoredClips
 
 # Definitions as text and data: their problems, what they expand to, what an edit would do.
 
@@ -127,21 +138,41 @@ ALLOWED = {
 }
 
 
-def change_status(session: Session, name: str, revision: int, status: str, identity: Identity) -> None:
-    """draft -> pilot -> live -> closed, and the ways back that lose nothing."""
-    study = for_edit(session, name, revision, identity, "run")
+def find_clip_faults(
+    database: Database, stored: StoredClips, name: str, identity: Identity
+) -> list[LaunchCheck]:
+    """What is wrong with the clips of a study that is about to be opened; each is decoded."""
+    with database.read() as session:
+        clips = clips_shown(session, find_study(session, name, identity, "run"))
+    return clip_findings(*stored.find_faults(clips, CLIPS_WITHIN_S))
+
+
+def change_status(
+    session: Session, name: str, order: ChangeStatus, identity: Identity, of_clips: Sequence[LaunchCheck]
+) -> None:
+    """draft -> pilot -> live -> closed, and the ways back that lose nothing.
+
+    `of_clips` is what `find_clip_faults` gave, for a study that is to be live.
+    """
+    status = order.status
+    study = for_edit(session, name, order.revision, identity, "run")
     if status == study.status:
         return
     if status not in ALLOWED[study.status]:
         raise Conflict(
             f"A study that is {study.status} can become {' or '.join(ALLOWED[study.status])}, not {status}."
         )
+    passed_over: dict[str, str] = {}
     if status == "live":
-        refuse_unready(session, study)
+        kinds = refuse_unready(session, study, of_clips, anyway=order.anyway)
+        passed_over = {"anyway": ", ".join(kinds)} if order.anyway else {}
     if study.status == "draft":
         study.opened_at = now()
     study.closed_at = now() if status == "closed" else None
-    record(session, identity, "status changed", "study", study.name, before=study.status, after=status)
+    before = study.status
+    record(
+        session, identity, "status changed", "study", study.name, before=before, after=status, **passed_over
+    )
     study.status = status
     study.revision += 1
 

@@ -880,6 +880,8 @@ export interface components {
    revision: number;
    /** @enum {string} */
    status: "draft" | "pilot" | "live" | "closed";
+   /** @default false */
+   anyway?: boolean;
   };
   ChangeWorkspace: {
    title: string;

@@ -1,5 +1,8 @@
 """What is found before a study goes live."""
 
+import hashlib
+import io
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +13,7 @@ from experiments.level_leaks import reported_leaks
 from experiments.manifest import Manifest
 from server.context import Services
 from server.core.settings import Settings
+from server.core.storage import FolderStore
 from server.models import Job, Study, StudyVersion
 from server.operations.doctor import Finding
 from server.rehearsals.service import of_finding
@@ -289,3 +293,120 @@ def test_folders_of_the_server_are_not_shown() -> None:
         ("backups", backups, "Backups: they cannot be read. Look at the store."),
     ):
         assert of_finding(kind, finding).text == said
+
+
+# Clips that the server itself finds missing, changed or impossible to decode.
+
+
+def lose_clip(services: Services, sha256: str) -> None:
+    assert isinstance(services.clips, FolderStore)
+    services.clips.path(sha256).unlink()
+
+
+def flip_byte(services: Services, sha256: str) -> None:
+    assert isinstance(services.clips, FolderStore)
+    path = services.clips.path(sha256)
+    path.chmod(0o600)
+    path.write_bytes(path.read_bytes()[:-1] + b"!")
+
+
+def declare_frames(services: Services, sha256: str) -> None:
+    _declare(services, sha256, frames=9)
+
+
+def declare_other_bytes(services: Services, sha256: str) -> None:
+    """A file that is as its manifest says, but no video."""
+    data = b"no video" * 64
+    other = hashlib.sha256(data).hexdigest()
+    services.clips.add(io.BytesIO(data), other)
+    _declare(services, sha256, sha256=other, bytes=len(data))
+
+
+def _declare(services: Services, clip: str, **values: Any) -> None:
+    with services.database.write() as session:
+        version = session.query(StudyVersion).one()
+        clips = [one | (values if one["sha256"] == clip else {}) for one in version.manifest["clips"]]
+        version.manifest = version.manifest | {"clips": clips}
+
+
+CLIP_FAULTS = {
+    lose_clip: ("clip_missing", "1 clip is missing on the server: "),
+    flip_byte: ("clip_different", "expected SHA-256 "),
+    declare_frames: ("clip_different", "expected 9 frames of 256 x 96 pixels, got 4 frames"),
+    declare_other_bytes: ("clip_undecodable", "cannot be read as a video"),
+}
+
+
+@pytest.mark.parametrize("plant", CLIP_FAULTS, ids=lambda plant: plant.__name__)
+def test_a_study_with_a_bad_clip_is_opened_only_anyway_and_the_audit_notes_it(
+    owner: Admin, services: Services, settings: Settings, tmp_path: Path, plant: Any
+) -> None:
+    add_study(services, tmp_path / "clips", READY, status="draft")
+    with services.database.read() as session:
+        [clip, *_] = session.query(StudyVersion).one().manifest["clips"]
+    plant(services, clip["sha256"])
+    kind, said = CLIP_FAULTS[plant]
+    refused = opened(owner)
+    assert refused.status_code == 409, refused.text
+    message = refused.json()["error"]["message"]
+    assert said in message
+    assert clip["file"] in message
+    found = [one for one in owner.get("/studies/short/launch-checks").json() if one["kind"] == kind]
+    assert [(one["text"], one["blocks"], one["page"]) for one in found] == [(message, True, "clips")]
+    by_command = run_server_command(settings, "study", "status", "short", "live")
+    assert by_command.returncode == 2
+    assert message in by_command.stderr.replace("\n", " ")
+    revision = owner.get("/studies/short").json()["summary"]["revision"]
+    body = {"revision": revision, "status": "live", "anyway": True}
+    assert owner.send("PUT", "/studies/short/status", body).status_code == 200
+    [entry] = [one for one in owner.get("/audit").json() if one["action"] == "status changed"]
+    assert entry["details"] == {"before": "draft", "after": "live", "anyway": kind}
+
+
+def test_the_command_opens_it_anyway_and_a_clip_brought_back_is_fine(
+    owner: Admin, services: Services, settings: Settings, tmp_path: Path
+) -> None:
+    add_study(services, tmp_path / "clips", READY, status="draft")
+    with services.database.read() as session:
+        [clip, *_] = session.query(StudyVersion).one().manifest["clips"]
+    assert isinstance(services.clips, FolderStore)
+    data = services.clips.path(clip["sha256"]).read_bytes()
+    lose_clip(services, clip["sha256"])
+    assert opened(owner).status_code == 409
+    services.clips.add(io.BytesIO(data), clip["sha256"])
+    assert opened(owner).status_code == 200
+    assert opened(owner, status="closed").status_code == 200
+    lose_clip(services, clip["sha256"])
+    assert run_server_command(settings, "study", "status", "short", "live").returncode == 2
+    opened_anyway = run_server_command(settings, "study", "status", "short", "live", "--anyway")
+    assert opened_anyway.returncode == 0, opened_anyway.stderr
+    assert "1 clip is missing on the server" in opened_anyway.stdout.replace("\n", " ")
+    [entry, *_] = [one for one in owner.get("/audit").json() if one["action"] == "status changed"]
+    assert entry["details"]["anyway"] == "clip_missing"
+
+
+def test_anyway_does_not_open_a_study_with_placeholders(
+    owner: Admin, services: Services, tmp_path: Path
+) -> None:
+    add_study(services, tmp_path / "clips", SHORT.replace(CONSENT, PLACEHOLDERS), status="draft")
+    body = {"revision": 1, "status": "live", "anyway": True}
+    body["revision"] = owner.get("/studies/short").json()["summary"]["revision"]
+    assert owner.send("PUT", "/studies/short/status", body).status_code == 409
+
+
+def test_the_disk_is_examined_only_for_accounts_that_may_see_the_study(
+    owner: Admin, services: Services, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    add_study(services, tmp_path / "clips", READY, status="draft")
+    asked: list[Path] = []
+    disk_usage = shutil.disk_usage
+
+    def note_and_ask(folder: Path) -> Any:
+        asked.append(folder)
+        return disk_usage(folder)
+
+    monkeypatch.setattr("shutil.disk_usage", note_and_ask)
+    assert owner.get("/studies/nobodys/launch-checks").status_code == 404
+    assert asked == []
+    assert owner.get("/studies/short/launch-checks").status_code == 200
+    assert asked

@@ -4,13 +4,14 @@ import { Anchor, Button, Group, Select, Stack, Text, Title } from "@mantine/core
 import { useQuery } from "@tanstack/react-query";
 import { Link, useNavigate, useParams, useSearch } from "@tanstack/react-router";
 import { api, type Schemas, unwrap } from "../api";
-import { Answer } from "../ui/Answer";
+import { Answer, onDemand } from "../ui/Answer";
 import { words } from "../ui/format";
 import { useShortcuts } from "../ui/page-events";
-import { Player } from "./Player";
 import "./replay.css";
 
 type Replay = Schemas["Replay"];
+
+const Player = onDemand(async () => (await import("./Player")).Player);
 
 export function ReplayPage() {
   const { study = "", run = "" } = useParams({ strict: false });

@@ -8,9 +8,10 @@ import { playNeeded, useUpload } from "../clips/useUpload";
 import { useChange } from "../ui/useChange";
 import { declaredPattern, patternProblem } from "./file-pattern";
 import { useParams } from "@tanstack/react-router";
-import { ClipGrid } from "../clips/ClipCard";
-import { Answer } from "../ui/Answer";
+import { Answer, onDemand } from "../ui/Answer";
 import { counted } from "../ui/format";
+
+const ClipGrid = onDemand(async () => (await import("../clips/ClipCard")).ClipGrid);
 
 // Further clips, or others in the place of those there are: saved as a new version.
 

@@ -1,12 +1,13 @@
 /** What differs between two versions: a sentence each, and its words where they are asked for. */
 
-import { Badge, Card, Group, List, Select, Stack, Text, Title } from "@mantine/core";
+import { Anchor, Badge, Card, Group, List, Select, Stack, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";
 import { api, type Schemas, unwrap } from "../api";
 import { Answer } from "../ui/Answer";
+import { DataTable } from "../ui/DataTable";
 import { labelOf } from "../builder/data";
-import { counted, languageName, words } from "../ui/format";
+import { counted, languageName, when, words } from "../ui/format";
 
 export function CompareVersions({ detail }: { detail: Schemas["StudyDetail"] }) {
   const study = detail.summary.name;
@@ -142,4 +143,39 @@ function Clips({ comparison }: { comparison: Schemas["Comparison"] }) {
 
 function files({ old_file, new_file }: Schemas["ClipDifference"]): string {
   return [...new Set([old_file, new_file])].filter((file) => file != null).join(" → ");
+}
+
+// Every version, with its text.
+
+type Version = Schemas["StudyDetail"]["versions"][number];
+
+export function Versions({ detail }: { detail: Schemas["StudyDetail"] }) {
+  const address = (version: Version) => `/api/admin/studies/${detail.summary.name}/versions/${version.number}`;
+  return (
+    <Card withBorder>
+      <Title order={2} size="h4" mb="sm">
+        Versions
+      </Title>
+      <DataTable
+        rows={detail.versions}
+        rowKey={(version) => version.number}
+        empty="None."
+        columns={[
+          {
+            title: "Version",
+            number: true,
+            cell: (version) => (
+              <Anchor href={address(version)} target="_blank" rel="noopener">
+                {version.number}
+              </Anchor>
+            ),
+          },
+          { title: "Made", cell: (version) => when(version.created_at) },
+          { title: "Runs", number: true, cell: (version) => version.runs },
+          { title: "Note", wrap: true, cell: (version) => version.note },
+          { title: "SHA-256", wide: true, cell: (version) => <code>{version.definition_sha256.slice(0, 12)}</code> },
+        ]}
+      />
+    </Card>
+  );
 }

@@ -1,6 +1,6 @@
 /** The checklist before a study goes live: what is wrong, where, and the way there; its clips are tried in this browser. */
 
-import { Badge, Button, Group, Progress, Stack, Text } from "@mantine/core";
+import { Badge, Button, Card, Checkbox, Group, Progress, Stack, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
 import { reviewed } from "../../i18n/reviewed";
@@ -9,6 +9,7 @@ import { clipCheckQuery, launchChecksQuery, type Schemas, studyQuery } from "../
 import { namedSection } from "../builder/data";
 import type { ClipCheck, ClipProgress } from "../clips/examine";
 import { Answer, ErrorAlert } from "../ui/Answer";
+import { DataTable } from "../ui/DataTable";
 import { counted, languageName } from "../ui/format";
 import { TurnedAway } from "./StatusBadge";
 
@@ -18,9 +19,11 @@ interface Props {
   study: string;
   /** Try the clips at once: the study is about to be opened. */
   atOnce?: boolean;
+  /** A box to open the study in spite of its clips; only where nothing else blocks. */
+  override?: { isOn: boolean; onChange: (isOn: boolean) => void };
 }
 
-export function Preflight({ study, atOnce = false }: Props) {
+export function Preflight({ study, atOnce = false, override }: Props) {
   const detail = useQuery(studyQuery(study)).data;
   const checks = useQuery(launchChecksQuery(study));
   const version = detail?.summary.version ?? 0;
@@ -28,13 +31,22 @@ export function Preflight({ study, atOnce = false }: Props) {
   return (
     <Answer of={checks}>
       {(checked) => {
-        const findings = [...checked, ...languageFindings(detail?.definition.languages ?? []), ...(clips.data?.findings ?? [])];
+        // The server names missing and undecodable clips itself; the browser's line about the same is left out.
+        const ofBrowser = (clips.data?.findings ?? []).filter(({ kind }) => !checked.some((one) => one.kind === kind));
+        const findings = [...checked, ...languageFindings(detail?.definition.languages ?? []), ...ofBrowser];
         return (
           <Stack gap="sm" role="group" aria-label="Before it goes live">
             <Text fw={600}>{summaryOf(findings)}</Text>
             <Findings study={study} findings={findings} />
             <ClipsTried study={study} version={version} check={clips} />
             <TurnedAway design={detail?.design} />
+            {override !== undefined && (
+              <Checkbox
+                label="Set live with these clips anyway. The audit log records it."
+                checked={override.isOn}
+                onChange={(event) => override.onChange(event.currentTarget.checked)}
+              />
+            )}
           </Stack>
         );
       }}
@@ -168,5 +180,37 @@ function ClipsTried({ study, version, check }: ClipsTriedProps) {
       </Text>
       {data.done < data.of && button("Try all clips")}
     </Group>
+  );
+}
+
+/** Languages in which the participants' page itself speaks, and whether a person has read what it says. */
+export function PageLanguages() {
+  return (
+    <Card withBorder>
+      <Title order={2} size="h4" mb="xs">
+        The page&rsquo;s own words
+      </Title>
+      <Text size="sm" mb="sm">
+        Buttons, hints and errors of the participant page; other languages use English. Have an unreviewed language checked before people
+        take part in it.
+      </Text>
+      <DataTable
+        label="Languages of the page"
+        rows={SHIPPED}
+        rowKey={(tag) => tag}
+        empty="None."
+        columns={[
+          { title: "Language", cell: (tag) => <span lang={tag}>{languageName(tag)}</span> },
+          { title: "Tag", cell: (tag) => <code>{tag}</code> },
+          {
+            title: "Read by",
+            cell: (tag) => {
+              const by = reviewed[tag];
+              return by ? `${by.by}, ${by.on}` : <Badge variant="default">unreviewed</Badge>;
+            },
+          },
+        ]}
+      />
+    </Card>
   );
 }

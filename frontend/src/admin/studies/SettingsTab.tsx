@@ -1,22 +1,4 @@
-import {
-  Badge,
-  Card,
-  Text,
-  Title,
-  List,
-  Button,
-  NavLink,
-  NumberInput,
-  Select,
-  SimpleGrid,
-  Stack,
-  Switch,
-  TextInput,
-  Anchor,
-} from "@mantine/core";
-import { languageName, SHIPPED } from "../../i18n";
-import { reviewed } from "../../i18n/reviewed";
-import { DataTable } from "../ui/DataTable";
+import { Card, Text, Title, List, Button, NavLink, NumberInput, Select, SimpleGrid, Stack, Switch, TextInput, Anchor } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { api, type Schemas, unwrap, studyQuery } from "../api";
 import { Answer, onDemand } from "../ui/Answer";
@@ -25,38 +7,6 @@ import { useState } from "react";
 import { useChange } from "../ui/useChange";
 import { Address, addressFor, RECRUITER_NAMES, SigningButton } from "./recruiting";
 import { Link, useParams, useSearch } from "@tanstack/react-router";
-
-/** Languages in which the participants' page itself speaks, and whether a person has read what it says. */
-function PageLanguages() {
-  return (
-    <Card withBorder>
-      <Title order={2} size="h4" mb="xs">
-        The page&rsquo;s own words
-      </Title>
-      <Text size="sm" mb="sm">
-        Buttons, hints and errors of the participant page; other languages use English. Have an unreviewed language checked before people
-        take part in it.
-      </Text>
-      <DataTable
-        label="Languages of the page"
-        rows={SHIPPED}
-        rowKey={(tag) => tag}
-        empty="None."
-        columns={[
-          { title: "Language", cell: (tag) => <span lang={tag}>{languageName(tag)}</span> },
-          { title: "Tag", cell: (tag) => <code>{tag}</code> },
-          {
-            title: "Read by",
-            cell: (tag) => {
-              const by = reviewed[tag];
-              return by ? `${by.by}, ${by.on}` : <Badge variant="default">unreviewed</Badge>;
-            },
-          },
-        ]}
-      />
-    </Card>
-  );
-}
 
 // How long the study's data of persons are kept, and what the server will erase.
 
@@ -290,7 +240,9 @@ function RecruiterFields({ service, texts, onChange }: FieldsProps) {
   );
 }
 
+const Versions = onDemand(async () => (await import("./CompareVersions")).Versions);
 const CompareVersions = onDemand(async () => (await import("./CompareVersions")).CompareVersions);
+const PageLanguages = onDemand(async () => (await import("./Preflight")).PageLanguages);
 const LifeCycle = onDemand(async () => (await import("./LifeCycle")).LifeCycle);
 const Sharing = onDemand(async () => (await import("./Sharing")).Sharing);
 
@@ -357,37 +309,4 @@ function SettingsPart({ part, detail }: { part: Part; detail: Schemas["StudyDeta
     case "danger":
       return <LifeCycle detail={detail} />;
   }
-}
-
-type Version = Schemas["StudyDetail"]["versions"][number];
-
-function Versions({ detail }: { detail: Schemas["StudyDetail"] }) {
-  const address = (version: Version) => `/api/admin/studies/${detail.summary.name}/versions/${version.number}`;
-  return (
-    <Card withBorder>
-      <Title order={2} size="h4" mb="sm">
-        Versions
-      </Title>
-      <DataTable
-        rows={detail.versions}
-        rowKey={(version) => version.number}
-        empty="None."
-        columns={[
-          {
-            title: "Version",
-            number: true,
-            cell: (version) => (
-              <Anchor href={address(version)} target="_blank" rel="noopener">
-                {version.number}
-              </Anchor>
-            ),
-          },
-          { title: "Made", cell: (version) => when(version.created_at) },
-          { title: "Runs", number: true, cell: (version) => version.runs },
-          { title: "Note", wrap: true, cell: (version) => version.note },
-          { title: "SHA-256", wide: true, cell: (version) => <code>{version.definition_sha256.slice(0, 12)}</code> },
-        ]}
-      />
-    </Card>
-  );
 }

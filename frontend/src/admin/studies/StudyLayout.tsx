@@ -91,9 +91,16 @@ const isOpen = (status: Status) => status === "live" || status === "pilot";
 
 function StatusButtons({ summary }: { summary: Schemas["StudySummary"] }) {
   const [opened, setOpened] = useState(false);
+  const [anyway, setAnyway] = useState(false);
   const path = { params: { path: { study: summary.name } } };
   const change = useChange(
-    (status: Status) => unwrap(api.PUT("/api/admin/studies/{study}/status", { ...path, body: { revision: summary.revision, status } })),
+    (status: Status) =>
+      unwrap(
+        api.PUT("/api/admin/studies/{study}/status", {
+          ...path,
+          body: { revision: summary.revision, status, anyway: anyway && status === "live" },
+        }),
+      ),
     {
       touches: [["study", summary.name], ["studies"]],
       // The dialog with the link says so itself; a message in the corner would lie over it on a phone.
@@ -104,7 +111,10 @@ function StatusButtons({ summary }: { summary: Schemas["StudySummary"] }) {
   // Loaded by what the dialog shows; the server refuses for the same reasons, but it cannot try the clips.
   const checks = useQuery({ ...launchChecksQuery(summary.name), enabled: false }).data;
   const clips = useQuery({ ...clipCheckQuery(summary.name, summary.version), enabled: false });
-  const isBlocked = [...(checks ?? []), ...(clips.data?.findings ?? [])].some(({ blocks }) => blocks);
+  const blocking = [...(checks ?? []), ...(clips.data?.findings ?? [])].filter(({ blocks }) => blocks);
+  // Only what is wrong with clips can be overridden: server and browser may be mistaken about a clip.
+  const mayOverride = blocking.length > 0 && blocking.every(({ page }) => page === "clips");
+  const isBlocked = blocking.length > 0 && !(mayOverride && anyway);
   const preview = useChange(
     () =>
       unwrap(
@@ -133,7 +143,11 @@ function StatusButtons({ summary }: { summary: Schemas["StudySummary"] }) {
         >
           {isOpen(status) && (
             <Card withBorder mt="sm">
-              <Preflight study={summary.name} atOnce={status === "live"} />
+              <Preflight
+                study={summary.name}
+                atOnce={status === "live"}
+                {...(status === "live" && mayOverride ? { override: { isOn: anyway, onChange: setAnyway } } : {})}
+              />
             </Card>
           )}
         </ConfirmButton>

@@ -39,7 +39,7 @@ export function ConfirmButton({
       <Modal opened={opened} onClose={close} title={label} size={wide ? "lg" : "md"} closeButtonProps={{ "aria-label": "Close" }}>
         <Text>{question}</Text>
         {children}
-        <Group justify="flex-end" mt="md">
+        <Group justify="flex-end" mt="md" className="dialog-actions">
           <Button variant="default" onClick={close}>
             Cancel
           </Button>
