@@ -14,6 +14,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from analysis.pairs.abilities import fit_abilities
+from analysis.pairs.comparisons import read_comparisons
 from analysis.plans.clip_rating import READING, analyse_study
 from analysis.read.study_answers import load_csv, load_database
 from analysis.report.within_tables import all_tables
@@ -176,3 +178,24 @@ def test_an_hour_at_once_and_frame_by_frame(benchmark):
     )
     benchmark.extra_info["times_baseline"] = at_once / baseline
     benchmark.pedantic(lambda: perform(60.0, FPS, seed=3), rounds=5, iterations=1)
+
+
+def test_a_million_paired_comparisons(benchmark, tmp_path) -> None:
+    """Target: under 5 s of processor time, raters as clusters; next to reading the file by pandas."""
+    rng, n, items = np.random.default_rng(1), 1_000_000, 20
+    names = np.array([f"i{k:02d}" for k in range(items)])
+    left = rng.integers(items, size=n)
+    right = (left + rng.integers(1, items, size=n)) % items
+    winner = np.where(rng.random(n) < 1 / (1 + np.exp((right - left) / 10)), "left", "right")
+    raters = np.char.add("p", rng.integers(500, size=n).astype(str))
+    path = tmp_path / "pairs.csv"
+    columns = {"left": names[left], "right": names[right], "winner": winner, "rater": raters}
+    pd.DataFrame(columns).to_csv(path, index=False)
+    start = time.process_time()
+    comparisons = read_comparisons(path, "left", "right", "winner", None, "rater")
+    read = time.process_time() - start
+    fitted = cpu_ms(lambda: fit_abilities(comparisons), 3)
+    parsed = cpu_ms(lambda: pd.read_csv(path), 3)
+    say_ratio("1,000,000 comparisons fitted", fitted, "file read by pandas", parsed)
+    say_ratio("1,000,000 comparisons read and fitted", 1000 * read + fitted, "file read by pandas", parsed)
+    benchmark(lambda: fit_abilities(comparisons))

@@ -4,7 +4,7 @@ from dataclasses import asdict
 from enum import StrEnum
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -19,6 +19,9 @@ from analysis.commands.output import (
 from experiments.errors import InputError
 
 if TYPE_CHECKING:
+    from analysis.pairs.comparisons import Comparisons
+    from analysis.pairs.intervals import QuestionPair
+    from analysis.pairs.jod import Prior
     from analysis.thresholds.answers import Answers
 
 
@@ -30,8 +33,19 @@ class MethodChoice(StrEnum):
 
     BRADLEY_TERRY = "bradley-terry"
     DAVIDSON = "davidson"
+    RAO_KUPPER = "rao-kupper"
     THURSTONE = "thurstone"
     JOD = "jod"
+    ELO = "elo"
+
+
+class IntervalsChoice(StrEnum):
+    """How 95% intervals of abilities are found."""
+
+    WALD = "wald"
+    PROFILE = "profile"
+    BOOTSTRAP = "bootstrap"
+    ANYTIME = "anytime"
 
 
 class PriorChoice(StrEnum):
@@ -63,9 +77,9 @@ def pairs(
         MethodChoice | None,
         typer.Option(
             help=(
-                "bradley-terry, davidson (ties), thurstone (case V), or jod: case V in just-objectionable "
-                "differences (1 JOD: 75% prefer the better), as pwcmp scales. Default: depends on whether "
-                "there are ties."
+                "bradley-terry, davidson or rao-kupper (ties), thurstone (case V), elo, or jod: case V in "
+                "just-objectionable differences (1 JOD: 75% prefer the better), as pwcmp scales. Default: "
+                "depends on whether there are ties."
             )
         ),
     ] = None,
@@ -88,6 +102,32 @@ def pairs(
         str | None,
         typer.Option(help="Column of the content (scene): each is scaled separately, and all together."),
     ] = None,
+    question: Annotated[
+        str | None,
+        typer.Option(help="Column of the question: each is fitted separately, then they are compared."),
+    ] = None,
+    intervals: Annotated[
+        IntervalsChoice,
+        typer.Option(
+            help=(
+                "Limits of abilities and differences: wald, profile (likelihood), bootstrap (of raters), or "
+                "anytime: valid while you watch answers arrive."
+            )
+        ),
+    ] = IntervalsChoice.WALD,
+    crossed: Annotated[
+        bool,
+        typer.Option(
+            "--crossed",
+            help=(
+                "Random effects of raters on items; with --by also of contents, with --factors of items "
+                "beyond their factors."
+            ),
+        ),
+    ] = False,
+    k_factor: Annotated[
+        float, typer.Option(help="For elo: points that one comparison can move at most.")
+    ] = 32.0,
     prior: Annotated[
         PriorChoice, typer.Option(help="For jod: pwcmp's prior, or none (maximum likelihood).")
     ] = PriorChoice.GAUSSIAN,
@@ -96,7 +136,7 @@ def pairs(
         typer.Option(help="For jod: item whose score is fixed, ITEM or ITEM=10. Default: a mean of 0."),
     ] = None,
     bootstrap: Annotated[
-        int, typer.Option(help="For jod: samples of raters for the intervals; 0 for none.", min=0)
+        int, typer.Option(help="Samples for jod, elo and --intervals bootstrap; 0 for no intervals.", min=0)
     ] = 500,
     screen: Annotated[
         bool,
@@ -118,19 +158,15 @@ def pairs(
       analysis pairs comparisons.csv --levels left=baseline,ours,recorded
 
       analysis pairs comparisons.csv --by scene --participant observer --method jod --screen
+
+      analysis pairs table.csv --method rao-kupper --tie same --intervals profile
+
+      analysis pairs table.csv --participant id --intervals anytime
+
+      analysis pairs table.csv --participant id --by scene --crossed
     """
-    from analysis.pairs.abilities import fit_abilities, read_item_factors
+    from analysis.pairs.abilities import read_item_factors
     from analysis.pairs.comparisons import read_comparisons
-    from analysis.pairs.jod import scale_jod
-    from analysis.pairs.likelihood import Method
-    from analysis.report.choice_tables import (
-        abilities_table,
-        contrasts_table,
-        factors_table,
-        jod_tables,
-        jod_text,
-        pairs_text,
-    )
 
     with progress_spinner("reading comparisons"):
         # The items are levels of `left`; any other ordered column is a factor of the items.
@@ -138,36 +174,123 @@ def pairs(
         of_items = [one for one in orders if factors is None or one.partition("=")[0].strip() == left]
         of_factors = [one for one in orders if one not in of_items]
         is_jod = method is MethodChoice.JOD
-        comparisons = read_comparisons(file, left, right, winner, tie, participant, of_items, by, same=is_jod)
+        columns = (left, right, winner, tie, participant)
+        comparisons = read_comparisons(file, *columns, of_items, by, question, same=is_jod)
         design = None if factors is None else read_item_factors(factors, of_factors)
-    if is_jod:
-        if factors or order_effect or firth:
-            raise InputError("--method jod takes no --factors, --order-effect or --firth; remove them")
-        anchor, at = _anchor(reference)
-        with progress_spinner("fitting"):
-            scaled = scale_jod(comparisons.by_content(), prior.value, anchor, at, bootstrap, screen)
-        save_json(json, asdict(scaled), comparisons.synthetic)
-        show_text(jod_text(scaled, file.stem, comparisons.synthetic))
-        show_tables(*jod_tables(scaled, file.stem, comparisons.synthetic))
-        return
-    if reference or screen or prior is PriorChoice.NONE:
+    if (reference or screen or prior is PriorChoice.NONE) and not is_jod:
         raise InputError("--reference, --screen and --prior are for --method jod")
-    usual: Method = "davidson" if comparisons.ties else "bradley-terry"
-    chosen: Method = usual if method is None else method.value  # type: ignore[assignment]
-    with progress_spinner("fitting"):
-        fitted = {
-            content: fit_abilities(own, chosen, order_effect=order_effect, firth=firth, factors=design)
-            for content, own in comparisons.by_content().items()
+    if method is not None and method in (MethodChoice.JOD, MethodChoice.ELO):
+        others = factors, order_effect, firth, crossed, question
+        if any(others) or intervals is not IntervalsChoice.WALD:
+            raise InputError(
+                f"--method {method.value} takes no --factors, --order-effect or --firth, and no --crossed, "
+                "--question or --intervals; remove them"
+            )
+    if is_jod:
+        anchor, at = _anchor(reference)
+        _show_jod(comparisons, (prior.value, anchor, at, bootstrap, screen), file.stem, json)
+    elif method is MethodChoice.ELO:
+        _show_elo(comparisons, k_factor, bootstrap, by, file.stem, json)
+    else:
+        if intervals is IntervalsChoice.BOOTSTRAP and not bootstrap:
+            raise InputError("--intervals bootstrap needs --bootstrap above 0")
+        options = {
+            "order_effect": order_effect,
+            "firth": firth,
+            "factors": design,
+            "intervals": intervals.value,
+            "samples": bootstrap,
+            "crossed": crossed,
         }
-    numbers = {content: asdict(result) for content, result in fitted.items()}
-    save_json(json, {"by": by, "contents": numbers} if by else numbers["all"], comparisons.synthetic)
-    for content, result in fitted.items():
-        name = f"{file.stem}, {content}" if by else file.stem
-        show_text(pairs_text(result, name, comparisons.synthetic))
-        show_tables(abilities_table(result, name, comparisons.synthetic))
-        if design is not None:
-            show_tables(factors_table(result, name, comparisons.synthetic))
-        show_tables(contrasts_table(result, name, comparisons.synthetic))
+        _show_abilities(comparisons, method, options, by, file.stem, json)
+
+
+def _show_jod(
+    comparisons: "Comparisons",
+    options: tuple["Prior", str | None, float, int, bool],
+    name: str,
+    json: Path | None,
+) -> None:
+    from analysis.pairs.jod import scale_jod
+    from analysis.report.choice_tables import jod_tables, jod_text
+
+    with progress_spinner("fitting"):
+        scaled = scale_jod(comparisons.by_content(), *options)
+    save_json(json, asdict(scaled), comparisons.synthetic)
+    show_text(jod_text(scaled, name, comparisons.synthetic))
+    show_tables(*jod_tables(scaled, name, comparisons.synthetic))
+
+
+def _show_elo(
+    comparisons: "Comparisons", k_factor: float, samples: int, by: str | None, name: str, json: Path | None
+) -> None:
+    from analysis.pairs.elo import rate_elo
+    from analysis.report.choice_tables import elo_table, elo_text
+
+    with progress_spinner("rating"):
+        rated = {
+            content: rate_elo(own, k_factor, samples) for content, own in comparisons.by_content().items()
+        }
+    numbers = {content: asdict(result) for content, result in rated.items()}
+    separate = comparisons.content is not None
+    save_json(json, {"by": by, "contents": numbers} if separate else numbers["all"], comparisons.synthetic)
+    for content, result in rated.items():
+        title = f"{name}, {content}" if separate else name
+        show_text(elo_text(result, title, comparisons.synthetic))
+        show_tables(elo_table(result, title, comparisons.synthetic))
+
+
+def _show_abilities(
+    comparisons: "Comparisons",
+    method: MethodChoice | None,
+    options: dict[str, Any],
+    by: str | None,
+    name: str,
+    json: Path | None,
+) -> None:
+    """Fit each question and content, and compare the questions."""
+    from analysis.pairs.abilities import fit_abilities
+    from analysis.pairs.intervals import compare_questions
+    from analysis.pairs.likelihood import Method
+    from analysis.report.choice_tables import (
+        abilities_table,
+        contrasts_table,
+        effects_table,
+        factors_table,
+        pairs_text,
+        questions_table,
+    )
+
+    usual: Method = "davidson" if comparisons.ties else "bradley-terry"
+    if options["crossed"] and comparisons.ties:
+        usual = "rao-kupper"
+    chosen: Method = usual if method is None else method.value  # type: ignore[assignment]
+    questions = comparisons.by_question()
+    # with crossed effects the contents are levels of one model
+    parts = {
+        ", ".join(part for part in (question, content) if part): own
+        for question, asked in questions.items()
+        for content, own in ({"": asked} if options["crossed"] else asked.by_content(alone="")).items()
+    }
+    with progress_spinner("fitting"):
+        fitted = {part: fit_abilities(own, chosen, **options) for part, own in parts.items()}
+        compared: tuple[QuestionPair, ...] = ()
+        if len(questions) > 1 and options["factors"] is None and not options["crossed"]:
+            compared = compare_questions(questions, chosen, order_effect=options["order_effect"])
+    numbers = {part: asdict(result) for part, result in fitted.items()}
+    document: dict[str, Any] = numbers[""] if list(numbers) == [""] else {"by": by, "contents": numbers}
+    if len(questions) > 1:
+        document["questions"] = [asdict(pair) for pair in compared]
+    save_json(json, document, comparisons.synthetic)
+    for part, result in fitted.items():
+        title = f"{name}, {part}" if part else name
+        show_text(pairs_text(result, title, comparisons.synthetic))
+        show_tables(abilities_table(result, title, comparisons.synthetic))
+        show_tables(effects_table(result, title, comparisons.synthetic))
+        if result.factors:
+            show_tables(factors_table(result, title, comparisons.synthetic))
+        show_tables(contrasts_table(result, title, comparisons.synthetic))
+    show_tables(questions_table(compared, name, comparisons.synthetic))
 
 
 def _anchor(reference: str | None) -> tuple[str | None, float]:

@@ -136,17 +136,15 @@ SCORE_TOLERANCE = 1e-9
 
 
 class Trials:
-    """Each trial's likelihood and derivatives; u (people, c) and v (items,) are the random effects."""
+    """Likelihood and derivatives of each trial's category, from thresholds and predictors eta (n,)."""
 
-    def __init__(self, data: OrdinalData, p: Parameters, u: Floats, v: Floats) -> None:
-        of_people = np.einsum("tc,tc->t", data.z * p.sd[data.term], u[data.participant])
-        eta = data.x @ p.beta + of_people + p.sd[-1] * v[data.item]
-        edges = np.concatenate([[-np.inf], p.thresholds, [np.inf]])
-        a, b = edges[data.category + 1] - eta, edges[data.category] - eta
+    def __init__(self, thresholds: Floats, category: Integers, eta: Floats) -> None:
+        edges = np.concatenate([[-np.inf], thresholds, [np.inf]])
+        a, b = edges[category + 1] - eta, edges[category] - eta
         self.upper, self.lower = special.expit(a), special.expit(b)
         self.above = special.expit(-a)
         self.f_upper, self.f_lower = self.upper * self.above, self.lower * special.expit(-b)
-        gap = np.exp(-(edges[data.category + 1] - edges[data.category]))
+        gap = np.exp(-(edges[category + 1] - edges[category]))
         self.log_likelihood = float((special.log_expit(a) + special.log_expit(-b) + np.log1p(-gap)).sum())
         self.between = gap / (1 - gap)
         self.slope = self.lower - self.above
@@ -175,6 +173,12 @@ class LaplaceLikelihood:
         self.u = np.zeros((self.data.n_participants, self.data.z.shape[1]))
         self.v = np.zeros(self.data.n_items)
 
+    def _trials(self, p: Parameters, u: Floats, v: Floats) -> Trials:
+        """Trials where the random effects are u (people, c) and v (items,)."""
+        d = self.data
+        of_people = np.einsum("tc,tc->t", d.z * p.sd[d.term], u[d.participant])
+        return Trials(p.thresholds, d.category, d.x @ p.beta + of_people + p.sd[-1] * v[d.item])
+
     def _carried(self, scaled: Floats, sd_item: float, values: Floats) -> tuple[Floats, Floats]:
         """L' of values of trials (n,): to participants (people, c) and items (items,)."""
         d = self.data
@@ -185,7 +189,7 @@ class LaplaceLikelihood:
     def _modes(self, p: Parameters, scaled: Floats, sd_item: float) -> tuple[Trials, CrossedHessian]:
         """Newton with halved steps: the joint density is log-concave, so it always arrives."""
         u, v = self.u, self.v
-        t = Trials(self.data, p, u, v)
+        t = self._trials(p, u, v)
         value = t.log_likelihood - ((u**2).sum() + v @ v) / 2
         for _ in range(NEWTON_STEPS):
             hessian = CrossedHessian(self.data, scaled, sd_item, t.weight)
@@ -209,7 +213,7 @@ class LaplaceLikelihood:
         length = 1.0
         while True:
             u, v = at[0] + length * step[0], at[1] + length * step[1]
-            trial = Trials(self.data, p, u, v)
+            trial = self._trials(p, u, v)
             reached = trial.log_likelihood - ((u**2).sum() + v @ v) / 2
             if reached >= value - 1e-9 * abs(value) or length < 1e-6:
                 return u, v, trial, reached

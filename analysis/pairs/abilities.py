@@ -18,16 +18,20 @@ from analysis.pairs.comparisons import (
     separated_items,
     transitivity,
 )
+from analysis.pairs.crossed import RandomEffect, crossed_pairs, fit_crossed
+from analysis.pairs.intervals import FittedPairs, Intervals, interval_limits, rank_limits
 from analysis.pairs.likelihood import (
+    TIED,
     Counts,
     Fit,
     Method,
     Model,
+    count_by_rater,
     count_outcomes,
     fit,
     free_abilities,
+    outcome_gradients,
     sandwich,
-    scores,
 )
 from analysis.read.text_table import names_in_order, read_text_table, texts_required
 from analysis.thresholds.likelihood import fit_p
@@ -176,7 +180,10 @@ def factor_tests(
 
 @dataclass(frozen=True)
 class Item:
-    """One item: ability against the first item in sorted order, on the method's scale."""
+    """One item: ability against the first item in sorted order, on the method's scale.
+
+    `rank_low` and `rank_high` are the ranks that anytime-valid intervals leave open; None of other intervals.
+    """
 
     name: str
     ability: float
@@ -191,6 +198,8 @@ class Item:
     wins: int
     losses: int
     ties: int
+    rank_low: int | None = None
+    rank_high: int | None = None
 
 
 @dataclass(frozen=True)
@@ -211,6 +220,8 @@ class Contrast:
     se_robust: float | None = None
     p_robust: float | None = None
     p_robust_holm: float | None = None
+    ci_low: float = float("nan")
+    ci_high: float = float("nan")
 
 
 @dataclass(frozen=True)
@@ -221,6 +232,8 @@ class Parameter:
     se: float
     z: float
     p: float
+    ci_low: float = float("nan")
+    ci_high: float = float("nan")
 
 
 @dataclass(frozen=True)
@@ -255,11 +268,15 @@ class PairsResult:
     transitivity: Transitivity
     firth: bool
     decisions: tuple[str, ...] = field(default_factory=tuple)
+    log_theta: Parameter | None = None
+    intervals: Intervals = "wald"
+    random_effects: tuple[RandomEffect, ...] = ()
 
 
 SCALES: dict[Method, str] = {
     "bradley-terry": "log odds of winning",
     "davidson": "log odds of winning, given that there is no tie",
+    "rao-kupper": "log odds of winning, beyond the threshold of a tie",
     "thurstone": "standard deviations of the difference of two items (case V; x 1.414 for those of an item)",
 }
 
@@ -294,9 +311,6 @@ def _unordered(counts: Counts, values: Array) -> Array:
     return total
 
 
-Z_95 = float(stats.norm.ppf(0.975))
-
-
 def fit_abilities(
     comparisons: Comparisons,
     method: Method = "bradley-terry",
@@ -304,19 +318,29 @@ def fit_abilities(
     order_effect: bool = False,
     firth: bool = False,
     factors: ItemFactors | None = None,
+    intervals: Intervals = "wald",
+    samples: int = 500,
+    crossed: bool = False,
 ) -> PairsResult:
     """Fit a model of paired comparisons.
 
     Parameters
     ----------
     comparisons : Comparisons
-    method : {"bradley-terry", "davidson", "thurstone"}
+    method : {"bradley-terry", "davidson", "rao-kupper", "thurstone"}
     order_effect : bool
         Whether the left (first) side has a separate advantage.
     firth : bool
         Firth's penalized likelihood (Bradley-Terry only).
     factors : ItemFactors, optional
         Abilities as a linear function of the items' factors.
+    intervals : {"wald", "profile", "bootstrap", "anytime"}
+        How the 95% limits of abilities, differences and parameters are found (`analysis.pairs.intervals`).
+    samples : int
+        Samples of the bootstrap.
+    crossed : bool
+        Whether raters (and contents, and items beyond their factors) have random effects
+        (`analysis.pairs.crossed`); Bradley-Terry and Rao-Kupper only, Wald intervals.
 
     Raises
     ------
@@ -325,33 +349,56 @@ def fit_abilities(
         method that has none.
     """
     _refuse_unfit(comparisons, method, firth)
-    ties = method == "davidson"
+    if crossed and (firth or intervals != "wald" or method not in ("bradley-terry", "rao-kupper")):
+        raise InputError(
+            "--crossed is for --method bradley-terry or rao-kupper, without --firth and with Wald intervals"
+        )
+    ties = method in TIED
     counts = count_outcomes(comparisons, ties=ties)
     design = free_abilities(len(comparisons.items)) if factors is None else factors.design(comparisons.items)
     model = Model(method, design, order_effect)
     fitted = fit(model, counts, firth=firth)
+    effects: tuple[RandomEffect, ...] = ()
+    if crossed:
+        data = crossed_pairs(comparisons, model, items_vary=factors is not None)
+        fitted, effects = fit_crossed(data, fitted)
     full = np.zeros((len(comparisons.items), model.names))
     full[:, : design.shape[1]] = design
-    robust = _robust(comparisons, model, fitted, counts)
+    robust = None if crossed else _robust(comparisons, model, fitted, counts)
+    pairs = FittedPairs(comparisons, model, counts, fitted, robust, firth)
+    k, extra = len(comparisons.items), np.eye(model.names)[design.shape[1] :]
+    differences = [full[first] - full[second] for first, second in combinations(range(k), 2)]
+    limits, notes = interval_limits(pairs, np.stack([*full, *differences, *extra]), intervals, samples)
+    of_pairs = limits[k : len(limits) - len(extra)]
+    ranks = rank_limits(k, of_pairs) if intervals == "anytime" else None
+    tie = _parameter(fitted, -1, limits) if ties else None
+    # Davidson's nu, or Rao and Kupper's theta
+    size = float(np.exp(fitted.parameters[-1]))
+    tie_probability = size / (2 + size) if method == "davidson" else (size - 1) / (size + 1)
     return PairsResult(
         method,
         SCALES[method],
         comparisons.items[0],
-        _items(comparisons, fitted, full, robust),
-        _contrasts(comparisons, full, fitted, robust),
+        _items(comparisons, fitted, full, robust, limits, ranks),
+        _contrasts(comparisons, full, fitted, robust, of_pairs),
         tuple(tuple(row) for row in (full @ fitted.covariance @ full.T).tolist()),
         comparisons.outcome.size,
         comparisons.ties,
         len(comparisons.participants) if comparisons.participant is not None else None,
         fitted.log_likelihood,
-        goodness_of_fit(model, counts, fitted),
-        _parameter(fitted, design.shape[1]) if order_effect else None,
-        _parameter(fitted, -1) if ties else None,
-        float(np.exp(fitted.parameters[-1]) / (2 + np.exp(fitted.parameters[-1]))) if ties else None,
-        () if factors is None else factor_tests(comparisons.items, factors, model, counts),
+        Goodness(float("nan"), 0, float("nan"), order_effect)
+        if crossed
+        else goodness_of_fit(model, counts, fitted),
+        _parameter(fitted, design.shape[1], limits) if order_effect else None,
+        tie if method == "davidson" else None,
+        tie_probability if ties else None,
+        () if factors is None or crossed else factor_tests(comparisons.items, factors, model, counts),
         transitivity(comparisons),
         firth,
-        comparisons.decisions,
+        (*comparisons.decisions, *notes),
+        tie if method == "rao-kupper" else None,
+        intervals,
+        effects,
     )
 
 
@@ -360,17 +407,17 @@ def _refuse_unfit(comparisons: Comparisons, method: Method, firth: bool) -> None
         raise InputError(
             f"{comparisons.source}: expected two items or more, got '{comparisons.items[0]}' alone"
         )
-    if comparisons.ties and method != "davidson":
+    if comparisons.ties and method not in TIED:
         raise InputError(
             f"{comparisons.source}: {comparisons.ties} comparisons are ties, which {method} does not "
-            "support; use --method davidson"
+            "support; use --method davidson or rao-kupper"
         )
     if comparisons.ties == comparisons.outcome.size:
         raise InputError(
             f"{comparisons.source}: every comparison is a tie, so items do not differ and the frequency "
             "of ties has no finite estimate; there is nothing to fit"
         )
-    if not comparisons.ties and method == "davidson":
+    if not comparisons.ties and method in TIED:
         raise InputError(f"{comparisons.source}: no comparison is a tie; use --method bradley-terry")
     if firth and method != "bradley-terry":
         raise InputError(f"--firth is for --method bradley-terry, got {method}")
@@ -383,7 +430,14 @@ def _refuse_unfit(comparisons: Comparisons, method: Method, firth: bool) -> None
         )
 
 
-def _items(comparisons: Comparisons, fitted: Fit, full: Array, robust: Array | None) -> tuple[Item, ...]:
+def _items(
+    comparisons: Comparisons,
+    fitted: Fit,
+    full: Array,
+    robust: Array | None,
+    limits: Array,
+    rank_ends: list[tuple[int, int]] | None,
+) -> tuple[Item, ...]:
     abilities = full @ fitted.parameters
     standard = np.sqrt(np.clip(np.diag(full @ fitted.covariance @ full.T), 0.0, None))
     centring = full - full.mean(axis=0)
@@ -397,13 +451,14 @@ def _items(comparisons: Comparisons, fitted: Fit, full: Array, robust: Array | N
             float(abilities[k]),
             float(standard[k]),
             _two_sided(abilities[k], standard[k]),
-            float(abilities[k] - Z_95 * standard[k]),
-            float(abilities[k] + Z_95 * standard[k]),
+            float(limits[k, 0]),
+            float(limits[k, 1]),
             None if spread is None else float(spread[k]),
             float(centred[k]),
             float(abilities[k] - abilities.mean()),
             int(ranks[k]),
             *_record(comparisons, k),
+            *(rank_ends[k] if rank_ends is not None else ()),
         )
         for k, name in enumerate(comparisons.items)
     )
@@ -425,31 +480,13 @@ def _robust(comparisons: Comparisons, model: Model, fitted: Fit, counts: Counts)
     """The sandwich covariance, raters as clusters; None without raters to tell apart."""
     if comparisons.participant is None or len(comparisons.participants) < 2:
         return None
-    z = scores(model, counts.left, counts.right)
-    pair = {
-        (int(left), int(right)): index
-        for index, (left, right) in enumerate(zip(counts.left, counts.right, strict=True))
-    }
-    sides = zip(comparisons.left.tolist(), comparisons.right.tolist(), strict=True)
-    index = np.array([pair[one] for one in sides])
-    if model.method == "thurstone":
-        difference = z[index, LEFT] - z[index, RIGHT]
-        eta = difference @ fitted.parameters
-        # By logarithms, since the density and the distribution both vanish far out, where their ratio is
-        # about eta.
-        sign = np.where(comparisons.outcome == LEFT, 1.0, -1.0)
-        rows = (sign * np.exp(stats.norm.logpdf(eta) - stats.norm.logcdf(sign * eta)))[:, None] * difference
-    else:
-        expected = np.einsum("mo,mop->mp", fitted.shares, z)
-        rows = z[index, comparisons.outcome] - expected[index]
-    count = len(comparisons.participants)
-    clusters = np.zeros((count, rows.shape[1]))
-    np.add.at(clusters, comparisons.participant, rows)
+    gradients = outcome_gradients(model, counts, fitted).reshape(-1, model.names)
+    clusters = np.asarray(count_by_rater(comparisons, counts) @ gradients, dtype=np.float64)
     return sandwich(fitted, clusters)
 
 
 def _contrasts(
-    comparisons: Comparisons, full: Array, fitted: Fit, robust: Array | None
+    comparisons: Comparisons, full: Array, fitted: Fit, robust: Array | None, limits: Array
 ) -> tuple[Contrast, ...]:
     items, rows = comparisons.items, []
     clustered: list[tuple[float | None, float | None]] = []
@@ -464,8 +501,8 @@ def _contrasts(
     p = _holm([row[-1] if np.isfinite(row[-1]) else None for row in rows])
     robust_p = _holm([p for _, p in clustered])
     return tuple(
-        Contrast(*row, float("nan") if own is None else own, *more, of_raters)
-        for row, own, more, of_raters in zip(rows, p, clustered, robust_p, strict=True)
+        Contrast(*row, float("nan") if own is None else own, *more, of_raters, float(low), float(high))
+        for row, own, more, of_raters, (low, high) in zip(rows, p, clustered, robust_p, limits, strict=True)
     )
 
 
@@ -486,6 +523,8 @@ def _clustered(
     return se, float(2 * stats.t.sf(abs(difference) / se, raters - 1)) if se > 0 else None
 
 
-def _parameter(fitted: Fit, index: int) -> Parameter:
+def _parameter(fitted: Fit, index: int, limits: Array) -> Parameter:
+    """A parameter by its index; the last rows of the limits are those of the last parameters."""
     estimate, se = float(fitted.parameters[index]), float(np.sqrt(fitted.covariance[index, index]))
-    return Parameter(estimate, se, estimate / se, _two_sided(estimate, se))
+    low, high = limits[index if index < 0 else index - fitted.parameters.size]
+    return Parameter(estimate, se, estimate / se, _two_sided(estimate, se), float(low), float(high))

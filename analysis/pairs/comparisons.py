@@ -49,6 +49,8 @@ class Comparisons:
         Index into `participants`.
     content : (n,) array of str or None
         What was shown in both items, where a column names it.
+    question : (n,) array of str or None
+        What raters were asked, where a column names it.
     """
 
     items: tuple[str, ...]
@@ -61,12 +63,25 @@ class Comparisons:
     synthetic: bool
     decisions: tuple[str, ...]
     content: NDArray[Any] | None = None
+    question: NDArray[Any] | None = None
 
-    def by_content(self) -> dict[str, "Comparisons"]:
-        """The comparisons of each content, and of all together if contents share their items."""
+    def by_question(self) -> dict[str, "Comparisons"]:
+        """The comparisons of each question; of all, under an empty name, if there is one question."""
+        if self.question is None:
+            return {"": self}
+        return {
+            name: self._subset(self.question == name, name) for name in map(str, np.unique(self.question))
+        }
+
+    def by_content(self, alone: str = "all") -> dict[str, "Comparisons"]:
+        """The comparisons of each content, and of all together if contents share their items.
+
+        Without contents the one entry has the name `alone`.
+        """
         if self.content is None:
-            return {"all": self}
+            return {alone: self}
         parts = {name: self._subset(self.content == name, name) for name in map(str, np.unique(self.content))}
+        parts = {name: replace(own, content=None) for name, own in parts.items()}
         if "all" in parts:
             raise InputError(f"{self.source}: a content is called all, as all contents together; rename it")
         shared = len(_components(self, strong=False)) == 1
@@ -89,7 +104,8 @@ class Comparisons:
             participant=people,
             participants=raters,
             source=f"{self.source}, {name}",
-            content=None,
+            content=None if self.content is None else self.content[rows],
+            question=None,
         )
 
     @property
@@ -107,6 +123,7 @@ def read_comparisons(
     participant: str | None = None,
     levels: Sequence[str] = (),
     by: str | None = None,
+    question: str | None = None,
     same: bool = False,
 ) -> Comparisons:
     """Read one row per comparison.
@@ -127,6 +144,8 @@ def read_comparisons(
         Order of the items, as that of the column `left`.
     by : str, optional
         Column that names the content of both items.
+    question : str, optional
+        Column that names what raters were asked.
     same : bool
         Whether comparisons of an item with itself are kept.
 
@@ -136,7 +155,7 @@ def read_comparisons(
         As `read_text_table`; a pair of an item with itself; a winner that is none of the two; a `tie` that
         is an item or a side.
     """
-    more = [name for name in (participant, by) if name]
+    more = [name for name in (participant, by, question) if name]
     roles = [left, right, winner, *more]
     refuse_shared_roles(roles)
     table = read_text_table(path, roles, EXPORT_COLUMNS)
@@ -155,7 +174,8 @@ def read_comparisons(
     people: tuple[str, ...] = ()
     codes = None
     if participant is not None:
-        names, codes = np.unique(columns[participant][judged], return_inverse=True)
+        # hashed: to sort a million texts takes a second
+        codes, names = pd.factorize(columns[participant][judged], sort=True)
         people = tuple(str(name) for name in names)
     return Comparisons(
         items,
@@ -168,6 +188,7 @@ def read_comparisons(
         table.synthetic,
         (*table.decisions, *said),
         columns[by][judged] if by else None,
+        columns[question][judged] if question else None,
     )
 
 
@@ -187,8 +208,7 @@ def _items(left: "pd.Series[Any]", right: "pd.Series[Any]", judged: NDArray[np.b
 
 
 def _indices(items: tuple[str, ...], names: NDArray[Any]) -> Codes:
-    position = {item: index for index, item in enumerate(items)}
-    return np.array([position[name] for name in names], dtype=np.int64)
+    return pd.Index(items, dtype=object).get_indexer(pd.Index(names, dtype=object)).astype(np.int64)
 
 
 def _refuse_same(table: TextTable, left: NDArray[Any], right: NDArray[Any]) -> None:
@@ -208,16 +228,17 @@ def _outcomes(
 ) -> tuple[Codes, NDArray[np.bool_]]:
     """Return the outcome of each row, and which rows have one."""
     sides = {"left": LEFT, "right": RIGHT}
-    confused = sides.keys() & {name.casefold() for name in (*left, *right)}
+    names = {*pd.unique(left), *pd.unique(right)}
+    confused = sides.keys() & {name.casefold() for name in names}
     if confused:
         name = min(confused)
         raise InputError(f"{table.source}: an item is called '{name}', like a side; rename the item")
     if tie is not None:
-        _refuse_tie(table, tie, {*left, *right})
+        _refuse_tie(table, tie, names)
     outcome = np.full(left.size, -1, dtype=np.int64)
-    folded = np.char.lower(said.astype(str))
-    for name, code in sides.items():
-        outcome[folded == name] = code
+    for answer in pd.unique(said):
+        if (side := answer.casefold()) in sides:
+            outcome[said == answer] = sides[side]
     if tie is not None:
         outcome[said == tie] = TIE
     outcome[said == left] = LEFT
@@ -407,7 +428,9 @@ def _circles(comparisons: Comparisons) -> tuple[int, int, int]:
     most_each = (size**3 - size) // 24 if size % 2 else (size**3 - 4 * size) // 24
     if comparisons.participant is None:
         return 0, 0, 0
-    for rater in range(len(comparisons.participants)):
+    answers = np.bincount(comparisons.participant)
+    # nobody else can have judged every pair once
+    for rater in np.flatnonzero(answers == size * (size - 1) // 2):
         shares, compared = _shares(comparisons, comparisons.participant == rater)
         once = compared[np.triu_indices(size, 1)]
         if np.all(once == 1.0) and not np.any(shares == 0.5):

@@ -5,13 +5,15 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import sparse, special, stats
 
 from analysis.pairs.comparisons import LEFT, RIGHT, TIE, Comparisons
 from experiments.errors import InputError
 
 Array = NDArray[np.float64]
-Method = Literal["bradley-terry", "davidson", "thurstone"]
+Method = Literal["bradley-terry", "davidson", "rao-kupper", "thurstone"]
+TIED: tuple[Method, ...] = ("davidson", "rao-kupper")
+"""Methods with ties as a third outcome; their last parameter is that of ties."""
 STEPS_MAX = 200
 TOLERANCE = 1e-12
 FAR = 15.0
@@ -49,7 +51,7 @@ class Model:
 
     Attributes
     ----------
-    method : {"bradley-terry", "davidson", "thurstone"}
+    method : {"bradley-terry", "davidson", "rao-kupper", "thurstone"}
     design : (k, p) array
         Abilities of the k items are `design @ parameters[:p]`.
     order_effect : bool
@@ -63,7 +65,7 @@ class Model:
     @property
     def names(self) -> int:
         """How many parameters the model has."""
-        return int(self.design.shape[1]) + self.order_effect + (self.method == "davidson")
+        return int(self.design.shape[1]) + self.order_effect + (self.method in TIED)
 
 
 def free_abilities(items: int) -> Array:
@@ -80,6 +82,20 @@ def count_outcomes(comparisons: Comparisons, *, ties: bool) -> Counts:
     outcomes = np.zeros((seen.size, 3 if ties else 2))
     np.add.at(outcomes, (index, comparisons.outcome), 1.0)
     return Counts(seen // items, seen % items, outcomes)
+
+
+def count_by_rater(comparisons: Comparisons, counts: Counts) -> sparse.csr_array:
+    """Each rater's counts (G, m * o) of the pairs and outcomes of `counts`, in its order.
+
+    Without raters each comparison counts as one rater's.
+    """
+    items, width = len(comparisons.items), counts.outcomes.shape[1]
+    pair = np.searchsorted(counts.left * items + counts.right, comparisons.left * items + comparisons.right)
+    rater = comparisons.participant
+    rows = np.arange(pair.size) if rater is None else rater
+    shape = (int(rows.max()) + 1, counts.outcomes.size)
+    cells = pair * width + comparisons.outcome
+    return sparse.csr_array(sparse.coo_array((np.ones(pair.size), (rows, cells)), shape=shape))
 
 
 def scores(model: Model, left: NDArray[np.int64], right: NDArray[np.int64]) -> Array:
@@ -99,7 +115,7 @@ def scores(model: Model, left: NDArray[np.int64], right: NDArray[np.int64]) -> A
     and the probability of an outcome is its exp(eta) over their sum.
     """
     one, other = model.design[left], model.design[right]
-    ties = model.method == "davidson"
+    ties = model.method in TIED
     z = np.zeros((left.size, 3 if ties else 2, model.names))
     abilities = model.design.shape[1]
     z[:, LEFT, :abilities], z[:, RIGHT, :abilities] = one, other
@@ -126,9 +142,12 @@ def fit(model: Model, counts: Counts, *, firth: bool = False) -> Fit:
     InputError
         Where the likelihood has no maximum.
     """
-    step = _thurstone_step if model.method == "thurstone" else _softmax_step
+    step = STEPS.get(model.method, softmax_step)
     # All items alike: for a concave likelihood any start will do, and this one lies inside.
     parameters = np.zeros(model.names)
+    if model.method == "rao-kupper":
+        share = counts.outcomes[:, TIE].sum() / counts.outcomes.sum()
+        parameters[-1] = 2 * np.arctanh(share)
     previous = -np.inf
     for _ in range(STEPS_MAX):
         value, gradient, information, curvature, shares = step(model, counts, parameters, firth)
@@ -141,7 +160,10 @@ def fit(model: Model, counts: Counts, *, firth: bool = False) -> Fit:
             return Fit(parameters, covariance, _plain(counts, shares), shares)
         # Halved where a full Newton step would lose, as it may in Thurstone's model far from the maximum.
         size = 1.0
-        while size > 1e-8 and step(model, counts, parameters + size * change, firth)[0] < value - 1e-12:
+        # `not >=`: beyond the parameters' limits the likelihood is not a number
+        while size > 1e-8 and not (
+            step(model, counts, parameters + size * change, firth)[0] >= value - 1e-12 * (1 + abs(value))
+        ):
             size /= 2
         parameters, previous = parameters + size * change, value
     raise no_maximum(firth)
@@ -189,7 +211,7 @@ def _plain(counts: Counts, shares: Array) -> float:
     return float(np.sum(counts.outcomes * np.log(np.where(counts.outcomes > 0, shares, 1.0))))
 
 
-def _softmax_step(
+def softmax_step(
     model: Model, counts: Counts, parameters: Array, firth: bool
 ) -> tuple[float, Array, Array, Array, Array]:
     """Log-likelihood, gradient, information, the curvature that a step goes by, and shares of outcomes."""
@@ -248,3 +270,61 @@ def _thurstone_step(
     information = np.einsum("m,mp,mq->pq", weight, difference, difference)
     value = float(counts.outcomes[:, LEFT] @ log_left + counts.outcomes[:, RIGHT] @ log_right)
     return value, (toward - away) @ difference, information, information, shares
+
+
+def _rao_kupper_step(
+    model: Model, counts: Counts, parameters: Array, firth: bool
+) -> tuple[float, Array, Array, Array, Array]:
+    r"""Rao and Kupper's model: an item wins if its advantage exceeds a threshold (1967, JASA 62, 194).
+
+    .. math::
+
+        P(\text{left}) &= F(\eta - \tau), \quad P(\text{right}) = F(-\eta - \tau), \quad
+            \eta = \lambda_l - \lambda_r + \delta \tag{1} \\
+        P(\text{tie}) &= (e^{2 \tau} - 1) \, P(\text{left}) \, P(\text{right}) \tag{2} \\
+        I &= \sum_o n P_o \, g_o g_o' \tag{3}
+
+    F is logistic, tau the logarithm of their theta, g_o the gradient of log P of the outcome o.
+    """
+    del firth  # refused before: the penalty is derived for the logistic model
+    gradients, shares = _rao_kupper_outcomes(model, counts, parameters)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        value = float(np.sum(special.xlogy(counts.outcomes, shares)))
+    gradient = np.einsum("mo,mop->p", counts.outcomes, gradients)
+    weights = counts.totals[:, None] * shares
+    information = np.einsum("mo,mop,moq->pq", weights, gradients, gradients)
+    return value, gradient, information, information, shares
+
+
+def _rao_kupper_outcomes(model: Model, counts: Counts, parameters: Array) -> tuple[Array, Array]:
+    """Gradients (m, 3, p) of the outcomes' log probabilities, and these probabilities (m, 3)."""
+    z = scores(model, counts.left, counts.right)
+    difference, tau = z[:, LEFT] - z[:, RIGHT], parameters[-1]
+    eta, threshold = difference @ parameters, np.zeros(model.names)
+    threshold[-1] = 1.0
+    left, right = special.expit(eta - tau), special.expit(-eta - tau)
+    shares = np.stack([left, right, np.expm1(2 * tau) * left * right], axis=1)
+    of_left = (1 - left)[:, None] * (difference - threshold)
+    of_right = (1 - right)[:, None] * (-difference - threshold)
+    # e^2t - 1, whose logarithm has the derivative 2 / (1 - e^-2t)
+    of_tie = of_left + of_right + threshold * (2 / -np.expm1(-2 * tau))
+    return np.stack([of_left, of_right, of_tie], axis=1), shares
+
+
+def outcome_gradients(model: Model, counts: Counts, fitted: Fit) -> Array:
+    """Gradient (m, o, p) of the log probability of each pair's outcomes, at the fitted parameters."""
+    if model.method == "rao-kupper":
+        return _rao_kupper_outcomes(model, counts, fitted.parameters)[0]
+    z = scores(model, counts.left, counts.right)
+    if model.method == "thurstone":
+        difference = z[:, LEFT] - z[:, RIGHT]
+        eta = difference @ fitted.parameters
+        # By logarithms, since the density and the distribution both vanish far out, where their ratio is
+        # about eta.
+        ratios = [np.exp(stats.norm.logpdf(eta) - stats.norm.logcdf(sign * eta)) for sign in (1, -1)]
+        return np.stack([ratios[0][:, None] * difference, -ratios[1][:, None] * difference], axis=1)
+    centred: Array = z - np.einsum("mo,mop->mp", fitted.shares, z)[:, None, :]
+    return centred
+
+
+STEPS = {"thurstone": _thurstone_step, "rao-kupper": _rao_kupper_step}

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 
 from analysis.pairs.abilities import Contrast, PairsResult
+from analysis.pairs.elo import EloResult
+from analysis.pairs.intervals import QuestionPair
 from analysis.pairs.jod import JodResult
 from analysis.report.contents import caption, mark_name
 from analysis.report.formats import Table
@@ -13,22 +15,34 @@ from analysis.thresholds.plane_people import PersonPlane, PlanesResult
 
 # Paired comparisons as tables and words.
 
+INTERVALS: dict[str, tuple[str, ...]] = {
+    "wald": (),
+    "profile": ("Intervals: profile likelihood.",),
+    "bootstrap": ("Intervals: percentiles of raters (or comparisons) drawn with replacement.",),
+    "anytime": (
+        "Intervals hold at every look together, for all differences of items (asymptotic confidence "
+        "sequence, Waudby-Smith et al. 2024). In parentheses: the ranks that they leave open.",
+    ),
+}
+
 
 def abilities_table(result: PairsResult, name: str, synthetic: bool = False) -> Table:
     """Items from the ablest down, against the reference."""
     robust = any(item.se_robust is not None for item in result.items)
+    is_watched = any(item.rank_low is not None for item in result.items)
     header = ["Item", "Rank", "Ability", "SE", *(["robust SE"] if robust else []), "95% CI", "p", "W/L/T"]
     rows = []
     for item in sorted(result.items, key=lambda one: (one.rank, one.name)):
         errors = [item.se, *([item.se_robust] if item.se_robust is not None else [])]
-        row = [item.name, str(item.rank), fixed(item.ability, 3), *(fixed(error, 3) for error in errors)]
+        rank = f"{item.rank} ({item.rank_low}-{item.rank_high})" if is_watched else str(item.rank)
+        row = [item.name, rank, fixed(item.ability, 3), *(fixed(error, 3) for error in errors)]
         is_reference = item.name == result.reference
         row += [DASH if is_reference else interval((item.ci_low, item.ci_high)), p_value(item.p)]
         rows.append((*row, f"{item.wins}/{item.losses}/{item.ties}"))
     said = f"Abilities in {result.scale}; '{result.reference}' is fixed at 0. W/L/T: won, lost, tied."
-    if robust:
+    if robust and result.intervals == "wald":
         said += " CI and p use the model's SE; robust p values are in the table of differences."
-    notes = (said,)
+    notes = (said, *INTERVALS[result.intervals])
     title = caption("Abilities", name, synthetic)
     return Table("abilities", title, tuple(header), tuple(rows), 1, notes)
 
@@ -36,16 +50,20 @@ def abilities_table(result: PairsResult, name: str, synthetic: bool = False) -> 
 def contrasts_table(result: PairsResult, name: str, synthetic: bool = False) -> Table:
     """Every pair of items, Holm-corrected: by the model's errors, and by those that count raters."""
     robust = any(c.se_robust is not None for c in result.contrasts)
+    is_special = result.intervals != "wald"
     rows = tuple(
         (
             f"{c.first} - {c.second}",
-            *(fixed(c.difference, 3), fixed(c.se, 3), fixed(c.z), p_value(c.p_holm)),
+            fixed(c.difference, 3),
+            *((interval((c.ci_low, c.ci_high)),) if is_special else (fixed(c.se, 3), fixed(c.z))),
+            p_value(c.p_holm),
             *(_robust_cells(c) if robust else ()),
         )
         for c in result.contrasts
     )
     title = caption("Differences between items", name, synthetic)
-    header = ("Items", "Difference", "SE", "z", "p", *(("robust SE", "t", "robust p") if robust else ()))
+    errors = ("95% CI",) if is_special else ("SE", "z")
+    header = ("Items", "Difference", *errors, "p", *(("robust SE", "t", "robust p") if robust else ()))
     return Table("pair-contrasts", title, header, rows, 1, (_which_errors(result, robust),), True)
 
 
@@ -58,6 +76,8 @@ def _robust_cells(contrast: Contrast) -> tuple[str, str, str]:
 
 def _which_errors(result: PairsResult, robust: bool) -> str:
     """Which errors the p of the contrasts go by, and which to read."""
+    if result.random_effects:
+        return "SE, z and p allow for the crossed effects. p is Holm-corrected."
     if not robust:
         return (
             "SE, z and p assume that every comparison is from a different rater. Name the column of raters "
@@ -68,6 +88,68 @@ def _which_errors(result: PairsResult, robust: bool) -> str:
         f"on {(result.n_participants or 1) - 1} df. Report the robust p if raters gave several comparisons. "
         "p is Holm-corrected."
     )
+
+
+def effects_table(result: PairsResult, name: str, synthetic: bool = False) -> Table:
+    """SDs of crossed effects, and the tests that they are zero."""
+    rows = tuple(
+        (effect.name, str(effect.levels), fixed(effect.sd, 3), fixed(effect.chi2), p_value(effect.p))
+        for effect in result.random_effects
+    )
+    notes = ("SD of each item's ability between raters, contents or items. p is half that of χ²(1).",)
+    title = caption("Crossed effects", name, synthetic)
+    return Table("pair-effects", title, ("Differs by", "Levels", "SD", "χ²", "p"), rows, 1, notes)
+
+
+def questions_table(compared: Sequence[QuestionPair], name: str, synthetic: bool = False) -> Table:
+    """Whether questions rank the items alike, and each item's difference between two questions."""
+    rows: list[tuple[str, ...]] = []
+    for pair in compared:
+        df = f"{pair.df}" if pair.df_error is None else f"{pair.df}, {pair.df_error:g}"
+        test = DASH if pair.f_value is None or pair.p is None else f"F({df}) = {fixed(pair.f_value)}"
+        p = DASH if pair.p is None else p_value(pair.p)
+        rows.append((f"{pair.first} - {pair.second}", f"r = {fixed(pair.correlation)}", test, p))
+        rows += [
+            (f"  {one.item}", fixed(one.difference, 3), f"SE {fixed(one.se, 3)}", p_value(one.p_holm))
+            for one in pair.differences
+        ]
+    notes = ("F: all abilities, against their mean, are the same for both questions. p of items: Holm.",)
+    title = caption("Questions", name, synthetic)
+    return Table("questions", title, ("Questions", "Difference", "Test", "p"), tuple(rows), 1, notes)
+
+
+def elo_table(result: EloResult, name: str, synthetic: bool = False) -> Table:
+    """Elo ratings from the highest down."""
+    rows = tuple(
+        (
+            item.name,
+            fixed(item.elo, 0),
+            DASH
+            if item.elo_low is None or item.elo_high is None
+            else f"[{fixed(item.elo_low, 0)}, {fixed(item.elo_high, 0)}]",
+            fixed(item.sd_order, 0),
+            DASH if item.bradley_terry is None else fixed(item.bradley_terry, 0),
+            f"{item.wins}/{item.losses}/{item.ties}",
+        )
+        for item in sorted(result.items, key=lambda one: -one.elo)
+    )
+    drawn = "comparisons" if result.n_participants is None else "raters"
+    notes = (
+        f"Elo: mean over {result.orders} random orders of the comparisons, K = {result.k_factor:g}. Order "
+        f"SD: how much a single pass depends on the order. 95% CI: {result.samples} samples of {drawn}. "
+        "Maximum likelihood: Bradley-Terry abilities on the same scale, without order.",
+    )
+    header = ("Item", "Elo", "95% CI", "Order SD", "Max. likelihood", "W/L/T")
+    return Table("elo", caption("Elo ratings", name, synthetic), header, rows, 1, notes)
+
+
+def elo_text(result: EloResult, name: str, synthetic: bool = False) -> str:
+    """What was rated, and what to know about it."""
+    said = (
+        f"{mark_name(name, synthetic)}: Elo ratings, {result.n_comparisons} comparisons of "
+        f"{len(result.items)} items."
+    )
+    return " ".join([said, *(f"{decision}." for decision in result.decisions)])
 
 
 def factors_table(result: PairsResult, name: str, synthetic: bool = False) -> Table:

@@ -15,9 +15,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
-from scipy import special
+from scipy import special, stats
 
-from analysis.pairs.abilities import Z_95, PairsResult
+from analysis.pairs.abilities import PairsResult
 from analysis.pairs.findings import PairCount
 from analysis.plans.result import Analysis
 from analysis.report.contents import Picture, in_words
@@ -340,7 +340,7 @@ def draw_abilities(result: PairsResult, synthetic: bool, people: int) -> Picture
         axes.errorbar(
             [item.centred for item in ranked],
             rows,
-            xerr=[Z_95 * item.se_centred for item in ranked],
+            xerr=[float(stats.norm.ppf(0.975)) * item.se_centred for item in ranked],
             linestyle="none",
             marker="o",
             color=COLOURS[0],

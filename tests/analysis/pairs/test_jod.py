@@ -165,7 +165,10 @@ def test_commands_scale_contents(tmp_path: Path) -> None:
             "'d' is not an item of all; expected a reference that every",
         ),
         (["--method", "jod", "--screen"], "--screen compares observers; add --participant COLUMN"),
-        (["--method", "jod", "--firth"], "--method jod takes no --factors, --order-effect or --firth"),
+        (
+            ["--method", "jod", "--firth"],
+            "--method jod takes no --factors, --order-effect or --firth, and no --crossed",
+        ),
         (["--screen"], "--reference, --screen and --prior are for --method jod"),
         (["--prior", "none"], "--reference, --screen and --prior are for --method jod"),
         (["--method", "jod", "--reference", "a=nan"], "--reference should be ITEM or ITEM=10, got 'a=nan'"),
