@@ -15,11 +15,21 @@ from scipy.sparse.csgraph import connected_components
 from analysis.read.number_columns import numbers, unusual_numbers
 from analysis.read.reading import EXPORT_COLUMNS, answers_that_count
 from analysis.read.text_table import (
+    TextTable,
     name_lines,
     names_in_order,
     read_text_table,
     refuse_shared_roles,
     texts_required,
+)
+from analysis.standard_scores import (
+    ScoreMethod,
+    Screening,
+    Standard,
+    bt500_counts,
+    differential_scores,
+    screen_raters,
+    standardized_votes,
 )
 from analysis.within.level_codes import given_orders
 from experiments.errors import InputError
@@ -291,7 +301,7 @@ def person_scores(
     names: Sequence[str], scores: Array, counts: Array, model: Projection
 ) -> tuple[PersonScore, ...]:
     """Scores of each person from votes (people, items), NaN where none, and their numbers."""
-    rejected = bt500_rejects(scores)
+    rejected = bt500_counts(scores)[2]
     mos = np.nanmean(scores, axis=0)
     people = []
     for index, name in enumerate(names):
@@ -312,28 +322,6 @@ def person_scores(
             )
         )
     return tuple(people)
-
-
-def bt500_rejects(scores: Array) -> NDArray[np.bool_]:
-    """Screen people by ITU-R BT.500: too many votes far from an item's mean, on both sides alike (people,).
-
-    A vote is far beyond 2 SD of the item's votes where their kurtosis is between 2 and 4, beyond sqrt(20) SD
-    elsewhere; a person goes where more than 5% of the votes are far and the sides differ by less than 30%.
-    Items of one vote, or of which all votes are alike, have no vote that is far.
-    """
-    n = np.isfinite(scores).sum(axis=0)
-    centred = scores - np.nanmean(scores, axis=0)
-    squares = np.nansum(centred**2, axis=0)
-    varied = squares > 0
-    sd = np.sqrt(squares / np.maximum(n - 1, 1))
-    fourth = np.nansum(centred**4, axis=0)
-    kurtosis = np.divide(fourth * n, squares**2, out=np.zeros_like(squares), where=varied)
-    limit = np.where((kurtosis >= 2) & (kurtosis <= 4), 2.0, np.sqrt(20.0)) * sd
-    above = np.sum((centred >= limit) & varied, axis=1)
-    below = np.sum((centred <= -limit) & varied, axis=1)
-    share = (above + below) / np.sum(np.isfinite(scores), axis=1)
-    lean = np.abs(above - below) / np.maximum(above + below, 1)
-    return np.asarray((share > 0.05) & (lean < 0.3))
 
 
 # Mean opinion scores with intervals, and a model of who gave them.
@@ -392,30 +380,122 @@ class OpinionResult:
     iterations: int
     n_groups: int
     decisions: tuple[str, ...]
+    method: ScoreMethod = "acr"
+    z_scores: bool = False
 
 
-def read_votes(path: Path, item: str, participant: str, rating: str, levels: Sequence[str] = ()) -> Votes:
+def read_votes(
+    path: Path,
+    item: str,
+    participant: str,
+    rating: str,
+    levels: Sequence[str] = (),
+    standard: Standard = Standard(),
+    screening: Screening | None = None,
+) -> Votes:
     """Read one row per vote; `levels` may give the order of the items (`given_orders`).
+
+    Raters are screened before scores are computed against hidden references.
 
     Raises
     ------
     InputError
-        As `read_text_table`; a rating that is not a number, no rating at all.
+        As `read_text_table`; a rating that is not a number, no rating at all; options of `standard` that do
+        not belong together; a hidden reference that nobody rated; nobody left after screening.
     """
-    roles = [item, participant, rating]
+    return read_votes_by(path, (item, participant, rating), None, levels, standard, screening)[""]
+
+
+def read_votes_by(
+    path: Path,
+    columns: tuple[str, str, str],
+    by: str | None = None,
+    levels: Sequence[str] = (),
+    standard: Standard = Standard(),
+    screening: Screening | None = None,
+) -> dict[str, Votes]:
+    """The votes at each level of the column `by`, such as the scale; all under an empty name without one.
+
+    `columns` are those of the item, the person and the vote; see `read_votes`.
+    """
+    standard.check()
+    more = [name for name in (standard.reference, standard.first, standard.session, by) if name]
+    roles = [*columns, *more]
     refuse_shared_roles(roles)
     table = read_text_table(path, roles, EXPORT_COLUMNS)
-    for name in roles[:2]:
-        texts_required(table, name)
-    values = numbers(table, rating)
-    unusual_numbers(table, rating, values, "correct them or leave them empty")
+    texts_required(table, columns[0])
+    texts_required(table, columns[1])
+    values = _scored_rows(table, columns, standard)
     keep = np.isfinite(values)
     if not keep.all():
         lines = name_lines(table, ~keep)
         table.decisions.append(f"{int((~keep).sum())} rows without a rating excluded ({lines})")
     if not keep.any():
-        raise InputError(f"{path.name}: column '{rating}' has no rating in any row")
+        raise InputError(f"{path.name}: column '{columns[2]}' has no rating in any row")
     keep = answers_that_count(table, keep, "ratings")
+    if standard.z_scores:
+        values, keep = _z_scored(table, columns[1], standard.session, values, keep)
+    parts = {"": keep}
+    if by is not None:
+        texts_required(table, by)
+        of_row = table.columns[by].astype(str).to_numpy()
+        parts = {str(name): keep & (of_row == name) for name in np.unique(of_row[keep])}
+    return {
+        name: _votes(table, columns, values, rows, levels, standard, screening)
+        for name, rows in parts.items()
+    }
+
+
+def _scored_rows(table: TextTable, columns: tuple[str, str, str], standard: Standard) -> Array:
+    """The vote of each row, as the method counts it."""
+    values = numbers(table, columns[2])
+    unusual_numbers(table, columns[2], values, "correct them or leave them empty")
+    if standard.method == "dscqs" and standard.reference:
+        reference = numbers(table, standard.reference)
+        unusual_numbers(table, standard.reference, reference, "correct them or leave them empty")
+        return reference - values
+    if standard.first:
+        texts_required(table, standard.first)
+        # the vote compares the second with the first: it counts for the item, so that it is turned if first
+        is_first = table.columns[standard.first].astype(str) == table.columns[columns[0]].astype(str)
+        if is_first.all() or not is_first.any():
+            table.decisions.append(
+                f"every item was shown {'first' if is_first.all() else 'second'}, so the order is confounded "
+                "with the item"
+            )
+        return np.where(is_first.to_numpy(), -values, values)
+    return values
+
+
+def _z_scored(
+    table: TextTable, participant: str, session: str | None, values: Array, keep: Flags
+) -> tuple[Array, Flags]:
+    """Standardized votes, and the rows that have one."""
+    units = table.columns[participant].astype(str)
+    if session is not None:
+        texts_required(table, session)
+        units = units + ", " + table.columns[session].astype(str)
+    names, codes = np.unique(units.to_numpy()[keep].astype(str), return_inverse=True)
+    z = np.full(values.size, np.nan)
+    z[keep] = standardized_votes(values[keep], codes.astype(np.int64))
+    flat = np.bincount(codes, np.isnan(z[keep])) > 0
+    if flat.any():
+        table.decisions.append(f"excluded, since their votes do not vary: {_named(list(names), flat)}")
+    if flat.all():
+        raise InputError(f"{table.source}: nobody's votes vary, so there are no z-scores; remove --z-scores")
+    return z, keep & np.isfinite(z)
+
+
+def _votes(
+    table: TextTable,
+    columns: tuple[str, str, str],
+    values: Array,
+    keep: Flags,
+    levels: Sequence[str],
+    standard: Standard,
+    screening: Screening | None,
+) -> Votes:
+    item, participant, _ = columns
     people, person = np.unique(table.columns[participant].astype(str).to_numpy()[keep], return_inverse=True)
     items = names_in_order(table.columns[item], keep)
     orders, said = given_orders({item: items}, levels)
@@ -427,20 +507,73 @@ def read_votes(path: Path, item: str, participant: str, rating: str, levels: Seq
     scores = np.divide(totals, counts, out=np.full_like(totals, np.nan), where=counts > 0)
     squares = np.zeros_like(totals)
     np.add.at(squares, (person, which), (values[keep] - scores[person, which]) ** 2)
+    decisions = [*table.decisions, *said]
+    stays = np.ones(people.size, dtype=bool)
+    if screening is not None:
+        reasons = screen_raters(scores, screening)
+        stays[list(reasons)] = False
+        rule = {"bt500": "BT.500", "p913": "P.913"}[screening["rule"]]
+        decisions += [f"{rule} excluded {people[k]}: {why}" for k, why in reasons.items()]
+        if not reasons:
+            decisions.append(f"{rule} excluded nobody")
+    votes = Votes(
+        scores[stays],
+        counts[stays],
+        squares[stays],
+        tuple(str(one) for one in people[stays]),
+        items,
+        tuple(values[keep][(which == index) & stays[person]] for index in range(len(items))),
+        table.source,
+        table.synthetic,
+        tuple(decisions),
+    )
+    if standard.method != "acr-hr":
+        return votes
+    named = table.columns[standard.reference].astype(str).to_numpy()[keep]
+    return _against_references(votes, which, named, standard)
+
+
+def _against_references(votes: Votes, which: Codes, named: NDArray[Any], standard: Standard) -> Votes:
+    """Each person's votes against that person's vote on the hidden reference of the item."""
+    references = np.full(len(votes.items), -1, dtype=np.int64)
+    for index, name in enumerate(votes.items):
+        given = {text for text in np.unique(named[which == index]) if text not in ("", name)}
+        if len(given) > 1:
+            told = ", ".join(sorted(given)[:NAMED_MAX])
+            raise InputError(f"{votes.source}: item '{name}' has several references: {told}; expected one")
+        for text in given:
+            if text not in votes.items:
+                raise InputError(f"{votes.source}: nobody rated '{text}', the reference of '{name}'")
+            references[index] = votes.items.index(text)
+    if (references < 0).all():
+        raise InputError(
+            f"{votes.source}: column '{standard.reference}' names no reference; expected the hidden "
+            "reference's item in the rows of the other items"
+        )
+    scores = differential_scores(votes.scores, references, standard.highest or 0.0, standard.crush)
+    lost = np.isfinite(votes.scores) & ~np.isfinite(scores) & (references >= 0)
+    decisions = list(votes.decisions)
+    if lost.any():
+        told = _named(votes.people, np.any(lost, axis=1))
+        decisions.append(f"{int(lost.sum())} votes excluded, without a vote on the reference by {told}")
+    kept = (references >= 0) & np.isfinite(scores).any(axis=0)
+    people = np.any(np.isfinite(scores[:, kept]), axis=1)
+    scores = scores[np.ix_(people, kept)]
+    there = np.isfinite(scores)
     return Votes(
         scores,
-        counts,
-        squares,
-        tuple(str(one) for one in people),
-        items,
-        tuple(values[keep][which == index] for index in range(len(items))),
-        path.name,
-        table.synthetic,
-        (*table.decisions, *said),
+        there.astype(np.float64),
+        np.zeros_like(scores),
+        tuple(name for name, stays in zip(votes.people, people.tolist(), strict=True) if stays),
+        tuple(name for name, stays in zip(votes.items, kept.tolist(), strict=True) if stays),
+        tuple(column[np.isfinite(column)] for column in scores.T),
+        votes.source,
+        votes.synthetic,
+        tuple(decisions),
     )
 
 
-def fit_opinion(votes: Votes, repeats: Repeats = "mean") -> OpinionResult:
+def fit_opinion(votes: Votes, repeats: Repeats = "mean", standard: Standard = Standard()) -> OpinionResult:
     """Compute opinion scores.
 
     Parameters
@@ -449,12 +582,16 @@ def fit_opinion(votes: Votes, repeats: Repeats = "mean") -> OpinionResult:
     repeats : {"mean", "votes"}
         A person's repeated votes on an item count as their mean (n is people) or each by itself (n is votes),
         in the opinion scores and in the recovered ones.
+    standard : Standard
+        How the votes were made into scores, which the tables name.
 
     Raises
     ------
     InputError
-        Fewer than two people or items.
+        Fewer than two people or items; repeats of scores against hidden references.
     """
+    if repeats == "votes" and standard.method == "acr-hr":
+        raise InputError("--repeats votes is not for --method acr-hr, which compares each person's means")
     if len(votes.people) < 2 or len(votes.items) < 2:
         raise InputError(
             f"{votes.source}: expected two people and two items or more, got {len(votes.people)} and "
@@ -475,6 +612,8 @@ def fit_opinion(votes: Votes, repeats: Repeats = "mean") -> OpinionResult:
         model.iterations,
         int(model.groups.max()) + 1,
         tuple(decisions),
+        standard.method,
+        standard.z_scores,
     )
 
 

@@ -82,6 +82,9 @@ def agreement(
     level: Annotated[
         LevelChoice, typer.Option(help="What differences between ratings mean, for Krippendorff's alpha.")
     ] = LevelChoice.INTERVAL,
+    by: Annotated[
+        str | None, typer.Option(help="Column of the dimension, such as scale: each is analyzed separately.")
+    ] = None,
     json: JsonOption = None,
 ) -> None:
     """Agreement between people who rated the same items: intraclass correlations, Krippendorff's alpha.
@@ -91,18 +94,24 @@ def agreement(
       analysis agreement ratings.csv
 
       analysis agreement votes.csv --item clip --participant id --rating score --level ordinal --json out.json
+
+      analysis agreement ratings.csv --by scale
     """
     from analysis import agreement
-    from analysis.opinion import read_votes
+    from analysis.opinion import read_votes_by
     from analysis.report.rating_tables import agreement_text, intraclass_table
 
-    votes = read_votes(file, item, participant, rating)
+    votes = read_votes_by(file, (item, participant, rating), by)
     with progress_spinner("resampling items"):
-        result = agreement.agreement(votes, level.value)
-    save_json(json, asdict(result), votes.synthetic)
-    show_text(agreement_text(result, file.stem, votes.synthetic))
-    if result.icc:
-        show_tables(intraclass_table(result, file.stem, votes.synthetic))
+        results = {name: agreement.agreement(own, level.value) for name, own in votes.items()}
+    numbers = {name: asdict(result) for name, result in results.items()}
+    synthetic = next(iter(votes.values())).synthetic
+    save_json(json, numbers[""] if by is None else {"by": by, "dimensions": numbers}, synthetic)
+    for name, result in results.items():
+        title = f"{file.stem}, {name}" if name else file.stem
+        show_text(agreement_text(result, title, synthetic))
+        if result.icc:
+            show_tables(intraclass_table(result, title, synthetic))
 
 
 def _save_scores(path: Path, scores: tuple[tuple[str, float], ...], case: str) -> None:
@@ -119,6 +128,23 @@ def _save_scores(path: Path, scores: tuple[tuple[str, float], ...], case: str) -
 
 
 # `analysis opinion`.
+
+
+class ScoreChoice(StrEnum):
+    """How votes become scores."""
+
+    ACR = "acr"
+    ACR_HR = "acr-hr"
+    CCR = "ccr"
+    DSCQS = "dscqs"
+
+
+class ScreenChoice(StrEnum):
+    """The standard by which raters are excluded."""
+
+    NONE = "none"
+    BT500 = "bt500"
+    P913 = "p913"
 
 
 class RepeatsChoice(StrEnum):
@@ -138,6 +164,39 @@ def opinion(
     item: Annotated[str, typer.Option(help="Column that names the clip or condition.")] = "stimulus",
     participant: Annotated[str, typer.Option(help="Column that names the person.")] = "participant",
     rating: Annotated[str, typer.Option(help="Column with the vote.")] = "response",
+    method: Annotated[
+        ScoreChoice,
+        typer.Option(
+            help=(
+                "acr (absolute votes), acr-hr (DMOS against hidden references), ccr (comparisons with a "
+                "reference) or dscqs (votes on item and reference)."
+            )
+        ),
+    ] = ScoreChoice.ACR,
+    reference: Annotated[
+        str | None,
+        typer.Option(
+            help="acr-hr: column naming the item's hidden reference. dscqs: column of the reference's vote."
+        ),
+    ] = None,
+    first: Annotated[
+        str | None,
+        typer.Option(
+            help="ccr: column naming what was shown first; the vote on an item shown first is reversed."
+        ),
+    ] = None,
+    scale: Annotated[str | None, typer.Option(help="acr-hr: ends of the scale, e.g. 1:5.")] = None,
+    crush: Annotated[
+        bool, typer.Option("--crush", help="acr-hr: crush scores above the scale's end, as P.910 may.")
+    ] = False,
+    z_scores: Annotated[
+        bool, typer.Option("--z-scores", help="Standardize each person's votes (per session, if named).")
+    ] = False,
+    session: Annotated[str | None, typer.Option(help="Column of the session, for --z-scores.")] = None,
+    screen: Annotated[
+        ScreenChoice,
+        typer.Option(help="Exclude unlike raters by bt500 or p913 (correlation with the mean below .75)."),
+    ] = ScreenChoice.NONE,
     repeats: Annotated[
         RepeatsChoice,
         typer.Option(help="A person's repeated votes on an item: mean (n is people) or votes (n is votes)."),
@@ -152,13 +211,24 @@ def opinion(
       analysis opinion ratings.csv
 
       analysis opinion votes.csv --item clip --participant id --rating score --json mos.json
+
+      analysis opinion votes.csv --method acr-hr --reference source --scale 1:5 --screen bt500
+
+      analysis opinion votes.csv --z-scores --session day
     """
     from analysis.opinion import fit_opinion, read_votes
     from analysis.report.rating_tables import opinion_text, raters_table, scores_table
+    from analysis.standard_scores import P913_BELOW, Screening, Standard
 
+    bounds = scale_bounds(scale)
+    highest = None if bounds is None else bounds[1]
+    standard = Standard(method.value, reference, first, highest, crush, z_scores, session)
+    screening: Screening | None = None
+    if screen is not ScreenChoice.NONE:
+        screening = {"rule": "p913" if screen is ScreenChoice.P913 else "bt500", "below": P913_BELOW}
     with progress_spinner("reading votes"):
-        votes = read_votes(file, item, participant, rating, levels or ())
-    result = fit_opinion(votes, repeats.value)
+        votes = read_votes(file, item, participant, rating, levels or (), standard, screening)
+    result = fit_opinion(votes, repeats.value, standard)
     save_json(json, asdict(result), votes.synthetic)
     show_text(opinion_text(result, file.stem, votes.synthetic))
     show_tables(

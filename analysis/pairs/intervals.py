@@ -205,7 +205,7 @@ def resampled_parameters(pairs: FittedPairs, samples: int) -> tuple[Array, int]:
             continue
     raise InputError(
         f"in most samples of the {number} {'raters' if raters else 'comparisons'} an item wins or loses "
-        "every comparison, so the bootstrap has no interval; use --intervals profile, or add --firth"
+        "every comparison; use --intervals profile, or add --firth"
     )
 
 

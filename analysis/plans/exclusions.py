@@ -9,9 +9,11 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from analysis.read.study_answers import StudyAnswers
+from analysis.standard_scores import Screening, screen_raters
 from experiments import rules
 from experiments.declaration.experiment import Experiment
-from experiments.rules.exclusions import LeavesOutRuns, LeavesOutTrials, RunTrials, Source
+from experiments.kinds import scales_of
+from experiments.rules.exclusions import LeavesOutRuns, LeavesOutTrials, RunTrials, ScreensRaters, Source
 
 
 @dataclass(frozen=True)
@@ -128,13 +130,16 @@ def judge_rows(experiment: Experiment, ratings: StudyAnswers) -> RuleVerdicts:
     aside += [f"{not_applicable.sum()} answers of 'does not apply'"] if not_applicable.any() else []
     plays, main = main, main[~unrated]
     sources: dict[Source, pd.DataFrame] = {"rows": rows, "plays": plays, "attention": attention}
-    lacking = tuple(_lacking(rule, rows) for rule in experiment.exclusions)
+    lacking = tuple(_lacking(rule, rows, experiment) for rule in experiment.exclusions)
     usable = list(zip(experiment.exclusions, lacking, strict=True))
     return RuleVerdicts(
         rules=tuple(experiment.exclusions),
         people=_people(main, rows),
         by_hand=tuple(_by_hand(rows)),
-        runs=tuple(() if without else _runs_left_out(rule, sources) for rule, without in usable),
+        runs=tuple(
+            () if without else _runs_left_out(rule, sources, experiment.factor_names)
+            for rule, without in usable
+        ),
         trials=tuple(None if without else _trials_left_out(rule, main) for rule, without in usable),
         lacking=lacking,
         set_aside=tuple(aside),
@@ -173,11 +178,15 @@ def _people(main: pd.DataFrame, rows: pd.DataFrame) -> dict[str, str]:
     )
 
 
-def _lacking(rule: rules.ExclusionRule, rows: pd.DataFrame) -> str:
+def _lacking(rule: rules.ExclusionRule, rows: pd.DataFrame, experiment: Experiment) -> str:
     """Why a rule cannot be applied to these columns, or nothing."""
     needed: tuple[str, ...] = ()
     if isinstance(rule, LeavesOutRuns):
         needed = rule.needed
+    elif isinstance(rule, ScreensRaters):
+        if not scales_of(experiment):
+            return f"{rule.rule}: trials of this kind have no ratings on a scale"
+        needed = (*rule.needed, *experiment.factor_names)
     elif isinstance(rule, LeavesOutTrials):
         needed = (rule.needed,)
     missing = next((name for name in needed if name not in rows.columns), None)
@@ -185,12 +194,29 @@ def _lacking(rule: rules.ExclusionRule, rows: pd.DataFrame) -> str:
 
 
 def _runs_left_out(
-    rule: rules.ExclusionRule, sources: Mapping[Source, pd.DataFrame]
+    rule: rules.ExclusionRule, sources: Mapping[Source, pd.DataFrame], factors: Sequence[str]
 ) -> tuple[tuple[str, str], ...]:
+    if isinstance(rule, ScreensRaters):
+        return _screened(rule, sources["plays"], factors)
     if not isinstance(rule, LeavesOutRuns):
         return ()
     said = ((run, _why(rule, trials)) for run, trials in _by_run(sources[rule.source], rule.needed))
     return tuple((run, f"{rule.rule}: {reason}") for run, reason in said if reason is not None)
+
+
+def _screened(
+    rule: rules.ScreenByBT500 | rules.ScreenByP913, plays: pd.DataFrame, factors: Sequence[str]
+) -> tuple[tuple[str, str], ...]:
+    """Runs whose ratings are unlike those of all others; a clip's ratings on a scale are averaged."""
+    clip = [name for name in (*factors, "exemplar", "scale") if name in plays.columns]
+    rated = plays[np.isfinite(plays["response"].to_numpy())]
+    if rated.empty:
+        return ()
+    means = rated.groupby(["run", *clip], observed=True)["response"].mean()
+    table = means.unstack(clip)
+    screening: Screening = {"rule": rule.rule, "below": getattr(rule, "below", 0.0)}
+    reasons = screen_raters(table.to_numpy(dtype=np.float64), screening)
+    return tuple((str(table.index[run]), f"{rule.rule}: {why}") for run, why in reasons.items())
 
 
 def _trials_left_out(rule: rules.ExclusionRule, main: pd.DataFrame) -> NDArray[np.bool_] | None:
@@ -210,7 +236,7 @@ def _why(rule: rules.ExclusionRule, trials: RunTrials) -> str | None:
     """The rule's own word on a run; a rule that is of neither sort, or has no method, fails type-checking."""
     if isinstance(rule, LeavesOutRuns):
         return rule.excludes(trials)
-    if isinstance(rule, LeavesOutTrials):
+    if isinstance(rule, LeavesOutTrials | ScreensRaters):
         return None
     assert_never(rule)
 

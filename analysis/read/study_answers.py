@@ -15,6 +15,7 @@ from analysis.read.text_table import read_text_table
 from experiments.columns.runs import EVIDENCE_COLUMNS
 from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError
+from experiments.rules.exclusions import ScreensRaters
 
 
 @dataclass(frozen=True)
@@ -90,6 +91,8 @@ def load_database(
 
     query = AnswersQuery(url, reading, experiment.name, study)
     try:
+        # raters are compared clip by clip, exemplars apart
+        whole = whole or any(isinstance(rule, ScreensRaters) for rule in experiment.exclusions)
         rows = query.rows(reading.further if whole else (), experiment.factor_names)
         if rows.empty:
             if study:

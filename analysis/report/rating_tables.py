@@ -163,6 +163,14 @@ def ordinal_text(result: OrdinalResult) -> str:
 
 # Opinion scores as tables and words.
 
+SCORES: dict[str, tuple[str, ...]] = {
+    "acr": (),
+    "z": ("z: votes minus the person's mean (of the session), over the SD.",),
+    "acr-hr": ("DMOS: a person's vote minus that on the hidden reference, plus the scale's highest point.",),
+    "ccr": ("CMOS: above 0 if the item was preferred to the reference; reversed where it was shown first.",),
+    "dscqs": ("DMOS: the vote on the reference minus that on the item; higher is worse.",),
+}
+
 
 def scores_table(result: OpinionResult, name: str, synthetic: bool = False) -> Table:
     """Items from the best down, within each group of items that people rated across."""
@@ -180,8 +188,12 @@ def scores_table(result: OpinionResult, name: str, synthetic: bool = False) -> T
         for item in sorted(result.items, key=lambda one: (one.group or 0, -one.mos, one.name))
     )
     group = ("Group",) if result.n_groups > 1 else ()
-    header = ("Item", *group, "MOS", "SD", "n", "95% CI", "Recovered", "SE")
-    notes = ("Recovered: biases removed and votes weighted by consistency (alternating projection).",)
+    score = "z" if result.z_scores else {"acr": "MOS", "ccr": "CMOS"}.get(result.method, "DMOS")
+    header = ("Item", *group, score, "SD", "n", "95% CI", "Recovered", "SE")
+    notes = (
+        *SCORES["z" if result.z_scores else result.method],
+        "Recovered: biases removed and votes weighted by consistency (alternating projection).",
+    )
     title = caption("Mean opinion scores", name, synthetic)
     return Table("opinion", title, header, rows, 1, notes)
 
@@ -211,8 +223,8 @@ def opinion_text(result: OpinionResult, name: str, synthetic: bool = False) -> s
         f"{mark_name(name, synthetic)}: {result.n_votes} votes on {len(result.items)} items "
         f"by {len(result.participants)} people; intervals from t with n - 1 degrees of freedom."
     ]
-    if rejected:
-        said.append(f"BT.500 would reject {', '.join(rejected)}; nobody was excluded.")
+    if rejected and not any("BT.500" in decision for decision in result.decisions):
+        said.append(f"BT.500 would reject {', '.join(rejected)}; add --screen bt500 to exclude them.")
     return " ".join([*said, *(f"{decision}." for decision in result.decisions)])
 
 

@@ -18,6 +18,8 @@ from experiments.rules.exclusions import (
     ExcludeIncomplete,
     ExcludePlayback,
     ExcludeStraightLining,
+    ScreenByBT500,
+    ScreenByP913,
 )
 from experiments.rules.playback import PlaybackRules
 from experiments.rules.screening import AttentionChecks, ScreenAttention, ScreenDevice, ScreenFormAnswer
@@ -37,7 +39,9 @@ ExclusionRule = Annotated[
     | ExcludeFast
     | ExcludeEvidence
     | DropFailedPlays
-    | DropSlowTrials,
+    | DropSlowTrials
+    | ScreenByBT500
+    | ScreenByP913,
     Field(discriminator="rule"),
 ]
 """Excludes a participant's run, or single trials, from the analysis."""
@@ -55,6 +59,8 @@ __all__ = [
     "ExclusionRule",
     "PlaybackRules",
     "ScreenAttention",
+    "ScreenByBT500",
+    "ScreenByP913",
     "ScreenDevice",
     "ScreenFormAnswer",
     "ScreeningRule",

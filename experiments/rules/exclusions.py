@@ -68,6 +68,16 @@ class LeavesOutTrials(Declaration):
     needed: ClassVar[str]
 
 
+class ScreensRaters(Declaration):
+    """A rule that compares each run's ratings of clips with those of all other runs.
+
+    The analysis computes it from the ratings of all runs, also of those that other rules exclude. It needs
+    ratings on a scale.
+    """
+
+    needed: ClassVar[tuple[str, ...]] = ("response",)
+
+
 # Trials excluded because their clip was not shown as declared.
 
 
@@ -214,3 +224,22 @@ class ExcludeStraightLining(LeavesOutRuns):
         given = run.given("response")
         share = max(Counter(given).values(), default=0) / max(1, len(given))
         return f"{share:.0%} of answers are the same" if share > self.more_than else None
+
+
+# Screening of raters as the standards of the ITU declare it.
+
+
+class ScreenByBT500(ScreensRaters):
+    """Exclude raters by ITU-R BT.500: too many ratings far from the mean, above and below alike."""
+
+    rule: Literal["bt500"] = "bt500"
+    """The name of this rule."""
+
+
+class ScreenByP913(ScreensRaters):
+    """Exclude raters by ITU-T P.913: a low correlation with the mean ratings, the lowest first."""
+
+    rule: Literal["p913"] = "p913"
+    """The name of this rule."""
+    below: Annotated[float, Field(gt=0, lt=1)] = 0.75
+    """Correlation with the mean ratings of clips below which a rater is excluded."""

@@ -1530,7 +1530,7 @@ export interface components {
    */
    warnings: components["schemas"]["Warnings"];
    /** @default [] */
-   exclusions: (components["schemas"]["ExcludeIncomplete"] | components["schemas"]["ExcludeAttention"] | components["schemas"]["ExcludePlayback"] | components["schemas"]["ExcludeStraightLining"] | components["schemas"]["ExcludeFast"] | components["schemas"]["ExcludeEvidence"] | components["schemas"]["DropFailedPlays"] | components["schemas"]["DropSlowTrials"])[];
+   exclusions: (components["schemas"]["ExcludeIncomplete"] | components["schemas"]["ExcludeAttention"] | components["schemas"]["ExcludePlayback"] | components["schemas"]["ExcludeStraightLining"] | components["schemas"]["ExcludeFast"] | components["schemas"]["ExcludeEvidence"] | components["schemas"]["DropFailedPlays"] | components["schemas"]["DropSlowTrials"] | components["schemas"]["ScreenByBT500"] | components["schemas"]["ScreenByP913"])[];
    /** @default [] */
    forms: components["schemas"]["Form"][];
    texts: {
@@ -2870,6 +2870,22 @@ export interface components {
    /** @default 0 */
    more_than: number;
   };
+  ScreenByBT500: {
+   /**
+   * @description discriminator enum property added by openapi-typescript
+   * @enum {string}
+   */
+   rule: "bt500";
+  };
+  ScreenByP913: {
+   /**
+   * @description discriminator enum property added by openapi-typescript
+   * @enum {string}
+   */
+   rule: "p913";
+   /** @default 0.75 */
+   below: number;
+  };
   ScreenDevice: {
    /**
    * @description discriminator enum property added by openapi-typescript
@@ -3968,6 +3984,8 @@ export type RunSummary = components['schemas']['RunSummary'];
 export type Saved = components['schemas']['Saved'];
 export type ScaleAnswer = components['schemas']['ScaleAnswer'];
 export type ScreenAttention = components['schemas']['ScreenAttention'];
+export type ScreenByBt500 = components['schemas']['ScreenByBT500'];
+export type ScreenByP913 = components['schemas']['ScreenByP913'];
 export type ScreenDevice = components['schemas']['ScreenDevice'];
 export type ScreenFormAnswer = components['schemas']['ScreenFormAnswer'];
 export type ScreenOut = components['schemas']['ScreenOut'];

@@ -9,7 +9,8 @@ import pytest
 from typer.testing import CliRunner
 
 from analysis.cli import app
-from analysis.opinion import OpinionResult, bt500_rejects, fit_opinion, read_votes
+from analysis.opinion import OpinionResult, fit_opinion, read_votes
+from analysis.standard_scores import bt500_counts
 from experiments.errors import InputError
 
 FOLDER = Path(__file__).parents[2] / "golden/r/opinion"
@@ -56,7 +57,7 @@ def test_bt500_rejects_who_is_far_off_on_both_sides() -> None:
     quality = np.tile([2.0, 4.0], 20)
     scores = quality + rng.normal(0, 0.1, (24, 40))
     scores[0] = quality + np.tile([3.0, 3.0, -3.0, -3.0], 10)
-    assert bt500_rejects(scores).tolist() == [True, *[False] * 23]
+    assert bt500_counts(scores)[2].tolist() == [True, *[False] * 23]
 
 
 def test_the_command(tmp_path: Path) -> None:

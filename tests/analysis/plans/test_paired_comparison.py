@@ -81,6 +81,12 @@ def test_ties_are_davidsons_third_outcome(tmp_path) -> None:
     assert numbers["equal_abilities"]["chi2"] == pytest.approx(chi2)
 
 
+def test_screening_of_ratings_is_not_applied_to_choices_and_the_report_says_so(tmp_path, rows) -> None:
+    found = report(tmp_path, rows, with_rules(rules.ScreenByBT500()))
+    assert found.n_participants == 12
+    assert any("bt500: trials of this kind have no ratings on a scale" in line for line in found.left_out)
+
+
 @pytest.mark.parametrize(
     ("rule", "values", "reason"),
     [

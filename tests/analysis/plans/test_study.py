@@ -1,5 +1,6 @@
 """A declared experiment from its export and its database: exclusions by name, checks, the same numbers."""
 
+import random
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -71,6 +72,25 @@ def test_a_participant_rule_excludes_by_name_with_its_reason(tmp_path, rows, rul
     assert excluded.participant == "P03"
     assert excluded.reasons[0].startswith(reason)
     assert any("participant P03 (run run3) excluded" in line for line in left_out(analysis.exclusions))
+
+
+@pytest.mark.parametrize("rule", [rules.ScreenByBT500(), rules.ScreenByP913()])
+def test_a_declared_screening_leaves_out_the_rater_unlike_all_others(tmp_path, rule) -> None:
+    """All give the clip's rating, one of them far above and far below it in turn."""
+    rows = rows_of(EXP3, simulate(EXP3, 30, trials=5))
+    clips = sorted({row["stimulus"] for row in rows})
+    quality = {clip: 3 + 2 * (place % 2) for place, clip in enumerate(clips)}
+    jitter = random.Random(2)
+    changed = []
+    for row in rows:
+        near = quality[row["stimulus"]] + jitter.choice((-1, *[0] * 18, 1))
+        far = 7 if quality[row["stimulus"]] == 3 else 1
+        changed.append(row | {"response": far if row["run"] == "run6" else near})
+    analysis = analyse(tmp_path, changed, with_rules(rule))
+    (excluded,) = analysis.exclusions.runs
+    assert excluded.participant == "P06"
+    assert excluded.reasons[0].startswith(f"{rule.rule}: ")
+    assert any("participant P06 (run run6) excluded" in line for line in left_out(analysis.exclusions))
 
 
 class ExcludeAnswersInTurn(LeavesOutRuns):
