@@ -14,7 +14,7 @@ ScoreMethod = Literal["acr", "acr-hr", "ccr", "dscqs"]
 P913_BELOW = 0.75
 """P.913: a lower correlation with the mean votes excludes."""
 RATERS_MIN = 3
-"""Fewer raters cannot be told apart by their likeness to the mean."""
+"""Fewer raters cannot be distinguished by their likeness to the mean."""
 FAR_SHARE, LEAN_MAX = 0.05, 0.3
 """BT.500: more than this share of votes is far, and the sides differ by less than this share of them."""
 

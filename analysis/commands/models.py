@@ -12,6 +12,7 @@ from analysis.commands.output import (
     LevelsOption,
     names_in,
     progress_spinner,
+    refuse_unwritable,
     save_json,
     show_tables,
 )
@@ -19,6 +20,8 @@ from experiments.errors import InputError
 
 if TYPE_CHECKING:
     from analysis.models.columns import Slopes
+    from analysis.models.ordinal import OrdinalResult
+    from analysis.models.random_part import MixedResult
     from analysis.read.model_csv import ModelInput
 
 
@@ -87,6 +90,18 @@ RatioOption = Annotated[
 ]
 
 
+ResidualsOption = Annotated[
+    Path | None,
+    typer.Option(
+        help=(
+            "Check residuals: tests by simulated ratings, and a figure (PNG or SVG) with residuals over "
+            "fitted values, normal quantiles and simulated ranks."
+        ),
+        callback=refuse_unwritable,
+    ),
+]
+
+
 class SlopesChoice(StrEnum):
     """By-participant slopes of the linear mixed model."""
 
@@ -151,6 +166,7 @@ def mixed(
     formula: FormulaOption = None,
     means: MeansOption = False,
     likelihood_ratio: RatioOption = False,
+    residuals: ResidualsOption = None,
     levels: LevelsOption = None,
     json: JsonOption = None,
 ) -> None:
@@ -166,10 +182,11 @@ def mixed(
 
       analysis mixed ratings.csv --df kenward-roger --intervals
 
-      analysis mixed ratings.csv --means --likelihood-ratio
+      analysis mixed ratings.csv --means --likelihood-ratio --residuals residuals.png
 
       analysis mixed table.csv --formula 'score ~ face*age + (1 + face | id) + (1 | clip)' --means
     """
+    _refuse_format(residuals)
     from analysis.models.mixed import fit_mixed
     from analysis.report.rating_tables import (
         means_tables,
@@ -203,10 +220,12 @@ def mixed(
             model.random,
             effects=model.effects,
             slope_effects=model.slope_effects,
+            group_slopes=model.group_slopes,
             df_method=df.value,
             intervals=intervals,
             means=means,
             likelihood_ratio=likelihood_ratio,
+            residuals=residuals is not None,
             progress=say,
         )
     save_json(json, asdict(result), data.synthetic)
@@ -214,6 +233,7 @@ def mixed(
     named = (result, file.stem, data.synthetic)
     tables = [mixed_effects_table(*named), mixed_components_table(*named)]
     show_tables(*tables, *([mixed_coefficients_table(*named)] if intervals else []), *means_tables(*named))
+    _show_residuals(residuals, *named)
 
 
 def ordinal(
@@ -248,6 +268,7 @@ def ordinal(
     formula: FormulaOption = None,
     means: MeansOption = False,
     likelihood_ratio: RatioOption = False,
+    residuals: ResidualsOption = None,
     levels: LevelsOption = None,
     json: JsonOption = None,
 ) -> None:
@@ -265,6 +286,7 @@ def ordinal(
 
       analysis ordinal table.csv --formula 'score ~ face + age + (1 | id) + (1 | clip)'
     """
+    _refuse_format(residuals)
     from analysis.models.ordinal import fit_ordinal
     from analysis.report.rating_tables import (
         means_tables,
@@ -288,6 +310,8 @@ def ordinal(
     if model.random:
         more = ", ".join(model.random)
         raise InputError(f"the ordinal model has participants and one more grouping; remove {more}")
+    for grouping, _ in model.group_slopes:
+        raise InputError(f"the ordinal model has slopes of participants only; write (1 | {grouping})")
     clips = data.item if quadrature in (None, 1) or model.item else ()
     with progress_spinner("fitting"):
         result = fit_ordinal(
@@ -304,12 +328,14 @@ def ordinal(
             slope_effects=model.slope_effects,
             means=means,
             likelihood_ratio=likelihood_ratio,
+            residuals=residuals is not None,
         )
     save_json(json, asdict(result), data.synthetic)
     _show(file, data, ordinal_text(result))
     named = (result, file.stem, data.synthetic)
     tables = (ordinal_effects_table, ordinal_coefficients_table, ordinal_components_table)
     show_tables(*(table(*named) for table in tables), *means_tables(*named))
+    _show_residuals(residuals, *named)
 
 
 @dataclass(frozen=True)
@@ -326,6 +352,7 @@ class _Model:
     slopes: str | None
     effects: tuple[str, ...] | None = None
     slope_effects: tuple[str, ...] = ()
+    group_slopes: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
 
 def _read_model(
@@ -353,6 +380,7 @@ def _read_model(
             options.slopes,
             options.effects,
             options.slope_effects,
+            options.group_slopes,
         )
     columns = (model.within, model.item, model.between, model.covariates, model.random)
     with progress_spinner("reading ratings"):
@@ -367,6 +395,28 @@ def _read_model(
             f"columns of numbers are covariates: {', '.join(numbers)}; factor(x) makes one a factor"
         )
     return model, replace(data, rows=rows, decisions=tuple(decisions))
+
+
+def _refuse_format(path: Path | None) -> None:
+    if path is not None and path.suffix not in (".png", ".svg"):
+        raise InputError(f"--residuals writes a figure: expected a name in .png or .svg, got '{path.name}'")
+
+
+def _show_residuals(
+    path: Path | None, result: "MixedResult | OrdinalResult", name: str, synthetic: bool
+) -> None:
+    """The table of residual checks, and their figure in the format that the file's name says."""
+    from analysis.report.figures import residuals_figure
+    from analysis.report.rating_tables import residuals_table
+    from experiments.files import whole_file
+
+    if path is None or result.residuals is None:
+        return
+    show_tables(residuals_table(result.residuals, name, synthetic))
+    picture = residuals_figure(result.residuals, synthetic)
+    with whole_file(path) as temporary:
+        temporary.write_bytes(picture.svg if path.suffix == ".svg" else picture.png)
+    typer.echo(f"written: {path}")
 
 
 def _show(file: Path, data: "ModelInput", text: str) -> None:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 # What the commands on models and synthetic data share: tables, JSON, a spinner.
 
 
-def _writable(path: Path | None) -> Path | None:
+def refuse_unwritable(path: Path | None) -> Path | None:
     """Reject a file that cannot be written before the work begins."""
     from experiments.files import check_targets
 
@@ -37,7 +37,7 @@ LevelsOption = Annotated[
     ),
 ]
 JsonOption = Annotated[
-    Path | None, typer.Option(help="Write every number to this JSON file.", callback=_writable)
+    Path | None, typer.Option(help="Write every number to this JSON file.", callback=refuse_unwritable)
 ]
 
 

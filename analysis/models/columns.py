@@ -23,7 +23,7 @@ class ModelTerms:
     `within` vary within participants, `between` do not; `item` (several columns together) names what was
     rated; `covariates` are numbers, centered; `interactions` are products of covariates with covariates or
     factors, by the names of their members; `random` are further groupings with an intercept each, `a/b` for
-    b nested in a.
+    b nested in a. `group_slopes` names effects that differ between the levels of a further grouping.
     """
 
     participant: str
@@ -36,6 +36,7 @@ class ModelTerms:
     interactions: tuple[tuple[str, ...], ...] = ()
     effects: tuple[str, ...] | None = None
     slope_effects: tuple[str, ...] | None = None
+    group_slopes: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
 
 def split_covariates(

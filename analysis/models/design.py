@@ -247,8 +247,17 @@ class ModelData:
             whole[:, self.columns(effect)] = contrasts[:, self._of_factors(number_effect)]
         return whole
 
-    def random_effects(self, slopes: RandomSlopes) -> list[str]:
-        """What differs between levels of a further grouping, `intercept` first; covariates do not."""
+    def group_effects(self, group: Grouping, slopes: RandomSlopes) -> list[str]:
+        """What differs between levels of a further grouping, `intercept` first.
+
+        Covariates do only where a formula names them.
+        """
+        named = dict(self.terms.group_slopes).get(group.name)
+        if named is not None:
+            known = {frozenset(name.split(":")): name for name in self.effects}
+            return ["intercept", *(known[frozenset(name.split(":"))] for name in named)]
+        if slopes == "none" or not self.has_slopes(group):
+            return ["intercept"]
         every = list(dict.fromkeys(self.effect_of))
         return [name for name in every if slopes == "all" or name == "intercept" or name in self.factors]
 
@@ -289,9 +298,9 @@ class ModelData:
 
     def _further_term(self, group: Grouping, slopes: RandomSlopes) -> Term:
         """Independent slopes, one variance an effect, as participants have them; or an intercept."""
-        if slopes == "none" or not self.has_slopes(group):
+        effects = self.group_effects(group, slopes)
+        if effects == ["intercept"]:
             return intercept_term(group.codes, len(group.names))
-        effects = self.random_effects(slopes)
         of_column = [name for name in effects for _ in self.columns(name)]
         z = self.slope_columns(effects)
         patterns = np.stack([np.diag([float(name == e) for name in of_column]) for e in effects])
@@ -489,6 +498,26 @@ def _named_slopes(data: ModelData, slopes: Slopes) -> tuple[list[str], list[str]
     if said:
         raise InputError(f"{said[0].replace('no slope', 'the slope')}; remove it")
     return kept, []
+
+
+def refuse_group_slopes(data: ModelData) -> None:
+    """Refuse slopes of further groupings that the ratings do not determine."""
+    for group in data.groups[1:]:
+        effects = data.group_effects(group, "none")[1:]
+        for effect in effects:
+            columns = pd.DataFrame(data.slope_columns([effect]))
+            spread = columns.groupby(group.codes).std(ddof=0).max(axis=1)
+            if int((spread > 1e-9).sum()) < 2:
+                raise InputError(
+                    f"the slope of {effect} by {group.name} is not determined: it does not vary within a "
+                    f"{group.name}; write it outside the brackets only"
+                )
+        own = 1 + sum(len(data.columns(effect)) for effect in effects)
+        if effects and own * len(group.names) >= len(data.rating):
+            raise InputError(
+                f"the slopes by {group.name} are not determined: they have {own * len(group.names)} "
+                f"coefficients, expected fewer than the {len(data.rating)} ratings; remove one"
+            )
 
 
 def _many_covariances(data: ModelData, effects: Sequence[str]) -> list[str]:

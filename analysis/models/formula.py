@@ -50,7 +50,7 @@ class Formula:
 
 @dataclass(frozen=True)
 class ModelOptions:
-    """A formula in the words of the commands' options."""
+    """A formula in the words of the commands' options; `group_slopes` are those of further groupings."""
 
     participant: str
     rating: str
@@ -61,6 +61,7 @@ class ModelOptions:
     slopes: Slopes
     effects: tuple[str, ...]
     slope_effects: tuple[str, ...]
+    group_slopes: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
 
 def parse_formula(text: str) -> Formula:
@@ -113,13 +114,20 @@ def model_options(formula: Formula, header: Sequence[str], numeric: Collection[s
         if name not in header:
             raise InputError(f"'{name}' in the formula is not a column{did_you_mean(name, header)}")
     with_slopes = [part for part in formula.random if part.slopes]
-    if len(with_slopes) > 1:
+    correlated = [part for part in with_slopes if part.correlated]
+    if len(correlated) > 1:
         raise InputError(
-            f"expected slopes of one grouping, such as (1 + a | person) + (1 | clip), got '{formula.text}'"
+            f"slopes of one grouping may correlate; write (1 + {':'.join(correlated[1].slopes[0])} || "
+            f"{correlated[1].grouping}) for the other"
         )
-    people = (with_slopes or list(formula.random))[0]
+    for part in with_slopes:
+        if "/" in part.grouping:
+            raise InputError(
+                f"the nested grouping {part.grouping} has no slopes; write (1 | {part.grouping})"
+            )
+    people = (correlated or with_slopes or list(formula.random))[0]
     if "/" in people.grouping:
-        raise InputError(f"the nested grouping {people.grouping} has no slopes; name another grouping first")
+        raise InputError(f"name another grouping before the nested {people.grouping}")
     others = [part.grouping for part in formula.random if part is not people]
     factors = tuple(n for n in formula.predictors if n in formula.as_factors or n not in numeric)
     named = [":".join(effect) for effect in formula.effects if not set(effect) <= set(factors)]
@@ -135,6 +143,11 @@ def model_options(formula: Formula, header: Sequence[str], numeric: Collection[s
         slopes,
         tuple(":".join(effect) for effect in formula.effects if set(effect) <= set(factors)),
         tuple(":".join(effect) for effect in people.slopes),
+        tuple(
+            (part.grouping, tuple(":".join(effect) for effect in part.slopes))
+            for part in with_slopes
+            if part is not people
+        ),
     )
 
 

@@ -12,7 +12,7 @@ from scipy.sparse import linalg
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from analysis.models.columns import ModelTerms, RandomSlopes, Slopes, Units, split_covariates, units_of
-from analysis.models.design import ModelData, model_data, slope_groups, unmodelled_slopes
+from analysis.models.design import ModelData, model_data, refuse_group_slopes, slope_groups, unmodelled_slopes
 from analysis.models.fixed_effect_tests import KenwardRoger, Uncertainty, kenward_roger, uncertainty
 from analysis.models.means import Estimate, model_means, ratio_tests
 from analysis.models.profile import Profile, with_intervals
@@ -31,6 +31,7 @@ from analysis.models.random_part import (
     theta_names,
 )
 from analysis.models.reml import CrossProducts, Term, criterion, cross_products
+from analysis.models.residuals import mixed_checks
 from experiments.errors import InputError
 
 # Ratings that a mixed model repeats to the last digit: without residual variance nothing is tested.
@@ -79,8 +80,10 @@ def fit_mixed(
     intervals: bool = False,
     means: bool = False,
     likelihood_ratio: bool = False,
+    residuals: bool = False,
     effects: Sequence[str] | None = None,
     slope_effects: Sequence[str] = (),
+    group_slopes: Sequence[tuple[str, tuple[str, ...]]] = (),
     progress: Callable[[str], None] | None = None,
 ) -> MixedResult:
     """Fit rating ~ full factorial of the factors + covariates with crossed random groupings by REML.
@@ -120,10 +123,14 @@ def fit_mixed(
         Add marginal means, their pairs, and trends of covariates.
     likelihood_ratio : bool, optional
         Add likelihood-ratio tests (maximum likelihood, without an effect's sum-coded columns).
+    residuals : bool, optional
+        Add residual checks by ratings simulated from the model.
     effects : sequence of str, optional
         The effects of factors that the model has, such as a and a:b; default: all.
     slope_effects : sequence of str, optional
         The effects with by-participant slopes, correlated if `slopes` says so; default: as `slopes` says.
+    group_slopes : sequence of (str, tuple of str), optional
+        Further groupings, such as the item, with the effects that differ between their levels, uncorrelated.
     progress : callable, optional
         Takes a word on every interval before it is computed.
 
@@ -145,9 +152,11 @@ def fit_mixed(
         interactions,
         None if effects is None else tuple(effects),
         tuple(slope_effects) or None,
+        tuple(group_slopes),
     )
     data = model_data(rows, terms)
     sloped, notes = slope_groups(data, slopes)
+    refuse_group_slopes(data)
     random_terms = data.random_terms(slopes, sloped, random_slopes)
     parameters = sum(len(term.patterns) for term in random_terms)
     x = data.x
@@ -164,6 +173,12 @@ def fit_mixed(
         result = _result(fitted, sloped, slopes, random_slopes, df_method, (*data.notes, *notes), means)
         if likelihood_ratio:
             result = replace(result, ratio_tests=ratio_tests(data, Profile(c, theta).chi2_without))
+        if residuals:
+            factors = [block.factor(theta) for block in c.blocks]
+            at = criterion(c, theta)
+            checks = mixed_checks(units.scaled(data.rating), x, at.beta, random_terms, factors, at.sigma)
+            moved = tuple(value * units.scale + units.middle for value in checks.fitted)
+            result = replace(result, residuals=replace(checks, fitted=moved))
         if not intervals:
             return result
         scales = [data.unit(row.term) for row in result.components]
@@ -213,7 +228,7 @@ def _result(
     components = (*components_of_people(labels, factor, sigma, slopes, data),)
     for group, block in zip(data.groups[1:], c.blocks[1:], strict=True):
         terms = terms_of(data, group, random_slopes)
-        sds = sigma * theta[block.theta]
+        sds = sigma * theta[block.theta] / [data.unit(term) for term in terms]
         components += tuple(Component(group.name, *of) for of in zip(terms, map(float, sds), strict=True))
     degenerate = degenerate_terms(components, factor, sigma, data)
     components += (Component("residual", "", sigma),)

@@ -25,6 +25,7 @@ from analysis.models.ordinal_maximum import (
     newton_step,
     pooled_start,
 )
+from analysis.models.residuals import ResidualChecks, ordinal_checks
 from experiments.errors import InputError
 
 # What a fitted cumulative-link mixed model says: coefficients, tests, SDs.
@@ -94,6 +95,7 @@ class OrdinalResult:
     quadrature: int = 1
     means: ModelMeans | None = None
     ratio_tests: tuple[RatioTest, ...] = ()
+    residuals: ResidualChecks | None = None
 
 
 @dataclass(frozen=True)
@@ -275,6 +277,7 @@ def fit_ordinal(
     quadrature: int | None = None,
     means: bool = False,
     likelihood_ratio: bool = False,
+    residuals: bool = False,
     effects: Sequence[str] | None = None,
     slope_effects: Sequence[str] = (),
 ) -> OrdinalResult:
@@ -343,6 +346,8 @@ def fit_ordinal(
         with threadpool_limits(1, "blas"):
             without = partial(_chi2_without, ordinal, maximum, nodes, bool(items))
             result = replace(result, ratio_tests=ratio_tests(data, without))
+    if residuals:
+        result = replace(result, residuals=ordinal_checks(ordinal, maximum.parameters))
     return result
 
 

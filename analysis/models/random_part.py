@@ -13,6 +13,7 @@ from analysis.models.design import ModelData
 from analysis.models.fixed_effect_tests import Uncertainty
 from analysis.models.means import ModelMeans, RatioTest
 from analysis.models.reml import CrossProducts, criterion
+from analysis.models.residuals import ResidualChecks
 from experiments.errors import InputError
 
 # Relative standard deviations that minimize the criterion of a mixed model.
@@ -197,8 +198,7 @@ def degenerate_terms(
 
 def terms_of(data: ModelData, group: Grouping, slopes: RandomSlopes) -> list[str]:
     """What differs between the levels of a further grouping, `intercept` first."""
-    sloped = slopes != "none" and data.has_slopes(group)
-    return data.random_effects(slopes) if sloped else ["intercept"]
+    return data.group_effects(group, slopes)
 
 
 def formula_of(data: ModelData, labels: list[str], slopes: Slopes, random_slopes: RandomSlopes) -> str:
@@ -321,3 +321,4 @@ class MixedResult:
     df_method: DfMethod = "satterthwaite"
     means: ModelMeans | None = None
     ratio_tests: tuple[RatioTest, ...] = ()
+    residuals: ResidualChecks | None = None

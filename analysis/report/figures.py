@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy import special, stats
 
+from analysis.models.residuals import ResidualChecks
 from analysis.pairs.abilities import PairsResult
 from analysis.pairs.findings import PairCount
 from analysis.plans.result import Analysis
@@ -466,6 +467,38 @@ def _mark_events(panel: Any, trace: MeanTrace, below: float, height: float) -> N
     for position, events in enumerate(clips):
         top = below - position * row
         panel.vlines(events, top - 0.7 * row, top, color="#444444", linewidth=0.9)
+
+
+POINTS_MAX = 5000
+"""More points hide one another; those drawn are evenly spread over the rows."""
+
+
+def residuals_figure(checks: ResidualChecks, synthetic: bool) -> Picture:
+    """Residuals over fitted values, their normal quantiles, and simulated ranks against a uniform."""
+    figure = new_figure(width=9.0, height=3.4)
+    fitted, residuals, scaled = (np.array(v) for v in (checks.fitted, checks.residuals, checks.scaled))
+    shown = np.linspace(0, len(fitted) - 1, min(len(fitted), POINTS_MAX)).astype(int)
+    over, normal, uniform = figure.subplots(1, 3)
+    dots: dict[str, Any] = {"s": 6, "color": COLOURS[0], "alpha": 0.4, "linewidth": 0}
+    over.scatter(fitted[shown], residuals[shown], **dots)
+    bins = np.array_split(np.argsort(fitted, kind="stable"), min(10, len(fitted)))
+    means = [(fitted[rows].mean(), residuals[rows].mean()) for rows in bins]
+    over.plot(*np.transpose(means), color=COLOURS[1])
+    over.set(xlabel="Fitted value", ylabel="Standardized residual")
+    places = (np.arange(len(residuals)) + 0.5) / len(residuals)
+    normal.scatter(special.ndtri(places)[shown], np.sort(residuals)[shown], **dots)
+    normal.set(xlabel="Normal quantile", ylabel="Residual quantile")
+    uniform.scatter(places[shown], np.sort(scaled)[shown], **dots)
+    uniform.set(xlabel="Uniform quantile", ylabel="Rank among simulations")
+    over.axhline(0, color="#888888", linewidth=0.6)
+    for panel, at in ((normal, (0.0, 0.0)), (uniform, (0.5, 0.5))):
+        panel.axline(at, slope=1, color=COLOURS[1])
+    note = (
+        "Line, left: means of tenths of the ratings; middle and right: where points lie if the model holds."
+    )
+    write_note(figure, note, synthetic)
+    alt = "Residuals over fitted values, normal quantiles of residuals, and ranks among simulated ratings"
+    return _trace_picture(figure, "figure-residuals", "Residuals", alt)
 
 
 def _trace_picture(figure: Any, key: str, title: str, alt: str) -> Picture:

@@ -5,6 +5,7 @@ from functools import partial
 from analysis.agreement import Agreement, Reliability
 from analysis.models.ordinal import OrdinalResult
 from analysis.models.random_part import MixedResult
+from analysis.models.residuals import ResidualChecks
 from analysis.opinion import OpinionResult
 from analysis.plans.result import Analysis
 from analysis.report.contents import Section, caption, mark_name
@@ -145,6 +146,17 @@ def mixed_text(result: MixedResult) -> str:
 
 def _integral(nodes: int) -> str:
     return "Laplace approximation" if nodes == 1 else f"adaptive Gauss-Hermite quadrature with {nodes} nodes"
+
+
+def residuals_table(checks: ResidualChecks, name: str, synthetic: bool = False) -> Table:
+    """Tests of residuals."""
+    rows = tuple((test.name, fixed(test.statistic, 3), p_value(test.p_value)) for test in checks.tests)
+    notes = (
+        f"p: share of {checks.n_simulations} data sets simulated from the model, each with its own "
+        "random effects, that depart as far from it.",
+    )
+    title = caption("Residual checks", name, synthetic)
+    return Table("residuals", title, ("Check", "Statistic", "p"), rows, 1, notes)
 
 
 def ordinal_text(result: OrdinalResult) -> str:

@@ -45,6 +45,15 @@ def test_models_that_are_not_full_factorials_agree_with_lmer(tmp_path: Path, kno
     assert intercept == pytest.approx(known["fixed"]["(Intercept)"], rel=1e-5)
 
 
+def test_slopes_of_items_are_sds_in_the_covariates_unit(tmp_path: Path) -> None:
+    formula = "rating ~ group + blur + age + (1 + blur | participant) + (1 + age || clip)"
+    result = _run(tmp_path, "mixed", CROSSED, "--formula", formula)
+    assert result["formula"] == formula
+    components = {(c["group"], c["term"]): c["sd"] for c in result["components"]}
+    known = next(one for one in GOLDEN["mixed"] if one["formula"] == formula)
+    assert components["clip", "age"] == pytest.approx(known["sd_clip_age"][0], rel=1e-3)
+
+
 def test_ordinal_models_agree_with_clmm(tmp_path: Path) -> None:
     file, known = FOLDER / "models" / "ordinal_three_levels.csv", GOLDEN["ordinal"]
     formula = "rating ~ A + B + (1 | participant) + (1 | clip)"
@@ -105,7 +114,15 @@ def test_formulas_are_read_as_r_reads_them() -> None:
         ("rating ~ group + (1 + group | participant)", "it does not vary within a participant"),
         (
             "rating ~ blur + (1 + blur | participant) + (1 + blur | clip)",
-            "expected slopes of one grouping, such as",
+            "slopes of one grouping may correlate; write (1 + blur || clip) for the other",
+        ),
+        (
+            "rating ~ face + (1 | participant) + (1 + face || clip)",
+            "the slope of face by clip is not determined: it does not vary within a clip",
+        ),
+        (
+            "rating ~ blur + (1 | participant) + (1 + blur || lab/room)",
+            "the nested grouping lab/room has no slopes",
         ),
     ],
 )
@@ -121,6 +138,9 @@ def test_a_formula_goes_with_no_other_option_for_columns(tmp_path: Path) -> None
         _run(tmp_path, "mixed", CROSSED, "--formula", "rating ~ 1 + (1 | clip)", "--within", "blur")
     formula = "rating ~ blur + (1 | participant) + (1 | clip) + (1 | lab)"
     with pytest.raises(InputError, match="participants and one more grouping; remove lab"):
+        _run(tmp_path, "ordinal", CROSSED, "--formula", formula)
+    formula = "rating ~ blur + (1 + blur || participant) + (1 + blur || clip)"
+    with pytest.raises(InputError, match="the ordinal model has slopes of participants only"):
         _run(tmp_path, "ordinal", CROSSED, "--formula", formula)
     with pytest.raises(InputError, match="slopes of the ordinal model cannot correlate"):
         _run(tmp_path, "ordinal", CROSSED, "--formula", "rating ~ blur + (1 + blur | participant)")

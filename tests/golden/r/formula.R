@@ -9,11 +9,14 @@ tight <- lmerControl(optimizer = "nloptwrap", calc.derivs = FALSE, check.conv.si
 fits <- lapply(c(
   "rating ~ group + blur + age + group:age + (1 + blur | participant) + (1 | clip)",
   "rating ~ blur + age + (1 | participant) + (1 | clip)",
+  "rating ~ group + blur + age + (1 + blur | participant) + (1 + age || clip)",
   "rating ~ 1 + (1 | participant) + (1 | clip)"), function(text) {
     fit <- lmer(as.formula(text), d, control = tight)
+    for (i in 1:9) fit <- update(fit, start = getME(fit, "theta") * (1 + 0.1 * (i %% 3))) # BOBYQA stops early
     tests <- if (grepl("blur", text)) { a <- anova(fit, type = 3)
       data.frame(effect = rownames(a), f = a$`F value`, df1 = a$NumDF, df2 = a$DenDF) } else list()
-    list(formula = text, reml = REMLcrit(fit), tests = tests, fixed = as.list(fixef(fit)), sigma = sigma(fit))
+    clip_age <- with(as.data.frame(VarCorr(fit)), sdcor[grepl("^clip", grp) & var1 %in% "age"])
+    list(formula = text, sd_clip_age = I(clip_age), reml = REMLcrit(fit), tests = tests, fixed = as.list(fixef(fit)), sigma = sigma(fit))
   })
 o <- read.csv("models/ordinal_three_levels.csv")
 for (f in c("A", "B", "participant", "clip")) o[[f]] <- factor(o[[f]])
