@@ -21,7 +21,10 @@ class Mean(BaseModel):
     levels: dict[str, str]
     mean: float
     se_within: float | None = Field(description="Within-participant standard error (Cousineau-Morey).")
+    low: float | None = Field(description="Limit of the 95% t interval by `se_within`.")
+    high: float | None
     participants: int
+    people: list[float] = Field(description="Means of single participants, at most 200, by their size.")
 
 
 class Margin(BaseModel):

@@ -15,12 +15,27 @@ from experiments.error_bars import within_participant_errors
 
 @dataclass(frozen=True)
 class MarginMean:
-    """Mean of one combination of levels; `se_within` is Cousineau-Morey, None for one participant."""
+    """Mean of one combination of levels over participants.
+
+    Attributes
+    ----------
+    se_within, low, high : float or None
+        Cousineau-Morey's standard error and the limits of the 95% t interval; None for one participant.
+    people : list of float
+        Means of single participants, at most `MAX_PEOPLE`, in the order of their size.
+    """
 
     levels: dict[str, str]
     mean: float
     se_within: float | None
+    low: float | None
+    high: float | None
     participants: int
+    people: list[float]
+
+
+MAX_PEOPLE = 200
+"""More points behind a mean would cover each other."""
 
 
 CellMeans = Mapping[str, Mapping[tuple[str, ...], float]]
@@ -90,16 +105,29 @@ def _of_group(
     rows = [row for columns in complete for row in zip(*(columns[key] for key in conditions), strict=True)]
     if not rows:
         return []
-    errors = within_participant_errors(rows)
+    errors: Sequence[float | None] = within_participant_errors(rows) or [None] * len(conditions)
     return [
-        MarginMean(
-            levels=dict(zip(keep, key, strict=True)),
-            mean=math.fsum(column) / len(rows),
-            se_within=errors[index] if errors else None,
-            participants=len(rows),
-        )
-        for index, (key, column) in enumerate(zip(conditions, zip(*rows, strict=True), strict=True))
+        _margin_mean(dict(zip(keep, key, strict=True)), column, error)
+        for key, column, error in zip(conditions, zip(*rows, strict=True), errors, strict=True)
     ]
+
+
+def _margin_mean(levels: dict[str, str], column: Sequence[float], error: float | None) -> MarginMean:
+    mean = math.fsum(column) / len(column)
+    half = None if error is None else student_t(len(column) - 1) * error
+    # In the order of their size, values of several conditions cannot be put together to one person.
+    values = sorted(column)
+    every = max(1.0, len(values) / MAX_PEOPLE)
+    shown = min(MAX_PEOPLE, len(values))
+    return MarginMean(
+        levels=levels,
+        mean=mean,
+        se_within=error,
+        low=None if half is None else mean - half,
+        high=None if half is None else mean + half,
+        participants=len(column),
+        people=[round(values[int((number + 0.5) * every)], 4) for number in range(shown)],
+    )
 
 
 def _collapse(those: RatersOfSameCells, places: Sequence[int]) -> dict[tuple[str, ...], Sequence[float]]:

@@ -1858,7 +1858,10 @@ export interface components {
    };
    mean: number;
    se_within: number | null;
+   low: number | null;
+   high: number | null;
    participants: number;
+   people: number[];
   };
   MeanTilt: {
    people: number;

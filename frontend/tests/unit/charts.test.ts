@@ -32,17 +32,26 @@ const FACTORS = [factor("character", ["a", "Anna"], ["b", "Bert"]), factor("spee
 const SCALE = { scale: { name: "rating", minimum: 1, maximum: 7 } } as Parameters<typeof marginPlot>[1];
 
 describe("the chart of means", () => {
-  const mean = (levels: Record<string, string>, value: number, se_within: number | null) => ({
+  const mean = (levels: Record<string, string>, value: number, half: number | null, people: number[] = []) => ({
     levels,
     mean: value,
-    se_within,
+    se_within: half === null ? null : half / 4,
+    low: half === null ? null : value - half,
+    high: half === null ? null : value + half,
     participants: 3,
+    people,
   });
-  const means = [mean({ speed: "20" }, 4.25, 0.5), mean({ speed: "100" }, 2.5, 0.125)];
+  const means = [mean({ speed: "20" }, 4.25, 0.5, [3, 6.5]), mean({ speed: "100" }, 2.5, 0.125, [2.25])];
 
-  it("has bars of one standard error up and one down, about points at the means", () => {
+  it("has bars from end to end of the interval, about points at the means, and participants behind them", () => {
     const plot = marginPlot({ factors: ["speed"], means }, SCALE, FACTORS);
-    expect(drawn(plot, "dot").map(({ x, y }) => [x, y])).toEqual([
+    const dots = drawn(plot, "dot").map(({ x, y }) => [x, y]);
+    expect(dots.slice(0, 3)).toEqual([
+      ["20 ms", 3],
+      ["100 ms", 2.25],
+      ["20 ms", 6.5],
+    ]);
+    expect(dots.slice(3)).toEqual([
       ["20 ms", 4.25],
       ["100 ms", 2.5],
     ]);
@@ -54,7 +63,15 @@ describe("the chart of means", () => {
     expect(plot.y?.domain).toEqual([1, 7]);
   });
 
-  it("has bars without length where there is no standard error", () => {
+  it("says of how many people it is, what the bars are, and how many participants it shows", () => {
+    const caption = (of: typeof means) => marginPlot({ factors: ["speed"], means: of }, SCALE, FACTORS).caption;
+    expect(caption(means)).toBe(
+      "N = 3. Small points: participants (2 shown). Large points: their means. Bars: 95% within-participant CI (Cousineau-Morey).",
+    );
+    expect(caption([mean({ speed: "20" }, 4.25, null)])).toContain("No bars");
+  });
+
+  it("has bars without length where there is no interval", () => {
     const plot = marginPlot({ factors: ["speed"], means: [mean({ speed: "20" }, 4.25, null)] }, SCALE, FACTORS);
     expect(drawn(plot, "rule").map(({ y1, y2 }) => [y1, y2])).toEqual([[4.25, 4.25]]);
   });
@@ -66,15 +83,15 @@ describe("the chart of means", () => {
     const plot = marginPlot({ factors: ["character", "speed"], means: crossed }, SCALE, FACTORS);
     expect(drawn(plot, "dot").map(({ x, y, fill }) => [x, y, fill])).toEqual([
       ["Anna", 2, "100 ms"],
-      ["Anna", 2.5, "20 ms"],
       ["Bert", 3, "100 ms"],
+      ["Anna", 2.5, "20 ms"],
       ["Bert", 3.5, "20 ms"],
     ]);
     expect(drawn(plot, "rule").map(({ y1, y2, stroke }) => [y1, y2, stroke])[3]).toEqual([3.25, 3.75, "20 ms"]);
     expect(drawn(plot, "line").map(({ z, stroke }) => [z, stroke])).toEqual([
       ["100 ms", "100 ms"],
-      ["20 ms", "20 ms"],
       ["100 ms", "100 ms"],
+      ["20 ms", "20 ms"],
       ["20 ms", "20 ms"],
     ]);
   });

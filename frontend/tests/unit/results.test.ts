@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { cellRows, marginRows, cellLabels, cellPlot, countTicks, marginPlot } from "../../src/admin/results/plots";
+import { cellRows, marginRows, cellLabels, cellPlot, countTicks } from "../../src/admin/results/plots";
 import { labelOfOrigin, counted } from "../../src/admin/ui/format";
 import { seriesLabels, seriesPlot } from "../../src/admin/kinds/threshold/plots";
 import { csvText } from "../../src/admin/ui/figure-files";
@@ -11,20 +11,13 @@ const factor = (name: string, ...levels: [string, string][]) => ({
 });
 const FACTORS = [factor("character", ["a", "Anna"], ["b", "Bert"]), factor("speed", ["100", "100 ms"], ["20", "20 ms"])];
 
-it("a figure of means mentions bars only where there are some", () => {
-  const caption = (se_within: number | null): unknown => {
-    const means = [{ levels: { speed: "20" }, mean: 2, se_within, participants: 1 }];
-    return marginPlot({ factors: ["speed"], means }, { scale: { name: "rating", minimum: 1, maximum: 7 } } as never, FACTORS).caption;
-  };
-  expect(caption(0.2)).toMatch(/^Bars:/);
-  expect(caption(null)).toMatch(/^No bars:/);
-});
-
 describe("figures that are saved", () => {
   it("have their numbers under the labels of the study, in declared order", () => {
-    const mean = (speed: string, value: number) => ({ levels: { speed }, mean: value, se_within: null, participants: 3 });
+    const mean = (speed: string, value: number) => ({
+      ...{ levels: { speed }, mean: value, se_within: 0.5, low: value - 1, high: value + 1, participants: 3, people: [value] },
+    });
     const rows = marginRows({ factors: ["speed"], means: [mean("20", 2), mean("100", 1.5)] }, FACTORS);
-    expect(csvText(rows)).toBe("speed,mean,se_within,participants\r\n100 ms,1.5,,3\r\n20 ms,2,,3\r\n");
+    expect(csvText(rows)).toBe("speed,mean,se_within,ci95_low,ci95_high,participants\r\n100 ms,1.5,0.5,0.5,2.5,3\r\n20 ms,2,0.5,1,3,3\r\n");
     const cells = [
       { cell: "b/20", ratings: 1, counts: [1, 0] },
       { cell: "a/20", ratings: 2, counts: [0, 2] },

@@ -125,11 +125,19 @@ def test_a_figure_is_saved_as_picture_and_numbers(dashboard: Dashboard) -> None:
     picture = ElementTree.fromstring(saved["SVG"])
     texts = {"".join(text.itertext()) for text in picture.iter("{http://www.w3.org/2000/svg}text")}
     header, *rows = list(csv.reader(io.StringIO(saved["CSV"])))
-    assert header[2:] == ["mean", "se_within", "participants"]
+    assert header[2:] == ["mean", "se_within", "ci95_low", "ci95_high", "participants"]
     assert {cell for row in rows for cell in row[:2]} <= texts
-    assert "Bars: ± one within-participant standard error." in texts
+    assert "Bars: 95% within-participant CI (Cousineau-Morey)." in " ".join(
+        "".join(text.itertext()) for text in picture.iter("{http://www.w3.org/2000/svg}text")
+    )
     assert float(picture.attrib["height"]) > 250
     assert "var(--mantine" not in saved["SVG"]
+    with page.expect_download() as download:
+        page.get_by_role("button", name=re.compile("Save as PNG: Marginal means of .* x .*")).click()
+    png = Path(download.value.path()).read_bytes()
+    width, height = int.from_bytes(png[16:20]), int.from_bytes(png[20:24])
+    assert png[:8] == b"\x89PNG\r\n\x1a\n"
+    assert (width, height) == (3 * 640, round(3 * float(picture.attrib["height"])))
 
 
 def test_the_timeline_of_a_run_shows_each_trial(dashboard: Dashboard) -> None:

@@ -59,6 +59,15 @@ export function labelAxis(text: (name: string) => string): Plot.Markish {
   return Plot.axisY({ lineWidth: LABEL_EMS, label: null, tickFormat: text });
 }
 
+/** The title of an axis is in its middle, without an arrow. */
+const CENTERED = { labelAnchor: "center", labelArrow: "none" } as const;
+const TITLE_PX = 6;
+
+const BLUE = "#0072B2";
+/** Okabe and Ito's colors in the report's order, which people with any common color vision can tell apart; so do symbols. */
+export const PALETTE = [BLUE, "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F6A00", "#888888"];
+const SYMBOLS: Plot.SymbolType[] = ["circle", "square", "triangle", "diamond", "wye", "cross", "star", "times"];
+
 /** Width of labels below a figure, in ems, and the room of their lines. */
 const belowEms = (labels: readonly string[]) => 24 / Math.max(3, labels.length);
 
@@ -67,36 +76,71 @@ function belowOf(labels: readonly string[]): number {
   return 24 + 14 * (lines === 1 ? 1 : lines + 1);
 }
 
-/** Means of one factor, or of two: the second as color. Bars are within-participant standard errors. */
+/** Where participants lie around their mean: in so many columns, so that equal answers do not hide each other. */
+const JITTER = [0, -2, 2, -1, 1];
+/** Room of all conditions of a figure on a phone. */
+const CONDITIONS_PX = 240;
+
+/** Means of one factor, or of two: the second as color and symbol; behind them participants. The report draws the same. */
 export function marginPlot(margin: Schemas["Margin"], { scale }: Results, factors: Factors): Plot.PlotOptions {
   const [first = "", second] = margin.factors;
   const [across, hues] = [labelsOf(factors, first), labelsOf(factors, second ?? "")];
-  const rows = margin.means.map((mean) => ({
-    x: across.of(mean.levels[first] ?? ""),
-    colour: second === undefined ? "" : hues.of(mean.levels[second] ?? ""),
-    mean: mean.mean,
-    low: mean.mean - (mean.se_within ?? 0),
-    high: mean.mean + (mean.se_within ?? 0),
+  const rows = margin.means.map(({ levels, mean, low, high, people }) => ({
+    x: across.of(levels[first] ?? ""),
+    colour: second === undefined ? "" : hues.of(levels[second] ?? ""),
+    mean,
+    low: low ?? mean,
+    high: high ?? mean,
+    people,
   }));
   const crossed = second !== undefined;
-  const colour = crossed ? "colour" : "currentColor";
+  const shades = crossed ? hues.all : [""];
+  const domain = across.all.length > 0 ? across.all : rows.map((row) => row.x);
+  const step = Math.min(22, CONDITIONS_PX / Math.max(1, domain.length * shades.length));
+  const marks = shades.map((shade, row) => {
+    const own = rows.filter(({ colour }) => colour === shade);
+    const dx = (row - (shades.length - 1) / 2) * step;
+    const ink = crossed ? { stroke: "colour" } : { stroke: BLUE };
+    const fill = crossed ? { fill: "colour", symbol: "colour" } : { fill: BLUE };
+    const points = own.flatMap((row) => row.people.map((mean, index) => ({ ...row, mean, column: index % JITTER.length })));
+    const columns = JITTER.map((to, column) => ({ dx: dx + (to * step) / 8, points: points.filter((point) => point.column === column) }));
+    return [
+      ...columns.map((column) =>
+        Plot.dot(column.points, { x: "x", y: "mean", dx: column.dx, r: 2, fill: crossed ? "colour" : BLUE, fillOpacity: 0.45 }),
+      ),
+      ...(crossed ? [Plot.line(own, { x: "x", y: "mean", z: "colour", dx, ...ink, strokeOpacity: 0.6 })] : []),
+      Plot.ruleX(own, { x: "x", y1: "low", y2: "high", dx, ...ink, strokeWidth: 1.5 }),
+      Plot.dot(own, { x: "x", y: "mean", dx, ...fill, r: 4, stroke: "white", strokeWidth: 0.7, tip: true }),
+    ];
+  });
   return {
-    height: 250,
-    marginBottom: belowOf(across.all),
-    caption: rows.some(({ low, high }) => low < high)
-      ? "Bars: ± one within-participant standard error."
-      : "No bars: a standard error needs at least two participants with different answers.",
-    x: { type: "point", padding: 0.6, label: null, domain: across.all.length > 0 ? across.all : rows.map((row) => row.x) },
-    y: { domain: [scale.minimum, scale.maximum], grid: true, label: `mean ${scale.name}` },
-    color: { legend: crossed, scheme: "observable10", ...(crossed ? { domain: hues.all } : {}) },
-    marks: [
-      // Long labels break into lines.
-      Plot.axisX({ lineWidth: belowEms(across.all), label: null }),
-      ...(crossed ? [Plot.line(rows, { x: "x", y: "mean", stroke: "colour", z: "colour", strokeOpacity: 0.5 })] : []),
-      Plot.ruleX(rows, { x: "x", y1: "low", y2: "high", stroke: colour, strokeWidth: 1.5 }),
-      Plot.dot(rows, { x: "x", y: "mean", fill: colour, r: 3, tip: true }),
-    ],
+    height: 280,
+    marginBottom: belowOf(domain) + TITLE_PX,
+    caption: marginCaption(margin),
+    x: { type: "point", padding: 0.6, label: null, domain },
+    y: {
+      // Intervals of few people reach beyond the scale; a bar that leaves its figure could not be read.
+      domain: [Math.min(scale.minimum, ...rows.map(({ low }) => low)), Math.max(scale.maximum, ...rows.map(({ high }) => high))],
+      grid: true,
+      label: `mean ${scale.name}`,
+    },
+    color: crossed ? { domain: hues.all, range: PALETTE } : {},
+    symbol: crossed ? { domain: hues.all, range: SYMBOLS, legend: true } : {},
+    // Long labels break into lines.
+    marks: [Plot.axisX({ lineWidth: belowEms(domain), label: across.title, ...CENTERED }), ...marks.flat()],
   };
+}
+
+/** What points and bars are, and of how many people. */
+function marginCaption({ means }: Schemas["Margin"]): string {
+  const numbers = [...new Set(means.map(({ participants }) => participants))].sort((a, b) => a - b);
+  const people = numbers.length > 1 ? `${String(numbers[0])} to ${String(numbers.at(-1))}` : String(numbers[0] ?? 0);
+  const shown = Math.max(0, ...means.map((mean) => mean.people.length));
+  const some = shown < (numbers.at(-1) ?? 0) ? ` (${String(shown)} shown)` : "";
+  const bars = means.some(({ low, high }) => low !== null && high !== null && low < high)
+    ? "Bars: 95% within-participant CI (Cousineau-Morey)."
+    : "No bars: an interval needs at least two participants with different answers.";
+  return `N = ${people}. Small points: participants${some}. Large points: their means. ${bars}`;
 }
 
 const SHARE_COLOUR = "#3c8697";
@@ -126,7 +170,7 @@ export function cellPlot({ cells, bins }: Results, factors: Factors): Plot.PlotO
   return {
     height: Math.max(140, 34 * cells.length + 50),
     marginLeft: leftOf(names),
-    marginBottom: 36,
+    caption: "Share of the answers in each cell; deeper color: more answers.",
     x: { label: every === 1 ? "answer" : `answer, from the number on, ${step} wide`, ticks: bins.filter((_, bin) => bin % every === 0) },
     y: { label: null, domain: names },
     marks: [
@@ -162,9 +206,8 @@ export function countTicks(largest: number): number[] {
 function histogram(bins: { from: number; count: number }[], step: number, label: string, counted: string): Plot.PlotOptions {
   return {
     height: 210,
-    marginLeft: 52,
-    marginBottom: 36,
-    x: { label },
+    caption: `N = ${String(bins.reduce((sum, { count }) => sum + count, 0))} ${counted}.`,
+    x: { label, domain: [0, Math.max(step, ...bins.map(({ from }) => from + step))] },
     y: { label: counted, grid: true, ticks: countTicks(Math.max(1, ...bins.map(({ count }) => count))), tickFormat: "d" },
     marks: [
       Plot.rectY(bins, { x1: "from", x2: ({ from }: { from: number }) => from + step, y: "count", fill: SHARE_COLOUR, tip: true }),
@@ -178,14 +221,14 @@ export function timePlot({ response_times }: AnyResults): Plot.PlotOptions {
   return histogram(
     bins.filter(({ from }) => from <= 10_000),
     250,
-    "ms",
+    "response time after the clip (ms)",
     "answers",
   );
 }
 
 export function delayPlot({ playback }: AnyResults): Plot.PlotOptions {
   const bins = playback.key_to_first_frame_ms.map((count, bin) => ({ from: 10 * bin, count }));
-  return histogram(bins, 10, "ms, key to frame (last bin: 100+)", "plays");
+  return histogram(bins, 10, "time from key to first frame (ms; last bar: 100 and more)", "plays");
 }
 
 // The numbers of each figure of the results, as they are saved: labels where the figures have labels.
@@ -199,9 +242,9 @@ export function marginRows(margin: Schemas["Margin"], factors: Factors): Row[] {
     named.reduce((sum, { name, of, all }) => sum * (all.length + 1) + all.indexOf(of(levels[name] ?? "")), 0);
   return margin.means
     .toSorted((a, b) => rank(a.levels) - rank(b.levels))
-    .map(({ levels, ...numbers }) => ({
+    .map(({ levels, mean, se_within, low, high, participants }) => ({
       ...Object.fromEntries(named.map(({ name, title, of }) => [title, of(levels[name] ?? "")])),
-      ...numbers,
+      ...{ mean, se_within, ci95_low: low, ci95_high: high, participants },
     }));
 }
 

@@ -5,8 +5,8 @@ import { useElementSize } from "@mantine/hooks";
 import * as Plot from "@observablehq/plot";
 import { useEffect, useRef, useMemo } from "react";
 import { allowStyles } from "../nonce";
-import { downloadText } from "./useChange";
-import { csvText, type Row, svgText } from "./figure-files";
+import { download, downloadText } from "./useChange";
+import { csvText, inPaperStyle, pngBlob, type Row, svgText } from "./figure-files";
 
 // An Observable Plot drawn into the page, in the page's colors and as wide as its place.
 
@@ -26,7 +26,7 @@ export function PlotFigure({ options, label, rows }: PlotProps) {
   useEffect(() => {
     if (width === 0) return;
     const style = { background: "none", color: "inherit", fontSize: "12px" };
-    const figure = Plot.plot({ style, width, ...options });
+    const figure = Plot.plot({ style, width, ...inPaperStyle(options) });
     allowStyles(figure);
     // Plot labels its inner groups, which may carry no label without a role; the figure has one as a whole.
     for (const group of figure.querySelectorAll("[aria-label]")) group.removeAttribute("aria-label");
@@ -55,6 +55,7 @@ function Saving({ options, label, rows }: Required<PlotProps>) {
   return (
     <Group gap={6} mt={4} justify="flex-end">
       {button("SVG", () => downloadText(`${name}.svg`, svgText(options, label), "image/svg+xml"))}
+      {button("PNG", () => void pngBlob(svgText(options, label)).then((png) => download(`${name}.png`, png)))}
       {button("CSV", () => downloadText(`${name}.csv`, csvText(rows)))}
     </Group>
   );
@@ -65,8 +66,6 @@ function closurePlot(closure: readonly number[], height = 110, other: readonly n
   const line = { x: (_: number, frame: number) => (frame * 1000) / 300, y: (value: number) => value, strokeWidth: 1.5 };
   return {
     height,
-    marginBottom: 34,
-    marginLeft: 34,
     x: { label: "time (ms)" },
     y: { domain: [1, 0], ticks: 3, label: "closure" },
     marks: [

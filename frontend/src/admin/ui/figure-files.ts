@@ -11,11 +11,44 @@ const SVG = "http://www.w3.org/2000/svg";
 const WIDTH_PX = 640;
 const LINE_PX = 20;
 const GLYPH_PX = 7;
+const PNG_SCALE = 3;
 const INK = { background: "white", color: "black", fontFamily: "sans-serif", fontSize: "12px" };
+
+/** The one style of all figures: titles in the middle of their axes, axis lines, room for both. */
+export function inPaperStyle(options: Plot.PlotOptions): Plot.PlotOptions {
+  const titles = { labelAnchor: "center", labelArrow: "none" } as const;
+  const line = { stroke: "currentColor", strokeOpacity: 0.6 };
+  return {
+    marginLeft: 52,
+    marginBottom: 42,
+    ...options,
+    x: { ...titles, ...options.x },
+    y: { ...titles, ...options.y },
+    marks: [Plot.frame({ ...line, anchor: "bottom" }), Plot.frame({ ...line, anchor: "left" }), ...(options.marks ?? [])],
+  };
+}
+
+/** The picture of `svgText` as PNG, three times as large: about 300 dots per printed inch. */
+export async function pngBlob(svg: string): Promise<Blob> {
+  const address = URL.createObjectURL(new Blob([svg], { type: "image/svg+xml" }));
+  try {
+    const image = new Image();
+    image.src = address;
+    await image.decode();
+    const canvas = document.createElement("canvas");
+    [canvas.width, canvas.height] = [PNG_SCALE * image.naturalWidth, PNG_SCALE * image.naturalHeight];
+    canvas.getContext("2d")?.drawImage(image, 0, 0, canvas.width, canvas.height);
+    const blob = await new Promise<Blob | null>((resolve) => canvas.toBlob(resolve));
+    if (blob === null) throw new Error("This browser cannot make a PNG. Save the figure as SVG.");
+    return blob;
+  } finally {
+    URL.revokeObjectURL(address);
+  }
+}
 
 /** The picture, dark on white whatever the page's colors are; its legend and caption, which the page has as HTML, are drawn into it. */
 export function svgText(options: Plot.PlotOptions, label: string): string {
-  const drawn = Plot.plot({ ...options, width: WIDTH_PX, style: INK });
+  const drawn = Plot.plot({ ...inPaperStyle(options), width: WIDTH_PX, style: INK });
   const parts = drawn instanceof SVGSVGElement ? [drawn] : [...drawn.querySelectorAll<SVGSVGElement>(":scope > svg")];
   const whole = element("svg", { xmlns: SVG, "font-family": "sans-serif", "font-size": 12 });
   whole.append(element("title", {}, label));
@@ -33,13 +66,26 @@ export function svgText(options: Plot.PlotOptions, label: string): string {
     whole.append(part);
   }
   if (typeof options.caption === "string") {
-    whole.append(element("text", { x: 8, y: top + 14 }, options.caption));
-    top += LINE_PX;
+    for (const line of linesOf(options.caption)) {
+      whole.append(element("text", { x: 8, y: top + 14 }, line));
+      top += LINE_PX;
+    }
   }
   for (const [name, value] of Object.entries({ width: WIDTH_PX, height: top, viewBox: `0 0 ${WIDTH_PX} ${top}` }))
     whole.setAttribute(name, String(value));
   paper.setAttribute("height", String(top));
   return `<?xml version="1.0" encoding="UTF-8"?>\n${new XMLSerializer().serializeToString(whole)}\n`;
+}
+
+/** A text in lines that are no longer than the figure. */
+function linesOf(text: string): string[] {
+  const lines = [""];
+  for (const word of text.split(" ")) {
+    const longer = `${lines.at(-1) ?? ""} ${word}`.trim();
+    if (longer.length * GLYPH_PX > WIDTH_PX - 16) lines.push(word);
+    else lines[lines.length - 1] = longer;
+  }
+  return lines;
 }
 
 /** A legend of colors by name, in lines no longer than the figure. */

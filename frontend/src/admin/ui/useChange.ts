@@ -43,7 +43,11 @@ export function useChange<Input, T>(change: (input: Input) => Promise<T>, { touc
 
 /** Offer text as a file to save. */
 export function downloadText(name: string, text: string, type = "text/csv"): void {
-  const address = URL.createObjectURL(new Blob([text], { type }));
+  download(name, new Blob([text], { type }));
+}
+
+export function download(name: string, content: Blob): void {
+  const address = URL.createObjectURL(content);
   const link = document.createElement("a");
   link.href = address;
   link.download = name;

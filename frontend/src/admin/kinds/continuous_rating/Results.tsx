@@ -49,15 +49,13 @@ function TraceResults({ data, factors }: { data: Data; factors: Factors }) {
 
 function CellCard({ cell, data, label }: { cell: Cell; data: Data; label: string }) {
   const options = useMemo(() => cellTracePlot(cell, data), [cell, data]);
-  const blinks = cell.blinks_s.length > 0 ? " Ticks: blinks in the clips, one row per clip." : " No blinks are marked in its clips.";
-  const interval = cell.low === null ? "One person: no interval." : "Shaded: 95% interval over people.";
+  const blinks = cell.blinks_s.length > 0 ? "Ticks: blinks in the clips, one row per clip." : "No blinks are marked in its clips.";
   return (
     <Card withBorder>
       <Title order={2} size="h5">
         {label}
       </Title>
       <Text size="sm">
-        {interval}
         {blinks}
         {cell.left_out > 0 && ` ${cell.left_out} traces with another sampling rate are excluded.`}
       </Text>

@@ -3,6 +3,7 @@
 import * as Plot from "@observablehq/plot";
 import type { Schemas } from "../../api";
 import type { Row } from "../../ui/figure-files";
+import { PALETTE } from "../../results/plots";
 
 type Data = Schemas["TraceResults"];
 type Cell = Schemas["TraceCell"];
@@ -25,17 +26,18 @@ export function pointsOf(cell: Cell, label: string): Point[] {
   }));
 }
 
-const AXES = { height: 240, marginLeft: 44, marginBottom: 40 };
-const TIME = { label: "s in the clip", ticks: 6 };
+const AXES = { height: 240 };
+const TIME = { label: "time in the clip (s)", ticks: 6 };
 
 /** All cells' mean traces on one pair of axes. */
 export function tracesPlot({ cells, minimum, maximum }: Data, labels: Map<string, string>): Plot.PlotOptions {
   const rows = cells.flatMap((cell) => pointsOf(cell, labels.get(cell.cell) ?? cell.cell));
   return {
     ...AXES,
+    caption: "Means over people; the figures of single cells have their 95% CI.",
     x: TIME,
     y: { domain: [minimum, maximum], grid: true, label: "rating" },
-    color: { legend: true, scheme: "observable10", domain: [...labels.values()] },
+    color: { legend: true, domain: [...labels.values()], range: PALETTE },
     marks: [Plot.lineY(rows, { x: "time_s", y: "mean", stroke: "cell", tip: true })],
   };
 }
@@ -59,6 +61,7 @@ export function cellTracePlot(cell: Cell, data: Data): Plot.PlotOptions {
   const foot = ticks.length > 0 ? minimum - STRIP * (maximum - minimum) : minimum;
   return {
     ...AXES,
+    caption: `N = ${String(cell.people)}. Line: mean. ${cell.low === null ? "One person: no interval." : "Band: 95% CI over people."}`,
     x: TIME,
     y: { domain: [foot, maximum], ticks: [minimum, (minimum + maximum) / 2, maximum], grid: true, label: "rating" },
     marks: [

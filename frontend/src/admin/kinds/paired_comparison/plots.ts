@@ -29,7 +29,6 @@ export function choicePlot({ pairs }: Data, labels: Map<string, string>): Plot.P
   return {
     height: 80 + 44 * names.length,
     marginLeft: leftOf(names),
-    marginBottom: 40,
     x: { domain: names, label: "over", tickFormat: (name: string) => numbers.get(name) ?? "" },
     y: { domain: names, label: null },
     color: { type: "linear", scheme: "PuOr", domain: [0, 1], legend: true, label: "share chosen", tickFormat: ".0%" },
@@ -54,14 +53,16 @@ export function levelPlot(name: string, { levels }: Data, factors: Factors): Plo
     .filter((level) => level.factor === name && level.share !== null)
     .map(({ level, n, share }) => ({ level: labels.of(level), share: share ?? 0, n }));
   if (rows.length === 0) return null;
+  const counts = rows.map(({ n }) => n);
+  const comparisons = [...new Set([Math.min(...counts), Math.max(...counts)])].join(" to ");
   return {
-    height: 210,
-    marginLeft: 48,
-    marginBottom: 52,
+    height: 230,
+    caption: `N = ${comparisons} comparisons per level, ties as half. Dashed: no preference. The report has the intervals.`,
+    marginBottom: 68,
     x: { domain: labels.all, label: null },
     y: { domain: [0, 1], tickFormat: ".0%", grid: true, label: "chosen over other levels" },
     marks: [
-      Plot.axisX({ lineWidth: 24 / Math.max(3, labels.all.length), label: null }),
+      Plot.axisX({ lineWidth: 24 / Math.max(3, labels.all.length), label: labels.title, labelAnchor: "center", labelArrow: "none" }),
       Plot.ruleY([0.5], { strokeDasharray: "4 3", strokeOpacity: 0.6 }),
       Plot.dot(rows, { x: "level", y: "share", r: 4, fill: "currentColor", tip: true, channels: { comparisons: "n" } }),
     ],

@@ -44,8 +44,6 @@ function planePlot(series: Series, along: string, second: { title: string; middl
   const mean = series.mean === null ? [] : [{ value: series.mean, second: second.middle }];
   return {
     height: 260,
-    marginLeft: 56,
-    marginBottom: 40,
     x: { label: along, nice: true, ticks: 6 },
     y: { label: second.title, nice: true, inset: 14, ticks: [...new Set(rows.map((row) => row.second ?? 0))] },
     color: { type: "linear", scheme: "viridis", domain: [0, 1], tickFormat: ".0%", label: positive, legend: true },
@@ -61,8 +59,6 @@ function linePlot(series: Series, along: string, positive: string): Plot.PlotOpt
   const { rows, radius } = rowsOf(series);
   return {
     height: 230,
-    marginLeft: 48,
-    marginBottom: 40,
     x: { label: along, nice: true, ticks: 6 },
     y: { domain: [-0.06, 1], ticks: [0, 0.25, 0.5, 0.75, 1], tickFormat: ".0%", grid: true, label: positive },
     marks: [
