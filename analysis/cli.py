@@ -18,7 +18,7 @@ def _gather() -> None:
     from analysis.commands.plan import register_plan
     from analysis.commands.ranks import register_ranks
     from analysis.commands.run import register_run
-    from analysis.commands.tables import register_convert, register_reshape
+    from analysis.commands.tables import register_columns, register_convert, register_reshape
 
     register_run(app)
     register_anova(app)
@@ -31,6 +31,7 @@ def _gather() -> None:
     register_agreement(app)
     register_verify(app)
     register_replicate(app)
+    register_columns(app)
     register_convert(app)
     register_reshape(app)
     register_plan(app)

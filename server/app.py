@@ -30,6 +30,7 @@ from server.privacy.retention import hourly_retention
 from server.rehearsals import endpoints as rehearsals
 from server.request_limits import ConcurrencyLimit, RequestLimits
 from server.results import endpoints as results
+from server.results import own_tables
 from server.results.kinds import results_counted_ahead
 from server.studies import clip_endpoints, library
 from server.studies import endpoints as studies
@@ -73,6 +74,7 @@ def _routers() -> tuple[APIRouter, ...]:
         rehearsals.router,
         exports.capsule_router,
         results.methods_router,
+        own_tables.router,
         library.blink_router,
         library.strip_router,
         web.page_router,

@@ -3,7 +3,7 @@
 from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -14,9 +14,16 @@ from analysis.commands.output import (
     progress_spinner,
     save_json,
     scale_bounds,
+    show_figure,
     show_tables,
     show_text,
 )
+
+if TYPE_CHECKING:
+    from analysis.report.contents import Picture
+
+MAX_DRAWN = 40
+"""Items in a figure of opinion scores."""
 
 # `analysis reliability` and `analysis agreement`.
 
@@ -231,6 +238,19 @@ def opinion(
     result = fit_opinion(votes, repeats.value, standard)
     save_json(json, asdict(result), votes.synthetic)
     show_text(opinion_text(result, file.stem, votes.synthetic))
+    rows = [(one.name, one.mos, one.ci_low, one.ci_high) for one in result.items]
+    show_figure(lambda: _draw_scores(rows, votes.synthetic))
     show_tables(
         scores_table(result, file.stem, votes.synthetic), raters_table(result, file.stem, votes.synthetic)
     )
+
+
+def _draw_scores(rows: list[tuple[str, float, float, float]], synthetic: bool) -> "Picture":
+    """Mean opinion scores, the best on top; of many items the best and the worst."""
+    from analysis.report.pictures import draw_estimates
+
+    ranked = sorted(rows, key=lambda row: -row[1])
+    shown = ranked if len(ranked) <= MAX_DRAWN else ranked[: MAX_DRAWN // 2] + ranked[-MAX_DRAWN // 2 :]
+    left_out = f" The best and the worst {MAX_DRAWN // 2} of {len(rows)}." if len(rows) > len(shown) else ""
+    note = f"Bars: 95% intervals.{left_out}"
+    return draw_estimates("figure-scores", "Mean opinion scores", "MOS", shown, note, synthetic)

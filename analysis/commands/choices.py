@@ -1,8 +1,10 @@
 """`analysis pairs` and `analysis thresholds`."""
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from enum import StrEnum
-from math import isfinite
+from functools import partial
+from hashlib import sha256
+from math import isfinite, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,16 +15,20 @@ from analysis.commands.output import (
     LevelsOption,
     progress_spinner,
     save_json,
+    show_figure,
     show_tables,
     show_text,
 )
 from experiments.errors import InputError
 
 if TYPE_CHECKING:
+    from analysis.pairs.abilities import PairsResult
     from analysis.pairs.comparisons import Comparisons
     from analysis.pairs.intervals import QuestionPair
     from analysis.pairs.jod import Prior
+    from analysis.report.contents import Picture
     from analysis.thresholds.answers import Answers
+    from analysis.thresholds.people import ThresholdsResult
 
 
 # `analysis pairs`.
@@ -290,7 +296,18 @@ def _show_abilities(
         if result.factors:
             show_tables(factors_table(result, title, comparisons.synthetic))
         show_tables(contrasts_table(result, title, comparisons.synthetic))
+        show_figure(partial(_draw_items, result, part, comparisons))
     show_tables(questions_table(compared, name, comparisons.synthetic))
+
+
+def _draw_items(result: "PairsResult", content: str, comparisons: "Comparisons") -> "Picture":
+    from analysis.report.figures import draw_abilities
+
+    drawn = draw_abilities(result, comparisons.synthetic, len(comparisons.participants))
+    words = f"{drawn.caption}, {content}" if content else drawn.caption
+    # The file's name may not hold what a content may be called.
+    mark = f"-{sha256(content.encode()).hexdigest()[:8]}" if content else ""
+    return replace(drawn, key=f"{drawn.key}{mark}", caption=words)
 
 
 def _anchor(reference: str | None) -> tuple[str | None, float]:
@@ -402,6 +419,24 @@ def thresholds(
     show_tables(threshold_table(result, file.stem, answers.synthetic))
     if result.people:
         show_tables(people_table(result, file.stem, answers.synthetic))
+    show_figure(partial(_draw_thresholds, result, x, answers.synthetic))
+
+
+def _draw_thresholds(result: "ThresholdsResult", x: str, synthetic: bool) -> "Picture":
+    from analysis.report.pictures import draw_estimates
+
+    rows = [
+        (
+            name,
+            one.threshold,
+            nan if one.threshold_ci.low is None else one.threshold_ci.low,
+            nan if one.threshold_ci.high is None else one.threshold_ci.high,
+        )
+        for name, one in result.pooled.items()
+    ]
+    note = "Bars: 95% profile likelihood intervals, all trials together."
+    axis = f"Threshold, in the unit of {x}"
+    return draw_estimates("figure-thresholds", "Thresholds", axis, rows, note, synthetic)
 
 
 def _planes(

@@ -2,6 +2,7 @@
 
 from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast
 
@@ -14,15 +15,20 @@ from analysis.commands.output import (
     progress_spinner,
     refuse_unwritable,
     save_json,
+    show_decisions,
+    show_figure,
     show_tables,
+    show_text,
 )
 from experiments.errors import InputError
 
 if TYPE_CHECKING:
     from analysis.models.columns import Slopes
+    from analysis.models.means import ModelMeans
     from analysis.models.ordinal import OrdinalResult
     from analysis.models.random_part import MixedResult
     from analysis.read.model_csv import ModelInput
+    from analysis.report.contents import Picture
 
 
 FileArgument = Annotated[
@@ -234,6 +240,8 @@ def mixed(
     tables = [mixed_effects_table(*named), mixed_components_table(*named)]
     show_tables(*tables, *([mixed_coefficients_table(*named)] if intervals else []), *means_tables(*named))
     _show_residuals(residuals, *named)
+    if result.means is not None:
+        show_figure(partial(_draw_means, result.means, model.rating, data.synthetic))
 
 
 def ordinal(
@@ -336,6 +344,8 @@ def ordinal(
     tables = (ordinal_effects_table, ordinal_coefficients_table, ordinal_components_table)
     show_tables(*(table(*named) for table in tables), *means_tables(*named))
     _show_residuals(residuals, *named)
+    if result.means is not None:
+        show_figure(partial(_draw_means, result.means, f"{model.rating}, logits", data.synthetic))
 
 
 @dataclass(frozen=True)
@@ -420,9 +430,18 @@ def _show_residuals(
 
 
 def _show(file: Path, data: "ModelInput", text: str) -> None:
-    from analysis.report.formats import wrap
-
     if data.synthetic:
         typer.echo("SYNTHETIC DATA: no person gave these ratings")
-    for said in (f"{file.name}: {text}", *(f"- {decision}" for decision in data.decisions)):
-        typer.echo("\n".join(wrap(said)))
+    show_text(f"{file.name}: {text}")
+    show_decisions(data.decisions)
+
+
+def _draw_means(means: "ModelMeans", rating: str, synthetic: bool) -> "Picture":
+    """The means of single factors; of a model without factors, its trends."""
+    from analysis.report.pictures import draw_estimates
+
+    single = [one for one in means.means if len(one.levels) == 1]
+    rows = [(", ".join(one.levels.values()), one.estimate, *one.ci) for one in single]
+    rows = rows or [(one.covariate, one.estimate, *one.ci) for one in means.trends]
+    note = "Bars: 95% intervals of the model."
+    return draw_estimates("figure-means", "Marginal means", rating, rows, note, synthetic)

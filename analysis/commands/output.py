@@ -1,8 +1,10 @@
 """What the commands share: the option `--scale`, tables, JSON and a spinner."""
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,7 +13,7 @@ import typer
 from experiments.errors import InputError
 
 if TYPE_CHECKING:
-    from analysis.report.contents import Contents
+    from analysis.report.contents import Contents, Picture
     from analysis.report.formats import Table
 
 
@@ -46,12 +48,29 @@ def names_in(text: str) -> list[str]:
     return [name.strip() for name in text.split(",") if name.strip()]
 
 
+@dataclass
+class ShownResult:
+    """What a command shows, for a page: `analysis page` collects it next to what is printed."""
+
+    sentences: list[str] = field(default_factory=list)
+    decisions: list[str] = field(default_factory=list)
+    tables: list["Table"] = field(default_factory=list)
+    draw: list[Callable[[], "tuple[Picture, ...]"]] = field(default_factory=list)
+    synthetic: bool = False
+
+
+SHOWN: ContextVar[ShownResult | None] = ContextVar("SHOWN", default=None)
+"""Where what is shown is also collected; None but in `analysis page`."""
+
+
 def show_tables(*tables: "Table") -> None:
     """Print tables that have rows, at most 80 columns wide."""
     from analysis.report.formats import as_text
 
     for table in (table for table in tables if table.rows):
         typer.echo("\n" + as_text(table))
+        if (shown := SHOWN.get()) is not None:
+            shown.tables.append(table)
 
 
 def show_text(text: str) -> None:
@@ -59,6 +78,18 @@ def show_text(text: str) -> None:
     from analysis.report.formats import wrap
 
     typer.echo("\n".join(wrap(text)))
+    if (shown := SHOWN.get()) is not None:
+        shown.sentences.append(text)
+
+
+def show_decisions(decisions: Sequence[str]) -> None:
+    """Print what was decided while reading, in lines of at most 80 columns."""
+    from analysis.report.formats import wrap
+
+    for decision in decisions:
+        typer.echo("\n".join(wrap(f"- {decision}")))
+    if (shown := SHOWN.get()) is not None:
+        shown.decisions += decisions
 
 
 def show(contents: "Contents") -> None:
@@ -71,6 +102,12 @@ def show(contents: "Contents") -> None:
     said = [*contents.left_out, *contents.decisions]
     lines += [part for text in said for part in wrap(f"- {text}")]
     typer.echo("\n".join(lines))
+    if (shown := SHOWN.get()) is not None:
+        shown.decisions += said
+        for part in contents.parts:
+            shown.sentences += part.sentences
+            shown.tables += part.tables
+            shown.draw.append(part.draw)
     for part in contents.parts:
         if part.title:
             typer.echo(f"\n{part.title}")
@@ -101,6 +138,8 @@ def save_json(path: Path | None, numbers: dict[str, Any], synthetic: bool | None
     """
     from experiments.files import json_text, whole_file
 
+    if (shown := SHOWN.get()) is not None:
+        shown.synthetic = bool(numbers.get("synthetic", synthetic))
     if path is None:
         return
     said = {} if synthetic is None else {"synthetic": synthetic}
@@ -131,6 +170,34 @@ def _say_model(script: str) -> None:
         f"{script}: R fits the model again, which takes minutes; press Ctrl-C to leave it unverified",
         err=True,
     )
+
+
+def show_figure(draw: "Callable[[], Picture]") -> None:
+    """Keep what draws a figure, where figures are collected; a terminal shows none."""
+    if (shown := SHOWN.get()) is not None:
+        shown.draw.append(lambda: (draw(),))
+
+
+def save_page(shown: ShownResult, folder: Path, command_line: str) -> None:
+    """Write `page.json` (the command, sentences, decisions, tables) and the figures as SVG and PNG."""
+    from experiments.files import json_text, whole_file
+
+    pictures = [picture for draw in shown.draw for picture in draw()]
+    page = {
+        "command_line": command_line,
+        "synthetic": shown.synthetic,
+        "sentences": shown.sentences,
+        "decisions": shown.decisions,
+        "tables": [asdict(table) for table in shown.tables],
+        "figures": [{"key": one.key, "caption": one.caption, "alt": one.alt} for one in pictures],
+    }
+    files = {"page.json": json_text(page).encode()}
+    for one in pictures:
+        files |= {f"{one.key}.svg": one.svg, f"{one.key}.png": one.png}
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, content in files.items():
+        with whole_file(folder / name) as temporary:
+            temporary.write_bytes(content)
 
 
 @contextmanager

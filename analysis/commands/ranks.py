@@ -1,9 +1,10 @@
 """`analysis ranks` and `analysis t-test`: tests of one factor, or of one sample."""
 
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -13,6 +14,8 @@ from analysis.commands.output import (
     equivalence_bounds,
     save_json,
     scale_bounds,
+    show_decisions,
+    show_figure,
     show_tables,
     show_text,
 )
@@ -21,6 +24,8 @@ from experiments.errors import InputError
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
+    from analysis.report.contents import Picture
 
 
 FileArgument = Annotated[Path, typer.Argument(help="CSV file, one row per trial (or one per cell).")]
@@ -95,7 +100,7 @@ def ranks(
     import numpy as np
 
     from analysis.ranks import rank_against, rank_between, rank_within
-    from analysis.report.rank_tables import levels_table, pairs_table
+    from analysis.report.rank_tables import levels_table, pairs_table, ranks_text
 
     data = _levels_of(file, (participant, rating), (within, between), scale, levels)
     bounds = equivalence_bounds(equivalence)
@@ -109,9 +114,10 @@ def ranks(
         raise InputError("expected a factor (--within or --between COLUMN), or a value (--against 4)")
     result = replace(result, decisions=data.decisions)
     save_json(json, asdict(result), data.synthetic)
-    for decision in result.decisions:
-        typer.echo(f"- {decision}")
+    show_decisions(result.decisions)
     named = (result, file.stem, data.synthetic)
+    show_text(ranks_text(*named))
+    show_figure(partial(_draw_levels, data, rating, "median"))
     show_tables(*([levels_table(*named)] if result.test else []), pairs_table(*named))
 
 
@@ -158,10 +164,18 @@ def t_test(
         raise InputError("expected groups (--between COLUMN), or a value (--against 4)")
     result = replace(result, decisions=data.decisions)
     save_json(json, asdict(result), data.synthetic)
-    for decision in result.decisions:
-        typer.echo(f"- {decision}")
+    show_decisions(result.decisions)
     show_text(means_text(result, file.stem, data.synthetic))
+    show_figure(partial(_draw_levels, data, rating, "mean"))
     show_tables(mean_tests_table(result, file.stem, data.synthetic))
+
+
+def _draw_levels(data: _Levels, rating: str, center: Literal["mean", "median"]) -> "Picture":
+    from analysis.report.pictures import draw_people
+
+    levels = [(name, values) for name, values in zip(data.names, data.values, strict=True)]
+    title = f"{rating} by {data.factor}" if data.factor else rating
+    return draw_people(title, rating, levels, center, data.synthetic)
 
 
 def _levels_of(

@@ -1,11 +1,27 @@
-"""`analysis convert` and `analysis reshape`."""
+"""`analysis columns`, `convert` and `reshape`, and `page`: tables before and after an analysis."""
 
+import json as json_module
+import shlex
+from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
+from analysis.commands.output import (
+    SHOWN,
+    JsonOption,
+    ShownResult,
+    save_json,
+    save_page,
+    show_tables,
+    show_text,
+)
 from experiments.errors import InputError
+from table_files import counted
+
+MAX_LISTED = 20
+"""Columns of a table that `analysis columns` describes, whether or not they have a role."""
 
 # `analysis convert`: a CSV whose columns are declared, as SPSS or Parquet.
 
@@ -89,3 +105,70 @@ def reshape(
         f"{', '.join(table.beside) or 'none'}"
     )
     typer.echo(f"written: {out} ({len(table.rows)} rows)")
+
+
+# `analysis columns`: what a table may be, and the command that fits it.
+
+
+def register_columns(app: typer.Typer) -> None:
+    """Add the commands to `app`."""
+    app.command(name="columns")(columns)
+    app.command(name="page", hidden=True)(page)
+
+
+def columns(
+    file: Annotated[Path, typer.Argument(help="CSV, Excel, SPSS or JSON file, or a folder of CSV files.")],
+    json: JsonOption = None,
+) -> None:
+    """Show what the columns of a table hold, and suggest the command that fits.
+
+    Example:
+
+      analysis columns ratings.csv
+    """
+    from analysis.read.column_roles import ONE_FACTOR, OPTIONS, SEVERAL, guess_roles, said_of_values
+    from analysis.report.formats import Table
+
+    guess = guess_roles(file)
+    shown = guess.command_line(str(file)) if guess.command else ""
+    commands = {
+        name: {"needed": needed, "optional": optional} for name, (needed, optional) in OPTIONS.items()
+    }
+    several = {"roles": SEVERAL, "not_in": ONE_FACTOR}
+    save_json(json, {**asdict(guess), "command_line": shown, "commands": commands, "several": several})
+    for decision in guess.decisions:
+        typer.echo(f"- {decision}")
+    # Exports have dozens of columns: the analysis takes part in few.
+    listed = [one for one in guess.columns if one.role or len(guess.columns) <= MAX_LISTED]
+    rows = tuple((one.name, said_of_values(one), one.role or "-") for one in listed)
+    title = f"{file.name}: {counted(guess.n_rows, 'row')}, {counted(len(guess.columns), 'column')}"
+    show_tables(Table("columns", title, ("Column", "Values", "Role"), rows, 3))
+    if others := [one.name for one in guess.columns if one not in listed]:
+        show_text(f"No role: {', '.join(others)}")
+    typer.echo(f"\n{shown}" if shown else "\nNo analysis fits these names. See analysis --help.")
+
+
+def page(
+    context: typer.Context,
+    file: Annotated[Path, typer.Argument(help="The table.")],
+    folder: Annotated[Path, typer.Argument(help="Folder to write page.json and the figures to.")],
+    roles: Annotated[Path, typer.Option(help="JSON file: the command, and the role of each column.")],
+) -> None:
+    """Run the command that a JSON file names, and write what it shows for a page of the admin site.
+
+    Example:
+
+      analysis page ratings.csv results --roles roles.json
+    """
+    from analysis.read.column_roles import options_of
+
+    asked = json_module.loads(roles.read_text(encoding="utf-8"))
+    command, shown_name = asked["command"], asked.get("name", file.name)
+    options = options_of(command, asked["roles"])
+    more = ["--means"] if command in ("mixed", "ordinal") else []
+    collected = ShownResult()
+    SHOWN.set(collected)
+    program: Any = context.find_root().command
+    program.main([command, str(file), *options, *more], standalone_mode=False)
+    line = shlex.join(["analysis", command, shown_name, *options, *more])
+    save_page(collected, folder, line)

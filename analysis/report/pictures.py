@@ -1,18 +1,26 @@
 """What all figures share: colors, style, and bytes that do not differ from run to run."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from io import BytesIO
 from textwrap import wrap
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib import font_manager
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.ticker import FixedFormatter, FuncFormatter
+from numpy.typing import NDArray
+from scipy import special
+
+from analysis.report.contents import Picture
+from table_files import counted
+
+Floats = NDArray[np.float64]
 
 # Letters of names in figures: which of them the figures' own font lacks, and what draws those.
 
@@ -152,3 +160,88 @@ def in_both_formats(figure: Figure) -> tuple[bytes, bytes]:
 
 def _drawn(by: Callable[..., None], into: BytesIO, metadata: dict[str, None]) -> None:
     by(into, metadata=metadata)
+
+
+# Figures of one command: estimates with intervals, and every person's mean in each level.
+
+
+def draw_estimates(
+    key: str,
+    caption: str,
+    axis: str,
+    rows: Sequence[tuple[str, float, float, float]],
+    note: str,
+    synthetic: bool,
+) -> Picture:
+    """Estimates with intervals, the first on top.
+
+    Parameters
+    ----------
+    key, caption : str
+        File stem and title.
+    axis : str
+        What the estimates are, with the unit.
+    rows : sequence of (name, estimate, low, high)
+    note : str
+        Below the figure: what the bars are.
+    synthetic : bool
+        Whether no person gave the data; marked.
+    """
+    ends = list(reversed(rows))
+    with mpl.rc_context(STYLE):
+        figure = new_figure(7.2, 1.5 + 0.32 * len(ends))
+        axes = figure.add_subplot()
+        values = np.array([row[1:] for row in ends], dtype=np.float64)
+        # A limit that does not exist leaves the point without its bar on that side.
+        reach = np.nan_to_num(np.abs(values[:, 1:] - values[:, :1]), posinf=0.0)
+        bars: dict[str, Any] = {"linestyle": "none", "marker": "o", "color": COLOURS[0], "capsize": 3.2}
+        axes.errorbar(values[:, 0], range(len(ends)), xerr=reach.T, **bars)
+        axes.set_yticks(range(len(ends)), [wrap_text(row[0], 40) for row in ends])
+        axes.set_xlabel(axis)
+        axes.grid(axis="x", linewidth=0.4, alpha=0.5)
+        axes.set_axisbelow(True)
+        write_note(figure, note, synthetic)
+        ends_said = f"from {values[:, 0].min():.3g} to {values[:, 0].max():.3g}"
+        alt = f"{axis}: {counted(len(rows), 'estimate')} with intervals, {ends_said}"
+        return Picture(key, caption, alt, *in_both_formats(figure))
+
+
+def draw_people(
+    caption: str, axis: str, levels: Sequence[tuple[str, Floats]], center: str, synthetic: bool
+) -> Picture:
+    """Every person's value in each level, and the level's mean with its 95% t interval, or its median.
+
+    Parameters
+    ----------
+    caption, axis : str
+        Title, and what the values are.
+    levels : sequence of (name, values (n,))
+    center : {"mean", "median"}
+    synthetic : bool
+        Whether no person gave the data; marked.
+    """
+    with mpl.rc_context(STYLE):
+        figure = new_figure(max(3.6, 1.4 + 0.9 * len(levels)), 4.0)
+        axes = figure.add_subplot()
+        for at, (_, values) in enumerate(levels):
+            spread = 0.16 * np.linspace(-1, 1, len(values)) if len(values) > 1 else np.zeros(1)
+            # Neighbors in the file would lie side by side: a golden step scatters them, the same in each run.
+            offsets = spread[np.argsort((np.arange(len(values)) * 0.618033988749895) % 1)]
+            faint: dict[str, Any] = {"alpha": 0.3, "markersize": 3.5, "markeredgewidth": 0}
+            axes.plot(at + offsets, values, "o", color=COLOURS[0], **faint)
+            if center == "median":
+                axes.plot([at - 0.25, at + 0.25], [np.median(values)] * 2, color=COLOURS[0], linewidth=2)
+            else:
+                n = len(values)
+                reach = float(special.stdtrit(n - 1, 0.975)) if n > 1 else 0.0
+                half = reach * values.std(ddof=min(1, n - 1)) / np.sqrt(n)
+                axes.errorbar(at, values.mean(), half, marker="o", color=COLOURS[0], capsize=4, markersize=7)
+        axes.set_xticks(range(len(levels)), [wrap_text(name, 14) for name, _ in levels])
+        axes.set_xlim(-0.6, len(levels) - 0.4)
+        axes.set_ylabel(axis)
+        axes.grid(axis="y", linewidth=0.4, alpha=0.5)
+        kind = "medians" if center == "median" else "means with 95% t intervals"
+        write_note(figure, f"Bars: {kind}. Points: one per participant.", synthetic)
+        named = ", ".join(name for name, _ in levels)
+        alt = f"{axis} of every participant in {counted(len(levels), 'level')}: {named}"
+        return Picture("figure-levels", caption, alt, *in_both_formats(figure))

@@ -7,6 +7,7 @@ from analysis.report.contents import caption, mark_name
 from analysis.report.formats import Table
 from analysis.report.numbers import DASH, apa_p, fixed, interval, p_value, share, share_interval
 from analysis.t_tests import MeansAnalysis
+from analysis.within.simple_effects import SIGNIFICANCE
 
 EFFECTS = {"Friedman": "Kendall's W", "Kruskal-Wallis": "Epsilon squared, H / (N - 1)"}
 
@@ -27,6 +28,23 @@ def levels_table(result: RankAnalysis, name: str, synthetic: bool = False) -> Ta
     bounds = share_interval((test.effect_low, test.effect_high))
     notes = (f"{test.name} test, corrected for ties. Effect: {EFFECTS[test.name]}, 95% CI {bounds}.",)
     return Table("ranks", caption(f"{test.name} test", name, synthetic), header, rows, 1, notes)
+
+
+def ranks_text(result: RankAnalysis, name: str, synthetic: bool = False) -> str:
+    """The test of all levels in a sentence, else that of each pair or value that is significant."""
+    if (test := result.test) is not None:
+        verdict = "differed" if test.p_value < SIGNIFICANCE else "did not differ significantly"
+        symbol = "W" if test.name == "Friedman" else "ε²"
+        bounds = share_interval((test.effect_low, test.effect_high))
+        return (
+            f"{mark_name(name, synthetic)}: ratings {verdict} between levels of {result.factor}, "
+            f"χ²({test.df}, N = {sum(result.n) if result.design == 'between' else result.n[0]}) = "
+            f"{fixed(test.chi2)}, {apa_p(test.p_value)}, {symbol} = {share(test.effect)}, 95% CI {bounds}."
+        )
+    found = [pair for pair in result.pairs if pair.p_holm < SIGNIFICANCE]
+    named = "; ".join(f"{pair.first} and {pair.second}, {apa_p(pair.p_holm)} (Holm)" for pair in found)
+    start = mark_name(name, synthetic)
+    return f"{start}: significant differences: {named}." if found else f"{start}: no significant difference."
 
 
 def pairs_table(result: RankAnalysis, name: str, synthetic: bool = False) -> Table:

@@ -40,8 +40,7 @@ def run_analysis(
     manifest: Path | None = None,
 ) -> str:
     """Write the report into `folder`; return the analysis' own error line where it failed, else ''."""
-    program = Path(sys.executable).with_name("analysis")
-    command = [str(program), "run", str(definition), "--csv", str(answers)]
+    command = [analysis_program(), "run", str(definition), "--csv", str(answers)]
     command += ["--runs", str(runs)]
     command += ["--origin", origin, "--series", str(series), "--out", str(folder)]
     command += [] if sensitivity else ["--no-sensitivity"]
@@ -50,9 +49,19 @@ def run_analysis(
     done = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST_S, check=False)  # noqa: S603
     if done.returncode == 0:
         return ""
-    lines = [line for line in (done.stderr or done.stdout).splitlines() if line.strip()]
     shutil.rmtree(folder, ignore_errors=True)
-    return (lines[-1] if lines else f"the analysis ended with code {done.returncode}")[:500]
+    reason = last_line(done.stderr or done.stdout)
+    return (reason or f"the analysis ended with code {done.returncode}")[:500]
+
+
+def analysis_program() -> str:
+    """The command `analysis` of this installation."""
+    return str(Path(sys.executable).with_name("analysis.exe" if sys.platform == "win32" else "analysis"))
+
+
+def last_line(printed: str) -> str:
+    """The last line that is not empty: a command line prints its error there."""
+    return next((line for line in reversed(printed.splitlines()) if line.strip()), "")
 
 
 # Work in the background that a row of `jobs` describes: reports, capsules and rehearsals.

@@ -57,6 +57,11 @@ const figures = createRoute({
   component: lazyRouteComponent(() => import("./figures/FiguresPage"), "FiguresPage"),
 });
 
+const analyze = createRoute({
+  ...page,
+  path: "/analyze",
+  component: lazyRouteComponent(() => import("./results/AnalyzePage"), "AnalyzePage"),
+});
 const labelling = createRoute({
   ...page,
   path: "/labelling",
@@ -115,6 +120,7 @@ const tree = root.addChildren([
     backups,
     audit,
     figures,
+    analyze,
     labelling,
     blinkReview,
     study.addChildren(tabs),

@@ -613,6 +613,16 @@ export interface paths {
   };
   get: operations["get_methods_text"];
  };
+ "/api/admin/analyses/columns": {
+  parameters: {
+  };
+  post: operations["describe_columns"];
+ };
+ "/api/admin/analyses": {
+  parameters: {
+  };
+  post: operations["analyze_table"];
+ };
  "/api/admin/blinks/library": {
   parameters: {
   };
@@ -1002,6 +1012,10 @@ export interface components {
    name: string;
    version?: number | null;
    workspace?: string | null;
+  };
+  CommandRoles: {
+   needed: string[];
+   optional: string[];
   };
   ComparedVersion: {
    study: string;
@@ -2167,6 +2181,15 @@ export interface components {
   OwnAddress: {
    address: string | null;
   };
+  OwnAnalysis: {
+   name: string;
+   /** Format: base64 */
+   content: string;
+   command: string;
+   roles: {
+    [key: string]: string;
+   };
+  };
   OwnClips: {
    /**
    * @default rating
@@ -2180,6 +2203,37 @@ export interface components {
    low?: string;
    /** @default very natural */
    high?: string;
+  };
+  OwnColumn: {
+   name: string;
+   is_number: boolean;
+   n_values: number;
+   n_missing: number;
+   values: string[];
+   role: string;
+  };
+  OwnColumns: {
+   n_rows: number;
+   columns: components["schemas"]["OwnColumn"][];
+   command: string;
+   decisions: string[];
+   commands: {
+    [key: string]: components["schemas"]["CommandRoles"];
+   };
+   several: components["schemas"]["SeveralColumns"];
+  };
+  OwnResult: {
+   command_line: string;
+   synthetic: boolean;
+   sentences: string[];
+   decisions: string[];
+   tables: components["schemas"]["ResultTable"][];
+   figures: components["schemas"]["ResultFigure"][];
+  };
+  OwnTable: {
+   name: string;
+   /** Format: base64 */
+   content: string;
   };
   PairChoices: {
    first: string;
@@ -2715,12 +2769,28 @@ export interface components {
    finished_at: string | null;
    files: string[];
   };
+  ResultFigure: {
+   key: string;
+   caption: string;
+   alt: string;
+   svg: string;
+   png: string;
+  };
   ResultScale: {
    name: string;
    type: string;
    minimum: number;
    maximum: number;
    reverse: boolean;
+  };
+  ResultTable: {
+   key: string;
+   title: string;
+   header: string[];
+   rows: string[][];
+   text_columns: number;
+   notes: string[];
+   folded: boolean;
   };
   Results: {
    study: string;
@@ -3006,6 +3076,10 @@ export interface components {
   SetMember: {
    /** @enum {string} */
    role: "viewer" | "experimenter" | "owner";
+  };
+  SeveralColumns: {
+   roles: string[];
+   not_in: string[];
   };
   ShippedExperiment: {
    name: string;
@@ -3820,6 +3894,7 @@ export type ClipOut = components['schemas']['ClipOut'];
 export type ClipRating = components['schemas']['ClipRating'];
 export type ClipResult = components['schemas']['ClipResult'];
 export type CloneStudy = components['schemas']['CloneStudy'];
+export type CommandRoles = components['schemas']['CommandRoles'];
 export type ComparedVersion = components['schemas']['ComparedVersion'];
 export type Comparison = components['schemas']['Comparison'];
 export type ComparisonAnswer = components['schemas']['ComparisonAnswer'];
@@ -3932,7 +4007,12 @@ export type Option = components['schemas']['Option'];
 export type OtherResults = components['schemas']['OtherResults'];
 export type OtherWay = components['schemas']['OtherWay'];
 export type OwnAddress = components['schemas']['OwnAddress'];
+export type OwnAnalysis = components['schemas']['OwnAnalysis'];
 export type OwnClips = components['schemas']['OwnClips'];
+export type OwnColumn = components['schemas']['OwnColumn'];
+export type OwnColumns = components['schemas']['OwnColumns'];
+export type OwnResult = components['schemas']['OwnResult'];
+export type OwnTable = components['schemas']['OwnTable'];
 export type PairChoices = components['schemas']['PairChoices'];
 export type PairResults = components['schemas']['PairResults'];
 export type PairedComparison = components['schemas']['PairedComparison'];
@@ -3974,7 +4054,9 @@ export type ReplayedPlay = components['schemas']['ReplayedPlay'];
 export type ReplayedTrial = components['schemas']['ReplayedTrial'];
 export type ReplayedView = components['schemas']['ReplayedView'];
 export type ReportOut = components['schemas']['ReportOut'];
+export type ResultFigure = components['schemas']['ResultFigure'];
 export type ResultScale = components['schemas']['ResultScale'];
+export type ResultTable = components['schemas']['ResultTable'];
 export type Results = components['schemas']['Results'];
 export type Retention = components['schemas']['Retention'];
 export type RetentionPreview = components['schemas']['RetentionPreview'];
@@ -4005,6 +4087,7 @@ export type Session = components['schemas']['Session'];
 export type SessionOut = components['schemas']['SessionOut'];
 export type SetGrant = components['schemas']['SetGrant'];
 export type SetMember = components['schemas']['SetMember'];
+export type SeveralColumns = components['schemas']['SeveralColumns'];
 export type ShippedExperiment = components['schemas']['ShippedExperiment'];
 export type ShownAnswer = components['schemas']['ShownAnswer'];
 export type ShownCheck = components['schemas']['ShownCheck'];
@@ -8753,6 +8836,76 @@ export interface operations {
    200: {
     headers: {
      [name: string]: unknown;
+    };
+   };
+   422: {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["ErrorBody"];
+    };
+   };
+   "4XX": {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["ErrorBody"];
+    };
+   };
+  };
+ };
+ describe_columns: {
+  parameters: {
+  };
+  requestBody: {
+   content: {
+    "application/json": components["schemas"]["OwnTable"];
+   };
+  };
+  responses: {
+   200: {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["OwnColumns"];
+    };
+   };
+   422: {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["ErrorBody"];
+    };
+   };
+   "4XX": {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["ErrorBody"];
+    };
+   };
+  };
+ };
+ analyze_table: {
+  parameters: {
+  };
+  requestBody: {
+   content: {
+    "application/json": components["schemas"]["OwnAnalysis"];
+   };
+  };
+  responses: {
+   200: {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["OwnResult"];
     };
    };
    422: {

@@ -10,6 +10,7 @@ interface Known {
 }
 
 const FROM_CLIPS = "/studies/new";
+const FROM_TABLE = "/analyze";
 
 function whatIsKnown(): Known {
   const parts = new URLSearchParams(window.location.hash.slice(1));
@@ -21,7 +22,7 @@ function whatIsKnown(): Known {
 export function StartPage() {
   useDocumentTitle("Welcome – Palpebra");
   const [{ demo, invitation, folder }] = useState(whatIsKnown);
-  const entrance = invitation === null ? "/admin" + FROM_CLIPS : `/admin/invitation?next=${encodeURIComponent(FROM_CLIPS)}#${invitation}`;
+  const entrance = (to: string) => (invitation === null ? "/admin" + to : `/admin/invitation?next=${encodeURIComponent(to)}#${invitation}`);
   return (
     <Container size="lg" py={48} component="main">
       <Title order={1} ta="center">
@@ -48,14 +49,13 @@ export function StartPage() {
               : "Create your account first. Then upload clips, say what varies, and get a link for participants."
           }
           button={invitation === null ? "New study" : "Create account"}
-          href={entrance}
+          href={entrance(FROM_CLIPS)}
         />
         <Choice
           title="Analyze data"
-          text="Run an ANOVA, mixed models, pairs or opinion scores on a table that you already have."
-          button="Show me how"
-          href="/docs/tutorials/analyze-csv.html"
-          newTab
+          text="Drop a table of ratings that you already have: ANOVA, mixed models, pairs or opinion scores."
+          button="Choose a table"
+          href={entrance(FROM_TABLE)}
         />
       </SimpleGrid>
       <Group justify="center" mt="xl" gap="lg">

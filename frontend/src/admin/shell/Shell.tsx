@@ -48,6 +48,7 @@ function AccountMenu({ account }: { account: Schemas["AccountOut"] }) {
 const PAGE_TITLES: Record<string, string> = {
   "": "Studies",
   new: "New study",
+  analyze: "Analyze a table",
   blinks: "Blinks",
   labelling: "Label video",
   "blink-review": "Review blinks",
@@ -73,6 +74,7 @@ const SignInAgain = onDemand(async () => (await import("./SignInAgain")).SignInA
 
 const PAGES = [
   { to: "/", label: "Studies", role: "viewer", group: "Rating" },
+  { to: "/analyze", label: "Analyze a table", role: "viewer", group: "Rating" },
   { to: "/blinks", label: "Blinks", role: "viewer", group: "Stimuli" },
   { to: "/labelling", label: "Label video", role: "viewer", group: "Stimuli" },
   { to: "/blink-review", label: "Review blinks", role: "viewer", group: "Stimuli" },
