@@ -32,7 +32,7 @@ TABLE_COMMANDS = (
     *("pairs", "thresholds", "opinion", "reliability", "agreement"),
 )
 TABLE_MAKERS = ("synthesise",)
-FILE_OPTIONS = ("--json", "--out", "--scores", "--factors")
+FILE_OPTIONS = ("--json", "--out", "--scores", "--factors", "--residuals")
 DECLARATION = "study.toml"
 CommandLine = Callable[[list[str]], object]
 """Runs a command line, and raises its errors."""

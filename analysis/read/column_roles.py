@@ -24,7 +24,7 @@ NO_FACTOR = (
     r"repetitions?|repeats?|trials?|trial.?(?:index|number)|blocks?|orders?|sessions?|runs?|index|rows?"
     r"|.*rating.*|.*_id"
 )
-"""Columns with few values that tell rows apart and were not varied."""
+"""Columns with few values that separate rows and were not varied."""
 
 ROLES = (
     *("participant", "rating", "within", "between", "covariate", "item"),
@@ -216,9 +216,9 @@ def _named_roles(texts: Mapping[str, "pd.Series[str]"], numbers: Mapping[str, bo
     if (
         person is not None
         and "rating" not in roles.values()
-        and (found := _likely_measure(texts, numbers, roles))
+        and (measure := _likely_measure(texts, numbers, roles))
     ):
-        roles[found] = "rating"
+        roles[measure] = "rating"
     return roles
 
 
@@ -252,10 +252,10 @@ def _fitting_command(
         if named and _present(texts[named[0]]).nunique() > 1:
             roles[named[0]] = "by"
         return "pairs"
-    if (found := _threshold_columns(texts, numbers)) is not None:
-        for name in [name for name, role in roles.items() if role in ("rating", "item") or name in found]:
+    if (pair := _threshold_columns(texts, numbers)) is not None:
+        for name in [name for name, role in roles.items() if role in ("rating", "item") or name in pair]:
             roles.pop(name)
-        roles[found[0]], roles[found[1]] = "x", "response"
+        roles[pair[0]], roles[pair[1]] = "x", "response"
         conditions = [name for name, role in roles.items() if role in ("within", "between")]
         for name in conditions:
             roles.pop(name)

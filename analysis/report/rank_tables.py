@@ -41,10 +41,14 @@ def ranks_text(result: RankAnalysis, name: str, synthetic: bool = False) -> str:
             f"χ²({test.df}, N = {sum(result.n) if result.design == 'between' else result.n[0]}) = "
             f"{fixed(test.chi2)}, {apa_p(test.p_value)}, {symbol} = {share(test.effect)}, 95% CI {bounds}."
         )
-    found = [pair for pair in result.pairs if pair.p_holm < SIGNIFICANCE]
-    named = "; ".join(f"{pair.first} and {pair.second}, {apa_p(pair.p_holm)} (Holm)" for pair in found)
+    significant = [pair for pair in result.pairs if pair.p_holm < SIGNIFICANCE]
+    named = "; ".join(f"{pair.first} and {pair.second}, {apa_p(pair.p_holm)} (Holm)" for pair in significant)
     start = mark_name(name, synthetic)
-    return f"{start}: significant differences: {named}." if found else f"{start}: no significant difference."
+    return (
+        f"{start}: significant differences: {named}."
+        if significant
+        else f"{start}: no significant difference."
+    )
 
 
 def pairs_table(result: RankAnalysis, name: str, synthetic: bool = False) -> Table:

@@ -28,7 +28,7 @@ def test_a_table_becomes_a_result(dashboard: Dashboard, tmp_path: Path) -> None:
     scores = _table(tmp_path / "warmth.csv")
     page = dashboard.open("/analyze")
     page.locator('input[type="file"]').set_input_files(tmp_path / "warmth.csv")
-    # `warmth` is no name of a rating: the page asks for it
+    # `warmth` does not name a rating: the page asks for one
     expect(page.get_by_text("Choose a column for: Rating.")).to_be_visible()
     page.get_by_label("Role of warmth").select_option(label="Rating")
     expect(page.get_by_label("Role of face")).to_have_value("within")

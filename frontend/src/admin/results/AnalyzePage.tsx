@@ -1,20 +1,5 @@
 /** A table that you already have: drop it, confirm what the columns are, and read the result. Nothing is stored. */
-import {
-  Alert,
-  Anchor,
-  Button,
-  Card,
-  Code,
-  CopyButton,
-  FileInput,
-  Group,
-  Image,
-  NativeSelect,
-  Stack,
-  Table,
-  Text,
-  Title,
-} from "@mantine/core";
+import { Alert, Anchor, Button, Card, Code, CopyButton, FileInput, Group, NativeSelect, Stack, Table, Text, Title } from "@mantine/core";
 import { useMutation } from "@tanstack/react-query";
 import { useState } from "react";
 import { api, type Schemas, unwrap } from "../api";
@@ -288,7 +273,7 @@ function Figure({ figure: { key, caption, alt, svg, png } }: { figure: Result["f
         {caption}
       </Title>
       {/* White in both color schemes, as figures of a report are. */}
-      <Image src={files[0]?.[1]} alt={alt} bg="white" maw={720} fit="contain" />
+      <img src={files[0]?.[1]} alt={alt} style={{ background: "white", maxWidth: 720, width: "100%" }} />
       <Group mt="xs">
         {files.map(([kind, address]) => (
           <Anchor key={kind} href={address} download={`${key}.${kind}`} size="sm">
