@@ -132,9 +132,9 @@ def _checks(fixed: Floats, fitted: Floats, sets: Floats, residuals: Floats) -> R
     distance = np.maximum(ordered - steps, steps + 1 / n - ordered).max(axis=1)
     statistics = [("uniformity (KS distance)", distance), ("largest residual", np.abs(sets).max(axis=1))]
     if np.ptp(fixed) > 0:
-        place = stats.rankdata(fixed)
+        position = stats.rankdata(fixed)
         spread = stats.rankdata(np.abs(sets), axis=1)
-        centred = place - place.mean()
+        centred = position - position.mean()
         away = spread - spread.mean(axis=1, keepdims=True)
         correlation = away @ centred / np.sqrt((away**2).sum(axis=1) * (centred**2).sum())
         statistics.append(("spread along fixed effects (|r|)", np.abs(correlation)))
