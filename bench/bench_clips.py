@@ -30,9 +30,8 @@ from stimuli_builder.clips.curves import ClipCurve
 from stimuli_builder.clips.design_clips import Options, planned_clips
 from stimuli_builder.clips.encode import encode_clip
 from stimuli_builder.clips.frames import FramePainter
-from stimuli_builder.clips.jobs import render
+from stimuli_builder.clips.jobs import available_cores, render, run_jobs
 from stimuli_builder.clips.levels import LevelSet
-from stimuli_builder.clips.workers import available_cores, run_jobs
 
 SAMPLE = 24
 ALL = {"exp1": 320, "exp2": 200, "exp3": 80}

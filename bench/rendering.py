@@ -26,8 +26,7 @@ from experiments.declaration.rendering import RenderSettings
 from experiments.load import load_experiment
 from stimuli_builder.clips.cli_clip import parse_size
 from stimuli_builder.clips.design_clips import Options, look_of, performance_curve, planned_clips
-from stimuli_builder.clips.jobs import ClipJob, render
-from stimuli_builder.clips.workers import run_jobs
+from stimuli_builder.clips.jobs import ClipJob, render, run_jobs
 
 # Every so manyth clip: one of each character of Exp 1, and of Exp 3 one of each way the lower lid moves.
 STEPS = {"exp1": 160, "exp3": 20}

@@ -63,8 +63,8 @@ COMMANDS = {
     "link": ("server.studies.cli", "Links for participants."),
     "admin": ("server.accounts.cli", "Accounts of experimenters."),
     "account": ("server.accounts.cli", "Restore access for someone who lost a password or a phone."),
-    "audit": ("server.accounts.audit_cli", "The audit log: verify its chain of hashes, export it."),
-    "workspace": ("server.accounts.workspace_cli", "Workspaces: laboratories that share this server."),
+    "audit": ("server.accounts.cli", "The audit log: verify its chain of hashes, export it."),
+    "workspace": ("server.accounts.cli", "Workspaces: laboratories that share this server."),
     "person": ("server.privacy.cli", "One participant: subject access and erasure."),
 }
 """Command -> the module whose `register` adds it, and the line of help that lists it."""

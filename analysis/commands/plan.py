@@ -117,7 +117,7 @@ def simulate(
     numbers = asdict(result) | {"power": result.power.tolist(), "se": result.se.tolist()}
     save_json(json, numbers | {"smallest_n": result.smallest_n(target), "text": text}, True)
     if plot is not None:
-        from analysis.power.figure import save_power_figure
+        from analysis.report.pictures import save_power_figure
 
         save_power_figure(result, plot, target)
         typer.echo(f"written: {plot}")

@@ -80,8 +80,8 @@ def power(
 
       analysis power sliders-demo --scale eeriness --effect character=9 --effect blink=4
     """
-    from analysis.power.figure import save_power_figure
     from analysis.power.simulate import sample_sizes, simulate_power
+    from analysis.report.pictures import save_power_figure
     from analysis.synthetic.synthesise import make_plan
 
     sizes = sample_sizes(n)

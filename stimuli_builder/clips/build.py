@@ -23,7 +23,7 @@ from stimuli_builder.clips.folder import (
     readable_failures,
     stale,
 )
-from stimuli_builder.clips.workers import available_cores, run_jobs
+from stimuli_builder.clips.jobs import available_cores, run_jobs
 
 Progress = Callable[[int, int], None]
 """Called with the clips done and the clips to do."""

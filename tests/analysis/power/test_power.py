@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.power.figure import save_power_figure
 from analysis.power.simulate import sample_sizes, simulate_power
+from analysis.report.pictures import save_power_figure
 from analysis.synthetic.synthesise import make_plan
 from experiments.errors import InputError
 

@@ -22,7 +22,7 @@ from sqlalchemy import text
 
 from server.accounts import repository
 from server.accounts.audit import Verdict, _send, record, verify
-from server.accounts.audit_cli import _lines
+from server.accounts.cli import _lines
 from server.context import Services, open_services
 from server.core.db import open_database
 from server.core.settings import Settings, syslog_address

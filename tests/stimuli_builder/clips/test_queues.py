@@ -5,7 +5,7 @@ from random import Random
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stimuli_builder.clips.workers import WORTH_READING, JobQueues
+from stimuli_builder.clips.jobs import WORTH_READING, JobQueues
 
 
 def drained(queues: JobQueues, turns: list[int]) -> dict[int, list[int]]:
