@@ -74,6 +74,13 @@ def anova(
     robust: Annotated[
         bool, typer.Option("--robust", help="Add permutation tests, aligned ranks and trimmed means.")
     ] = False,
+    bayes: Annotated[
+        bool,
+        typer.Option(
+            "--bayes",
+            help="Add Bayes factors of the effects within participants (JZS), who may differ in effects.",
+        ),
+    ] = False,
     levels: LevelsOption = None,
     contrast: Annotated[
         list[str] | None,
@@ -90,7 +97,7 @@ def anova(
 
       analysis anova long.csv --participant id --rating score --within phase --between group --covariate age
 
-      analysis anova ratings.csv --participant id --rating score --within face --robust
+      analysis anova ratings.csv --participant id --rating score --within face --robust --bayes
 
     The JSON file has effects[], marginal_means[], pairwise[], dropped[], n_participants.
     """
@@ -138,6 +145,11 @@ def anova(
 
         with progress_spinner("permutations"):
             analysis = replace(analysis, robust=companions_of(analysis.anova))
+    if bayes:
+        from analysis.within.bayes import bayes_anova
+
+        with progress_spinner("Bayes factors"):
+            analysis = replace(analysis, bayes=bayes_anova(analysis.anova))
     contents = contents_of(analysis)
     # before what is printed, which `| head` may cut off
     save_json(json, contents.numbers)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from analysis.pairs.abilities import PairsResult
     from analysis.pairs.comparisons import Comparisons
     from analysis.pairs.intervals import QuestionPair
-    from analysis.pairs.jod import Prior
+    from analysis.pairs.jod_and_elo import Prior
     from analysis.report.contents import Picture
     from analysis.thresholds.answers import Answers
     from analysis.thresholds.people import ThresholdsResult
@@ -217,7 +217,7 @@ def _show_jod(
     name: str,
     json: Path | None,
 ) -> None:
-    from analysis.pairs.jod import scale_jod
+    from analysis.pairs.jod_and_elo import scale_jod
     from analysis.report.choice_tables import jod_tables, jod_text
 
     with progress_spinner("fitting"):
@@ -230,7 +230,7 @@ def _show_jod(
 def _show_elo(
     comparisons: "Comparisons", k_factor: float, samples: int, by: str | None, name: str, json: Path | None
 ) -> None:
-    from analysis.pairs.elo import rate_elo
+    from analysis.pairs.jod_and_elo import rate_elo
     from analysis.report.choice_tables import elo_table, elo_text
 
     with progress_spinner("rating"):

@@ -12,7 +12,7 @@ from scipy import special
 
 from analysis.paper.printed import PrintedInterval
 from analysis.report.numbers import share
-from analysis.within.eta_squared import partial_eta_squared_ci
+from analysis.within.strata import partial_eta_squared_ci
 
 # How far behind a statistic its own p and effect size may be: up to where another clause begins.
 

@@ -16,6 +16,7 @@ from analysis.within.simple_effects import SimpleEffect, reports_multivariate, s
 if TYPE_CHECKING:
     from analysis.plans.exclusions import Exclusions
     from analysis.robust import Companions
+    from analysis.within.bayes import BayesAnova
     from experiments.declaration.experiment import Experiment
 
 
@@ -97,6 +98,7 @@ class Analysis:
     experiment: "Experiment | None" = None
     exclusions: "Exclusions | None" = None
     robust: "Companions | None" = None
+    bayes: "BayesAnova | None" = None
 
     @property
     def multivariate_first(self) -> bool:

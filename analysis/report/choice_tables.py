@@ -3,9 +3,8 @@
 from collections.abc import Sequence
 
 from analysis.pairs.abilities import Contrast, PairsResult
-from analysis.pairs.elo import EloResult
 from analysis.pairs.intervals import QuestionPair
-from analysis.pairs.jod import JodResult
+from analysis.pairs.jod_and_elo import EloResult, JodResult
 from analysis.report.contents import caption, mark_name
 from analysis.report.formats import Table
 from analysis.report.numbers import DASH, apa_p, decimals, fixed, interval, p_value

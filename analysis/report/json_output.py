@@ -21,7 +21,8 @@ def as_data(analysis: Analysis) -> dict[str, Any]:
 
     Keys: name, title, source, synthetic, rating, factors, levels, n_participants, participants, effects,
     marginal_means, pairwise, dropped, decisions,
-    robust (null unless asked for), and exclusions (null for a table without a declaration).
+    robust (null unless asked for), bayes (only if asked for), and exclusions (null for a table without a
+    declaration).
     `multivariate`, `mauchly` and `univariate` each have a `..._reason`: why a test is null, else null.
     """
     cells = analysis.cells
@@ -78,6 +79,7 @@ def as_data(analysis: Analysis) -> dict[str, Any]:
         ],
         "constant_participants": list(cells.constant),
         "decisions": list(analysis.decisions),
+        **({} if analysis.bayes is None else {"bayes": asdict(analysis.bayes)}),
         "robust": None if analysis.robust is None else asdict(analysis.robust),
         "exclusions": None if analysis.exclusions is None else exclusions_data(analysis.exclusions),
     }

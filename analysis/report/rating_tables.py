@@ -12,6 +12,7 @@ from analysis.report.contents import Section, caption, mark_name
 from analysis.report.formats import Table
 from analysis.report.numbers import DASH, fixed, interval, p_value, share
 from analysis.report.r_script import robust_files
+from analysis.report.rank_tables import bayes_text
 from analysis.robust import TRIM, Companions, PermutationTest, RankTest, TrimmedPair
 
 # Mixed and ordinal models as tables.
@@ -320,6 +321,24 @@ def robust_section(analysis: Analysis, companions: Companions) -> Section:
     """The section of the report."""
     files = partial(robust_files, analysis, companions)
     return Section("Robust companions", TEXT, robust_tables(analysis, companions), (), files)
+
+
+def bayes_tables(analysis: Analysis) -> tuple[Table, ...]:
+    """Bayes factors of the effects, and of the best models."""
+    bayes = analysis.bayes
+    if bayes is None:
+        return ()
+    rows = tuple(
+        (analysis.labels.term(one.effect), fixed(one.log_bf_inclusion), bayes_text(one.bf_inclusion))
+        for one in bayes.effects
+    )
+    notes = (
+        "Models with the effect against the same models without it, none with its interactions. Above 1: for "
+        f"the effect. Priors: Cauchy, r = {bayes.scale_fixed:g} (participants {bayes.scale_random:g}). "
+        "Participants may differ in every effect but the highest interaction, which is the residual.",
+    )
+    title = caption("Bayes factors of effects", analysis.name, analysis.synthetic)
+    return (Table("bayes-anova", title, ("Effect", "ln BF", "BF"), rows, 1, notes),)
 
 
 def robust_tables(analysis: Analysis, companions: Companions) -> tuple[Table, ...]:

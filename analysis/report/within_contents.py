@@ -203,6 +203,10 @@ def part_of(
 def tables_of(analysis: Analysis) -> tuple[Table, ...]:
     """Every table, those of the robust companions last where they were asked for."""
     tables = all_tables(analysis)
+    if analysis.bayes is not None:
+        from analysis.report.rating_tables import bayes_tables
+
+        tables = (*tables, *bayes_tables(analysis))
     if analysis.robust is None:
         return tables
     # what only some ask for is imported when it is

@@ -5,9 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from analysis.within.contrasts import effect_name
-from analysis.within.eta_squared import SizeIntervals
 from analysis.within.multivariate_tests import MultivariateTest, MultivariateTests
-from analysis.within.strata import Hypothesis, Mauchly, UnivariateTest, univariate_tests
+from analysis.within.strata import Hypothesis, Mauchly, SizeIntervals, UnivariateTest, univariate_tests
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from analysis.within.eta_squared import SizeIntervals
-from analysis.within.strata import ErrorStratum, Hypothesis, scaled_svd
+from analysis.within.strata import ErrorStratum, Hypothesis, SizeIntervals, scaled_svd
 
 Floats = NDArray[np.float64]
 

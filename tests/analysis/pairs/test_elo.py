@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from analysis.cli import app
 from analysis.pairs.abilities import fit_abilities
 from analysis.pairs.comparisons import LEFT, RIGHT, TIE, Comparisons
-from analysis.pairs.elo import rate_elo
+from analysis.pairs.jod_and_elo import rate_elo
 from experiments.errors import InputError
 
 

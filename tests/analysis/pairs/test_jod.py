@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from analysis.cli import app
 from analysis.pairs.abilities import fit_abilities
 from analysis.pairs.comparisons import Comparisons, read_comparisons
-from analysis.pairs.jod import SIGMA, scale_jod
+from analysis.pairs.jod_and_elo import SIGMA, scale_jod
 from experiments.errors import InputError
 
 HEADER = "rater,scene,left,right,winner\n"

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from analysis.within.eta_squared import noncentrality, partial_eta_squared_ci
+from analysis.within.strata import noncentrality, partial_eta_squared_ci
 
 
 @settings(deadline=None, max_examples=80)
