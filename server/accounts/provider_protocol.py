@@ -6,22 +6,20 @@ import logging
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 from urllib.request import getproxies, proxy_bypass
 
 import httpx2
-from authlib.common.errors import AuthlibBaseError
-from authlib.integrations.httpx_client import AsyncOAuth2Client
-from authlib.oauth2.claims import JWTClaims
-from authlib.oidc.core import CodeIDToken
-from joserfc import jwt
-from joserfc.errors import InvalidKeyIdError, JoseError
-from joserfc.jwk import KeySet
-from joserfc.jws import JWSRegistry
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 
 from server.core.errors import ApiError
 from server.core.settings import Provider, Settings, is_safe
+
+# Authlib and joserfc are imported where they work: few servers have a provider, but every start would wait.
+if TYPE_CHECKING:
+    from joserfc import jwt
+    from joserfc.jwk import KeySet
+    from joserfc.jws import JWSRegistry
 
 # How a sign-in by a provider is refused: one sentence for people, the reason in the log.
 
@@ -287,6 +285,9 @@ class ProviderClient:
 
         One that names a session alone (`sid`) is refused: sessions here are known by their subject.
         """
+        from authlib.oauth2.claims import JWTClaims
+        from joserfc.errors import JoseError
+
         metadata = await self._described()
         options = {"iss": {**ESSENTIAL, "value": self.provider.issuer}, "sub": ESSENTIAL, "jti": ESSENTIAL}
         options |= {"aud": {**ESSENTIAL, "value": self.provider.client_id}, "iat": ESSENTIAL}
@@ -319,6 +320,8 @@ class ProviderClient:
         return by_amr or claims.get("acr") in self.provider.second_factor_acr
 
     def _client(self, metadata: Metadata) -> Any:
+        from authlib.integrations.httpx_client import AsyncOAuth2Client
+
         secret = self.provider.client_secret()
         methods = metadata.token_endpoint_auth_methods_supported or ("client_secret_basic",)
         by_post = "client_secret_basic" not in methods and "client_secret_post" in methods
@@ -343,6 +346,8 @@ class ProviderClient:
         return self._metadata
 
     async def _token(self, client: Any, metadata: Metadata, code: str, verifier: str) -> Mapping[str, Any]:
+        from authlib.common.errors import AuthlibBaseError
+
         try:
             token = await client.fetch_token(metadata.token_endpoint, code=code, code_verifier=verifier)
         except AuthlibBaseError as error:
@@ -355,6 +360,9 @@ class ProviderClient:
 
     async def _claims(self, metadata: Metadata, token: Mapping[str, Any], nonce: str) -> Mapping[str, Any]:
         """What a checked ID token says: signature, issuer, audience, times, nonce (Core 1.0, 3.1.3.7)."""
+        from authlib.oidc.core import CodeIDToken
+        from joserfc.errors import JoseError
+
         own = self.provider.client_id
         options = {
             "iss": {**ESSENTIAL, "value": self.provider.issuer},
@@ -374,14 +382,19 @@ class ProviderClient:
             raise sign_in_refused("its ID token names no subject")
         return dict(claims)
 
-    async def _decoded(self, metadata: Metadata, text: str, registry: JWSRegistry) -> jwt.Token:
+    async def _decoded(self, metadata: Metadata, text: str, registry: "JWSRegistry") -> "jwt.Token":
+        from joserfc import jwt
+        from joserfc.errors import InvalidKeyIdError
+
         keys = await self._key_set(metadata, KEPT_S)
         try:
             return jwt.decode(text, keys, registry=registry)
         except InvalidKeyIdError:
             return jwt.decode(text, await self._key_set(metadata, KEYS_AGAIN_S), registry=registry)
 
-    async def _key_set(self, metadata: Metadata, age: float) -> KeySet:
+    async def _key_set(self, metadata: Metadata, age: float) -> "KeySet":
+        from joserfc.jwk import KeySet
+
         if time.monotonic() - self._keys_at > age:
             self._keys = await json_object(metadata.jwks_uri)
             self._keys_at = time.monotonic()
@@ -396,6 +409,8 @@ class ProviderClient:
         self, client: Any, metadata: Metadata, claims: Mapping[str, Any]
     ) -> Mapping[str, Any]:
         """Claims that the ID token leaves out, asked for only where a rule or a name needs them."""
+        from authlib.common.errors import AuthlibBaseError
+
         needed = {rule.claim.split(".")[0] for rule in self.provider.roles if rule.claim}
         endpoint = metadata.userinfo_endpoint
         if (needed | {"name"}) <= claims.keys() or endpoint is None:
@@ -411,7 +426,9 @@ class ProviderClient:
         return told
 
 
-def _registry(metadata: Metadata) -> JWSRegistry:
+def _registry(metadata: Metadata) -> "JWSRegistry":
+    from joserfc.jws import JWSRegistry
+
     announced = metadata.id_token_signing_alg_values_supported or ("RS256",)
     return JWSRegistry(algorithms=sorted(ALGORITHMS.intersection(announced)))
 
