@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -320,7 +320,7 @@ _MEANINGS = {
 }
 
 
-def agreement(votes: Votes, level: Level = "interval") -> Agreement:
+def agreement(votes: Votes, level: Level = "interval", dimension: str = "") -> Agreement:
     """How far people agree.
 
     Parameters
@@ -329,6 +329,8 @@ def agreement(votes: Votes, level: Level = "interval") -> Agreement:
         Several ratings that a person gave to an item count as their mean.
     level : {"nominal", "ordinal", "interval", "ratio"}
         What differences between ratings mean; the distance of Krippendorff's alpha.
+    dimension : str
+        What was rated, as errors name it where there are several.
 
     Raises
     ------
@@ -342,6 +344,8 @@ def agreement(votes: Votes, level: Level = "interval") -> Agreement:
     (1979), Psychological Bulletin 86, 420-428; names of forms by McGraw, K. O. & Wong, S. P. (1996),
     Psychological Methods 1, 30-46.
     """
+    if dimension:
+        votes = replace(votes, source=f"{votes.source}, {dimension}")
     scores = _usable(votes, level)
     low, high = _interval(scores, level)
     complete = np.isfinite(scores).all(axis=0)

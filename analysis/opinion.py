@@ -516,6 +516,8 @@ def _votes(
         decisions += [f"{rule} excluded {people[k]}: {why}" for k, why in reasons.items()]
         if not reasons:
             decisions.append(f"{rule} excluded nobody")
+        elif 2 * len(reasons) > people.size:
+            decisions.append(f"{rule} excluded more than half of the raters, who hardly agree at all")
     votes = Votes(
         scores[stays],
         counts[stays],

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy import special, stats
 
 from analysis.within.adjustments import bonferroni, holm, tukey
+from analysis.within.contrast_tests import equivalence_p
 from analysis.within.pairwise import bayes_factor, size_intervals
 from experiments.errors import InputError
 
@@ -224,18 +225,13 @@ def _corrected(
                 "p_holm": float(by_holm),
                 "p_bonferroni": float(by_bonferroni),
                 "p_games_howell": game,
-                "p_equivalence": None if bounds is None else _equivalence(row, bounds),
+                "p_equivalence": None
+                if bounds is None
+                else equivalence_p(row.difference, row.se, row.df, bounds),
             }
         )
         for row, by_holm, by_bonferroni, game in zip(rows, holm(p), bonferroni(p), games, strict=True)
     )
-
-
-def _equivalence(row: MeanTest, bounds: tuple[float, float]) -> float:
-    """Schuirmann's (1987) two one-sided tests."""
-    above = special.stdtr(row.df, -(row.difference - bounds[0]) / row.se)
-    below = special.stdtr(row.df, (row.difference - bounds[1]) / row.se)
-    return float(max(above, below))
 
 
 def _described(names: Sequence[str], groups: Sequence[Floats]) -> tuple[GroupMean, ...]:

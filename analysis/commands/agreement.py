@@ -110,7 +110,7 @@ def agreement(
 
     votes = read_votes_by(file, (item, participant, rating), by)
     with progress_spinner("resampling items"):
-        results = {name: agreement.agreement(own, level.value) for name, own in votes.items()}
+        results = {name: agreement.agreement(own, level.value, name) for name, own in votes.items()}
     numbers = {name: asdict(result) for name, result in results.items()}
     synthetic = next(iter(votes.values())).synthetic
     save_json(json, numbers[""] if by is None else {"by": by, "dimensions": numbers}, synthetic)

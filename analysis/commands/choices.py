@@ -13,6 +13,7 @@ import typer
 from analysis.commands.output import (
     JsonOption,
     LevelsOption,
+    equivalence_bounds,
     progress_spinner,
     save_json,
     show_figure,
@@ -121,6 +122,10 @@ def pairs(
             )
         ),
     ] = IntervalsChoice.WALD,
+    equivalence: Annotated[
+        str | None,
+        typer.Option(help="Bounds of equivalence of two abilities, on the method's scale: 0.3 or -0.2,0.4."),
+    ] = None,
     crossed: Annotated[
         bool,
         typer.Option(
@@ -186,11 +191,11 @@ def pairs(
     if (reference or screen or prior is PriorChoice.NONE) and not is_jod:
         raise InputError("--reference, --screen and --prior are for --method jod")
     if method is not None and method in (MethodChoice.JOD, MethodChoice.ELO):
-        others = factors, order_effect, firth, crossed, question
+        others = factors, order_effect, firth, crossed, question, equivalence
         if any(others) or intervals is not IntervalsChoice.WALD:
             raise InputError(
                 f"--method {method.value} takes no --factors, --order-effect or --firth, and no --crossed, "
-                "--question or --intervals; remove them"
+                "--question, --equivalence or --intervals; remove them"
             )
     if is_jod:
         anchor, at = _anchor(reference)
@@ -207,6 +212,7 @@ def pairs(
             "intervals": intervals.value,
             "samples": bootstrap,
             "crossed": crossed,
+            "equivalence": equivalence_bounds(equivalence),
         }
         _show_abilities(comparisons, method, options, by, file.stem, json)
 

@@ -11,6 +11,7 @@ import typer
 from analysis.commands.output import (
     JsonOption,
     LevelsOption,
+    equivalence_bounds,
     names_in,
     progress_spinner,
     refuse_unwritable,
@@ -108,6 +109,20 @@ ResidualsOption = Annotated[
 ]
 
 
+EquivalenceOption = Annotated[
+    str | None,
+    typer.Option(
+        help="With --means: bounds of equivalence of pairs, 0.5 or -0.3,0.5; in ordinal on the logit scale."
+    ),
+]
+
+
+def _bounds(text: str | None, means: bool) -> tuple[float, float] | None:
+    if text is not None and not means:
+        raise InputError("--equivalence tests pairs of marginal means: add --means")
+    return equivalence_bounds(text)
+
+
 class SlopesChoice(StrEnum):
     """By-participant slopes of the linear mixed model."""
 
@@ -173,6 +188,7 @@ def mixed(
     means: MeansOption = False,
     likelihood_ratio: RatioOption = False,
     residuals: ResidualsOption = None,
+    equivalence: EquivalenceOption = None,
     levels: LevelsOption = None,
     json: JsonOption = None,
 ) -> None:
@@ -232,6 +248,7 @@ def mixed(
             means=means,
             likelihood_ratio=likelihood_ratio,
             residuals=residuals is not None,
+            equivalence=_bounds(equivalence, means),
             progress=say,
         )
     save_json(json, asdict(result), data.synthetic)
@@ -277,6 +294,7 @@ def ordinal(
     means: MeansOption = False,
     likelihood_ratio: RatioOption = False,
     residuals: ResidualsOption = None,
+    equivalence: EquivalenceOption = None,
     levels: LevelsOption = None,
     json: JsonOption = None,
 ) -> None:
@@ -337,6 +355,7 @@ def ordinal(
             means=means,
             likelihood_ratio=likelihood_ratio,
             residuals=residuals is not None,
+            equivalence=_bounds(equivalence, means),
         )
     save_json(json, asdict(result), data.synthetic)
     _show(file, data, ordinal_text(result))

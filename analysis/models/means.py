@@ -10,6 +10,7 @@ from scipy import stats
 
 from analysis.models.design import ModelData
 from analysis.within.adjustments import bonferroni, holm, tukey
+from analysis.within.contrast_tests import equivalence_p
 
 Floats = NDArray[np.float64]
 
@@ -34,7 +35,10 @@ class ModelMean:
 
 @dataclass(frozen=True)
 class ModelPair:
-    """Difference of two cells of a margin, or of two slopes; corrected for the pairs of the margin."""
+    """Difference of two cells of a margin, or of two slopes; corrected for the pairs of the margin.
+
+    `p_equivalence` is that of two one-sided tests, of cells alone; None without bounds.
+    """
 
     margin: str
     first: dict[str, str]
@@ -48,6 +52,7 @@ class ModelPair:
     p_holm: float
     p_tukey: float
     ci: tuple[float, float]
+    p_equivalence: float | None = None
 
 
 @dataclass(frozen=True)
@@ -84,7 +89,9 @@ class ModelMeans:
     trend_pairs: tuple[ModelPair, ...]
 
 
-def model_means(data: ModelData, estimated: Callable[[Floats], Estimate]) -> ModelMeans:
+def model_means(
+    data: ModelData, estimated: Callable[[Floats], Estimate], bounds: tuple[float, float] | None = None
+) -> ModelMeans:
     """Means, pairs and trends of a fitted model.
 
     Parameters
@@ -92,6 +99,8 @@ def model_means(data: ModelData, estimated: Callable[[Floats], Estimate]) -> Mod
     data : ModelData
     estimated : callable
         Takes a contrast of the columns of `data.x` (f,), whose first is the intercept.
+    bounds : tuple of float, optional
+        Of equivalence of two cells.
     """
     means: list[ModelMean] = []
     pairs: list[ModelPair] = []
@@ -103,7 +112,7 @@ def model_means(data: ModelData, estimated: Callable[[Floats], Estimate]) -> Mod
         for levels, row in cells:
             value, se, df = estimated(row)
             means.append(ModelMean(name, levels, value, se, df, _interval(value, se, df)))
-        pairs += _pairs(name, cells, estimated)
+        pairs += _pairs(name, cells, estimated, bounds)
     for effect in data.number_effects:
         if len(effect.covariates) > 1 or effect.factors:
             continue
@@ -156,7 +165,10 @@ def _trend_row(data: ModelData, covariate: str, cell: Floats) -> Floats:
 
 
 def _pairs(
-    margin: str, cells: Sequence[tuple[dict[str, str], Floats]], estimated: Callable[[Floats], Estimate]
+    margin: str,
+    cells: Sequence[tuple[dict[str, str], Floats]],
+    estimated: Callable[[Floats], Estimate],
+    bounds: tuple[float, float] | None = None,
 ) -> list[ModelPair]:
     both = list(combinations(cells, 2))
     if not both:
@@ -171,7 +183,8 @@ def _pairs(
     ):
         by_tukey = tukey(np.array([t]), len(cells), one[2])[0]
         all_p = (own, float(by_bonferroni), float(by_holm), float(by_tukey))
-        pairs.append(ModelPair(margin, first, second, *one, t, *all_p, _interval(*one)))
+        equal = None if bounds is None else equivalence_p(*one, bounds)
+        pairs.append(ModelPair(margin, first, second, *one, t, *all_p, _interval(*one), equal))
     return pairs
 
 

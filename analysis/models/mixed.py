@@ -81,6 +81,7 @@ def fit_mixed(
     means: bool = False,
     likelihood_ratio: bool = False,
     residuals: bool = False,
+    equivalence: tuple[float, float] | None = None,
     effects: Sequence[str] | None = None,
     slope_effects: Sequence[str] = (),
     group_slopes: Sequence[tuple[str, tuple[str, ...]]] = (),
@@ -125,6 +126,8 @@ def fit_mixed(
         Add likelihood-ratio tests (maximum likelihood, without an effect's sum-coded columns).
     residuals : bool, optional
         Add residual checks by ratings simulated from the model.
+    equivalence : tuple of float, optional
+        Bounds of equivalence for pairs of marginal means.
     effects : sequence of str, optional
         The effects of factors that the model has, such as a and a:b; default: all.
     slope_effects : sequence of str, optional
@@ -170,7 +173,9 @@ def fit_mixed(
             theta = fit_theta(c)
         fitted = _RemlFit(data, random_terms, c, theta, units)
         notes += unmodelled_slopes(data, slopes)
-        result = _result(fitted, sloped, slopes, random_slopes, df_method, (*data.notes, *notes), means)
+        result = _result(
+            fitted, sloped, slopes, random_slopes, df_method, (*data.notes, *notes), means, equivalence
+        )
         if likelihood_ratio:
             result = replace(result, ratio_tests=ratio_tests(data, Profile(c, theta).chi2_without))
         if residuals:
@@ -204,6 +209,7 @@ def _result(
     df_method: DfMethod,
     notes: tuple[str, ...],
     means: bool,
+    equivalence: tuple[float, float] | None,
 ) -> MixedResult:
     data, c, theta, units = fitted.data, fitted.c, fitted.theta, fitted.units
     at = criterion(c, theta)
@@ -249,7 +255,7 @@ def _result(
         notes=(*notes, *degenerate),
         factors=data.factors,
         df_method=df_method,
-        means=model_means(data, estimated) if means else None,
+        means=model_means(data, estimated, equivalence) if means else None,
     )
 
 

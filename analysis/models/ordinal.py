@@ -278,6 +278,7 @@ def fit_ordinal(
     means: bool = False,
     likelihood_ratio: bool = False,
     residuals: bool = False,
+    equivalence: tuple[float, float] | None = None,
     effects: Sequence[str] | None = None,
     slope_effects: Sequence[str] = (),
 ) -> OrdinalResult:
@@ -341,7 +342,7 @@ def fit_ordinal(
     terms = RandomTerms(slopes, tuple(groups))
     result = ordinal_result(data, categories, maximum, terms, left_out, nodes)
     if means:
-        result = replace(result, means=_latent_means(data, maximum))
+        result = replace(result, means=_latent_means(data, maximum, equivalence))
     if likelihood_ratio:
         with threadpool_limits(1, "blas"):
             without = partial(_chi2_without, ordinal, maximum, nodes, bool(items))
@@ -351,7 +352,7 @@ def fit_ordinal(
     return result
 
 
-def _latent_means(data: ModelData, maximum: Maximum) -> ModelMeans:
+def _latent_means(data: ModelData, maximum: Maximum, equivalence: tuple[float, float] | None) -> ModelMeans:
     """Means on the logit scale, from the mean of the thresholds (as emmeans' mode `latent`)."""
     p = maximum.parameters
     count, gaps = len(p.thresholds), np.diff(p.thresholds)
@@ -364,7 +365,7 @@ def _latent_means(data: ModelData, maximum: Maximum) -> ModelMeans:
         row = np.concatenate([-contrast[0] * of_mean, contrast[1:]])
         return value, float(np.sqrt(row @ covariance @ row)), float("inf")
 
-    return model_means(data, estimated)
+    return model_means(data, estimated, equivalence)
 
 
 def _chi2_without(

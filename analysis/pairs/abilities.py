@@ -1,7 +1,7 @@
 """Abilities of items and their contrasts."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from pathlib import Path
 
@@ -36,6 +36,7 @@ from analysis.pairs.likelihood import (
 from analysis.read.text_table import names_in_order, read_text_table, texts_required
 from analysis.thresholds.likelihood import fit_p
 from analysis.within.adjustments import holm
+from analysis.within.contrast_tests import equivalence_p
 from analysis.within.level_codes import given_orders
 from experiments.errors import InputError
 
@@ -207,7 +208,8 @@ class Contrast:
     """Difference of two abilities, and its Holm-corrected p.
 
     `se_robust` has raters as clusters, `p_robust` is its t test on as many df as raters less one,
-    `p_robust_holm` corrected like the model's.
+    `p_robust_holm` corrected like the model's. `p_equivalence` is that of two one-sided tests, with raters as
+    clusters where they are known; None without bounds.
     """
 
     first: str
@@ -222,6 +224,7 @@ class Contrast:
     p_robust_holm: float | None = None
     ci_low: float = float("nan")
     ci_high: float = float("nan")
+    p_equivalence: float | None = None
 
 
 @dataclass(frozen=True)
@@ -321,6 +324,7 @@ def fit_abilities(
     intervals: Intervals = "wald",
     samples: int = 500,
     crossed: bool = False,
+    equivalence: tuple[float, float] | None = None,
 ) -> PairsResult:
     """Fit a model of paired comparisons.
 
@@ -341,6 +345,8 @@ def fit_abilities(
     crossed : bool
         Whether raters (and contents, and items beyond their factors) have random effects
         (`analysis.pairs.crossed`); Bradley-Terry and Rao-Kupper only, Wald intervals.
+    equivalence : tuple of float, optional
+        Bounds of equivalence of two abilities, on the method's scale.
 
     Raises
     ------
@@ -366,9 +372,13 @@ def fit_abilities(
     full[:, : design.shape[1]] = design
     robust = None if crossed else _robust(comparisons, model, fitted, counts)
     pairs = FittedPairs(comparisons, model, counts, fitted, robust, firth)
+    raters = len(comparisons.participants)
     k, extra = len(comparisons.items), np.eye(model.names)[design.shape[1] :]
     differences = [full[first] - full[second] for first, second in combinations(range(k), 2)]
     limits, notes = interval_limits(pairs, np.stack([*full, *differences, *extra]), intervals, samples)
+    always = separated_items(comparisons) if firth else None
+    if always:
+        notes.insert(0, f"{always}: only Firth's penalty keeps the ability finite")
     of_pairs = limits[k : len(limits) - len(extra)]
     ranks = rank_limits(k, of_pairs) if intervals == "anytime" else None
     tie = _parameter(fitted, -1, limits) if ties else None
@@ -380,7 +390,7 @@ def fit_abilities(
         SCALES[method],
         comparisons.items[0],
         _items(comparisons, fitted, full, robust, limits, ranks),
-        _contrasts(comparisons, full, fitted, robust, of_pairs),
+        _with_equivalence(_contrasts(comparisons, full, fitted, robust, of_pairs), raters, equivalence),
         tuple(tuple(row) for row in (full @ fitted.covariance @ full.T).tolist()),
         comparisons.outcome.size,
         comparisons.ties,
@@ -504,6 +514,19 @@ def _contrasts(
         Contrast(*row, float("nan") if own is None else own, *more, of_raters, float(low), float(high))
         for row, own, more, of_raters, (low, high) in zip(rows, p, clustered, robust_p, limits, strict=True)
     )
+
+
+def _with_equivalence(
+    contrasts: tuple[Contrast, ...], raters: int, bounds: tuple[float, float] | None
+) -> tuple[Contrast, ...]:
+    if bounds is None:
+        return contrasts
+    tested = []
+    for c in contrasts:
+        se, df = (c.se, float("inf")) if c.se_robust is None else (c.se_robust, float(raters - 1))
+        p = equivalence_p(c.difference, se, df, bounds) if se > 0 else None
+        tested.append(replace(c, p_equivalence=p))
+    return tuple(tested)
 
 
 def _holm(p: list[float | None]) -> list[float | None]:

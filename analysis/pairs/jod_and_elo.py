@@ -209,7 +209,13 @@ def _scaled(
     )
 
 
+def _refuse_all_ties(own: Comparisons) -> None:
+    if own.ties == own.outcome.size:
+        raise InputError(f"{own.source}: every comparison is a tie, so nothing can be scaled")
+
+
 def _refuse_unfit(content: str, own: Comparisons, prior: Prior) -> None:
+    _refuse_all_ties(own)
     if own.ties:
         raise InputError(
             f"{own.source}: {own.ties} comparisons of {content} are ties, which jod does not support; use "
@@ -467,6 +473,7 @@ def rate_elo(comparisons: Comparisons, k_factor: float = 32.0, samples: int = 50
         raise InputError(
             f"{comparisons.source}: expected two items or more, got '{comparisons.items[0]}' alone"
         )
+    _refuse_all_ties(comparisons)
     refuse_disconnected(comparisons)
     n, random = comparisons.outcome.size, np.random.default_rng(SEED)
     used = min(samples, max(SAMPLES_MIN, CELLS_MAX // n)) if samples else 0

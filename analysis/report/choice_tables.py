@@ -50,6 +50,7 @@ def contrasts_table(result: PairsResult, name: str, synthetic: bool = False) -> 
     """Every pair of items, Holm-corrected: by the model's errors, and by those that count raters."""
     robust = any(c.se_robust is not None for c in result.contrasts)
     is_special = result.intervals != "wald"
+    has_bounds = any(c.p_equivalence is not None for c in result.contrasts)
     rows = tuple(
         (
             f"{c.first} - {c.second}",
@@ -57,12 +58,14 @@ def contrasts_table(result: PairsResult, name: str, synthetic: bool = False) -> 
             *((interval((c.ci_low, c.ci_high)),) if is_special else (fixed(c.se, 3), fixed(c.z))),
             p_value(c.p_holm),
             *(_robust_cells(c) if robust else ()),
+            *((DASH if c.p_equivalence is None else p_value(c.p_equivalence),) if has_bounds else ()),
         )
         for c in result.contrasts
     )
     title = caption("Differences between items", name, synthetic)
     errors = ("95% CI",) if is_special else ("SE", "z")
     header = ("Items", "Difference", *errors, "p", *(("robust SE", "t", "robust p") if robust else ()))
+    header = (*header, *(("p (TOST)",) if has_bounds else ()))
     return Table("pair-contrasts", title, header, rows, 1, (_which_errors(result, robust),), True)
 
 

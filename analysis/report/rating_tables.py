@@ -78,16 +78,23 @@ def means_tables(result: MixedResult | OrdinalResult, name: str, synthetic: bool
             Table("trends", caption("Trends of covariates", name, synthetic), slope_header, trends, 1)
         )
         # pairs of cells of two factors are many: they are in the JSON
+        has_bounds = any(one.p_equivalence is not None for one in result.means.pairs)
         single = [one for one in result.means.pairs if ":" not in one.margin]
         pairs = tuple(
             (
                 f"{'' if one in single else one.margin + ', '}{_levels(one.first)} - {_levels(one.second)}",
                 *(fixed(one.difference, 3), fixed(one.se, 3), fixed(one.t), _df(one.df)),
                 *(p_value(one.p_tukey), p_value(one.p_holm), p_value(one.p_bonferroni)),
+                *(
+                    []
+                    if not has_bounds
+                    else [DASH if one.p_equivalence is None else p_value(one.p_equivalence)]
+                ),
             )
             for one in (*single, *result.means.trend_pairs)
         )
         header = ("Pair", "Difference", "SE", letter, "df", "p (Tukey)", "p (Holm)", "p (Bonf.)")
+        header = (*header, *(("p (TOST)",) if has_bounds else ()))
         tables.append(Table("pairs", caption("Pairs of means and slopes", name, synthetic), header, pairs, 1))
     rows = tuple(
         (test.effect, fixed(test.chi2), str(test.df), p_value(test.p_value)) for test in result.ratio_tests

@@ -124,6 +124,17 @@ def _as_numbers(levels: Sequence[str]) -> list[float] | None:
     return values if np.isfinite(values).all() and len(set(values)) == len(values) else None
 
 
+def equivalence_p(difference: float, se: float, df: float, bounds: tuple[float, float]) -> float:
+    """P of Schuirmann's (1987) two one-sided tests that a difference lies within bounds around zero."""
+    low, high = bounds
+    if not low < 0 < high:
+        raise InputError(f"expected bounds around zero, like -0.5,0.5, got {low:g} and {high:g}")
+    above, below = -(difference - low) / se, (difference - high) / se
+    if not np.isfinite(df):
+        return float(special.ndtr(max(above, below)))
+    return float(special.stdtr(df, max(above, below)))
+
+
 def equivalence(
     pairs: Sequence[Pair], low: float, high: float, alpha: float = 0.05
 ) -> tuple[Equivalence, ...]:

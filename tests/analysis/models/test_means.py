@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from scipy import stats
 from typer.testing import CliRunner
 
 from analysis.cli import app
@@ -129,3 +130,23 @@ def test_commands_add_means_and_tests(tmp_path: Path) -> None:
     ended = runner.invoke(app, ["ordinal", str(file), *named, "--within", "A,B", *more])
     assert ended.exit_code == 0, ended.output
     assert "On the logit scale, from the mean of the thresholds." in ended.output.replace("\n  ", " ")
+
+
+def test_equivalence_of_means_of_two_ratings_each_is_that_of_the_paired_t(tmp_path: Path) -> None:
+    """One rating of each person in each of two conditions: the model's test is the paired t test."""
+    random = np.random.default_rng(5)
+    y = random.normal(size=(14, 1)) + random.normal(size=(14, 2)) + [0.0, 0.2]
+    rows = [f"p{p:02d},{'ab'[c]},{value}" for (p, c), value in np.ndenumerate(y)]
+    path, out = tmp_path / "r.csv", tmp_path / "r.json"
+    path.write_text("\n".join(["id,cond,score", *rows]) + "\n", encoding="utf-8")
+    base = ["mixed", str(path), "--formula", "score ~ cond + (1 | id)", "--json", str(out)]
+    ended = CliRunner().invoke(app, [*base, "--means", "--equivalence", "-0.9,1.2"])
+    assert ended.exit_code == 0, ended.exception
+    assert "p (TOST)" in ended.stdout
+    (pair,) = json.loads(out.read_text(encoding="utf-8"))["means"]["pairs"]
+    d = y[:, 0] - y[:, 1]
+    above = stats.ttest_1samp(d, -0.9, alternative="greater").pvalue
+    below = stats.ttest_1samp(d, 1.2, alternative="less").pvalue
+    assert pair["p_equivalence"] == pytest.approx(max(above, below), rel=1e-5)
+    ended = CliRunner().invoke(app, [*base, "--equivalence", "0.5"])
+    assert "--equivalence tests pairs of marginal means: add --means" in str(ended.exception)

@@ -99,3 +99,8 @@ def test_command_says_how_the_order_is_treated(tmp_path: Path) -> None:
 def test_points_per_comparison_are_positive() -> None:
     with pytest.raises(InputError, match="expected --k-factor above 0, got 0"):
         rate_elo(of_rows([("a", "b", LEFT)]), k_factor=0)
+
+
+def test_complete_ties_are_refused() -> None:
+    with pytest.raises(InputError, match="every comparison is a tie"):
+        rate_elo(of_rows([("a", "b", TIE), ("b", "a", TIE)]))

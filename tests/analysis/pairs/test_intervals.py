@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy import optimize, special
+from scipy import optimize, special, stats
 from typer.testing import CliRunner
 
 from analysis.cli import app
@@ -365,3 +365,26 @@ def test_command_fits_questions_and_scenes_and_writes_their_comparison(tmp_path:
     result = CliRunner().invoke(app, [*base, "--by", "scene", "--crossed"])
     assert "Crossed effects, pairs" in result.stdout
     assert [one["name"] for one in json.loads(out.read_text())["random_effects"]] == ["rater", "content"]
+
+
+def test_equivalence_of_abilities_is_two_one_sided_tests_with_raters_as_clusters() -> None:
+    own = simulated()
+    result = fit_abilities(own, "davidson", equivalence=(-0.8, 0.6))
+    alone = fit_abilities(
+        replace(own, participant=None, participants=()), "davidson", equivalence=(-0.8, 0.6)
+    )
+    for c, plain in zip(result.contrasts, alone.contrasts, strict=True):
+        sides = (c.difference + 0.8) / c.se_robust, (0.6 - c.difference) / c.se_robust  # type: ignore[operator]
+        assert c.p_equivalence == pytest.approx(max(stats.t.sf(sides, 24)))
+        sides = (plain.difference + 0.8) / plain.se, (0.6 - plain.difference) / plain.se
+        assert plain.p_equivalence == pytest.approx(max(stats.norm.sf(sides)))
+    with pytest.raises(InputError, match="expected bounds around zero"):
+        fit_abilities(own, "davidson", equivalence=(0.1, 0.6))
+
+
+def test_an_item_that_only_firths_penalty_keeps_finite_is_named() -> None:
+    outcome = np.array([LEFT] * 4 + [LEFT, RIGHT])
+    left, right = np.array([0] * 4 + [1, 1]), np.array([1, 2, 1, 2, 2, 2])
+    own = Comparisons(("a", "b", "c"), left, right, outcome, None, (), "made", True, ())
+    said = fit_abilities(own, firth=True).decisions
+    assert said == ("a won every comparison with the others: only Firth's penalty keeps the ability finite",)
