@@ -23,6 +23,7 @@ from server.operations import endpoints as operations
 from server.operations.drill import weekly_drill
 from server.operations.metrics import Observer, ProxyWatch
 from server.operations.snapshots import snapshots_taken
+from server.operations.watch import studies_watched
 from server.participation import endpoints as participation
 from server.participation.judgement import digests_judged_later
 from server.privacy import endpoints as privacy
@@ -128,6 +129,7 @@ def create_app(settings: Settings | None = None, *, rehearses: bool = False) -> 
             hourly_retention(services.database, services.settings, services.locks),
             digests_judged_later(services.database, services.intake),
             results_counted_ahead(services.database, services.results),
+            studies_watched(services),
         ):
             yield
         served.state.services.changes.close()

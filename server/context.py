@@ -21,8 +21,7 @@ from server.participation.clip_hashes import ClipHashes
 from server.participation.intake import Intake
 from server.participation.versions import Versions
 from server.results.cache import ResultsCache
-from server.transcoding.preparing import UploadPreparation
-from server.transcoding.stored import StoredClips
+from server.transcoding.preparing import StoredClips, UploadPreparation
 
 SIMULATED_TIME = "x-palpebra-simulated-time"
 REFUSALS_PER_MINUTE, REFUSALS_OF_A_KIND = 20, 3

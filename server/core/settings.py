@@ -359,6 +359,11 @@ class Settings(BaseSettings):
     mail_from: str = Field(
         default="", description="Sender of emails, such as 'Palpebra <palpebra@lab.example>'."
     )
+    webhook_url: str = Field(
+        default="",
+        description="HTTPS address that gets warnings about studies as JSON, such as that of a chat channel.",
+        repr=False,
+    )
     monitor_stream_minutes: float = Field(
         default=60.0, gt=0, description="Minutes after which the browser of the live monitor reconnects."
     )
@@ -465,6 +470,15 @@ class Settings(BaseSettings):
     def _is_one_address(cls, value: str) -> str:
         if value and ("@" not in parseaddr(value)[1] or not value.isprintable()):
             raise ValueError("expected one email address, such as 'Palpebra <palpebra@lab.example>'")
+        return value
+
+    @field_validator("webhook_url")
+    @classmethod
+    def _is_private_address(cls, value: str) -> str:
+        parts = urlsplit(value)
+        local = parts.scheme == "http" and parts.hostname in LOCAL_HOSTS
+        if value and not (parts.hostname and (parts.scheme == "https" or local)):
+            raise ValueError("expected https://..., or http:// on only this machine")
         return value
 
     @model_validator(mode="after")

@@ -7,11 +7,13 @@ from prometheus_client import CONTENT_TYPE_LATEST
 from pydantic import BaseModel, Field
 
 from experiments.errors import InputError
-from server.accounts.access import Owner
+from server.accounts.access import Owner, Viewer
+from server.context import ServicesDep
 from server.core.errors import ERROR_RESPONSES, ApiError
 from server.core.requests import DatabaseDep, SettingsDep
 from server.core.settings import Settings
 from server.operations.metrics import exposition
+from server.operations.watch import StudyWarning, warnings_shown
 from server.operations.watched_backups import (
     OLD_AFTER_S,
     DrillResult,
@@ -84,6 +86,12 @@ def metrics(request: Request, database: DatabaseDep, settings: SettingsDep) -> R
 def get_backups(settings: SettingsDep, _identity: Owner) -> BackupsOut:
     """How old the newest backup is, and how the last restore drill went."""
     return backups_out(settings)
+
+
+@admin_router.get("/studies/{study}/warnings")
+def list_study_warnings(services: ServicesDep, identity: Viewer, study: str) -> list[StudyWarning]:
+    """What goes wrong with an open study, as sent to its owners: clips, drop-outs, plays, limit, server."""
+    return warnings_shown(services, study, identity)
 
 
 def _may_read_metrics(request: Request, token: str) -> bool:

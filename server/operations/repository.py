@@ -6,7 +6,17 @@ from typing import Any, NamedTuple
 from sqlalchemy import Connection, Engine, func, or_, select, text
 from sqlalchemy.orm import Session
 
-from server.models import Account, ApiToken, AuditEntry, Clip, Link, Study, StudyRun
+from server.models import (
+    Account,
+    ApiToken,
+    AuditEntry,
+    Clip,
+    Link,
+    Study,
+    StudyGrant,
+    StudyRun,
+    WorkspaceMember,
+)
 
 
 class RunCount(NamedTuple):
@@ -106,3 +116,31 @@ def session_is_kept(engine: Engine) -> bool:
 def newest_entry(session: Session) -> datetime | None:
     """Time of the newest entry of the audit log; None if it is empty."""
     return session.scalar(select(func.max(AuditEntry.at)))
+
+
+def open_study_names(session: Session) -> list[str]:
+    """The studies that people can begin, or are taking part in."""
+    query = select(Study.name).where(Study.status.in_(("pilot", "live")), Study.archived_at.is_(None))
+    return list(session.scalars(query.order_by(Study.id)))
+
+
+def owner_addresses(session: Session, study: Study) -> list[str]:
+    """Confirmed email addresses of a study's owners: of its workspace, or by a grant."""
+    members = select(WorkspaceMember.account_id).where(
+        WorkspaceMember.workspace_id == study.workspace_id, WorkspaceMember.role == "owner"
+    )
+    granted = select(StudyGrant.account_id).where(
+        StudyGrant.study_id == study.id, StudyGrant.granted == "own"
+    )
+    query = select(Account.email).where(
+        Account.disabled_at.is_(None),
+        Account.email.is_not(None),
+        or_(Account.id.in_(members), Account.id.in_(granted)),
+    )
+    return sorted({str(address) for address in session.scalars(query)})
+
+
+def events_recorded(session: Session, action: str, study: str) -> set[str]:
+    """The events that audit entries of this action name."""
+    query = select(AuditEntry.details).where(AuditEntry.action == action, AuditEntry.target == study)
+    return {str(details.get("event")) for details in session.scalars(query)}

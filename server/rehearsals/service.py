@@ -45,7 +45,7 @@ from server.results.jobs import begin_job, in_background, is_under_way, job_stat
 from server.studies.launch_checks import clip_findings, clips_shown, launch_checks
 from server.studies.lookup import active_version, find_study
 from server.studies.schemas import LaunchCheck
-from server.transcoding.stored import StoredClips
+from server.transcoding.preparing import StoredClips
 
 _KEPT_VARIABLES = ("PATH", "LANG", "LC_ALL", "HOME", "TMPDIR", "VIRTUAL_ENV", "PYTHONPATH")
 """What the sandbox gets of the environment: no address of a database, no key, no setting."""

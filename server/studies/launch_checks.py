@@ -33,7 +33,7 @@ from server.participation.recruiter import Recruiter, stored_recruiter
 from server.studies import repository
 from server.studies.lookup import active_version, definition_of, find_study, version_numbered
 from server.studies.schemas import LaunchCheck, LaunchPage
-from server.transcoding.stored import ClipFault
+from server.transcoding.preparing import ClipFault
 
 MAX_TEXTS_NAMED = 3
 CLIPS_WITHIN_S = 60.0

@@ -65,7 +65,7 @@ from server.studies.schemas import (
 )
 from server.studies.series import effects_of_edit, series_of
 from server.studies.toml_edit import with_data
-from server.transcoding.stored import StoredClips
+from server.transcoding.preparing import StoredClips
 
 # Definitions as text and data: their problems, what they expand to, what an edit would do.
 

@@ -105,6 +105,11 @@ export interface paths {
   };
   get: operations["get_backups"];
  };
+ "/api/admin/studies/{study}/warnings": {
+  parameters: {
+  };
+  get: operations["list_study_warnings"];
+ };
  "/api/admin/session": {
   parameters: {
   };
@@ -3364,6 +3369,14 @@ export interface components {
    workspace: string;
    rights: ("view" | "run" | "edit" | "export" | "own")[];
   };
+  StudyWarning: {
+   /** @enum {string} */
+   kind: "clip" | "drop_outs" | "plays" | "quota" | "server";
+   event: string;
+   text: string;
+   /** @enum {string} */
+   page: "clips" | "monitor" | "settings" | "server";
+  };
   TextField: {
    name: string;
    label: {
@@ -4114,6 +4127,7 @@ export type Stop = components['schemas']['Stop'];
 export type Strips = components['schemas']['Strips'];
 export type StudyDetail = components['schemas']['StudyDetail'];
 export type StudySummary = components['schemas']['StudySummary'];
+export type StudyWarning = components['schemas']['StudyWarning'];
 export type TextField = components['schemas']['TextField'];
 export type Texts = components['schemas']['Texts'];
 export type Threshold = components['schemas']['Threshold'];
@@ -4892,6 +4906,39 @@ export interface operations {
     };
     content: {
      "application/json": components["schemas"]["BackupsOut"];
+    };
+   };
+   422: {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["ErrorBody"];
+    };
+   };
+   "4XX": {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["ErrorBody"];
+    };
+   };
+  };
+ };
+ list_study_warnings: {
+  parameters: {
+   path: {
+    study: string;
+   };
+  };
+  responses: {
+   200: {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["StudyWarning"][];
     };
    };
    422: {

@@ -216,7 +216,7 @@ def test_a_study_with_a_lost_clip_is_set_live_only_by_an_explicit_override(
     picture(page, "lost")
     dialog.get_by_role("checkbox", name="Set live with these clips anyway").check()
     confirm.click()
-    expect(page.get_by_role("dialog").filter(has_text="Participants can start")).to_be_visible()
+    expect(page.get_by_role("dialog").filter(has_text="Link for participants")).to_be_visible()
     with migrated_services(dashboard.server.settings) as services, services.database.read() as session:
         entry = session.query(AuditEntry).filter_by(action="status changed", target="lost").one()
         assert entry.details["anyway"] == "clip_missing"
@@ -256,3 +256,17 @@ def test_every_page_of_a_study_says_its_step_and_what_comes_next(
     steps = page.get_by_role("list", name="Steps of the study")
     expect(steps.locator("[aria-current=step]")).to_have_text("Live")
     expect(page.get_by_role("link", name="Watch the participants: 3 complete.")).to_be_visible()
+
+
+def test_a_study_that_is_full_says_so_on_its_page_without_moving_it(dashboard: Dashboard, failing: str) -> None:
+    with migrated_services(dashboard.server.settings) as services, services.database.write() as session:
+        session.query(Study).filter_by(name="short").update({"quota": 3})
+    page = dashboard.open("/studies/short")
+    page.get_by_role("tab", name="Design").wait_for()
+    before = page.get_by_role("tab", name="Design").bounding_box()
+    warning = page.get_by_role("status").filter(has_text="This study needs attention")
+    expect(warning).to_contain_text("3 of 3 runs are complete: the study is full")
+    page.wait_for_timeout(1500)
+    assert page.get_by_role("tab", name="Design").bounding_box() == before
+    assert axe_violations(page) == []
+    picture(page, "warnings")

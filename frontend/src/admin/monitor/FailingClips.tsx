@@ -2,6 +2,7 @@
 import { Alert, List } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
+import { useEffect, useState } from "react";
 import { api, type Schemas, unwrap } from "../api";
 import { counted, ruleWords } from "../ui/format";
 
@@ -13,6 +14,40 @@ const failingClipsQuery = (study: string) => ({
   queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/failing-clips", { params: { path: { study } } })),
   refetchInterval: 30_000,
 });
+
+const warningsQuery = (study: string) => ({
+  queryKey: ["study", study, "warnings"],
+  queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/warnings", { params: { path: { study } } })),
+  refetchInterval: 60_000,
+});
+
+const LATEST_MS = 800;
+
+/** Whether it is known what goes wrong with a study, so that no warning moves the page later; true soon in any case. */
+export function useWarningsKnown(study: string): boolean {
+  const pending = [useQuery(failingClipsQuery(study)).isPending, useQuery(warningsQuery(study)).isPending];
+  const [isLate, setLate] = useState(false);
+  useEffect(() => {
+    const timer = setTimeout(() => setLate(true), LATEST_MS);
+    return () => clearTimeout(timer);
+  }, []);
+  return isLate || !pending.includes(true);
+}
+
+/** On every page of a study: what its owners are sent. Clips that fail have their own box. */
+export function StudyWarnings({ study }: { study: string }) {
+  const warnings = (useQuery(warningsQuery(study)).data ?? []).filter(({ kind }) => kind !== "clip");
+  if (warnings.length === 0) return null;
+  return (
+    <Alert role="status" color="yellow" title="This study needs attention">
+      <List size="sm">
+        {warnings.map(({ event, text }) => (
+          <List.Item key={event}>{text}</List.Item>
+        ))}
+      </List>
+    </Alert>
+  );
+}
 
 /** Why, as the browsers said it, or else by the rule that most of its plays failed by. */
 function reasonOf({ reason, rules }: Failing): string {

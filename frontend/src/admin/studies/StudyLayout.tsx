@@ -11,6 +11,7 @@ import { useState, useEffect, useRef } from "react";
 import { keptWork, otherWork } from "../builder/kept";
 import { ConfirmButton } from "../ui/ConfirmButton";
 import { useChange } from "../ui/useChange";
+import { FailingClips, StudyWarnings, useWarningsKnown } from "../monitor/FailingClips";
 
 // After a study is opened: the link for participants, and what each recruiter needs.
 
@@ -159,8 +160,6 @@ function StatusButtons({ summary }: { summary: Schemas["StudySummary"] }) {
 
 // A study's heading and tabs.
 
-const FailingClips = onDemand(async () => (await import("../monitor/FailingClips")).FailingClips);
-
 const TABS = [
   ["design", "Design"],
   ["build", "Build"],
@@ -197,7 +196,7 @@ export function StudyLayout() {
     line.current?.querySelector("[aria-selected=true]")?.scrollIntoView({ block: "nearest", inline: "center" });
   });
   return (
-    <Answer of={useQuery(studyQuery(study))}>
+    <Answer of={useQuery(studyQuery(study))} waits={!useWarningsKnown(study)}>
       {({ summary }) => (
         <Stack gap="sm">
           <Group justify="space-between" align="start">
@@ -216,6 +215,7 @@ export function StudyLayout() {
           </Group>
           <StudySteps summary={summary} />
           <FailingClips study={study} />
+          <StudyWarnings study={study} />
           <Tabs
             value={current}
             keepMounted={false}

@@ -20,8 +20,15 @@ export function ErrorAlert({ error, retry }: { error: Error; retry?: () => void 
   );
 }
 
-export function Answer<T>({ of, children }: { of: UseQueryResult<T>; children: (data: T) => ReactNode }) {
-  if (of.data !== undefined) return <>{children(of.data)}</>;
+interface AnswerProps<T> {
+  of: UseQueryResult<T>;
+  /** True while something else is waited for, too. */
+  waits?: boolean;
+  children: (data: T) => ReactNode;
+}
+
+export function Answer<T>({ of, waits = false, children }: AnswerProps<T>) {
+  if (of.data !== undefined && !waits) return <>{children(of.data)}</>;
   if (of.error !== null) return <ErrorAlert error={of.error} retry={() => void of.refetch()} />;
   return <Waiting />;
 }
