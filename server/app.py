@@ -3,7 +3,7 @@
 import gc
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from functools import lru_cache
+from functools import lru_cache, partial
 
 from fastapi import APIRouter, FastAPI, Request
 from fastapi.routing import APIRoute
@@ -20,10 +20,11 @@ from server.core.errors import ApiError
 from server.core.settings import Settings
 from server.exports import endpoints as exports
 from server.operations import endpoints as operations
+from server.operations.doctor import findings_for_studies
 from server.operations.drill import weekly_drill
 from server.operations.metrics import Observer, ProxyWatch
 from server.operations.snapshots import snapshots_taken
-from server.operations.watch import studies_watched
+from server.operations.watch import WatchedServer, studies_watched
 from server.participation import endpoints as participation
 from server.participation.judgement import digests_judged_later
 from server.privacy import endpoints as privacy
@@ -120,6 +121,9 @@ def create_app(settings: Settings | None = None, *, rehearses: bool = False) -> 
     """
     services = open_services(settings or Settings(), rehearses=rehearses)
 
+    examine = partial(findings_for_studies, services)
+    watched = WatchedServer(services.settings, services.database, services.locks, examine)
+
     @asynccontextmanager
     async def lifespan(served: FastAPI) -> AsyncIterator[None]:
         served.state.services.stopping.listen()
@@ -129,7 +133,7 @@ def create_app(settings: Settings | None = None, *, rehearses: bool = False) -> 
             hourly_retention(services.database, services.settings, services.locks),
             digests_judged_later(services.database, services.intake),
             results_counted_ahead(services.database, services.results),
-            studies_watched(services),
+            studies_watched(watched),
         ):
             yield
         served.state.services.changes.close()

@@ -1,6 +1,7 @@
 """`/metrics` for Prometheus: with a token, or from only this machine; how the backups are, for owners."""
 
 import hmac
+from functools import partial
 
 from fastapi import APIRouter, Request, Response
 from prometheus_client import CONTENT_TYPE_LATEST
@@ -12,6 +13,7 @@ from server.context import ServicesDep
 from server.core.errors import ERROR_RESPONSES, ApiError
 from server.core.requests import DatabaseDep, SettingsDep
 from server.core.settings import Settings
+from server.operations.doctor import findings_for_studies
 from server.operations.metrics import exposition
 from server.operations.watch import StudyWarning, warnings_shown
 from server.operations.watched_backups import (
@@ -91,7 +93,7 @@ def get_backups(settings: SettingsDep, _identity: Owner) -> BackupsOut:
 @admin_router.get("/studies/{study}/warnings")
 def list_study_warnings(services: ServicesDep, identity: Viewer, study: str) -> list[StudyWarning]:
     """What goes wrong with an open study, as sent to its owners: clips, drop-outs, plays, limit, server."""
-    return warnings_shown(services, study, identity)
+    return warnings_shown(services.database, partial(findings_for_studies, services), study, identity)
 
 
 def _may_read_metrics(request: Request, token: str) -> bool:

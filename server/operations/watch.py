@@ -3,10 +3,10 @@
 import asyncio
 import logging
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractAsyncContextManager, suppress
 from datetime import timedelta
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import httpx2
 from pydantic import BaseModel, Field
@@ -15,14 +15,14 @@ from sqlalchemy.orm import Session
 from server.accounts.audit import record
 from server.accounts.identity import OPERATOR, Identity
 from server.accounts.letters import can_send, send_mail
-from server.context import Services
 from server.core.changes import Stopped, background_task
-from server.core.locks import LockTaken
+from server.core.db import Database
+from server.core.locks import Locks, LockTaken
 from server.core.settings import Settings
 from server.core.values import now
 from server.models import STAGES, Study
 from server.operations import repository
-from server.operations.doctor import Finding, findings_for_studies
+from server.operations.doctor import Finding
 from server.participation.run_schemas import Origin
 from server.results import monitor_repository
 from server.results.monitor import LATEST_RUNS, failing_clips, stage_reached
@@ -43,7 +43,7 @@ class StudyWarning(BaseModel):
     """Something about a study with participants that needs its owners."""
 
     kind: Literal["clip", "drop_outs", "plays", "quota", "server"]
-    event: str = Field(description="Tells events apart: each is sent once.")
+    event: str = Field(description="Identifies the event, which is sent once.")
     text: str = Field(description="What happened and what to do.")
     page: Literal["clips", "monitor", "settings", "server"]
 
@@ -132,65 +132,78 @@ def _of_server(findings: Sequence[Finding]) -> Iterator[StudyWarning]:
             yield StudyWarning(kind="server", event=event, text=text, page="server")
 
 
-def warnings_shown(services: Services, name: str, identity: Identity) -> list[StudyWarning]:
+Examine = Callable[[], Sequence[Finding]]
+"""Asks the doctor (`server.operations.doctor.findings_for_studies`)."""
+
+
+def warnings_shown(database: Database, examine: Examine, name: str, identity: Identity) -> list[StudyWarning]:
     """The warnings on a study's page. The doctor is asked only for accounts that may see the study."""
-    with services.database.read() as session:
+    with database.read() as session:
         study = find_study(session, name, identity, "view")
         if study.status not in ("pilot", "live"):
             return []
-        return study_warnings(session, study, findings_for_studies(services))
+        return study_warnings(session, study, examine())
 
 
 # The look that the server takes by itself, and what it sends.
 
 
+class WatchedServer(NamedTuple):
+    """What a look at all studies uses of the running server."""
+
+    settings: Settings
+    database: Database
+    locks: Locks
+    examine: Examine
+
+
 def studies_watched(
-    services: Services, first_look_s: float = FIRST_LOOK_S
+    server: WatchedServer, first_look_s: float = FIRST_LOOK_S
 ) -> AbstractAsyncContextManager[None]:
     """Look at every open study each ten minutes while the server runs; one process at a time."""
-    return background_task(lambda stopped: _watch(services, first_look_s, stopped))
+    return background_task(lambda stopped: _watch(server, first_look_s, stopped))
 
 
-async def _watch(services: Services, first_look_s: float, stopped: Stopped) -> None:
+async def _watch(server: WatchedServer, first_look_s: float, stopped: Stopped) -> None:
     await asyncio.sleep(first_look_s)
     while True:
         try:
-            await asyncio.to_thread(look_at_studies, services, stopped)
+            await asyncio.to_thread(look_at_studies, server, stopped)
         except Exception:  # the next look comes, whatever went wrong with this one
             LOG.exception("watching studies")
         await asyncio.sleep(LOOK_EVERY_S)
 
 
-def look_at_studies(services: Services, stopped: Stopped = lambda: False) -> None:
+def look_at_studies(server: WatchedServer, stopped: Stopped = lambda: False) -> None:
     """Send what is new of every open study to its owners, unless another process is at it."""
-    settings = services.settings
+    settings = server.settings
     if not can_send(settings) and not settings.webhook_url:
         return
-    with suppress(LockTaken), services.locks.held("watching studies"):
-        findings = findings_for_studies(services)
-        with services.database.read() as session:
+    with suppress(LockTaken), server.locks.held("watching studies"):
+        findings = server.examine()
+        with server.database.read() as session:
             names = repository.open_study_names(session)
         for name in names:
             if stopped():
                 return
             try:
-                _send_new(services, name, findings)
+                _send_new(server, name, findings)
             except Exception:  # the other studies are watched, whatever went wrong with this one
                 LOG.exception("watching the study %s", name)
 
 
-def _send_new(services: Services, name: str, findings: Sequence[Finding]) -> None:
-    with services.database.read() as session:
+def _send_new(server: WatchedServer, name: str, findings: Sequence[Finding]) -> None:
+    with server.database.read() as session:
         study = find_study(session, name, OPERATOR, "view")
         known = repository.events_recorded(session, _ACTION, name)
         new = [one for one in study_warnings(session, study, findings) if _key(study, one) not in known]
         title, addresses = study.title, repository.owner_addresses(session, study)
         keys = {one.event: _key(study, one) for one in new}
     for warning in new:
-        by = _send(services.settings, name, title, warning, addresses)
+        by = _send(server.settings, name, title, warning, addresses)
         if not by:  # nobody knows of it yet: the next look tries again
             continue
-        with services.database.write() as session:
+        with server.database.write() as session:
             record(session, OPERATOR, _ACTION, "study", name, event=keys[warning.event], by=by)
 
 

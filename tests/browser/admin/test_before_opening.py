@@ -258,7 +258,9 @@ def test_every_page_of_a_study_says_its_step_and_what_comes_next(
     expect(page.get_by_role("link", name="Watch the participants: 3 complete.")).to_be_visible()
 
 
-def test_a_study_that_is_full_says_so_on_its_page_without_moving_it(dashboard: Dashboard, failing: str) -> None:
+def test_a_study_that_is_full_says_so_on_its_page_without_moving_it(
+    dashboard: Dashboard, failing: str
+) -> None:
     with migrated_services(dashboard.server.settings) as services, services.database.write() as session:
         session.query(Study).filter_by(name="short").update({"quota": 3})
     page = dashboard.open("/studies/short")

@@ -6,6 +6,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import timedelta
+from functools import partial
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
@@ -17,7 +18,8 @@ from server.core.settings import Settings
 from server.core.values import now
 from server.models import Account, Study, StudyRun, Workspace, WorkspaceMember
 from server.operations import watch
-from server.operations.watch import look_at_studies
+from server.operations.doctor import findings_for_studies
+from server.operations.watch import WatchedServer, look_at_studies
 from tests.helpers.admins import Admin
 from tests.helpers.mail import ADDRESS, Letterbox, smtp_server
 from tests.helpers.studies import Participant, StudyInDatabase
@@ -96,6 +98,11 @@ def own(services: Services) -> None:
             session.add(WorkspaceMember(workspace_id=workspace.id, account_id=account.id, role="owner"))
 
 
+def look(services: Services) -> None:
+    examine = partial(findings_for_studies, services)
+    look_at_studies(WatchedServer(services.settings, services.database, services.locks, examine))
+
+
 def events(admin: Admin) -> dict[str, str]:
     return {one["kind"]: one["text"] for one in admin.get("/studies/short/warnings").json()}
 
@@ -110,13 +117,13 @@ def test_a_clip_that_fails_is_sent_once_with_a_link(
 ) -> None:
     own(services)
     clip = owner.get("/studies/short/clips").json()[0]
-    look_at_studies(services)
+    look(services)
     assert (box.letters, hook.taken) == ([], [])
     for _ in range(3):
         take_part(Participant(client, study.link_token), {clip["clip_sha256"]})
     assert f"{clip['file']} could not be shown to 3 of 3 people" in events(owner)["clip"]
     for _ in range(2):
-        look_at_studies(services)
+        look(services)
     [letter] = [one for one in box.letters if clip["file"] in one.get_content()]
     link = f"{services.settings.public_url}/admin/studies/short/clips"
     assert link in letter.get_content()
@@ -187,7 +194,7 @@ def test_a_webhook_that_fails_is_one_line_and_the_event_is_sent_later(
     if fault == "is gone":
         monkeypatch.setattr(services.settings, "webhook_url", "http://127.0.0.1:9/hook")
     with caplog.at_level(logging.ERROR):
-        look_at_studies(services)
+        look(services)
     [line] = [one.getMessage() for one in caplog.records]
     expected = {"hangs": "did not answer within 0.5 s", "refuses": "got 500", "is gone": "cannot be reached"}
     assert expected[fault] in line
@@ -196,7 +203,7 @@ def test_a_webhook_that_fails_is_one_line_and_the_event_is_sent_later(
     hook.is_hanging, hook.status = False, 200
     monkeypatch.setattr(services.settings, "webhook_url", address)
     for _ in range(2):
-        look_at_studies(services)
+        look(services)
     assert [one["kind"] for one in hook.taken] == ["server"]
 
 
@@ -213,7 +220,7 @@ def test_mail_that_is_refused_keeps_no_webhook_from_a_warning(
     monkeypatch.setattr("server.operations.doctor.LEAST_FREE_BYTES", 1 << 60)
     monkeypatch.setattr(services.settings, "smtp_port", 9)
     with caplog.at_level(logging.ERROR):
-        look_at_studies(services)
+        look(services)
     assert ["an email was not sent" in one.getMessage() for one in caplog.records] == [True]
     assert [one["kind"] for one in hook.taken] == ["server"]
     [entry] = [one for one in owner.get("/audit").json() if one["action"] == "warning sent"]

@@ -50,6 +50,7 @@ NEEDED: dict[Right, set[str]] = {
         "GET monitor",
         "GET monitor/stream",
         "GET failing-clips",
+        "GET warnings",
         "GET results",
         "GET data/analysis.{language}",
         "GET data/codebook.md",
