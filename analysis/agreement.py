@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from analysis.opinion import Votes
 from analysis.read.number_columns import numbers, unusual_numbers
 from analysis.read.text_table import (
     TextTable,
@@ -19,6 +18,7 @@ from analysis.read.text_table import (
     refuse_shared_roles,
     texts_required,
 )
+from analysis.votes import Votes
 from experiments.errors import InputError
 
 # Reliability of a scale made of several items: Cronbach's alpha, McDonald's omega, items, scale scores.

@@ -2,36 +2,15 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 from scipy import stats
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from analysis.read.number_columns import numbers, unusual_numbers
-from analysis.read.reading import EXPORT_COLUMNS, answers_that_count
-from analysis.read.text_table import (
-    TextTable,
-    name_lines,
-    names_in_order,
-    read_text_table,
-    refuse_shared_roles,
-    texts_required,
-)
-from analysis.standard_scores import (
-    ScoreMethod,
-    Screening,
-    Standard,
-    bt500_counts,
-    differential_scores,
-    screen_raters,
-    standardized_votes,
-)
-from analysis.within.level_codes import given_orders
+from analysis.votes import NAMED_MAX, ScoreMethod, Standard, Votes, bt500_counts, names_where
 from experiments.errors import InputError
 
 # Subject bias and inconsistency by alternating projection, as in ITU-T P.910 (2023), Annex E.
@@ -238,26 +217,26 @@ def _tied(seen: Flags) -> tuple[Codes, Codes]:
 
 # Caveats about recovered scores: who contributed nothing, and what has no common scale.
 
-NAMED_MAX = 6
-
 
 def doubts(model: Projection, people: Sequence[str], items: Sequence[str]) -> Iterator[str]:
     """Decisions on the model of votes by the people and items named, in words."""
     if (alone := model.person_groups < 0).any():
         counts = "counts" if alone.sum() == 1 else "count"
         yield (
-            f"bias cannot be estimated from one vote: {_named(people, alone)} {counts} in MOS, but not in "
-            "recovered scores"
+            f"bias cannot be estimated from one vote: {names_where(people, alone)} {counts} in MOS, but not "
+            "in recovered scores"
         )
     if (lacking := model.groups < 0).any():
-        yield f"only people with one vote rated {_named(items, lacking)}: no recovered score"
+        yield f"only people with one vote rated {names_where(items, lacking)}: no recovered score"
     if model.held.any():
         yield (
-            f"the estimated inconsistency of {_named(people, model.held)} is zero, which would let them "
+            f"the estimated inconsistency of {names_where(people, model.held)} is zero, which would let them "
             "alone determine the scores: the common inconsistency was used"
         )
     if (number := int(model.groups.max()) + 1) > 1:
-        told = " | ".join(_named(items, model.groups == group) for group in range(min(number, NAMED_MAX)))
+        told = " | ".join(
+            names_where(items, model.groups == group) for group in range(min(number, NAMED_MAX))
+        )
         more = f" and {number - NAMED_MAX} more" if number > NAMED_MAX else ""
         yield (
             f"the items form {number} groups with no person in common ({told}{more}): scores and biases "
@@ -268,12 +247,6 @@ def doubts(model: Projection, people: Sequence[str], items: Sequence[str]) -> It
             f"recovered scores did not converge in {model.iterations} rounds: too few people rated several "
             "items"
         )
-
-
-def _named(names: Sequence[str], which: NDArray[np.bool_]) -> str:
-    chosen = [name for name, one in zip(names, which, strict=True) if one]
-    rest = len(chosen) - NAMED_MAX
-    return ", ".join(chosen[:NAMED_MAX]) + (f" and {rest} more" if rest > 0 else "")
 
 
 # Who gave the opinions: bias, inconsistency, agreement with the others, and BT.500's ruling.
@@ -329,24 +302,6 @@ def person_scores(
 Repeats = Literal["mean", "votes"]
 
 
-@dataclass(frozen=True, eq=False)
-class Votes:
-    """Votes by person and item: means (people, items), NaN where none, and how many votes each rests on.
-
-    `squares` (people, items) are the sums of squared distances of votes from these means.
-    """
-
-    scores: Array
-    counts: Array
-    squares: Array
-    people: tuple[str, ...]
-    items: tuple[str, ...]
-    all_votes: tuple[Array, ...]
-    source: str
-    synthetic: bool
-    decisions: tuple[str, ...]
-
-
 @dataclass(frozen=True)
 class ItemScore:
     """One item. mos, sd (n - 1), se and the 95% interval (t with n - 1); `recovered` from the model.
@@ -382,197 +337,6 @@ class OpinionResult:
     decisions: tuple[str, ...]
     method: ScoreMethod = "acr"
     z_scores: bool = False
-
-
-def read_votes(
-    path: Path,
-    item: str,
-    participant: str,
-    rating: str,
-    levels: Sequence[str] = (),
-    standard: Standard = Standard(),
-    screening: Screening | None = None,
-) -> Votes:
-    """Read one row per vote; `levels` may give the order of the items (`given_orders`).
-
-    Raters are screened before scores are computed against hidden references.
-
-    Raises
-    ------
-    InputError
-        As `read_text_table`; a rating that is not a number, no rating at all; options of `standard` that do
-        not belong together; a hidden reference that nobody rated; nobody left after screening.
-    """
-    return read_votes_by(path, (item, participant, rating), None, levels, standard, screening)[""]
-
-
-def read_votes_by(
-    path: Path,
-    columns: tuple[str, str, str],
-    by: str | None = None,
-    levels: Sequence[str] = (),
-    standard: Standard = Standard(),
-    screening: Screening | None = None,
-) -> dict[str, Votes]:
-    """The votes at each level of the column `by`, such as the scale; all under an empty name without one.
-
-    `columns` are those of the item, the person and the vote; see `read_votes`.
-    """
-    standard.check()
-    more = [name for name in (standard.reference, standard.first, standard.session, by) if name]
-    roles = [*columns, *more]
-    refuse_shared_roles(roles)
-    table = read_text_table(path, roles, EXPORT_COLUMNS)
-    texts_required(table, columns[0])
-    texts_required(table, columns[1])
-    values = _scored_rows(table, columns, standard)
-    keep = np.isfinite(values)
-    if not keep.all():
-        lines = name_lines(table, ~keep)
-        table.decisions.append(f"{int((~keep).sum())} rows without a rating excluded ({lines})")
-    if not keep.any():
-        raise InputError(f"{path.name}: column '{columns[2]}' has no rating in any row")
-    keep = answers_that_count(table, keep, "ratings")
-    if standard.z_scores:
-        values, keep = _z_scored(table, columns[1], standard.session, values, keep)
-    parts = {"": keep}
-    if by is not None:
-        texts_required(table, by)
-        of_row = table.columns[by].astype(str).to_numpy()
-        parts = {str(name): keep & (of_row == name) for name in np.unique(of_row[keep])}
-    return {
-        name: _votes(table, columns, values, rows, levels, standard, screening)
-        for name, rows in parts.items()
-    }
-
-
-def _scored_rows(table: TextTable, columns: tuple[str, str, str], standard: Standard) -> Array:
-    """The vote of each row, as the method counts it."""
-    values = numbers(table, columns[2])
-    unusual_numbers(table, columns[2], values, "correct them or leave them empty")
-    if standard.method == "dscqs" and standard.reference:
-        reference = numbers(table, standard.reference)
-        unusual_numbers(table, standard.reference, reference, "correct them or leave them empty")
-        return reference - values
-    if standard.first:
-        texts_required(table, standard.first)
-        # the vote compares the second with the first: it counts for the item, so that it is turned if first
-        is_first = table.columns[standard.first].astype(str) == table.columns[columns[0]].astype(str)
-        if is_first.all() or not is_first.any():
-            table.decisions.append(
-                f"every item was shown {'first' if is_first.all() else 'second'}, so the order is confounded "
-                "with the item"
-            )
-        return np.where(is_first.to_numpy(), -values, values)
-    return values
-
-
-def _z_scored(
-    table: TextTable, participant: str, session: str | None, values: Array, keep: Flags
-) -> tuple[Array, Flags]:
-    """Standardized votes, and the rows that have one."""
-    units = table.columns[participant].astype(str)
-    if session is not None:
-        texts_required(table, session)
-        units = units + ", " + table.columns[session].astype(str)
-    names, codes = np.unique(units.to_numpy()[keep].astype(str), return_inverse=True)
-    z = np.full(values.size, np.nan)
-    z[keep] = standardized_votes(values[keep], codes.astype(np.int64))
-    flat = np.bincount(codes, np.isnan(z[keep])) > 0
-    if flat.any():
-        table.decisions.append(f"excluded, since their votes do not vary: {_named(list(names), flat)}")
-    if flat.all():
-        raise InputError(f"{table.source}: nobody's votes vary, so there are no z-scores; remove --z-scores")
-    return z, keep & np.isfinite(z)
-
-
-def _votes(
-    table: TextTable,
-    columns: tuple[str, str, str],
-    values: Array,
-    keep: Flags,
-    levels: Sequence[str],
-    standard: Standard,
-    screening: Screening | None,
-) -> Votes:
-    item, participant, _ = columns
-    people, person = np.unique(table.columns[participant].astype(str).to_numpy()[keep], return_inverse=True)
-    items = names_in_order(table.columns[item], keep)
-    orders, said = given_orders({item: items}, levels)
-    items = orders.get(item, items)
-    which = pd.Categorical(table.columns[item].astype(str)[keep], items).codes.astype(np.int64)
-    totals, counts = np.zeros((people.size, len(items))), np.zeros((people.size, len(items)))
-    np.add.at(totals, (person, which), values[keep])
-    np.add.at(counts, (person, which), 1.0)
-    scores = np.divide(totals, counts, out=np.full_like(totals, np.nan), where=counts > 0)
-    squares = np.zeros_like(totals)
-    np.add.at(squares, (person, which), (values[keep] - scores[person, which]) ** 2)
-    decisions = [*table.decisions, *said]
-    stays = np.ones(people.size, dtype=bool)
-    if screening is not None:
-        reasons = screen_raters(scores, screening)
-        stays[list(reasons)] = False
-        rule = {"bt500": "BT.500", "p913": "P.913"}[screening["rule"]]
-        decisions += [f"{rule} excluded {people[k]}: {why}" for k, why in reasons.items()]
-        if not reasons:
-            decisions.append(f"{rule} excluded nobody")
-        elif 2 * len(reasons) > people.size:
-            decisions.append(f"{rule} excluded more than half of the raters, who hardly agree at all")
-    votes = Votes(
-        scores[stays],
-        counts[stays],
-        squares[stays],
-        tuple(str(one) for one in people[stays]),
-        items,
-        tuple(values[keep][(which == index) & stays[person]] for index in range(len(items))),
-        table.source,
-        table.synthetic,
-        tuple(decisions),
-    )
-    if standard.method != "acr-hr":
-        return votes
-    named = table.columns[standard.reference].astype(str).to_numpy()[keep]
-    return _against_references(votes, which, named, standard)
-
-
-def _against_references(votes: Votes, which: Codes, named: NDArray[Any], standard: Standard) -> Votes:
-    """Each person's votes against that person's vote on the hidden reference of the item."""
-    references = np.full(len(votes.items), -1, dtype=np.int64)
-    for index, name in enumerate(votes.items):
-        given = {text for text in np.unique(named[which == index]) if text not in ("", name)}
-        if len(given) > 1:
-            told = ", ".join(sorted(given)[:NAMED_MAX])
-            raise InputError(f"{votes.source}: item '{name}' has several references: {told}; expected one")
-        for text in given:
-            if text not in votes.items:
-                raise InputError(f"{votes.source}: nobody rated '{text}', the reference of '{name}'")
-            references[index] = votes.items.index(text)
-    if (references < 0).all():
-        raise InputError(
-            f"{votes.source}: column '{standard.reference}' names no reference; expected the hidden "
-            "reference's item in the rows of the other items"
-        )
-    scores = differential_scores(votes.scores, references, standard.highest or 0.0, standard.crush)
-    lost = np.isfinite(votes.scores) & ~np.isfinite(scores) & (references >= 0)
-    decisions = list(votes.decisions)
-    if lost.any():
-        told = _named(votes.people, np.any(lost, axis=1))
-        decisions.append(f"{int(lost.sum())} votes excluded, without a vote on the reference by {told}")
-    kept = (references >= 0) & np.isfinite(scores).any(axis=0)
-    people = np.any(np.isfinite(scores[:, kept]), axis=1)
-    scores = scores[np.ix_(people, kept)]
-    there = np.isfinite(scores)
-    return Votes(
-        scores,
-        there.astype(np.float64),
-        np.zeros_like(scores),
-        tuple(name for name, stays in zip(votes.people, people.tolist(), strict=True) if stays),
-        tuple(name for name, stays in zip(votes.items, kept.tolist(), strict=True) if stays),
-        tuple(column[np.isfinite(column)] for column in scores.T),
-        votes.source,
-        votes.synthetic,
-        tuple(decisions),
-    )
 
 
 def fit_opinion(votes: Votes, repeats: Repeats = "mean", standard: Standard = Standard()) -> OpinionResult:

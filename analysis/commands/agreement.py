@@ -105,8 +105,8 @@ def agreement(
       analysis agreement ratings.csv --by scale
     """
     from analysis import agreement
-    from analysis.opinion import read_votes_by
     from analysis.report.rating_tables import agreement_text, intraclass_table
+    from analysis.votes import read_votes_by
 
     votes = read_votes_by(file, (item, participant, rating), by)
     with progress_spinner("resampling items"):
@@ -223,9 +223,9 @@ def opinion(
 
       analysis opinion votes.csv --z-scores --session day
     """
-    from analysis.opinion import fit_opinion, read_votes
+    from analysis.opinion import fit_opinion
     from analysis.report.rating_tables import opinion_text, raters_table, scores_table
-    from analysis.standard_scores import P913_BELOW, Screening, Standard
+    from analysis.votes import P913_BELOW, Screening, Standard, read_votes
 
     bounds = scale_bounds(scale)
     highest = None if bounds is None else bounds[1]

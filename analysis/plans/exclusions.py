@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from analysis.read.study_answers import StudyAnswers
-from analysis.standard_scores import Screening, screen_raters
+from analysis.votes import Screening, screen_raters
 from experiments import rules
 from experiments.declaration.experiment import Experiment
 from experiments.kinds import scales_of

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from analysis.agreement import LEVELS, _is_maximum, _one_factor, agreement, read_items, reliability
 from analysis.cli import app
-from analysis.opinion import read_votes
+from analysis.votes import read_votes
 from experiments.errors import InputError
 
 FOLDER = Path(__file__).parents[2] / "golden/r/agreement"

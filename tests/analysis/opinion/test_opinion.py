@@ -9,8 +9,8 @@ import pytest
 from typer.testing import CliRunner
 
 from analysis.cli import app
-from analysis.opinion import OpinionResult, fit_opinion, read_votes
-from analysis.standard_scores import bt500_counts
+from analysis.opinion import OpinionResult, fit_opinion
+from analysis.votes import bt500_counts, read_votes
 from experiments.errors import InputError
 
 FOLDER = Path(__file__).parents[2] / "golden/r/opinion"

@@ -9,7 +9,8 @@ import pytest
 from typer.testing import CliRunner
 
 from analysis.cli import app
-from analysis.opinion import alternating_projection, fit_opinion, read_votes
+from analysis.opinion import alternating_projection, fit_opinion
+from analysis.votes import read_votes
 
 CALL = ["--item", "clip", "--participant", "id", "--rating", "score"]
 

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.opinion import read_votes
 from analysis.read.long_csv import read_long_table
 from analysis.thresholds.answers import read_answers
+from analysis.votes import read_votes
 
 HEADER = "run,participant,run_status,trial_index,kind,profile_id,face,stimulus,response,verdict,excluded\n"
 

@@ -9,13 +9,13 @@ import pytest
 
 from analysis.models.columns import ModelTerms
 from analysis.models.design import model_data
-from analysis.opinion import read_votes
 from analysis.pairs.abilities import read_item_factors
 from analysis.pairs.comparisons import read_comparisons
 from analysis.read.long_csv import LongData, read_long_table
 from analysis.read.model_csv import read_model_input
 from analysis.thresholds.answers import read_answers
 from analysis.thresholds.people import fit_thresholds
+from analysis.votes import read_votes
 from analysis.within.cell_means import cell_table
 from experiments.errors import InputError
 

@@ -9,8 +9,8 @@ from scipy import stats
 from typer.testing import CliRunner
 
 from analysis.cli import app
-from analysis.opinion import OpinionResult, fit_opinion, read_votes
-from analysis.standard_scores import Screening, Standard, screen_raters
+from analysis.opinion import OpinionResult, fit_opinion
+from analysis.votes import Screening, Standard, read_votes, screen_raters
 from experiments.errors import InputError
 
 P913: Screening = {"rule": "p913", "below": 0.75}
