@@ -38,17 +38,19 @@ def as_text(table: Table, width: int = WIDTH) -> str:
 
 
 def _column_widths(table: Table, width: int) -> list[int]:
-    """The first column gives way down to 12, then the widest of those that can be broken at a space."""
+    """The first column gives way down to its longest word, then the widest that has a space."""
     columns = list(zip(table.header, *table.rows, strict=True))
     sizes = [max(map(len, column)) for column in columns]
     room = width - sum(sizes[1:]) - _GAP * (len(sizes) - 1)
-    sizes[0] = min(sizes[0], max(room, 12))
     floors = [max((len(word) for cell in column for word in cell.split()), default=0) for column in columns]
+    sizes[0] = min(sizes[0], max(room, 12, min(floors[0], 20)))
     spare = [size - floor - _GAP for size, floor in zip(sizes, floors, strict=True)]
     while sum(sizes) + _GAP * (len(sizes) - 1) > width and max(spare[1:], default=0) > 0:
         widest = max((i for i in range(1, len(sizes)) if spare[i] > 0), key=sizes.__getitem__)
         sizes[widest] -= 1
         spare[widest] -= 1
+    if (over := sum(sizes) + _GAP * (len(sizes) - 1) - width) > 0:
+        sizes[0] = min(sizes[0], max(12, sizes[0] - over))
     return sizes
 
 

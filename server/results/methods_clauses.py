@@ -480,6 +480,21 @@ def _reasons(of: DescribedSeries) -> list[str]:
     ]
 
 
+VERDICT_WORDS = {"likely": "likely human", "unclear": "unclear", "unlikely": "unlikely human"}
+
+
+def _verdicts(of: DescribedSeries) -> str:
+    """How many visits have each verdict; verdicts that none has are left out."""
+    parts = []
+    for name, word in VERDICT_WORDS.items():
+        if of.value(name):
+            forms = f"{{{name}:was|were}}" if parts else f"completed {{{name}:visit was|visits were}}"
+            parts.append(f"{{{name}}} {forms} {word}")
+    if of.value("not_judged"):
+        parts.append("{not_judged} could not be judged")
+    return " and ".join(parts) if len(parts) < 3 else _joined_parts(parts)
+
+
 def _evidence(of: DescribedSeries) -> list[str]:
     judged = sum(of.value(name) for name in ("likely", "unclear", "unlikely"))
     if not judged:
@@ -488,9 +503,7 @@ def _evidence(of: DescribedSeries) -> list[str]:
             "provided|visits provided} no evidence."
         ]
     lines = [
-        f"To detect automated answers, {_evidence_gathered(of)}. Based on this evidence, {{likely}} "
-        "completed {likely:visit was|visits were} likely human, {unclear} {unclear:was|were} unclear, "
-        "{unlikely} {unlikely:was|were} unlikely human, and {not_judged} could not be judged.",
+        f"To detect automated answers, {_evidence_gathered(of)}. Based on this evidence, {_verdicts(of)}.",
         "This evidence is not proof: it cannot detect a person who lets a program choose the answers.",
     ]
     if of.value("refused"):

@@ -15,9 +15,10 @@ if TYPE_CHECKING:
 CLIP_HELP = """
 Render one clip from a blink profile and a character.
 
-PROFILE is real, model, SL, AL, SL_ease, AL_ease, the name of a shipped recording (`stimuli profiles`), or a
-CSV file of closure samples at 300 fps (0 open, 1 closed). Columns are separated by commas, semicolons or
-tabs; decimal points and commas are accepted.
+PROFILE is real (a recorded blink), model (sampled from the model of recorded blinks), a textbook curve, the
+name of a shipped recording (`stimuli profiles`), or a CSV file of closure samples at 300 fps (0 open, 1
+closed). Textbook curves move at constant speed: SL is symmetric, AL closes faster than it opens; SL_ease and
+AL_ease start and end slowly.
 
 Examples:
 
