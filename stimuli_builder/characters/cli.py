@@ -1,4 +1,4 @@
-"""`stimuli bake` and `stimuli character`: render one, list those that are here, bring back an old one."""
+"""`stimuli bake` and `stimuli character`: render or record one, list those installed, restore an old one."""
 
 from collections.abc import Callable
 from importlib.metadata import entry_points
@@ -77,6 +77,49 @@ def fetch_character(
     """
     target = out or SHIPPED_FOLDER / name
     typer.echo(f"'{name}' is in {restore(name, source, target)}")
+
+
+@bake_app.command("recording")
+def bake_recording_command(
+    video: Annotated[
+        Path, typer.Argument(help="Video of a person who blinks, best at 240 frames per second.")
+    ],
+    out: Annotated[Path, typer.Option(help="Folder of the character; its name is the character's.")],
+    track: Annotated[
+        Path | None, typer.Argument(help="Track of VIDEO [default: it is tracked without labels].")
+    ] = None,
+    one_eye: Annotated[bool, typer.Option("--one-eye", help="Close-up of one eye.")] = False,
+    eye_distance_mm: Annotated[
+        float,
+        typer.Option(
+            min=40,
+            max=80,
+            help="Distance between the person's eyes; it sets the scale of two-eye recordings.",
+        ),
+    ] = 60.0,
+    label: Annotated[str, typer.Option(help="Words that describe the character.")] = "",
+    accept_variable_rate: Annotated[
+        bool, typer.Option("--accept-variable-rate", help="Accept a variable frame rate.")
+    ] = False,
+) -> None:
+    """Make a character from a person's own video: its levels are recorded frames, and pictures between them.
+
+    The levels come from the opening of one blink. Head motion and changes of light are removed, frames are
+    chosen by closure and gaze, and the tracker measures the opening of every level. The folder also gets
+    report.html: what is recorded, what is interpolated and how well, and what to record again.
+    Ask the person shown for consent first (docs/how-to/record-a-character.md has a form).
+
+    Examples:
+
+      stimuli bake recording me.mp4 --out characters/me
+
+      stimuli bake recording eye.mp4 eye_track.csv --one-eye --out characters/eye
+    """
+    from stimuli_builder.characters.recording_bake import RecordingOrder, bake_recording, summary_lines
+
+    order = RecordingOrder(video, out, track, one_eye, eye_distance_mm, label, accept_variable_rate)
+    for line in summary_lines(bake_recording(order), order):
+        typer.echo(line)
 
 
 ANY_OPTIONS: dict[str, Any] = {"ignore_unknown_options": True, "allow_extra_args": True}

@@ -1,0 +1,260 @@
+"""A character from a recording: against a generated one of known truth, on real eyes, and on bad input."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from experiments.errors import InputError
+from stimuli_builder.characters.atlas import load_atlas
+from stimuli_builder.characters.recording_bake import RecordingBake, RecordingOrder, bake_recording
+from stimuli_builder.characters.recording_levels import near_both_sides
+from stimuli_builder.cli import main
+from stimuli_builder.clips.build import Machines, build
+from stimuli_builder.clips.design_clips import Options
+from stimuli_builder.clips.verify import verify
+from stimuli_builder.tracking.cli_track import TrackJob, run_track
+from stimuli_builder.tracking.model import TrainingOptions
+from tests.stimuli_builder.characters.recordings import Recording
+
+SMALL = Recording(width_px=480, seconds=1.0, onsets=(0.3,))
+"""Quickly baked; its eyes are small, which is one of its stated limits."""
+
+
+def bake(recording: Recording, folder: Path) -> RecordingBake:
+    video, track = recording.write(folder)
+    return bake_recording(RecordingOrder(video, folder / "made", track))
+
+
+def decibels(one: NDArray[np.float32], other: NDArray[np.float32]) -> float:
+    return float(10 * np.log10(255**2 / ((one - other) ** 2).mean()))
+
+
+# Known truth.
+
+
+@dataclass(frozen=True)
+class Made:
+    recording: Recording
+    folder: Path
+    baked: RecordingBake
+
+
+@pytest.fixture(scope="session")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Made:
+    folder = tmp_path_factory.mktemp("recorded")
+    recording = Recording()
+    return Made(recording, folder / "made", bake(recording, folder))
+
+
+def test_left_out_frames_come_back_at_every_closure(made: Made) -> None:
+    values = made.baked.left_out[1:-1]
+    assert len(values) >= 15
+    assert values.min() >= 38
+    assert made.baked.limits == []
+
+
+def test_levels_show_the_true_face_and_its_opening(made: Made) -> None:
+    atlas = load_atlas(made.folder)
+    assert len(atlas.closures) >= 17
+    x, y, width, height = atlas.declaration.crop
+    base, region = made.baked.frames.numbers[0], made.baked.frames.region
+
+    def truth(closure: float) -> NDArray[np.float32]:
+        return region.cut(made.recording.truth(closure, base))[y : y + height, x : x + width]
+
+    for index in [*range(0, len(atlas.closures), 8), len(atlas.closures) - 1]:
+        level, closure = atlas.level_srgb(index).astype(np.float32), float(atlas.closures[index])
+        offsets = np.arange(-0.03, 0.0301, 0.0025)
+        alike = [decibels(level, truth(float(np.clip(closure + off, 0, 1)))) for off in offsets]
+        assert max(alike) >= 40, closure
+        assert abs(offsets[int(np.argmax(alike))]) * 11.0 <= 0.2, closure
+
+
+def test_the_tracker_confirms_every_opening(made: Made) -> None:
+    assert np.abs(made.baked.measured.off_mm).max() <= 0.2
+    assert made.baked.opening_mm == pytest.approx(9.5, abs=0.3)
+
+
+EXPERIMENT = """
+name = "recorded"
+title = "A recorded character"
+
+[[factors]]
+name = "profile"
+label = "Profile"
+[[factors.levels]]
+name = "real"
+label = "Real"
+render = { profile = "real" }
+[[factors.levels]]
+name = "model"
+label = "Model"
+render = { profile = "model" }
+
+[exemplars]
+per_cell = 1
+own_per = ["profile"]
+
+[render]
+character = "made"
+width_px = 960
+height_px = 360
+
+[trial]
+kind = "clip_rating"
+[trial.scale]
+question = { en = "How natural?" }
+low = { en = "very unnatural" }
+high = { en = "very natural" }
+
+[texts.en]
+consent = "c"
+instructions = "i"
+debrief = "d"
+"""
+
+
+def test_the_painter_renders_it_and_verify_agrees(made: Made) -> None:
+    from experiments.load import load_experiment
+
+    file = made.folder.parent / "recorded.toml"
+    file.write_text(EXPERIMENT, encoding="utf-8")
+    out = made.folder.parent / "clips"
+    build(load_experiment(str(file)), out, Options(base_folder=file.parent), Machines(workers=1))
+    verdict = verify(out, file.parent)
+    assert verdict.findings == ()
+    assert verdict.opening_checked == 2
+
+
+def test_the_report_says_what_is_interpolated(made: Made) -> None:
+    page = (made.folder / "report.html").read_text(encoding="utf-8")
+    assert page.count("data:image/webp;base64,") == 4
+    assert "http" not in page
+    assert page.count("interpolated, frames") >= 3
+    assert "Nothing: no limit was found." in page
+
+
+# Bad input: rejected in one line, or made with its limits.
+
+
+def refusal(recording: Recording, folder: Path, **options: object) -> str:
+    video, track = recording.write(folder)
+    order = replace(RecordingOrder(video, folder / "made", track), **options)  # type: ignore[arg-type]
+    with pytest.raises(InputError) as caught:
+        bake_recording(order)
+    assert not (folder / "made" / "character.toml").exists()
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def test_eyes_that_never_close_are_refused(tmp_path: Path) -> None:
+    assert "no eye closes fully, the deepest closure is 0.6" in refusal(replace(SMALL, depth=0.6), tmp_path)
+
+
+def test_a_person_who_looks_away_is_refused(tmp_path: Path) -> None:
+    assert "look to the side" in refusal(replace(SMALL, gaze_mm=5.0), tmp_path)
+
+
+def test_the_track_of_another_video_is_refused(tmp_path: Path) -> None:
+    video, _ = SMALL.write(tmp_path)
+    shorter = replace(SMALL, seconds=0.9).write_track(tmp_path / "shorter.csv")
+    later = replace(SMALL, onsets=(0.55,)).write_track(tmp_path / "later.csv")
+    larger = replace(SMALL, width_px=1920).write_track(tmp_path / "larger.csv")
+    for track, words in (
+        (shorter, "216 frames, but person.mp4 has 240"),
+        (later, "do not agree with the pictures"),
+        (larger, "outside the picture"),
+    ):
+        with pytest.raises(InputError, match=words):
+            bake_recording(RecordingOrder(video, tmp_path / "made", track))
+
+
+def test_one_eye_and_two_eyes_are_not_confused(tmp_path: Path) -> None:
+    assert "track of 2 eyes; remove --one-eye" in refusal(SMALL, tmp_path, one_eye=True)
+
+
+def test_a_blink_that_is_cut_off_is_refused(tmp_path: Path) -> None:
+    assert "it is cut off" in refusal(replace(SMALL, seconds=0.45), tmp_path)
+
+
+def test_a_folder_that_holds_a_character_is_kept(tmp_path: Path) -> None:
+    (tmp_path / "made").mkdir()
+    (tmp_path / "made" / "character.toml").write_text("mine", encoding="utf-8")
+    with pytest.raises(InputError, match="there is a character already"):
+        bake_recording(RecordingOrder(tmp_path / "person.mp4", tmp_path / "made"))
+    assert (tmp_path / "made" / "character.toml").read_text(encoding="utf-8") == "mine"
+
+
+def test_one_blink_is_stated(tmp_path: Path) -> None:
+    limits = " ".join(bake(SMALL, tmp_path).limits)
+    assert "Only one blink" in limits
+    assert "pixels wide" in limits
+    assert not any(words in limits for words in ("head moved", "light changed", "reflection"))
+
+
+def test_25_frames_per_second_are_stated(tmp_path: Path) -> None:
+    baked = bake(replace(SMALL, fps=25.0, seconds=2.0, onsets=(0.3, 1.1)), tmp_path)
+    limits = " ".join(baked.limits)
+    assert "At 25 frames per second" in limits
+    assert "No frame was recorded between closures" in limits
+
+
+def test_a_moving_head_is_stated(tmp_path: Path) -> None:
+    slow = replace(SMALL, head_px=lambda time_s: 30 * np.sin(2 * np.pi * 0.8 * time_s))
+    baked = bake(slow, tmp_path)
+    assert "The head moved by" in " ".join(baked.limits)
+    assert baked.left_out[1:-1].min() >= 38
+
+
+def test_rolling_shutter_is_stated(tmp_path: Path) -> None:
+    shaken = replace(SMALL, head_px=lambda time_s: 8 * np.sin(2 * np.pi * 4 * time_s), readout_s=0.03)
+    assert "rolling shutter" in " ".join(bake(shaken, tmp_path).limits)
+
+
+def test_changing_light_is_stated(tmp_path: Path) -> None:
+    baked = bake(replace(SMALL, light=0.3), tmp_path)
+    assert "The light changed by" in " ".join(baked.limits)
+    assert baked.left_out[1:-1].min() >= 38
+
+
+def test_glasses_are_stated(tmp_path: Path) -> None:
+    assert "as on glasses" in " ".join(bake(replace(SMALL, glasses=True), tmp_path).limits)
+
+
+# Real eyes, and the command.
+
+
+def test_real_close_up_of_one_eye(shared_data: Path, tmp_path: Path) -> None:
+    folder = shared_data / "face_video"
+    video, track = folder / "short_human_3blink.mp4", tmp_path / "track.csv"
+    labels = folder / "short_human_3blink.points.json"
+    run_track(TrackJob(video, track, TrainingOptions(), labels=labels, one_eye=True))
+    baked = bake_recording(RecordingOrder(video, tmp_path / "made", track, one_eye=True))
+    near = near_both_sides(baked.frames.closures)
+    assert near.sum() >= 8
+    assert baked.left_out[near].min() >= 38
+    assert np.nanmedian(baked.left_out) >= 38
+    assert len(load_atlas(tmp_path / "made").closures) >= 17
+    assert np.abs(baked.measured.off_mm).max() <= 0.2
+    assert any("78 frames per second" in limit for limit in baked.limits)
+
+
+def test_without_a_track_the_command_tracks_first(
+    shared_data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    video = shared_data / "face_video" / "short_human_3blink.mp4"
+    out = tmp_path / "made"
+    monkeypatch.setattr(
+        "sys.argv", ["stimuli", "bake", "recording", str(video), "--one-eye", "--out", str(out)]
+    )
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 0
+    said = capsys.readouterr().out
+    assert "left-out frames: median" in said
+    assert "limit: The tracker still sees" in said
+    assert (out / "track.csv").is_file()
+    assert (out / "report.html").is_file()
