@@ -485,7 +485,7 @@ VERDICT_WORDS = {"likely": "likely human", "unclear": "unclear", "unlikely": "un
 
 def _verdicts(of: DescribedSeries) -> str:
     """How many visits have each verdict; verdicts that none has are left out."""
-    parts = []
+    parts: list[str] = []
     for name, word in VERDICT_WORDS.items():
         if of.value(name):
             forms = f"{{{name}:was|were}}" if parts else f"completed {{{name}:visit was|visits were}}"
@@ -518,7 +518,7 @@ def _evidence_gathered(of: DescribedSeries) -> str:
         "with_digests": "digests of the clips",
         "with_presses": "summaries of key and pointer presses",
     }
-    parts = []
+    parts: list[str] = []
     for name, words in kinds.items():
         visits = of.value(name)
         if visits or name == "with_tickets":
