@@ -386,7 +386,9 @@ def write_small_video(shown: list[tuple[float, bytes]], target: Path) -> None:
 
 
 SIZE = (960, 360)
-CLOSURES = (0.0, 0.25, 0.5, 0.75, 1.0)
+SHEET_CLOSURES = np.linspace(0.0, 1.0, 16)
+ENLARGED_CLOSURES, TIMES = (0.0, 0.33, 0.67, 1.0), 3
+TILE_PX = 480
 MOVED, LOWERED = "hazel@5", "alder@8"
 """Whose brow, cheek, squint and gaze are shown moved, and whose lower lid: one face each, for its size."""
 FACES_IN_A_ROW = 6
@@ -401,7 +403,7 @@ def character_pictures(_: Path) -> None:
         whole = find_character(name).geometry.size_px
         tall = whole[1] > whole[0]
         character = find_character(name).levels(whole if tall else SIZE)
-        save(closures_sheet(character, tall), IMAGES / f"{name}-closures.webp")
+        save(closures_sheet(character), IMAGES / f"{name}-closures.webp")
         save(blink_sheet(character, tall), IMAGES / f"{name}-blink.webp")
         if name == LOWERED:
             save(lower_lid_sheet(character), IMAGES / f"{name}-lower-lid.webp")
@@ -410,11 +412,26 @@ def character_pictures(_: Path) -> None:
     profile_curves(IMAGES / "profiles.webp")
 
 
-def closures_sheet(character: LevelSet, tall: bool) -> Rgb:
-    """Eyes one below the other at actual size; whole faces side by side at half of it."""
-    if tall:
-        return np.hstack([_reduced(character.picture(w), 2) for w in CLOSURES[::2]])
-    return np.vstack([character.picture(w) for w in CLOSURES])
+def closures_sheet(character: LevelSet) -> Rgb:
+    """What a blink changes at sixteen closures, four in a row, and one eye at four of them, enlarged."""
+    window = character.window.slices
+    tiles = []
+    for closure in SHEET_CLOSURES:
+        part = character.picture(float(closure))[window]
+        height = round(part.shape[0] * TILE_PX / part.shape[1])
+        tiles.append(cv2.resize(part, (TILE_PX, height), interpolation=cv2.INTER_AREA))
+    return np.vstack([in_rows(tiles, 4), enlarged_eye(character)])
+
+
+def enlarged_eye(character: LevelSet) -> Rgb:
+    """The eye at the left, three times actual size, at four closures side by side."""
+    rows, columns = character.window.slices
+    width = TILE_PX // TIMES
+    middle = columns.start + (columns.stop - columns.start) // 4
+    across = slice(max(0, middle - width // 2), max(0, middle - width // 2) + width)
+    parts = [character.picture(closure)[rows, across] for closure in ENLARGED_CLOSURES]
+    size = (TILE_PX, parts[0].shape[0] * TIMES)
+    return np.hstack([cv2.resize(part, size, interpolation=cv2.INTER_CUBIC) for part in parts])
 
 
 def lower_lid_sheet(character: LevelSet) -> Rgb:

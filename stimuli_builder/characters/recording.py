@@ -25,7 +25,7 @@ from stimuli_builder.tracking.shapes import (
     with_border,
 )
 from stimuli_builder.tracking.table import distance_columns, numbers, point_columns, track_rows
-from stimuli_builder.video import Picture, VideoInfo, decode, grey, rgb
+from stimuli_builder.video import Picture, VideoInfo, decode
 
 Values = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -598,13 +598,3 @@ def _evened(picture: Image, target: Image, mask: NDArray[np.uint8]) -> tuple[Ima
         gains.append(np.exp(np.tensordot(plane.astype(np.float32), field_of, 1)))
     gain = np.stack(gains, axis=2)
     return np.asarray(picture * gain, np.float32), float(1 / np.exp(np.log(gain).mean()))
-
-
-def whole_picture(frame: Any) -> NDArray[np.uint8]:
-    """Colors of a decoded frame."""
-    return rgb(frame)
-
-
-def gray_picture(frame: Any) -> Picture:
-    """Luminance of a decoded frame."""
-    return grey(frame)

@@ -25,12 +25,10 @@ from stimuli_builder.characters.recording import (
     align_opening,
     find_openings,
     gaze_of,
-    gray_picture,
     iris_scale,
     read_eye_track,
     read_selected,
     region_of,
-    whole_picture,
 )
 from stimuli_builder.characters.recording_levels import (
     GOOD_DB,
@@ -53,7 +51,7 @@ from stimuli_builder.tracking.model import CoupledModel, TrainingOptions, train
 from stimuli_builder.tracking.shapes import CANTHI, EYE_POINTS, Points, default_markers, eye_axis
 from stimuli_builder.tracking.survey import survey
 from stimuli_builder.tracking.track import track_video
-from stimuli_builder.video import Picture, VideoInfo, read_frames
+from stimuli_builder.video import Picture, VideoInfo, grey, read_frames, rgb
 
 TRACK_NAME, REPORT_NAME = "track.csv", "report.html"
 FISSURE_MM = 30.0
@@ -192,7 +190,7 @@ def _choose(
     looks = sorted({*(opening.opened for opening in looked_at), *checked})
     with frame_progress() as progress:
         task = progress.add_task("looking at the eyes", total=info.frame_count)
-        pictures = read_selected(info, looks, gray_picture, lambda now: progress.update(task, completed=now))
+        pictures = read_selected(info, looks, grey, lambda now: progress.update(task, completed=now))
     require_own_video(track, {n: pictures[n] for n in checked}, str(order.track or info.path))
     gazes = {opening: gaze_of(pictures[opening.opened], track, opening.opened) for opening in looked_at}
     seen = [gaze for gaze in gazes.values() if gaze is not None]
@@ -278,7 +276,7 @@ def _bake(
     with frame_progress() as progress:
         task = progress.add_task("reading the blink", total=opening.opened + 1)
         pictures = read_selected(
-            info, list(opening.frames), whole_picture, lambda now: progress.update(task, completed=now)
+            info, list(opening.frames), rgb, lambda now: progress.update(task, completed=now)
         )
     gray = read_frames(info, [opening.opened])[opening.opened]
     video_px_per_mm = _scale(order, track, gray, opening)
