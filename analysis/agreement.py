@@ -20,6 +20,7 @@ from analysis.read.text_table import (
 )
 from analysis.votes import Votes
 from experiments.errors import InputError
+from table_files import counted
 
 # Reliability of a scale made of several items: Cronbach's alpha, McDonald's omega, items, scale scores.
 
@@ -390,7 +391,8 @@ def _decisions(votes: Votes) -> tuple[str, ...]:
     if repeated:
         said.append(f"{repeated} times a person rated an item more than once; their mean was used")
     if alone:
-        said.append(f"{alone} items were rated by only one person and were excluded")
+        were = "was" if alone == 1 else "were"
+        said.append(f"{counted(alone, 'item')} {were} rated by only one person and {were} excluded")
     return tuple(said)
 
 

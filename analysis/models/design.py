@@ -482,7 +482,7 @@ def _named_slopes(data: ModelData, slopes: Slopes) -> tuple[list[str], list[str]
     for name in named:
         if name not in data.slope_effects:
             raise InputError(
-                f"the slope of {name} by {participant} is not determined: it does not vary within a "
+                f"the slope of {name} by {participant} is not determined: it does not vary within one "
                 f"{participant}; write it outside the brackets only"
             )
         if name not in _without_last(data, data.slope_effects):
@@ -509,7 +509,7 @@ def refuse_group_slopes(data: ModelData) -> None:
             spread = columns.groupby(group.codes).std(ddof=0).max(axis=1)
             if int((spread > 1e-9).sum()) < 2:
                 raise InputError(
-                    f"the slope of {effect} by {group.name} is not determined: it does not vary within a "
+                    f"the slope of {effect} by {group.name} is not determined: it does not vary within one "
                     f"{group.name}; write it outside the brackets only"
                 )
         own = 1 + sum(len(data.columns(effect)) for effect in effects)

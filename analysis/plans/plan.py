@@ -11,7 +11,8 @@ from analysis.plans.exclusions import Exclusions, apply_exclusions
 from analysis.read.pool import Pool, origins, pooled
 from analysis.read.reading import NoRatingsError, Reading
 from analysis.read.study_answers import RunEvidence, StudyAnswers, with_verdicts
-from analysis.report.contents import Contents, evidence_section
+from analysis.report.contents import Contents
+from analysis.report.evidence import evidence_section
 from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError, did_you_mean
 from experiments.kinds import scale_called

@@ -322,6 +322,9 @@ def _warnings(of: DescribedSeries) -> list[str]:
     return [f"Participants were warned about {names} in {{warned}} {{warned:visit|visits}}.{ended}"]
 
 
+RULE_WORDS = {"bt500": "screening of raters by ITU-R BT.500", "p913": "screening of raters by ITU-T P.913"}
+
+
 def _exclusions(of: DescribedSeries) -> list[str]:
     lines = _declared_exclusions(of)
     if of.rules:
@@ -339,7 +342,10 @@ def _exclusions(of: DescribedSeries) -> list[str]:
 def _declared_exclusions(of: DescribedSeries) -> list[str]:
     """Of the newest version, which the analysis follows: declared before every visit, or later."""
     always, _ = _in_force(of, lambda experiment: experiment.exclusions)
-    now = {rule.model_dump_json(): rule.rule.replace("_", " ") for rule in of.experiment.exclusions}
+    now = {
+        rule.model_dump_json(): RULE_WORDS.get(rule.rule, rule.rule.replace("_", " "))
+        for rule in of.experiment.exclusions
+    }
     before = [name for name in dict.fromkeys(now.values()) if name in always]
     later: dict[tuple[int, ...], list[str]] = {}
     for key, name in now.items():

@@ -78,7 +78,7 @@ def test_krippendorffs_own_example(tmp_path, level, alpha) -> None:
     result = agreement(read_votes(votes_file(tmp_path, lines), "clip", "id", "score"), level)
     assert round(result.krippendorff_alpha, 3) == alpha
     # the unit that one observer rated says nothing about agreement
-    assert any("1 items were rated by only one person" in decision for decision in result.decisions)
+    assert any("1 item was rated by only one person" in decision for decision in result.decisions)
 
 
 def test_who_rated_what_nobody_else_did_is_not_a_rater(tmp_path) -> None:

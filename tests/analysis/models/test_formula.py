@@ -111,14 +111,14 @@ def test_formulas_are_read_as_r_reads_them() -> None:
             "'blur^2' in 'rating ~ blur^2 + (1 | participant)' is not under",
         ),
         ("rating ~ blur + (0 + blur | participant)", "has a term without an intercept (0 +)"),
-        ("rating ~ group + (1 + group | participant)", "it does not vary within a participant"),
+        ("rating ~ group + (1 + group | participant)", "it does not vary within one participant"),
         (
             "rating ~ blur + (1 + blur | participant) + (1 + blur | clip)",
             "slopes of one grouping may correlate; write (1 + blur || clip) for the other",
         ),
         (
             "rating ~ face + (1 | participant) + (1 + face || clip)",
-            "the slope of face by clip is not determined: it does not vary within a clip",
+            "the slope of face by clip is not determined: it does not vary within one clip",
         ),
         (
             "rating ~ blur + (1 | participant) + (1 + blur || lab/room)",
