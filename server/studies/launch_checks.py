@@ -35,7 +35,6 @@ from server.studies.lookup import active_version, definition_of, find_study, ver
 from server.studies.schemas import LaunchCheck, LaunchPage
 from server.transcoding.preparing import ClipFault
 
-MAX_TEXTS_NAMED = 3
 CLIPS_WITHIN_S = 60.0
 """How long opening a study waits until its clips are examined."""
 
@@ -179,12 +178,10 @@ def _translations(launch: LaunchState) -> Iterator[LaunchCheck]:
     """Texts that participants read in another language than they chose."""
     first = launch.experiment.languages[0]
     for language, paths in untranslated(launch.experiment).items():
-        named = ", ".join(paths[:MAX_TEXTS_NAMED])
-        more = f" and {len(paths) - MAX_TEXTS_NAMED} more" if len(paths) > MAX_TEXTS_NAMED else ""
         yield LaunchCheck(
             kind="translations",
             blocks=False,
-            text=f"Participants who choose the language {language} read {named}{more} in {first}: "
+            text=f"Participants who choose the language {language} read {', '.join(paths)} in {first}: "
             f"{'this text has' if len(paths) == 1 else 'these texts have'} no translation.",
             page="build",
             path=paths[0],
@@ -275,7 +272,7 @@ def _time(launch: LaunchState) -> Iterator[LaunchCheck]:
             )
         else:
             continue
-        yield _of_consent("time", language, f"The consent text (language {language}) {what}")
+        yield _of_consent("time", language, f"The consent text ({language}) {what}")
         return
 
 

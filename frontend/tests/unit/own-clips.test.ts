@@ -114,7 +114,7 @@ describe("the checklist", () => {
     expect(others).toEqual([]);
     expect(line?.blocks).toBe(true);
     expect(line?.text).toBe(
-      "5 clips do not play in the participant page: a.mp4 (no track), b.mp4 (no track), c.mp4 (no track), d.mp4 (no track) and 1 more. Export the clip again as H.264 in MP4.",
+      "5 clips do not play in the participant page: a.mp4 (no track), b.mp4 (no track), c.mp4 (no track), d.mp4 (no track), e.mp4 (no track). Export the clip again as H.264 in MP4.",
     );
   });
 

@@ -243,7 +243,6 @@ const WORDS: Readonly<Record<Kind, [one: string, several: string, todo: string]>
   begins_blank: ["begins with an empty picture", "begin with an empty picture", "Cut it off, or use a fixation instead."],
   blank: ["shows nothing", "show nothing", "Is this intended?"],
 };
-const MAX_NAMED = 4;
 
 /** One line per kind of problem, with the files that have it. */
 export function clipFindings(clips: readonly { file: string; problems: readonly ClipProblem[] }[]): Schemas["LaunchCheck"][] {
@@ -251,10 +250,9 @@ export function clipFindings(clips: readonly { file: string; problems: readonly 
     const hits = clips.flatMap(({ file, problems }) => problems.filter((one) => one.kind === kind).map(({ detail }) => ({ file, detail })));
     if (hits.length === 0) return [];
     const [one, several, todo] = WORDS[kind];
-    const named = hits.slice(0, MAX_NAMED).map(({ file, detail }) => `${file} (${detail})`);
-    const more = hits.length > MAX_NAMED ? ` and ${String(hits.length - MAX_NAMED)} more` : "";
+    const named = hits.map(({ file, detail }) => `${file} (${detail})`);
     const count = hits.length === 1 ? `1 clip ${one}` : `${String(hits.length)} clips ${several}`;
-    return finding(`clip_${kind}`, KINDS[kind], `${count}: ${named.join(", ")}${more}. ${todo}`);
+    return finding(`clip_${kind}`, KINDS[kind], `${count}: ${named.join(", ")}. ${todo}`);
   });
 }
 
@@ -264,7 +262,7 @@ export function repeatedFiles(clips: readonly Pick<Schemas["ClipOut"], "clip_sha
   for (const { clip_sha256, cell } of clips) cells.set(clip_sha256, (cells.get(clip_sha256) ?? new Set()).add(cell));
   const shared = [...cells.values()].filter((of) => of.size > 1);
   if (shared.length === 0) return [];
-  const named = shared.slice(0, MAX_NAMED).map((of) => [...of].slice(0, MAX_NAMED).join(" and "));
+  const named = shared.map((of) => [...of].join(" and "));
   const count = shared.length === 1 ? "1 clip is the same file" : `${String(shared.length)} clips are the same file`;
   const text = `${count} in several cells: ${named.join("; ")}. A difference between these cells cannot be seen. Is this intended?`;
   return [finding("clip_repeated", false, text)];

@@ -4,6 +4,7 @@ import { useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
 import { useEffect, useState } from "react";
 import { api, type Schemas, unwrap } from "../api";
+import { Sentence } from "../ui/Answer";
 import { counted, ruleWords } from "../ui/format";
 
 type Failing = Schemas["FailingClip"];
@@ -42,7 +43,9 @@ export function StudyWarnings({ study }: { study: string }) {
     <Alert role="status" color="yellow" title="This study needs attention">
       <List size="sm">
         {warnings.map(({ event, text }) => (
-          <List.Item key={event}>{text}</List.Item>
+          <List.Item key={event}>
+            <Sentence text={text} />
+          </List.Item>
         ))}
       </List>
     </Alert>

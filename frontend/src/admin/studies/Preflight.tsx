@@ -3,12 +3,13 @@
 import { Badge, Button, Card, Checkbox, Group, Progress, Stack, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
+import { useState } from "react";
 import { reviewed } from "../../i18n/reviewed";
 import { SHIPPED } from "../../i18n";
 import { clipCheckQuery, launchChecksQuery, type Schemas, studyQuery } from "../api";
 import { namedSection } from "../builder/data";
 import type { ClipCheck, ClipProgress } from "../clips/examine";
-import { Answer, ErrorAlert } from "../ui/Answer";
+import { Answer, ErrorAlert, Sentence } from "../ui/Answer";
 import { DataTable } from "../ui/DataTable";
 import { counted, languageName } from "../ui/format";
 import { TurnedAway } from "./StatusBadge";
@@ -90,11 +91,27 @@ function Findings({ study, findings }: { study: string; findings: readonly Findi
         <li key={`${finding.kind} ${finding.text}`}>
           <Badge color={finding.blocks ? "red.9" : "gray.7"}>{finding.blocks ? "fix" : "check"}</Badge>
           <Text size="sm" className="wrap-anywhere">
-            {finding.text} <Where study={study} finding={finding} />
+            <Long text={finding.text} /> <Where study={study} finding={finding} />
           </Text>
         </li>
       ))}
     </ul>
+  );
+}
+
+const LONG_TEXT = 400;
+
+/** A finding's sentence; one that names a great many things is shortened until somebody asks for all. */
+function Long({ text }: { text: string }) {
+  const [isWhole, setWhole] = useState(text.length <= LONG_TEXT);
+  if (isWhole) return <Sentence text={text} />;
+  return (
+    <>
+      <Sentence text={`${text.slice(0, text.lastIndexOf(",", LONG_TEXT))}, …`} />{" "}
+      <button type="button" className="line-link" onClick={() => setWhole(true)}>
+        Show all
+      </button>
+    </>
   );
 }
 

@@ -41,6 +41,11 @@ function Waiting() {
   );
 }
 
+/** A sentence with commands between backticks, which are shown as code. */
+export function Sentence({ text }: { text: string }) {
+  return text.split("`").map((part, index) => (index % 2 === 1 ? <code key={index}>{part}</code> : part));
+}
+
 // A long list that the server gives a page at a time: what there is of it, how much that is, and the way to more.
 
 interface Props<Page> {

@@ -2,6 +2,7 @@
 
 import type { NotificationData } from "@mantine/notifications";
 import { type QueryKey, useMutation, useQueryClient } from "@tanstack/react-query";
+import { Refused } from "../api";
 
 // Short messages in the corner of the page; their code loads after the page itself.
 
@@ -24,6 +25,11 @@ interface Options<T> {
   refused?: (error: Error) => boolean;
 }
 
+/** An entry that the server does not accept, such as a weak password, is not a fault of the program. */
+function titleOf(error: Error): string {
+  return error instanceof Refused && error.status === 422 ? "Not saved: please change your entry" : "Something went wrong";
+}
+
 export function useChange<Input, T>(change: (input: Input) => Promise<T>, { touches, done, then, before, refused }: Options<T>) {
   const queries = useQueryClient();
   return useMutation<T, Error, Input>({
@@ -36,7 +42,7 @@ export function useChange<Input, T>(change: (input: Input) => Promise<T>, { touc
       then?.(result);
     },
     onError: (error) => {
-      if (!refused?.(error)) notify({ title: "Something went wrong", message: error.message, color: "red" });
+      if (!refused?.(error)) notify({ title: titleOf(error), message: error.message, color: "red" });
     },
   });
 }
